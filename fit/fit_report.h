@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/types.h"
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace subvol {
+
+/// Why a solve ended. Everything but `input` problems (those throw) is told here, never by an exception.
+enum class StopReason {
+  converged,        ///< the last stage met its stop test (and the tolerance, where one was asked for)
+  tolerance_missed, ///< all stages done, but the distance asked for was not reached
+  iteration_limit,
+  time_limit,
+  cancelled,        ///< the progress callback said so; the best state so far is returned
+  stalled           ///< a level could not be started or no step was possible without inverting a cell
+};
+const char* to_string(StopReason reason);
+
+/// One Newton (or L-BFGS) step.
+struct IterationRecord {
+  double surface_energy = 0, volume_energy = 0;  ///< E_S and E_W (dimensionless), E = E_S + lambda E_W   Paper: Eq. 1
+  double step_length = 0;                        ///< accepted fraction of the search direction
+  int linear_iterations = 0;                     ///< CG iterations of this step
+  int evaluations = 0;                           ///< energy evaluations of its line search
+};
+
+/// One minimisation with fixed level, lambda and tangential weight.
+struct StageRecord {
+  std::string name;                ///< "level 2, lambda 0.05", "level 1, continuation t=0.5"
+  int level = 0;                   ///< level of the finite element mesh (control level + 1)
+  double lambda = 0, tangential_weight = 0;
+  std::size_t unknowns = 0, cells = 0;
+  std::vector<IterationRecord> iterations;
+  std::string stop;                ///< which test ended it, with its figure
+  bool kept = true;                ///< false: undone, because a cell could not be certified
+  double seconds = 0;
+};
+
+/// What a fit did, and what is true of its result.
+struct FitReport {
+  StopReason stop_reason = StopReason::converged;
+  std::string explanation;                 ///< one sentence for people
+  std::vector<StageRecord> stages;
+  double initial_distance_mean_percent = 0, initial_distance_max_percent = 0;
+  std::vector<std::string> warnings;       ///< audit: what the template's geometry cannot do, topology mismatch, ...
+  std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...
+};
+
+}  // namespace subvol

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/fit_report.h"
+#include "subvol/subdivision.h"
+#include "subvol/triangle_mesh.h"
+#include "subvol/volume_mesh.h"
+
+#include <functional>
+#include <optional>
+
+namespace subvol {
+
+/// What the fit is made to agree with the target.
+enum class FittedSurface {
+  limit,  ///< the Catmull-Clark limit surface of the cage: what an artist's tool shows at any level (default)
+  mesh    ///< the refined mesh itself (the paper's plain S)
+};
+
+enum class SolverKind { newton, lbfgs };
+
+/// Told at every step; `fraction` is an estimate of the share done, in [0, 1].
+struct FitProgress {
+  const char* stage;
+  int level, iteration;
+  double energy, fraction;
+};
+
+struct FitOptions {
+  int levels = 3;                                ///< subdivision level of the finest mesh, 1..6
+  std::optional<double> tolerance_percent;       ///< stop once the mean distance is below; per cent of the diagonal, > 0
+  FittedSurface surface = FittedSurface::limit;
+  BoundaryRule boundary = BoundaryRule::catmull_clark;
+  bool cage_only = false;                        ///< unknowns stay on the given template
+  double lambda_far = 1.0, lambda_close = 0.005; ///< > 0; close may be lowered further when a tolerance asks for it
+  std::optional<double> crease_angle_degrees;    ///< tags the template's boundary edges sharper than this, (0, 180)
+  SolverKind solver = SolverKind::newton;
+  int max_iterations = 0;                        ///< per stage; 0: the schedule's own
+  double time_limit_seconds = 0;                 ///< 0: none
+  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+};
+
+struct FitResult {
+  VolumeMesh cage;   ///< the last control mesh with its tags: its limit surface is the fitted surface
+  VolumeMesh mesh;   ///< the finest finite element mesh (boundary at limit positions for FittedSurface::limit)
+  FitReport report;
+};
+
+/// Fits a subdivision volume recursively (paper: section 4.3).
+///
+/// target   triangles in any state that encloses a volume; the unit of length is the target's.
+/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices.
+/// returns  the best state reached; every cell of `mesh` has positive Bernstein coefficients of its Jacobian unless
+///          report.stop_reason is `stalled`.
+/// InputError: options out of range, an empty target, a template that cannot be subdivided or that has inverted cells.
+FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options);
+
+}  // namespace subvol
