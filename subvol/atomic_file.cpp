@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/atomic_file.h"
+
+#include "subvol/error.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <random>
+#include <string>
+#include <utility>
+
+namespace subvol {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(const fs::path& path, const char* step, int error) {
+  throw IoError(path.string() + ": cannot " + step + ": " + std::strerror(error));
+}
+
+/// An open descriptor; closed on every way out.
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() { close(); }
+  int get() const { return fd_; }
+  bool close() { return fd_ < 0 || ::close(std::exchange(fd_, -1)) == 0; }
+
+ private:
+  int fd_;
+};
+
+/// A name to delete again unless it was renamed.
+struct Temporary {
+  fs::path path;
+  ~Temporary() {
+    if (!path.empty()) ::unlink(path.c_str());
+  }
+};
+
+void write_all(int fd, std::string_view bytes, const fs::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      fail(path, "write", errno);
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void write_directly(const fs::path& path, std::string_view bytes) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (file.get() < 0) fail(path, "open for writing", errno);
+  write_all(file.get(), bytes, path);
+  if (!file.close()) fail(path, "close", errno);
+}
+
+/// Creates an empty file of a fresh name. Not mkstemp: that would hide the user's umask behind mode 0600.
+int create_temporary(const fs::path& target, Temporary& temporary) {
+  std::random_device random;
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    fs::path candidate = target.parent_path() / (".subvol-" + std::to_string(random()) + ".tmp");
+    const int fd = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0) {
+      temporary.path = std::move(candidate);
+      return fd;
+    }
+    if (errno != EEXIST) fail(target, "create a temporary file in its folder", errno);
+  }
+  fail(target, "create a temporary file in its folder", EEXIST);
+}
+
+/// A rename is on the disk only when the folder is; a file system that cannot flush folders is not an error.
+void flush_folder(const fs::path& target) {
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (descriptor.get() >= 0) (void)::fsync(descriptor.get());
+}
+
+}  // namespace
+
+void write_file_atomically(const fs::path& path, std::string_view bytes) {
+  std::error_code ignored;
+  const fs::path resolved = fs::is_symlink(path, ignored) ? fs::weakly_canonical(path, ignored) : path;
+  const fs::path target = resolved.empty() ? path : resolved;
+
+  struct stat status = {};
+  const bool exists = ::stat(target.c_str(), &status) == 0;
+  if (exists && S_ISDIR(status.st_mode)) fail(path, "write", EISDIR);
+  if (exists && !S_ISREG(status.st_mode)) return write_directly(target, bytes);
+  // A rename would replace a write-protected file without asking.
+  if (exists && ::access(target.c_str(), W_OK) != 0) fail(path, "replace", errno);
+
+  Temporary temporary;
+  Descriptor file(create_temporary(target, temporary));
+  if (exists) (void)::fchmod(file.get(), status.st_mode & 07777);
+  write_all(file.get(), bytes, path);
+  if (::fsync(file.get()) != 0) fail(path, "flush to the disk", errno);
+  if (!file.close()) fail(path, "close", errno);
+  if (::rename(temporary.path.c_str(), target.c_str()) != 0) fail(path, "rename the temporary file", errno);
+  temporary.path.clear();
+  flush_folder(target);
+}
+
+}  // namespace subvol

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace subvol {
+
+/// Writes a whole file or nothing: into a temporary in the same folder, flushed to the disk, then renamed over `path`.
+///
+/// path     a symbolic link is followed; an existing regular file keeps its permissions; anything else that exists and is
+///          no folder (a pipe, a device) cannot be renamed over and is written to directly.
+/// bytes    the whole content, possibly empty.
+///
+/// Throws IoError that names the path, the step and the system's reason; the temporary is removed and an existing file
+/// is left as it was. Safe to call from several threads and processes at once: the last rename wins.
+void write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
+
+}  // namespace subvol
