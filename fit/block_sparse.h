@@ -9,19 +9,33 @@
 
 namespace subvol {
 
-/// A sparse square matrix of 3x3 blocks by rows: Hessians over nodes or samples.
+/// A square sparse matrix of 3x3 blocks over points, by rows (CSR): y_i = sum_j B_ij x_j.
 ///
-/// Columns of a row are ascending and unique; both halves of a symmetric matrix are stored. Single precision: such a
-/// matrix only shapes search directions, and half the bytes are half the time.
+/// Holds the Hessians of the energies. Columns of a row are ascending and unique. Blocks are single precision (a Newton
+/// matrix needs no more, and its product is bound by memory); products are summed in double.
 struct BlockSparse {
-  std::vector<std::size_t> offsets{0};  ///< number of block rows + 1
+  std::vector<std::size_t> offsets{0};  ///< num_rows() + 1 entries
   std::vector<Index> columns;
-  std::vector<float> blocks;            ///< 9 per entry of `columns`, row by row
+  std::vector<float> blocks;            ///< 9 per entry, row-major
 
   std::size_t num_rows() const { return offsets.size() - 1; }
+  std::size_t num_entries() const { return columns.size(); }
+  const float* block(std::size_t entry) const { return blocks.data() + 9 * entry; }
+  float* block(std::size_t entry) { return blocks.data() + 9 * entry; }
 
-  /// out = H in; sizes num_rows(), no overlap. Rows run in parallel, each summed in order: same bits for any thread count.
+  /// Entry number of block (row, column); num_entries() where the pattern has none. Cost: a binary search in the row.
+  std::size_t find(Index row, Index column) const;
+
+  /// out = B in; sizes num_rows(), must not overlap. Rows run in parallel, same bits for any number of threads.
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const;
+  /// The diagonal blocks, as 3x3 matrices; zero where the pattern has none.
+  std::vector<Mat3> diagonal() const;
+  void set_zero();
 };
+
+/// The pattern in which the nodes of every element are coupled with one another, and every node with itself; zero blocks.
+///
+/// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], each in [0, num_rows), else InputError.
+BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes);
 
 }  // namespace subvol
