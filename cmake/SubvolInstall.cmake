@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Installs the library, its headers, the program and a package config that find_package(subvol) understands.
+
+include(CMakePackageConfigHelpers)
+set(SUBVOL_CONFIG_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/subvol")
+
+install(TARGETS subvol EXPORT subvol-targets
+  ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
+  LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+foreach(folder subvol fit export)
+  install(DIRECTORY "${PROJECT_SOURCE_DIR}/${folder}/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/subvol/${folder}"
+    FILES_MATCHING PATTERN "*.h")
+endforeach()
+if(TARGET subvol_cli)
+  install(TARGETS subvol_cli RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+endif()
+
+install(EXPORT subvol-targets NAMESPACE subvol:: DESTINATION "${SUBVOL_CONFIG_DIR}")
+configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/subvol-config.cmake.in"
+  "${PROJECT_BINARY_DIR}/subvol-config.cmake" INSTALL_DESTINATION "${SUBVOL_CONFIG_DIR}")
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/subvol-config-version.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${PROJECT_BINARY_DIR}/subvol-config.cmake" "${PROJECT_BINARY_DIR}/subvol-config-version.cmake"
+  "${PROJECT_SOURCE_DIR}/cmake/FindOpenSubdiv.cmake" DESTINATION "${SUBVOL_CONFIG_DIR}")
+install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")
