@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/surface_refinement.h"
+
+#include <numeric>
+
+namespace subvol {
+
+void add_face_child(const SurfaceTopology& surface, Index f, double weight, std::span<const Index> columns,
+                    RowBuilder& row) {
+  const double share = weight / surface.face_size(f);
+  for (Index v : surface.face(f)) row.add(columns[v], share);
+}
+
+void add_edge_child(const SurfaceTopology& surface, Index e, BoundaryRule rule, std::span<const Index> columns,
+                    RowBuilder& row) {
+  const Index h = surface.edge_corners[e], twin = surface.twins[h];
+  const std::array<Index, 2> faces = {surface.corner_faces[h], surface.corner_faces[twin]};
+  const EdgeWeights weights =
+      edge_weights(rule, surface.edge_sharpness[e], {surface.face_size(faces[0]), surface.face_size(faces[1])});
+  row.add(columns[surface.corner_vertices[h]], weights.end);
+  row.add(columns[surface.corner_vertices[twin]], weights.end);
+  for (int i = 0; i < 2; ++i)
+    if (weights.face[i] != 0) add_face_child(surface, faces[i], weights.face[i], columns, row);
+}
+
+VertexWeights vertex_weights_at(const SurfaceTopology& surface, Index v, BoundaryRule rule) {
+  std::vector<float> sharpness;
+  const Index start = surface.vertex_corners[v];
+  Index h = start;
+  do {
+    sharpness.push_back(surface.edge_sharpness[surface.corner_edges[h]]);
+    h = surface.rotate(h);
+  } while (h != start);
+  return vertex_weights(rule, surface.vertex_sharpness[v], sharpness);
+}
+
+void add_vertex_child(const SurfaceTopology& surface, Index v, BoundaryRule rule, std::span<const Index> columns,
+                      RowBuilder& row) {
+  const VertexWeights weights = vertex_weights_at(surface, v, rule);
+  row.add(columns[v], weights.self);
+  if (weights.fixed()) return;
+  const Index start = surface.vertex_corners[v];
+  Index h = start;
+  int i = 0;
+  do {
+    const bool crease = weights.crease != 0 && (i == weights.crease_ends[0] || i == weights.crease_ends[1]);
+    const double weight = weights.edge + (crease ? weights.crease : 0);
+    if (weight != 0) row.add(columns[surface.corner_vertices[surface.next(h)]], weight);
+    if (weights.face != 0) add_face_child(surface, surface.corner_faces[h], weights.face, columns, row);
+    h = surface.rotate(h);
+    ++i;
+  } while (h != start);
+}
+
+namespace {
+
+/// Children of a corner's edge: the half at the corner and the half at its far end are numbered 2e and 2e + 1 for the
+/// edge's own corner, the other way round for its twin; the edges into the faces follow, by corner.
+SurfaceTopology fine_topology(const SurfaceTopology& coarse) {
+  const Index nv = static_cast<Index>(coarse.num_vertices()), ne = static_cast<Index>(coarse.num_edges());
+  const Index nf = static_cast<Index>(coarse.num_faces());
+  const std::size_t num_corners = coarse.corner_vertices.size();
+  SurfaceTopology fine;
+  fine.face_offsets.resize(num_corners + 1);
+  fine.corner_vertices.resize(4 * num_corners);
+  fine.corner_faces.resize(4 * num_corners);
+  fine.twins.resize(4 * num_corners);
+  fine.corner_edges.resize(4 * num_corners);
+  fine.edge_corners.assign(2 * ne + num_corners, kNoIndex);
+  fine.edge_sharpness.assign(2 * ne + num_corners, 0.0f);
+  fine.vertex_corners.assign(nv + ne + nf, kNoIndex);
+  fine.vertex_sharpness.assign(nv + ne + nf, 0.0f);
+  for (std::size_t i = 0; i < num_corners; ++i) {
+    // Child quad of corner h: (vertex, edge out, face, edge in).
+    const Index h = static_cast<Index>(i), p = coarse.prev(h), n = coarse.next(h);
+    const Index out = coarse.corner_edges[h], in = coarse.corner_edges[p];
+    const Index q = 4 * h;
+    fine.face_offsets[i] = q;
+    const std::array<Index, 4> vertices = {coarse.corner_vertices[h], nv + out, nv + ne + coarse.corner_faces[h],
+                                           nv + in};
+    const std::array<Index, 4> twins = {4 * coarse.next(coarse.twins[h]) + 3, 4 * n + 2, 4 * p + 1,
+                                        4 * coarse.rotate(h)};
+    const bool owns_out = coarse.edge_corners[out] == h, owns_in = coarse.edge_corners[in] == p;
+    const std::array<Index, 4> edges = {2 * out + (owns_out ? 0 : 1), 2 * ne + h, 2 * ne + p,
+                                        2 * in + (owns_in ? 1 : 0)};
+    for (int k = 0; k < 4; ++k) {
+      fine.corner_vertices[q + k] = vertices[k];
+      fine.corner_faces[q + k] = h;
+      fine.twins[q + k] = twins[k];
+      fine.corner_edges[q + k] = edges[k];
+      if (fine.edge_corners[edges[k]] == kNoIndex) fine.edge_corners[edges[k]] = q + k;
+      if (fine.vertex_corners[vertices[k]] == kNoIndex) fine.vertex_corners[vertices[k]] = q + k;
+    }
+  }
+  fine.face_offsets[num_corners] = static_cast<Index>(4 * num_corners);
+  for (Index e = 0; e < ne; ++e)
+    fine.edge_sharpness[2 * e] = fine.edge_sharpness[2 * e + 1] = child_sharpness(coarse.edge_sharpness[e]);
+  for (Index v = 0; v < nv; ++v) fine.vertex_sharpness[v] = child_sharpness(coarse.vertex_sharpness[v]);
+  return fine;
+}
+
+}  // namespace
+
+SurfaceLevel refine_surface(const SurfaceTopology& surface, BoundaryRule rule) {
+  const std::size_t nv = surface.num_vertices(), ne = surface.num_edges(), nf = surface.num_faces();
+  std::vector<Index> columns(nv);
+  std::iota(columns.begin(), columns.end(), 0);
+  SurfaceLevel level;
+  level.matrix = assemble_rows(nv + ne + nf, nv, [&](std::size_t i, RowBuilder& row) {
+    if (i < nv)
+      add_vertex_child(surface, static_cast<Index>(i), rule, columns, row);
+    else if (i < nv + ne)
+      add_edge_child(surface, static_cast<Index>(i - nv), rule, columns, row);
+    else
+      add_face_child(surface, static_cast<Index>(i - nv - ne), 1.0, columns, row);
+  });
+  level.fine = fine_topology(surface);
+  return level;
+}
+
+}  // namespace subvol
