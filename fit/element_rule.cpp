@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/element_rule.h"
+
+#include "subvol/error.h"
+
+#include <Eigen/LU>
+
+#include <cmath>
+
+namespace subvol {
+
+namespace {
+
+Mat3 ideal_matrix(CellKind kind) {
+  Mat3 a = Mat3::Identity();
+  if (kind != CellKind::hex) a.col(1) = Vec3(0.5, std::sqrt(3.0) / 2, 0);
+  if (kind == CellKind::tet) a.col(2) = Vec3(0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3);
+  return a;
+}
+
+/// Canonical gradients of all shape functions at a point.
+std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
+  const double u = p[0], v = p[1], w = p[2];
+  switch (kind) {
+    case CellKind::tet:
+      return {Vec3(-1, -1, -1), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+    case CellKind::prism: {
+      const double t = 1 - u - v;
+      return {Vec3(-(1 - w), -(1 - w), -t), Vec3(1 - w, 0, -u), Vec3(0, 1 - w, -v),
+              Vec3(-w, -w, t),              Vec3(w, 0, u),      Vec3(0, w, v)};
+    }
+    case CellKind::hex:
+      break;
+  }
+  const double a = 1 - u, b = 1 - v, c = 1 - w;
+  return {Vec3(-b * c, -a * c, -a * b), Vec3(b * c, -u * c, -u * b), Vec3(v * c, u * c, -u * v),
+          Vec3(-v * c, a * c, -a * v),  Vec3(-b * w, -a * w, a * b), Vec3(b * w, -u * w, u * b),
+          Vec3(v * w, u * w, u * v),    Vec3(-v * w, a * w, a * v)};
+}
+
+double trapezoidal_weight(int i, int n) { return (i == 0 || i == n - 1 ? 0.5 : 1.0) / (n - 1); }
+
+/// Points of the triangle's regular split, with the share of its triangles around each.
+void triangle_points(int n, std::vector<std::array<double, 3>>& points) {
+  const double small = 1.0 / ((n - 1) * (n - 1) * 3.0);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i + j < n; ++i) {
+      const int zeros = (i == 0) + (j == 0) + (i + j == n - 1);
+      const int triangles = zeros == 0 ? 6 : zeros == 1 ? 3 : 1;
+      points.push_back({double(i) / (n - 1), double(j) / (n - 1), small * triangles});
+    }
+}
+
+}  // namespace
+
+Mat3 ideal_inverse(CellKind kind) { return ideal_matrix(kind).inverse(); }
+
+double ideal_volume(CellKind kind) {
+  const double canonical[] = {1.0 / 6, 0.5, 1.0};
+  return canonical[static_cast<int>(kind)] * ideal_matrix(kind).determinant();
+}
+
+ElementRule make_element_rule(CellKind kind, int points_per_direction) {
+  const int n = points_per_direction;
+  if (n < 2) throw InputError("make_element_rule: points_per_direction must be at least 2, got " + std::to_string(n));
+  std::vector<Vec3> points;
+  ElementRule rule;
+  rule.kind = kind;
+  if (kind == CellKind::tet) {
+    points.push_back(Vec3(0.25, 0.25, 0.25));
+    rule.weights.push_back(1);
+  } else if (kind == CellKind::prism) {
+    std::vector<std::array<double, 3>> triangle;
+    triangle_points(n, triangle);
+    for (int k = 0; k < n; ++k)
+      for (const auto& t : triangle) {
+        points.push_back(Vec3(t[0], t[1], double(k) / (n - 1)));
+        rule.weights.push_back(t[2] * trapezoidal_weight(k, n));
+      }
+  } else {
+    for (int k = 0; k < n; ++k)
+      for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i) {
+          points.push_back(Vec3(i, j, k) / (n - 1));
+          rule.weights.push_back(trapezoidal_weight(i, n) * trapezoidal_weight(j, n) * trapezoidal_weight(k, n));
+        }
+  }
+  const Mat3 to_ideal = ideal_inverse(kind).transpose();
+  rule.offsets.push_back(0);
+  for (const Vec3& p : points) {
+    const std::vector<Vec3> gradients = canonical_gradients(kind, p);
+    for (std::size_t a = 0; a < gradients.size(); ++a) {
+      if (gradients[a].squaredNorm() == 0) continue;
+      const Vec3 g = to_ideal * gradients[a];
+      rule.entries.push_back({static_cast<std::int8_t>(a), {g[0], g[1], g[2]}});
+    }
+    rule.offsets.push_back(rule.entries.size());
+  }
+  return rule;
+}
+
+}  // namespace subvol

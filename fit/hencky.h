@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/types.h"
+
+namespace subvol {
+
+/// Number of Jacobians that the kernels below work on at once (one SIMD register of doubles, or several narrow ones).
+inline constexpr int kLanes = 8;
+
+/// Smallest eigenvalue that the clamped Hessian of the Hencky energy is given (dimensionless).
+inline constexpr double kHessianFloor = 0.01;
+
+/// Distortion energy of kLanes Jacobians, lane by lane, with its derivatives.
+///
+///   e(J) = 1/2 |H|^2,  H = 1/2 ln(J^T J),  de/dJ = J^-T H                      Paper: section 3.1, appendix A
+///
+/// With J = U diag(s) V^T: e = 1/2 sum (ln s_i)^2, de/dJ = U diag(ln s_i / s_i) V^T, and the second derivative has the
+/// eigenvectors u_i v_i^T (stretch) and (u_i v_j^T -+ u_j v_i^T)/sqrt 2 (twist, flip) with the eigenvalues
+///
+///   stretch_i = (1 - ln s_i)/s_i^2,  twist_ij = (g_i + g_j)/(s_i + s_j),  flip_ij = (g_i - g_j)/(s_i - s_j),
+///   g_i = ln s_i / s_i;
+///
+/// each is raised to at least kHessianFloor, so that the Hessian is positive definite.
+///
+/// Infeasible: det J <= 0 gives energy +infinity and zero derivatives. Never NaN for finite J.
+struct HenckyBatch {
+  alignas(64) double jacobian[9][kLanes];    ///< in: J row by row; rows are world x, y, z, columns reference directions
+  alignas(64) double energy[kLanes];         ///< e(J), dimensionless, >= 0
+  alignas(64) double stress[9][kLanes];      ///< de/dJ, laid out like J
+  alignas(64) double u[9][kLanes];           ///< left singular vectors (columns)
+  alignas(64) double v[9][kLanes];           ///< right singular vectors (columns)
+  alignas(64) double stretch[3][kLanes];     ///< clamped stretch_i
+  alignas(64) double pair_same[3][kLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
+  alignas(64) double pair_cross[3][kLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
+};
+
+/// Fills `energy`. Cost: one symmetric 3x3 eigenvalue computation per lane.
+void hencky_energy(HenckyBatch& batch);
+/// Fills `energy` and `stress`.
+void hencky_gradient(HenckyBatch& batch);
+/// Fills everything.
+void hencky_hessian(HenckyBatch& batch);
+
+/// The same for one Jacobian: e(J), +infinity where det J <= 0; `stress` (may be null) receives de/dJ.
+double hencky(const Mat3& jacobian, Mat3* stress = nullptr);
+
+}  // namespace subvol

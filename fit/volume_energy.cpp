@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/volume_energy.h"
+
+#include "subvol/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Greedy colouring: cells of one colour share no vertex.
+std::vector<int> color_cells(const VolumeMesh& mesh) {
+  std::vector<std::vector<std::uint64_t>> used;  // one bit mask per vertex for every 64 colours
+  std::vector<int> colors(mesh.num_cells());
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    std::size_t word = 0;
+    for (;; ++word) {
+      if (word == used.size()) used.emplace_back(mesh.num_vertices(), 0);
+      std::uint64_t mask = 0;
+      for (Index v : mesh.cell(c)) mask |= used[word][v];
+      if (~mask == 0) continue;
+      const int bit = std::countr_one(mask);
+      for (Index v : mesh.cell(c)) used[word][v] |= std::uint64_t{1} << bit;
+      colors[c] = static_cast<int>(64 * word) + bit;
+      break;
+    }
+  }
+  return colors;
+}
+
+/// J_q of all lanes: J = sum_a x_a g_a^T / h.
+inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes], const double* inverse_h,
+                      double (*jacobian)[kLanes]) {
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) {
+      double sum[kLanes] = {};
+      for (const ElementRule::Entry& entry : entries)
+#pragma omp simd
+        for (int l = 0; l < kLanes; ++l) sum[l] += entry.gradient[c] * x[entry.vertex][r][l];
+      for (int l = 0; l < kLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[l];
+    }
+}
+
+/// Adds K_ab = U Z_ab U^T for the active vertices of one point, a <= b: with w_a = V^T grad N_a / h,
+///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi.
+void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch, const double* inverse_h,
+                       const double* weight, double (*k)[9][kLanes]) {
+  constexpr int kPairs = kMaxCellVertices;
+  alignas(64) double w[kPairs][3][kLanes];
+  for (std::size_t a = 0; a < entries.size(); ++a)
+    for (int i = 0; i < 3; ++i)
+#pragma omp simd
+      for (int l = 0; l < kLanes; ++l)
+        w[a][i][l] = inverse_h[l] * (batch.v[i][l] * entries[a].gradient[0] + batch.v[3 + i][l] * entries[a].gradient[1] +
+                                     batch.v[6 + i][l] * entries[a].gradient[2]);
+  for (std::size_t a = 0; a < entries.size(); ++a)
+    for (std::size_t b = a; b < entries.size(); ++b) {
+      double (*block)[kLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
+#pragma omp simd
+      for (int l = 0; l < kLanes; ++l) {
+        const double p00 = w[a][0][l] * w[b][0][l], p11 = w[a][1][l] * w[b][1][l], p22 = w[a][2][l] * w[b][2][l];
+        const double s01 = batch.pair_same[0][l], s12 = batch.pair_same[1][l], s20 = batch.pair_same[2][l];
+        const double f = weight[l];
+        const double z00 = f * (batch.stretch[0][l] * p00 + s01 * p11 + s20 * p22);
+        const double z11 = f * (batch.stretch[1][l] * p11 + s01 * p00 + s12 * p22);
+        const double z22 = f * (batch.stretch[2][l] * p22 + s20 * p00 + s12 * p11);
+        const double c01 = f * batch.pair_cross[0][l], c12 = f * batch.pair_cross[1][l], c20 = f * batch.pair_cross[2][l];
+        const double z01 = c01 * w[a][1][l] * w[b][0][l], z10 = c01 * w[a][0][l] * w[b][1][l];
+        const double z12 = c12 * w[a][2][l] * w[b][1][l], z21 = c12 * w[a][1][l] * w[b][2][l];
+        const double z20 = c20 * w[a][0][l] * w[b][2][l], z02 = c20 * w[a][2][l] * w[b][0][l];
+        const double u[9] = {batch.u[0][l], batch.u[1][l], batch.u[2][l], batch.u[3][l], batch.u[4][l],
+                             batch.u[5][l], batch.u[6][l], batch.u[7][l], batch.u[8][l]};
+        for (int r = 0; r < 3; ++r) {
+          const double t0 = u[3 * r] * z00 + u[3 * r + 1] * z10 + u[3 * r + 2] * z20;
+          const double t1 = u[3 * r] * z01 + u[3 * r + 1] * z11 + u[3 * r + 2] * z21;
+          const double t2 = u[3 * r] * z02 + u[3 * r + 1] * z12 + u[3 * r + 2] * z22;
+          for (int c = 0; c < 3; ++c) block[3 * r + c][l] += t0 * u[3 * c] + t1 * u[3 * c + 1] + t2 * u[3 * c + 2];
+        }
+      }
+    }
+}
+
+/// Adds the stresses of one point to the gradients of its active vertices.
+inline void add_point_gradient(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
+                               const double* factor, double (*g)[3][kLanes]) {
+  for (const ElementRule::Entry& entry : entries)
+    for (int r = 0; r < 3; ++r)
+#pragma omp simd
+      for (int l = 0; l < kLanes; ++l)
+        g[entry.vertex][r][l] +=
+            factor[l] * (batch.stress[3 * r][l] * entry.gradient[0] + batch.stress[3 * r + 1][l] * entry.gradient[1] +
+                         batch.stress[3 * r + 2][l] * entry.gradient[2]);
+}
+
+}  // namespace
+
+VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal_sizes, int points_per_direction)
+    : num_nodes_(mesh.num_vertices()),
+      kinds_(mesh.kinds),
+      cell_offsets_(mesh.cell_offsets),
+      cell_vertices_(mesh.cell_vertices),
+      weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
+      points_(mesh.num_cells(), points_per_direction),
+      colors_(color_cells(mesh)) {
+  if (ideal_sizes.size() != mesh.num_cells())
+    throw InputError("VolumeEnergy: ideal_sizes must hold one length per cell (" + std::to_string(mesh.num_cells()) +
+                     "), got " + std::to_string(ideal_sizes.size()));
+  inverse_sizes_.reserve(ideal_sizes.size());
+  for (double h : ideal_sizes) {
+    if (!(h > 0) || !std::isfinite(h)) throw InputError("VolumeEnergy: ideal_sizes must be positive and finite");
+    inverse_sizes_.push_back(1 / h);
+  }
+
+  pattern_ = clique_pattern(num_nodes_, cell_offsets_, cell_vertices_);
+  pattern_.blocks = {};
+  block_offsets_.assign(1, 0);
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const auto cell = mesh.cell(c);
+    for (Index a : cell)
+      for (Index b : cell) block_slots_.push_back(static_cast<Index>(pattern_.find(a, b)));
+    block_offsets_.push_back(block_slots_.size());
+  }
+  rebuild_groups();
+}
+
+void VolumeEnergy::densify(std::span<const Index> cells, int points_per_direction) {
+  for (Index c : cells) points_[c] = std::max(points_[c], points_per_direction);
+  rebuild_groups();
+}
+
+void VolumeEnergy::rebuild_groups() {
+  // Cells by (kind, points, colour), each list in ascending order.
+  std::map<std::pair<int, int>, std::vector<std::vector<Index>>> lists;
+  for (std::size_t c = 0; c < kinds_.size(); ++c) {
+    auto& by_color = lists[{static_cast<int>(kinds_[c]), points_[c]}];
+    if (by_color.size() <= static_cast<std::size_t>(colors_[c])) by_color.resize(colors_[c] + 1);
+    by_color[colors_[c]].push_back(static_cast<Index>(c));
+  }
+  groups_.clear();
+  for (const auto& [key, by_color] : lists) {
+    Group& group = groups_.emplace_back();
+    group.rule = make_element_rule(static_cast<CellKind>(key.first), key.second);
+    group.color_offsets.assign(1, 0);
+    for (const std::vector<Index>& cells : by_color) {
+      for (std::size_t i = 0; i < cells.size(); i += kLanes) {
+        auto& batch = group.batches.emplace_back();
+        for (std::size_t l = 0; l < kLanes; ++l) batch[l] = cells[std::min(i + l, cells.size() - 1)];
+        group.active.push_back(static_cast<int>(std::min<std::size_t>(kLanes, cells.size() - i)));
+      }
+      group.color_offsets.push_back(group.batches.size());
+    }
+  }
+}
+
+void VolumeEnergy::gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes,
+                          double (*x)[3][kLanes]) const {
+  const int n = cell_topology(group.rule.kind).num_vertices;
+  for (int l = 0; l < kLanes; ++l) {
+    const Index* corners = cell_vertices_.data() + cell_offsets_[group.batches[batch][l]];
+    for (int a = 0; a < n; ++a)
+      for (int r = 0; r < 3; ++r) x[a][r][l] = nodes[corners[a]][r];
+  }
+}
+
+/// Runs per_batch(group, batch number) over all batches, colour by colour, and sums what it returns in batch order.
+template <class PerBatch>
+double VolumeEnergy::sum_batches(PerBatch&& per_batch) const {
+  double total = 0;
+  for (const Group& group : groups_) {
+    std::vector<double> sums(group.batches.size());
+#pragma omp parallel
+    for (std::size_t color = 0; color + 1 < group.color_offsets.size(); ++color) {
+#pragma omp for schedule(static)
+      for (std::size_t b = group.color_offsets[color]; b < group.color_offsets[color + 1]; ++b)
+        sums[b] = per_batch(group, b);
+    }
+    for (double s : sums) total += s;
+  }
+  return total;
+}
+
+double VolumeEnergy::value(std::span<const Vec3> nodes) const {
+  return sum_batches([&](const Group& group, std::size_t b) {
+    alignas(64) double x[kMaxCellVertices][3][kLanes], inverse_h[kLanes];
+    HenckyBatch hencky;
+    gather(group, b, nodes, x);
+    for (int l = 0; l < kLanes; ++l) inverse_h[l] = inverse_sizes_[group.batches[b][l]];
+    double sum = 0;
+    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
+      jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      hencky_energy(hencky);
+      for (int l = 0; l < group.active[b]; ++l)
+        sum += weights_[group.batches[b][l]] * group.rule.weights[q] * hencky.energy[l];
+    }
+    return sum;
+  });
+}
+
+double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
+  // Feasibility is known only at the end: gather into a copy, so that an infeasible state adds nothing.
+  std::vector<Vec3> local(num_nodes_, Vec3::Zero());
+  const double energy = sum_batches([&](const Group& group, std::size_t b) {
+    alignas(64) double x[kMaxCellVertices][3][kLanes], g[kMaxCellVertices][3][kLanes] = {}, inverse_h[kLanes],
+        factor[kLanes];
+    HenckyBatch hencky;
+    gather(group, b, nodes, x);
+    for (int l = 0; l < kLanes; ++l) inverse_h[l] = inverse_sizes_[group.batches[b][l]];
+    double sum = 0;
+    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
+      jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      hencky_gradient(hencky);
+      for (int l = 0; l < kLanes; ++l) {
+        const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
+        factor[l] = scale * w * inverse_h[l];
+        if (l < group.active[b]) sum += w * hencky.energy[l];
+      }
+      add_point_gradient(group.rule.point(q), hencky, factor, g);
+    }
+    const int n = cell_topology(group.rule.kind).num_vertices;
+    for (int l = 0; l < group.active[b]; ++l) {
+      const Index* corners = cell_vertices_.data() + cell_offsets_[group.batches[b][l]];
+      for (int a = 0; a < n; ++a) local[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
+    }
+    return sum;
+  });
+  if (energy < kInfinity) {
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < num_nodes_; ++i) gradient[i] += local[i];
+  }
+  return energy;
+}
+
+double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                                 BlockSparse& hessian) const {
+  const double energy = sum_batches([&](const Group& group, std::size_t b) {
+    constexpr int n_max = kMaxCellVertices;
+    alignas(64) double x[n_max][3][kLanes], g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], inverse_h[kLanes],
+        factor[kLanes], weight[kLanes];
+    HenckyBatch hencky;
+    gather(group, b, nodes, x);
+    const int n = cell_topology(group.rule.kind).num_vertices;
+    for (int a = 0; a < n; ++a)
+      for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
+    for (int l = 0; l < kLanes; ++l) inverse_h[l] = inverse_sizes_[group.batches[b][l]];
+    double sum = 0;
+    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
+      jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      hencky_hessian(hencky);
+      for (int l = 0; l < kLanes; ++l) {
+        const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
+        weight[l] = scale * w;
+        factor[l] = scale * w * inverse_h[l];
+        if (l < group.active[b]) sum += w * hencky.energy[l];
+      }
+      add_point_gradient(group.rule.point(q), hencky, factor, g);
+      add_point_hessian(group.rule.point(q), hencky, inverse_h, weight, k);
+    }
+    for (int l = 0; l < group.active[b]; ++l) {
+      const Index cell = group.batches[b][l];
+      const Index* corners = cell_vertices_.data() + cell_offsets_[cell];
+      const Index* slots = block_slots_.data() + block_offsets_[cell];
+      for (int a = 0; a < n; ++a) {
+        gradient[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
+        for (int c = a; c < n; ++c) {
+          const double (*block)[kLanes] = k[a * n_max + c];
+          float* upper = hessian.block(slots[a * n + c]);
+          for (int e = 0; e < 9; ++e) upper[e] += static_cast<float>(block[e][l]);
+          if (c == a) continue;
+          float* lower = hessian.block(slots[c * n + a]);
+          for (int e = 0; e < 9; ++e) lower[e] += static_cast<float>(block[e % 3 * 3 + e / 3][l]);
+        }
+      }
+    }
+    return sum;
+  });
+  return energy;
+}
+
+double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
+  constexpr double kShrink = 0.8, kKept = 0.1;
+  constexpr int kMaxSteps = 200;
+  std::array<double, kMaxSteps + 1> step;  // a table, so that a step has the same bits for every thread
+  for (int n = 0; n <= kMaxSteps; ++n) step[n] = limit * std::pow(kShrink, n);
+  std::atomic<int> steps{0};  // step[steps] is safe for every point seen so far
+  sum_batches([&](const Group& group, std::size_t b) {
+    alignas(64) double x[kMaxCellVertices][3][kLanes], d[kMaxCellVertices][3][kLanes], ones[kLanes];
+    double jx[9][kLanes], jd[9][kLanes];
+    std::fill_n(ones, kLanes, 1.0);
+    gather(group, b, nodes, x);
+    gather(group, b, direction, d);
+    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
+      jacobians(group.rule.point(q), x, ones, jx);
+      jacobians(group.rule.point(q), d, ones, jd);
+      for (int l = 0; l < kLanes; ++l) {
+        // det(J + t D) = c0 + c1 t + c2 t^2 + c3 t^3; positive on [0, t] if its four Bernstein coefficients there are.
+        Mat3 j, e;
+        for (int k = 0; k < 9; ++k) {
+          j(k / 3, k % 3) = jx[k][l];
+          e(k / 3, k % 3) = jd[k][l];
+        }
+        const Vec3 j12 = j.col(1).cross(j.col(2)), e12 = e.col(1).cross(e.col(2));
+        const Vec3 mixed = j.col(1).cross(e.col(2)) + e.col(1).cross(j.col(2));
+        const double det = j.col(0).dot(j12);
+        const double c0 = (1 - kKept) * det, c1 = e.col(0).dot(j12) + j.col(0).dot(mixed),
+                     c2 = e.col(0).dot(mixed) + j.col(0).dot(e12), c3 = e.col(0).dot(e12);
+        int n = steps.load(std::memory_order_relaxed);
+        for (; n < kMaxSteps; ++n) {
+          const double t = step[n];
+          const double a1 = c1 * t, a2 = c2 * t * t, a3 = c3 * t * t * t;
+          if (c0 + a1 / 3 > 0 && c0 + 2 * a1 / 3 + a2 / 3 > 0 && c0 + a1 + a2 + a3 > 0) break;
+        }
+        int seen = steps.load(std::memory_order_relaxed);
+        while (seen < n && !steps.compare_exchange_weak(seen, n)) {
+        }
+      }
+    }
+    return 0.0;
+  });
+  return step[steps.load()];
+}
+
+BlockSparse VolumeEnergy::pattern() const {
+  BlockSparse result = pattern_;
+  result.blocks.assign(9 * result.columns.size(), 0.0f);
+  return result;
+}
+
+}  // namespace subvol

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/block_sparse.h"
+#include "fit/element_rule.h"
+#include "fit/hencky.h"
+#include "subvol/volume_mesh.h"
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Mean distortion of a mesh of linear cells against ideal cells.
+///
+///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
+///
+/// e is the Hencky energy (`hencky.h`), J_cq the Jacobian of cell c at quadrature point q against the ideal cell of edge
+/// length h_c (`element_rule.h`). Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
+///
+/// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
+/// number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
+class VolumeEnergy {
+ public:
+  /// ideal_sizes  one positive edge length per cell, in the mesh's unit, else InputError. Cells weigh equally.
+  /// points_per_direction  >= 2; 2: corners only.
+  VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal_sizes, int points_per_direction);
+
+  /// Gives these cells a denser rule from now on (those that have it already stay).
+  void densify(std::span<const Index> cells, int points_per_direction);
+
+  double value(std::span<const Vec3> nodes) const;
+
+  /// Adds scale * dE/dx to `gradient`; returns the value. Infeasible: nothing is added.
+  double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const;
+
+  /// The same, and adds scale times the positive definite Hessian (clamped, see `hencky.h`) to `hessian`, a matrix of
+  /// this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both arguments are spoilt).
+  double add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;
+
+  /// The largest t in (0, limit] of a geometric sequence so that every determinant keeps at least a tenth of its value
+  /// on the way from x to x + t d. The nodes must be feasible.
+  double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const;
+
+  /// Zero matrix with one block per pair of nodes that share a cell.
+  BlockSparse pattern() const;
+
+ private:
+  /// Cells of one kind and rule; `batches` hold kLanes of them, the last one padded with repeats.
+  struct Group {
+    ElementRule rule;
+    std::vector<std::array<Index, kLanes>> batches;
+    std::vector<int> active;                 ///< real cells of each batch
+    std::vector<std::size_t> color_offsets;  ///< batches of each colour
+  };
+
+  void rebuild_groups();
+  void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
+  template <class PerBatch>
+  double sum_batches(PerBatch&& per_batch) const;
+
+  std::size_t num_nodes_;
+  std::vector<CellKind> kinds_;
+  std::vector<std::size_t> cell_offsets_;
+  std::vector<Index> cell_vertices_;
+  std::vector<double> inverse_sizes_, weights_;
+  std::vector<int> points_;        ///< points per direction of each cell
+  std::vector<int> colors_;
+  std::vector<Group> groups_;
+  BlockSparse pattern_;
+  std::vector<std::size_t> block_offsets_;  ///< of each cell in block_slots_
+  std::vector<Index> block_slots_;          ///< block number of (a, b), a-major, in the pattern
+};
+
+}  // namespace subvol
