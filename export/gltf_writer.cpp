@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/gltf_writer.h"
+
+#include "subvol/atomic_file.h"
+#include "subvol/error.h"
+#include "subvol/version.h"
+
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <sstream>
+
+namespace subvol {
+namespace {
+
+namespace gltf = tinygltf;
+
+constexpr double kUnitNormalTolerance = 1e-6;
+
+/// What may go wrong in one array of one node, with its name in front.
+struct Complaint {
+  std::string node;
+  [[noreturn]] void operator()(const std::string& array, const std::string& problem) const {
+    throw InputError("scene node \"" + node + "\": " + array + ": " + problem);
+  }
+};
+
+float to_float(double value, const std::string& array, const Complaint& refuse) {
+  const float single = static_cast<float>(value);
+  if (!std::isfinite(single)) refuse(array, "expected finite numbers in the range of float32");
+  return single;
+}
+
+bool is_attribute_name(const std::string& name) {
+  return name.size() > 1 && name[0] == '_' && std::all_of(name.begin() + 1, name.end(), [](unsigned char c) {
+           return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+         });
+}
+
+/// Appends typed arrays to one buffer, each behind a bufferView and an accessor of its own.
+class BufferWriter {
+ public:
+  explicit BufferWriter(gltf::Model& model) : model_(model) { model_.buffers.emplace_back(); }
+
+  /// Values of `width` components per element; returns the accessor's number.
+  template <class T>
+  int add(const std::vector<T>& values, int width, int component_type, int target, const std::string& name,
+          bool with_bounds = false, bool normalized = false) {
+    gltf::Accessor accessor;
+    accessor.name = name;
+    accessor.bufferView = add_view(values.data(), values.size() * sizeof(T), target);
+    accessor.componentType = component_type;
+    accessor.count = values.size() / width;
+    accessor.type = width == 1 ? TINYGLTF_TYPE_SCALAR : width == 3 ? TINYGLTF_TYPE_VEC3 : TINYGLTF_TYPE_VEC4;
+    accessor.normalized = normalized;
+    if (with_bounds) set_bounds(accessor, values, width);
+    model_.accessors.push_back(std::move(accessor));
+    return static_cast<int>(model_.accessors.size()) - 1;
+  }
+
+ private:
+  int add_view(const void* bytes, std::size_t size, int target) {
+    auto& data = model_.buffers[0].data;
+    gltf::BufferView view;
+    view.buffer = 0;
+    view.byteOffset = data.size();
+    view.byteLength = size;
+    view.target = target;
+    constexpr std::size_t kLimit = std::numeric_limits<std::int32_t>::max();
+    if (size > kLimit - 4 || data.size() > kLimit - 4 - size) throw InputError("scene: expected less than 2^31 bytes");
+    const auto* first = static_cast<const unsigned char*>(bytes);
+    data.insert(data.end(), first, first + size);
+    data.resize((data.size() + 3) / 4 * 4);
+    model_.bufferViews.push_back(std::move(view));
+    return static_cast<int>(model_.bufferViews.size()) - 1;
+  }
+
+  template <class T>
+  static void set_bounds(gltf::Accessor& accessor, const std::vector<T>& values, int width) {
+    accessor.minValues.assign(values.begin(), values.begin() + width);
+    accessor.maxValues = accessor.minValues;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double value = values[i];
+      accessor.minValues[i % width] = std::min(accessor.minValues[i % width], value);
+      accessor.maxValues[i % width] = std::max(accessor.maxValues[i % width], value);
+    }
+  }
+
+  gltf::Model& model_;
+};
+
+std::vector<float> relative_positions(const ScenePrimitive& primitive, const Vec3& origin, const Complaint& refuse) {
+  std::vector<float> values;
+  values.reserve(3 * primitive.positions.size());
+  for (const Vec3& position : primitive.positions)
+    for (const double x : Vec3(position - origin)) values.push_back(to_float(x, "positions", refuse));
+  return values;
+}
+
+std::vector<float> unit_normals(const ScenePrimitive& primitive, const Complaint& refuse) {
+  std::vector<float> values;
+  values.reserve(3 * primitive.normals.size());
+  for (const Vec3& normal : primitive.normals) {
+    if (!(std::abs(normal.norm() - 1) <= kUnitNormalTolerance)) refuse("normals", "expected length 1");
+    for (const double x : normal) values.push_back(static_cast<float>(x));
+  }
+  return values;
+}
+
+std::vector<std::uint16_t> color_words(const ScenePrimitive& primitive, const Complaint& refuse) {
+  std::vector<std::uint16_t> values;
+  values.reserve(4 * primitive.colors.size());
+  for (const LinearColor& color : primitive.colors)
+    for (const double c : color) {
+      if (!(c >= 0 && c <= 1)) refuse("colors", "expected values in [0, 1]");
+      values.push_back(static_cast<std::uint16_t>(std::lround(c * 65535)));
+    }
+  return values;
+}
+
+void check_sizes(const ScenePrimitive& primitive, const Complaint& refuse) {
+  const std::size_t n = primitive.positions.size();
+  const auto check = [&](std::size_t size, const std::string& array, bool may_be_empty) {
+    if (size == n || (may_be_empty && size == 0)) return;
+    refuse(array, "expected " + std::to_string(n) + " entries, one per position, got " + std::to_string(size));
+  };
+  if (n == 0) refuse("positions", "expected at least one");
+  check(primitive.normals.size(), "normals", true);
+  check(primitive.colors.size(), "colors", true);
+  for (const SceneAttribute& attribute : primitive.attributes) {
+    if (!is_attribute_name(attribute.name))
+      refuse("attribute \"" + attribute.name + "\"", "expected a name of an underscore and capitals");
+    check(attribute.values.size(), attribute.name, false);
+  }
+  const std::size_t corners = primitive.topology == ScenePrimitive::Topology::triangles ? 3 : 2;
+  if (primitive.indices.empty() || primitive.indices.size() % corners != 0)
+    refuse("indices", "expected a positive multiple of " + std::to_string(corners));
+  for (const Index i : primitive.indices)
+    if (i < 0 || static_cast<std::size_t>(i) >= n)
+      refuse("indices", "expected numbers from 0 to " + std::to_string(n - 1) + ", got " + std::to_string(i));
+}
+
+int add_indices(BufferWriter& buffer, const ScenePrimitive& primitive) {
+  // 65535 itself restarts a primitive in some graphics interfaces, so glTF forbids it as an index.
+  constexpr std::size_t kMaxShortVertices = 65535;
+  constexpr int kTarget = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
+  if (primitive.positions.size() <= kMaxShortVertices)
+    return buffer.add(std::vector<std::uint16_t>(primitive.indices.begin(), primitive.indices.end()), 1,
+                      TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kTarget, "indices");
+  return buffer.add(std::vector<std::uint32_t>(primitive.indices.begin(), primitive.indices.end()), 1,
+                    TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, kTarget, "indices");
+}
+
+int add_material(gltf::Model& model, const SceneNode& node, const Complaint& refuse) {
+  gltf::Material material;
+  material.name = node.name;
+  material.doubleSided = true;
+  material.pbrMetallicRoughness.metallicFactor = 0;
+  material.pbrMetallicRoughness.roughnessFactor = 0.7;
+  for (const double c : node.primitive.material_color)
+    if (!(c >= 0 && c <= 1)) refuse("material_color", "expected values in [0, 1]");
+  material.pbrMetallicRoughness.baseColorFactor.assign(node.primitive.material_color.begin(),
+                                                       node.primitive.material_color.end());
+  model.materials.push_back(std::move(material));
+  return static_cast<int>(model.materials.size()) - 1;
+}
+
+/// Adds mesh, material and node; returns the node's number.
+int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, const Vec3& origin) {
+  const Complaint refuse{node.name};
+  const ScenePrimitive& source = node.primitive;
+  check_sizes(source, refuse);
+  constexpr int kTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
+  gltf::Primitive primitive;
+  primitive.attributes["POSITION"] =
+      buffer.add(relative_positions(source, origin, refuse), 3, kFloat, kTarget, "positions", true);
+  if (!source.normals.empty())
+    primitive.attributes["NORMAL"] = buffer.add(unit_normals(source, refuse), 3, kFloat, kTarget, "normals");
+  if (!source.colors.empty())
+    primitive.attributes["COLOR_0"] = buffer.add(color_words(source, refuse), 4,
+                                                 TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kTarget, "colors", false, true);
+  for (const SceneAttribute& attribute : source.attributes) {
+    std::vector<float> values;
+    for (const double x : attribute.values) values.push_back(to_float(x, attribute.name, refuse));
+    primitive.attributes[attribute.name] = buffer.add(values, 1, kFloat, kTarget, attribute.name, true);
+  }
+  primitive.indices = add_indices(buffer, source);
+  primitive.mode = source.topology == ScenePrimitive::Topology::triangles ? TINYGLTF_MODE_TRIANGLES : TINYGLTF_MODE_LINE;
+  primitive.material = add_material(model, node, refuse);
+  gltf::Mesh mesh;
+  mesh.name = node.name;
+  mesh.primitives.push_back(std::move(primitive));
+  model.meshes.push_back(std::move(mesh));
+  gltf::Node out;
+  out.name = node.name;
+  out.mesh = static_cast<int>(model.meshes.size()) - 1;
+  model.nodes.push_back(std::move(out));
+  return static_cast<int>(model.nodes.size()) - 1;
+}
+
+gltf::Value to_value(const std::string& key, const SceneValue& value) {
+  if (const auto* flag = std::get_if<bool>(&value)) return gltf::Value(*flag);
+  if (const auto* text = std::get_if<std::string>(&value)) return gltf::Value(*text);
+  const double number = std::get<double>(value);
+  if (!std::isfinite(number)) throw InputError("scene extras: " + key + ": expected a finite number");
+  constexpr double kMaxInt = std::numeric_limits<int>::max();
+  if (number == std::floor(number) && std::abs(number) <= kMaxInt) return gltf::Value(static_cast<int>(number));
+  return gltf::Value(number);
+}
+
+gltf::Value to_object(const SceneValues& values) {
+  gltf::Value::Object object;
+  for (const auto& [key, value] : values) object[key] = to_value(key, value);
+  return gltf::Value(object);
+}
+
+gltf::Value extras(const Scene& scene) {
+  auto object = to_object(scene.extras).Get<gltf::Value::Object>();
+  object["unit"] = gltf::Value(std::string("metre"));
+  object["metres_per_input_unit"] = gltf::Value(scene.metres_per_unit);
+  object["up_axis"] = gltf::Value(std::string(scene.up_axis == UpAxis::y ? "y" : "z"));
+  object["version"] = gltf::Value(std::string(version()));
+  object["options"] = to_object(scene.options);
+  return gltf::Value(object);
+}
+
+gltf::Node root_node(const Scene& scene, std::vector<int> children) {
+  gltf::Node root;
+  root.name = scene.name;
+  root.children = std::move(children);
+  const double s = scene.metres_per_unit;
+  Vec3 translation = s * scene.origin;
+  if (scene.up_axis == UpAxis::z) {
+    root.rotation = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
+    translation = Vec3(translation.x(), translation.z(), -translation.y());
+  }
+  root.translation = {translation.x(), translation.y(), translation.z()};
+  root.scale = {s, s, s};
+  root.extras = extras(scene);
+  return root;
+}
+
+gltf::Model model_of(const Scene& scene) {
+  if (scene.nodes.empty()) throw InputError("scene: expected at least one node");
+  if (!(scene.metres_per_unit > 0) || !std::isfinite(scene.metres_per_unit))
+    throw InputError("scene: metres_per_unit: expected a positive number");
+  if (!(scene.metres_per_unit * scene.origin).allFinite()) throw InputError("scene: origin: expected finite numbers");
+  gltf::Model model;
+  model.asset.version = "2.0";
+  model.asset.generator = std::string("subvol ") + version();
+  model.asset.extras = extras(scene);
+  model.nodes.emplace_back();
+  BufferWriter buffer(model);
+  std::vector<int> children;
+  for (const SceneNode& node : scene.nodes) children.push_back(add_node(model, buffer, node, scene.origin));
+  model.nodes[0] = root_node(scene, std::move(children));
+  gltf::Scene root;
+  root.name = scene.name;
+  root.nodes = {0};
+  model.scenes.push_back(std::move(root));
+  model.defaultScene = 0;
+  return model;
+}
+
+}  // namespace
+
+std::string gltf_bytes(const Scene& scene, GltfContainer container) {
+  const gltf::Model model = model_of(scene);
+  std::ostringstream stream;
+  bool done = false;
+  try {
+    done = gltf::TinyGLTF().WriteGltfSceneToStream(&model, stream, true, container == GltfContainer::glb);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception&) {
+    // Everything numeric has been checked; what the JSON writer still refuses is text that is not UTF-8.
+    throw InputError("scene: names and extras: expected UTF-8 text");
+  }
+  if (!done || !stream) throw IoError("glTF: the writer failed");
+  return std::move(stream).str();
+}
+
+void write_gltf(const std::filesystem::path& path, const Scene& scene) {
+  const auto extension = path.extension();
+  if (extension != ".glb" && extension != ".gltf")
+    throw InputError(path.string() + ": expected the extension .glb or .gltf");
+  write_file_atomically(path, gltf_bytes(scene, extension == ".glb" ? GltfContainer::glb : GltfContainer::gltf));
+}
+
+}  // namespace subvol

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "export/scene.h"
+
+#include <filesystem>
+#include <string>
+
+namespace subvol {
+
+/// The two shapes a glTF 2.0 file comes in.
+enum class GltfContainer {
+  glb,  ///< one binary file
+  gltf  ///< JSON, with the buffer embedded as base64
+};
+
+/// A scene as the bytes of a glTF 2.0 file; equal scenes give equal bytes.
+///
+///   world = metres_per_unit R origin + metres_per_unit R p,   p = float(position - origin),   R: up axis to y
+///
+/// Written per node: POSITION (float32, min and max exact), NORMAL, COLOR_0 (linear RGBA, normalised 16 bits), the
+/// attributes as float32, indices of 16 bits where they reach and of 32 otherwise, and a double-sided, rough, not
+/// metallic material. A quad's two triangles stay one after the other. asset.generator is "subvol VERSION"; asset.extras
+/// and the root node's extras (which survive an import) both hold unit, up_axis, version, the scene's extras and options.
+///
+/// InputError, naming node and array: no nodes; a node without positions or indices; arrays of unequal length; an index
+/// out of range; a number that is not finite, or overflows float32; a normal whose length is not 1 within 1e-6; a colour
+/// outside [0, 1]; an attribute name that is not underscore and capitals; metres_per_unit not positive; text that is not
+/// UTF-8; more than 2^31 bytes.
+std::string gltf_bytes(const Scene& scene, GltfContainer container);
+
+/// Writes `gltf_bytes` to a .glb or .gltf file, all of it or nothing.
+///
+/// InputError: another extension, or a scene that `gltf_bytes` refuses. IoError: the file cannot be written.
+void write_gltf(const std::filesystem::path& path, const Scene& scene);
+
+}  // namespace subvol

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/obj_writer.h"
+
+#include "export/text_format.h"
+#include "subvol/atomic_file.h"
+#include "subvol/version.h"
+
+namespace subvol {
+
+std::string obj_text(const PolygonMesh& mesh, const std::string& name) {
+  require_polygons(mesh, "obj");
+  std::string text = std::string("# subvol ") + version() + "\no " + name + "\n";
+  for (const Vec3& position : mesh.positions) {
+    text += "v ";
+    append_vector(text, position, " ");
+    text += '\n';
+  }
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
+    text += 'f';
+    for (std::size_t k = mesh.face_offsets[f]; k < mesh.face_offsets[f + 1]; ++k) {
+      text += ' ';
+      append_number(text, mesh.face_vertices[k] + std::int64_t{1});
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+void write_obj(const std::filesystem::path& path, const PolygonMesh& mesh) {
+  write_file_atomically(path, obj_text(mesh));
+}
+
+}  // namespace subvol

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/triangle_mesh.h"
+
+#include <concepts>
+#include <string>
+
+namespace subvol {
+
+/// Appends the shortest decimal that reads back as the same number, whatever the locale.
+void append_number(std::string& text, double value);
+void append_number(std::string& text, std::integral auto value) { text += std::to_string(value); }
+
+/// Appends three numbers with a separator between them.
+void append_vector(std::string& text, const Vec3& vector, const char* separator);
+
+/// Throws InputError, naming `what`, unless there are faces, each of at least three corners, all in range, and all
+/// positions are finite.
+void require_polygons(const PolygonMesh& mesh, const std::string& what);
+
+}  // namespace subvol

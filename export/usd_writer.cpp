@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/usd_writer.h"
+
+#include "export/text_format.h"
+#include "subvol/atomic_file.h"
+#include "subvol/error.h"
+#include "subvol/version.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+namespace subvol {
+namespace {
+
+/// A run of crease edges of one sharpness; closed where the last vertex is the first.
+struct Chain {
+  std::vector<Index> vertices;
+  double sharpness;
+};
+
+/// Joins the edges of one sharpness into chains, the smallest vertex numbers first.
+class ChainBuilder {
+ public:
+  ChainBuilder(const std::vector<CreaseEdge>& edges, double sharpness) : sharpness_(sharpness) {
+    for (const CreaseEdge& edge : edges)
+      if (edge.sharpness == sharpness) {
+        neighbors_[edge.v0].insert(edge.v1);
+        neighbors_[edge.v1].insert(edge.v0);
+      }
+    for (const auto& [vertex, others] : neighbors_)
+      if (others.size() != 2) ends_.insert(vertex);
+  }
+
+  void append_to(std::vector<Chain>& chains) {
+    for (const Index end : ends_)
+      while (!neighbors_[end].empty()) chains.push_back(walk(end));
+    for (auto& [vertex, others] : neighbors_)  // what is left are loops
+      if (!others.empty()) chains.push_back(walk(vertex));
+  }
+
+ private:
+  Chain walk(Index vertex) {
+    Chain chain{{vertex}, sharpness_};
+    do {
+      const Index next = *neighbors_[vertex].begin();
+      neighbors_[vertex].erase(next);
+      neighbors_[next].erase(vertex);
+      chain.vertices.push_back(next);
+      vertex = next;
+    } while (!ends_.contains(vertex) && !neighbors_[vertex].empty());
+    return chain;
+  }
+
+  double sharpness_;
+  std::map<Index, std::set<Index>> neighbors_;
+  std::set<Index> ends_;
+};
+
+std::vector<Chain> crease_chains(const FeatureTags& tags) {
+  std::set<double, std::greater<>> sharpnesses;
+  for (const CreaseEdge& edge : tags.creases) sharpnesses.insert(edge.sharpness);
+  std::vector<Chain> chains;
+  for (const double sharpness : sharpnesses) ChainBuilder(tags.creases, sharpness).append_to(chains);
+  return chains;
+}
+
+void require_tags(const PolygonMesh& cage, const FeatureTags& tags) {
+  std::set<std::pair<Index, Index>> edges;
+  if (!tags.creases.empty())
+    for (std::size_t f = 0; f < cage.num_faces(); ++f)
+      for (std::size_t begin = cage.face_offsets[f], end = cage.face_offsets[f + 1], k = begin; k < end; ++k)
+        edges.insert(std::minmax(cage.face_vertices[k], cage.face_vertices[k + 1 < end ? k + 1 : begin]));
+  for (const CreaseEdge& edge : tags.creases) {
+    const std::string where = "usd: crease " + std::to_string(edge.v0) + " " + std::to_string(edge.v1);
+    if (!edges.contains(std::minmax(edge.v0, edge.v1))) throw InputError(where + ": expected an edge of the cage");
+    if (!(edge.sharpness > 0)) throw InputError(where + ": expected a sharpness above 0");
+  }
+  for (const CornerVertex& corner : tags.corners) {
+    const std::string where = "usd: corner " + std::to_string(corner.vertex);
+    if (corner.vertex < 0 || static_cast<std::size_t>(corner.vertex) >= cage.positions.size())
+      throw InputError(where + ": expected a vertex of the cage");
+    if (!(corner.sharpness > 0)) throw InputError(where + ": expected a sharpness above 0");
+  }
+}
+
+void require_options(const UsdOptions& options) {
+  const auto letter = [](unsigned char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; };
+  const auto inside = [&](unsigned char c) { return letter(c) || c == '_' || (c >= '0' && c <= '9'); };
+  const std::string& name = options.name;
+  if (name.empty() || !inside(name[0]) || (name[0] >= '0' && name[0] <= '9') ||
+      !std::all_of(name.begin(), name.end(), inside))
+    throw InputError("usd: name \"" + name + "\": expected letters, digits and underscores, no digit first");
+  if (!(options.metres_per_unit > 0) || !std::isfinite(options.metres_per_unit))
+    throw InputError("usd: metres_per_unit: expected a positive number");
+}
+
+/// One attribute line: `    type name = [a, b, ...]`.
+template <class Range, class Append>
+void append_array(std::string& text, const char* declaration, const Range& values, Append append) {
+  text += std::string("    ") + declaration + " = [";
+  bool first = true;
+  for (const auto& value : values) {
+    if (!first) text += ", ";
+    first = false;
+    append(value);
+  }
+  text += "]\n";
+}
+
+void append_geometry(std::string& text, const PolygonMesh& cage) {
+  const auto number = [&](auto value) { append_number(text, value); };
+  const auto point = [&](const Vec3& p) {
+    text += '(';
+    append_vector(text, p, ", ");
+    text += ')';
+  };
+  Vec3 low = cage.positions[0], high = low;
+  for (const Vec3& p : cage.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  std::vector<std::size_t> counts;
+  for (std::size_t f = 0; f < cage.num_faces(); ++f) counts.push_back(cage.face_offsets[f + 1] - cage.face_offsets[f]);
+  append_array(text, "float3[] extent", std::array{low, high}, point);
+  append_array(text, "int[] faceVertexCounts", counts, number);
+  append_array(text, "int[] faceVertexIndices", cage.face_vertices, number);
+  append_array(text, "point3f[] points", cage.positions, point);
+}
+
+void append_tags(std::string& text, const FeatureTags& tags) {
+  const auto number = [&](auto value) { append_number(text, value); };
+  std::vector<Index> indices, corners;
+  std::vector<std::size_t> lengths;
+  std::vector<double> sharpnesses, corner_sharpnesses;
+  for (const Chain& chain : crease_chains(tags)) {
+    indices.insert(indices.end(), chain.vertices.begin(), chain.vertices.end());
+    lengths.push_back(chain.vertices.size());
+    sharpnesses.push_back(std::min(chain.sharpness, kInfiniteSharpness));
+  }
+  for (const CornerVertex& corner : tags.corners) {
+    corners.push_back(corner.vertex);
+    corner_sharpnesses.push_back(std::min(corner.sharpness, kInfiniteSharpness));
+  }
+  append_array(text, "int[] creaseIndices", indices, number);
+  append_array(text, "int[] creaseLengths", lengths, number);
+  append_array(text, "float[] creaseSharpnesses", sharpnesses, number);
+  append_array(text, "int[] cornerIndices", corners, number);
+  append_array(text, "float[] cornerSharpnesses", corner_sharpnesses, number);
+}
+
+}  // namespace
+
+std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options) {
+  require_options(options);
+  require_polygons(cage, "usd");
+  require_tags(cage, tags);
+  std::string text = "#usda 1.0\n(\n    defaultPrim = \"" + options.name + "\"\n    doc = \"subvol " + version() +
+                     "\"\n    metersPerUnit = ";
+  append_number(text, options.metres_per_unit);
+  text += std::string("\n    upAxis = \"") + (options.up_axis == UpAxis::y ? "Y" : "Z") + "\"\n)\n\ndef Mesh \"" +
+          options.name + "\"\n{\n";
+  append_geometry(text, cage);
+  text += "    uniform token subdivisionScheme = \"catmullClark\"\n"
+          "    token interpolateBoundary = \"edgeAndCorner\"\n"
+          "    token triangleSubdivisionRule = \"catmullClark\"\n"
+          "    uniform token orientation = \"rightHanded\"\n";
+  append_tags(text, tags);
+  return text + "}\n";
+}
+
+void write_usd(const std::filesystem::path& path, const PolygonMesh& cage, const FeatureTags& tags,
+               const UsdOptions& options) {
+  if (path.extension() != ".usda") throw InputError(path.string() + ": expected the extension .usda");
+  write_file_atomically(path, usd_text(cage, tags, options));
+}
+
+}  // namespace subvol
