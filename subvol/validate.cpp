@@ -30,8 +30,12 @@ std::string name_of(Index v) { return "vertex " + std::to_string(v); }
 Key sorted_key(std::span<const Index> vertices) {
   Key key;
   key.fill(kNoIndex);
-  std::copy(vertices.begin(), vertices.end(), key.begin());
-  std::sort(key.begin(), key.begin() + vertices.size());
+  std::size_t size = 0;
+  for (const Index v : vertices) {
+    std::size_t i = size++;
+    for (; i > 0 && key[i - 1] > v; --i) key[i] = key[i - 1];
+    key[i] = v;
+  }
   return key;
 }
 

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/mesh_io.h"
+
+#include "subvol/atomic_file.h"
+#include "subvol/error.h"
+#include "subvol/mesh_formats.h"
+#include "subvol/mesh_topology.h"
+#include "subvol/text_scanner.h"
+
+#include <algorithm>
+
+namespace subvol {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Format {
+  const char* extension;
+  const char* description;
+  ParsedMesh (*parse)(const std::string& name, std::string_view bytes);
+  std::string (*format)(const VolumeMesh& mesh);
+};
+
+constexpr Format kFormats[] = {
+    {".mesh", "Medit ASCII, versions 1 to 4", parse_medit, format_medit},
+    {".vtk", "legacy VTK 2.0 to 5.1, ASCII or binary, unstructured grid", parse_legacy_vtk, format_legacy_vtk},
+};
+
+const Format& format_of(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  for (const Format& format : kFormats)
+    if (extension == format.extension) return format;
+  throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(extension) + ", expected " +
+                   volume_mesh_formats());
+}
+
+bool is_warning(const MeshDefect& defect) {
+  return defect.kind == MeshDefect::Kind::inverted_cell || defect.kind == MeshDefect::Kind::unused_vertex;
+}
+
+/// Drops tags off the boundary: other programs also mark edges between subdomains. Returns how many.
+std::size_t drop_inner_tags(VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  const std::size_t dropped_edges = std::erase_if(mesh.tags.creases, [&](const CreaseEdge& crease) {
+    const Index e = topology.find_edge(crease.v0, crease.v1);
+    return e == kNoIndex || !topology.is_boundary_edge(e);
+  });
+  return dropped_edges + std::erase_if(mesh.tags.corners, [&](const CornerVertex& corner) {
+           return !topology.is_boundary_vertex(corner.vertex);
+         });
+}
+
+void warn_of(const std::vector<MeshDefect>& defects, MeshDefect::Kind kind, const std::string& what,
+             std::vector<std::string>& warnings) {
+  const auto is_kind = [&](const MeshDefect& defect) { return defect.kind == kind; };
+  const auto n = std::count_if(defects.begin(), defects.end(), is_kind);
+  if (n == 0) return;
+  const auto first = std::find_if(defects.begin(), defects.end(), is_kind);
+  warnings.push_back(std::to_string(n) + what + "; the first: " + first->message);
+}
+
+void check_mesh(const std::string& name, ParsedMesh& parsed) {
+  std::vector<MeshDefect> defects = validate(parsed.mesh);
+  const auto is_fatal = [](const MeshDefect& d) { return !is_warning(d) && d.kind != MeshDefect::Kind::bad_tag; };
+  const auto fatal = std::find_if(defects.begin(), defects.end(), is_fatal);
+  if (fatal != defects.end()) {
+    const auto more = std::count_if(fatal + 1, defects.end(), is_fatal);
+    throw InputError(name + ": " + fatal->message + " (" + to_string(fatal->kind) + ")" +
+                     (more ? "; and " + std::to_string(more) + " more defects" : ""));
+  }
+  if (const std::size_t n = drop_inner_tags(parsed.mesh))
+    parsed.warnings.push_back(std::to_string(n) + " tagged edges or corners are not on the boundary: dropped");
+  warn_of(defects, MeshDefect::Kind::inverted_cell,
+          " of " + std::to_string(parsed.mesh.num_cells()) + " cells are flat or left-handed somewhere", parsed.warnings);
+  warn_of(defects, MeshDefect::Kind::unused_vertex, " vertices belong to no cell", parsed.warnings);
+}
+
+}  // namespace
+
+VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
+  const Format& format = format_of(path);
+  ParsedMesh parsed = format.parse(path.string(), read_file(path));
+  if (parsed.mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  if (options.check) check_mesh(path.string(), parsed);
+  if (options.warnings)
+    for (const std::string& warning : parsed.warnings) options.warnings->push_back(path.string() + ": " + warning);
+  return std::move(parsed.mesh);
+}
+
+void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {
+  const Format& format = format_of(path);
+  for (const MeshDefect& defect : validate(mesh))
+    if (defect.kind <= MeshDefect::Kind::not_finite || defect.kind == MeshDefect::Kind::bad_tag)
+      throw InputError("write_volume_mesh: " + defect.message);
+  write_file_atomically(path, format.format(mesh));
+}
+
+std::string volume_mesh_formats() {
+  std::string text;
+  for (const Format& format : kFormats)
+    text += std::string(text.empty() ? "" : ", ") + format.extension + " (" + format.description + ")";
+  return text;
+}
+
+}  // namespace subvol
