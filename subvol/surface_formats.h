@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+// The formats behind surface_io.h. Each parser returns what the file says, with all indices in range.
+
+#include "subvol/triangle_mesh.h"
+
+#include <string>
+#include <string_view>
+
+namespace subvol {
+
+/// `name` is the file's name for messages. Errors: InputError, as `read_polygon_mesh` documents for the file itself.
+PolygonMesh parse_off(const std::string& name, std::string_view bytes);
+PolygonMesh parse_obj(const std::string& name, std::string_view bytes);
+PolygonMesh parse_stl(const std::string& name, std::string_view bytes);
+PolygonMesh parse_ply(const std::string& name, std::string_view bytes);
+
+}  // namespace subvol

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/triangle_mesh.h"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace subvol {
+
+/// Most corners a polygon in a file may have.
+inline constexpr std::size_t kMaxPolygonCorners = 1000;
+
+/// Reads polygons; the extension chooses the format (docs/file-formats.md). Soups are welcome: nothing is welded, flipped or
+/// oriented, but STL, which has no vertex numbers, gets one vertex per distinct position.
+///
+///   .off  OFF, COFF, NOFF, CNOFF, STOFF and the like, text     .stl  text or binary
+///   .obj  polygons only; materials and the like are skipped    .ply  1.0, text or binary of either byte order
+///
+/// warnings  where remarks go, one line each with the file's name; may be null.
+/// returns   faces and vertices in the file's order. Dropped, with a warning: corners that repeat the one before, faces
+///           that then have fewer than three corners or name a vertex twice, and vertices of no face.
+///
+/// Throws InputError with file and line (binary: byte) for anything malformed, counts beyond what the file can hold, indices
+/// out of range, numbers that are not finite, larger polygons, no faces, all vertices in one place, and coordinates
+/// or extents whose squares overflow or underflow. Memory: a few times the size of the file, whatever it claims.
+PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
+/// The same as triangles (`triangulate`). Also dropped, with a warning: triangles without area, and all but the first of
+/// triangles with the same three positions.
+TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
+/// Extensions the readers accept, as text for help and messages.
+std::string surface_formats();
+
+}  // namespace subvol
