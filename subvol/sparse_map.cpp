@@ -2,6 +2,7 @@
 #include "subvol/sparse_map.h"
 
 #include "subvol/error.h"
+#include "subvol/row_assembly.h"
 
 #include <algorithm>
 
@@ -81,68 +82,23 @@ SparseMap transposed(const SparseMap& map) {
   return result;
 }
 
-namespace {
-
-/// Gathers one row as (column, value) sums in a dense workspace; hands it out sorted by column.
-class RowAccumulator {
- public:
-  explicit RowAccumulator(std::size_t num_cols) : sums_(num_cols, 0.0), used_(num_cols, 0) {}
-  void add(Index column, double value) {
-    if (!used_[column]) {
-      used_[column] = 1;
-      columns_.push_back(column);
-    }
-    sums_[column] += value;
-  }
-  void append_to(SparseMap& map) {
-    std::sort(columns_.begin(), columns_.end());
-    for (Index j : columns_) {
-      map.columns.push_back(j);
-      map.values.push_back(sums_[j]);
-      sums_[j] = 0;
-      used_[j] = 0;
-    }
-    map.offsets.push_back(map.columns.size());
-    columns_.clear();
-  }
-
- private:
-  std::vector<double> sums_;
-  std::vector<char> used_;
-  std::vector<Index> columns_;
-};
-
-}  // namespace
-
 SparseMap compose(const SparseMap& second, const SparseMap& first) {
   if (first.num_rows() != second.num_cols) throw InputError("compose: first.num_rows() must equal second.num_cols");
-  SparseMap result;
-  result.num_cols = first.num_cols;
-  result.offsets.reserve(second.offsets.size());
-  RowAccumulator row(first.num_cols);
-  for (std::size_t i = 0; i < second.num_rows(); ++i) {
+  return assemble_rows(second.num_rows(), first.num_cols, [&](std::size_t i, RowBuilder& row) {
     for (std::size_t k = second.offsets[i]; k < second.offsets[i + 1]; ++k) {
       const Index mid = second.columns[k];
       for (std::size_t l = first.offsets[mid]; l < first.offsets[mid + 1]; ++l)
         row.add(first.columns[l], second.values[k] * first.values[l]);
     }
-    row.append_to(result);
-  }
-  return result;
+  });
 }
 
 SparseMap blend(const SparseMap& a, const SparseMap& b, double t) {
   if (a.num_rows() != b.num_rows() || a.num_cols != b.num_cols) throw InputError("blend: maps of different shapes");
-  SparseMap result;
-  result.num_cols = a.num_cols;
-  result.offsets.reserve(a.offsets.size());
-  RowAccumulator row(a.num_cols);
-  for (std::size_t i = 0; i < a.num_rows(); ++i) {
+  return assemble_rows(a.num_rows(), a.num_cols, [&](std::size_t i, RowBuilder& row) {
     for (std::size_t k = a.offsets[i]; k < a.offsets[i + 1]; ++k) row.add(a.columns[k], (1 - t) * a.values[k]);
     for (std::size_t k = b.offsets[i]; k < b.offsets[i + 1]; ++k) row.add(b.columns[k], t * b.values[k]);
-    row.append_to(result);
-  }
-  return result;
+  });
 }
 
 SparseMap select_rows(const SparseMap& map, std::span<const Index> rows) {

@@ -194,14 +194,14 @@ class Refiner {
     if (vertex_cells_[v].empty())
       row.add(v, 1);  // unused vertices stay
     else if (surface_vertex_[v] != kNoIndex)
-      add_vertex_child(boundary_.topology, surface_vertex_[v], rule_, boundary_.vertices, row);
+      add_vertex_child(boundary_.topology, surface_vertex_[v], {rule_, boundary_.vertices, row});
     else
       add_cell_mean(vertex_cells_[v], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.vertices[i]; }, row);
   }
 
   void edge_row(Index e, RowBuilder& row) const {
     if (surface_edge_[e] != kNoIndex)
-      add_edge_child(boundary_.topology, surface_edge_[e], rule_, boundary_.vertices, row);
+      add_edge_child(boundary_.topology, surface_edge_[e], {rule_, boundary_.vertices, row});
     else
       add_cell_mean(edge_cells_[e], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.edges[i]; }, row);
   }

@@ -1,26 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface_refinement.h"
 
-#include <numeric>
-
 namespace subvol {
 
-void add_face_child(const SurfaceTopology& surface, Index f, double weight, std::span<const Index> columns,
-                    RowBuilder& row) {
-  const double share = weight / surface.face_size(f);
-  for (Index v : surface.face(f)) row.add(columns[v], share);
+namespace {
+
+void add_centroid(const SurfaceTopology& surface, Index f, double weight, const RowTarget& target) {
+  const double share = target.scale * weight / surface.face_size(f);
+  for (Index v : surface.face(f)) target.row.add(target.columns[v], share);
 }
 
-void add_edge_child(const SurfaceTopology& surface, Index e, BoundaryRule rule, std::span<const Index> columns,
-                    RowBuilder& row) {
+}  // namespace
+
+void add_face_child(const SurfaceTopology& surface, Index f, const RowTarget& target) {
+  add_centroid(surface, f, 1, target);
+}
+
+void add_edge_child(const SurfaceTopology& surface, Index e, const RowTarget& target) {
   const Index h = surface.edge_corners[e], twin = surface.twins[h];
   const std::array<Index, 2> faces = {surface.corner_faces[h], surface.corner_faces[twin]};
   const EdgeWeights weights =
-      edge_weights(rule, surface.edge_sharpness[e], {surface.face_size(faces[0]), surface.face_size(faces[1])});
-  row.add(columns[surface.corner_vertices[h]], weights.end);
-  row.add(columns[surface.corner_vertices[twin]], weights.end);
+      edge_weights(target.rule, surface.edge_sharpness[e], {surface.face_size(faces[0]), surface.face_size(faces[1])});
+  target.row.add(target.columns[surface.corner_vertices[h]], target.scale * weights.end);
+  target.row.add(target.columns[surface.corner_vertices[twin]], target.scale * weights.end);
   for (int i = 0; i < 2; ++i)
-    if (weights.face[i] != 0) add_face_child(surface, faces[i], weights.face[i], columns, row);
+    if (weights.face[i] != 0) add_centroid(surface, faces[i], weights.face[i], target);
 }
 
 VertexWeights vertex_weights_at(const SurfaceTopology& surface, Index v, BoundaryRule rule) {
@@ -34,10 +38,9 @@ VertexWeights vertex_weights_at(const SurfaceTopology& surface, Index v, Boundar
   return vertex_weights(rule, surface.vertex_sharpness[v], sharpness);
 }
 
-void add_vertex_child(const SurfaceTopology& surface, Index v, BoundaryRule rule, std::span<const Index> columns,
-                      RowBuilder& row) {
-  const VertexWeights weights = vertex_weights_at(surface, v, rule);
-  row.add(columns[v], weights.self);
+void add_vertex_child(const SurfaceTopology& surface, Index v, const RowTarget& target) {
+  const VertexWeights weights = vertex_weights_at(surface, v, target.rule);
+  target.row.add(target.columns[v], target.scale * weights.self);
   if (weights.fixed()) return;
   const Index start = surface.vertex_corners[v];
   Index h = start;
@@ -45,18 +48,30 @@ void add_vertex_child(const SurfaceTopology& surface, Index v, BoundaryRule rule
   do {
     const bool crease = weights.crease != 0 && (i == weights.crease_ends[0] || i == weights.crease_ends[1]);
     const double weight = weights.edge + (crease ? weights.crease : 0);
-    if (weight != 0) row.add(columns[surface.corner_vertices[surface.next(h)]], weight);
-    if (weights.face != 0) add_face_child(surface, surface.corner_faces[h], weights.face, columns, row);
+    if (weight != 0) target.row.add(target.columns[surface.corner_vertices[surface.next(h)]], target.scale * weight);
+    if (weights.face != 0) add_centroid(surface, surface.corner_faces[h], weights.face, target);
     h = surface.rotate(h);
     ++i;
   } while (h != start);
 }
 
-namespace {
+SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std::span<const Index> columns,
+                          std::size_t num_cols) {
+  const std::size_t nv = surface.num_vertices(), ne = surface.num_edges(), nf = surface.num_faces();
+  return assemble_rows(nv + ne + nf, num_cols, [&](std::size_t i, RowBuilder& row) {
+    const RowTarget target{rule, columns, row};
+    if (i < nv)
+      add_vertex_child(surface, static_cast<Index>(i), target);
+    else if (i < nv + ne)
+      add_edge_child(surface, static_cast<Index>(i - nv), target);
+    else
+      add_face_child(surface, static_cast<Index>(i - nv - ne), target);
+  });
+}
 
-/// Children of a corner's edge: the half at the corner and the half at its far end are numbered 2e and 2e + 1 for the
-/// edge's own corner, the other way round for its twin; the edges into the faces follow, by corner.
-SurfaceTopology fine_topology(const SurfaceTopology& coarse) {
+// The half of edge e at its own corner is edge 2e, the other half 2e + 1; then come the edges into the faces, by the
+// corner of the edge they start from.
+SurfaceTopology refined_topology(const SurfaceTopology& coarse) {
   const Index nv = static_cast<Index>(coarse.num_vertices()), ne = static_cast<Index>(coarse.num_edges());
   const Index nf = static_cast<Index>(coarse.num_faces());
   const std::size_t num_corners = coarse.corner_vertices.size();
@@ -97,25 +112,6 @@ SurfaceTopology fine_topology(const SurfaceTopology& coarse) {
     fine.edge_sharpness[2 * e] = fine.edge_sharpness[2 * e + 1] = child_sharpness(coarse.edge_sharpness[e]);
   for (Index v = 0; v < nv; ++v) fine.vertex_sharpness[v] = child_sharpness(coarse.vertex_sharpness[v]);
   return fine;
-}
-
-}  // namespace
-
-SurfaceLevel refine_surface(const SurfaceTopology& surface, BoundaryRule rule) {
-  const std::size_t nv = surface.num_vertices(), ne = surface.num_edges(), nf = surface.num_faces();
-  std::vector<Index> columns(nv);
-  std::iota(columns.begin(), columns.end(), 0);
-  SurfaceLevel level;
-  level.matrix = assemble_rows(nv + ne + nf, nv, [&](std::size_t i, RowBuilder& row) {
-    if (i < nv)
-      add_vertex_child(surface, static_cast<Index>(i), rule, columns, row);
-    else if (i < nv + ne)
-      add_edge_child(surface, static_cast<Index>(i - nv), rule, columns, row);
-    else
-      add_face_child(surface, static_cast<Index>(i - nv - ne), 1.0, columns, row);
-  });
-  level.fine = fine_topology(surface);
-  return level;
 }
 
 }  // namespace subvol

@@ -9,26 +9,27 @@
 
 namespace subvol {
 
-/// Adds weight times the centroid of face f. Columns are columns[v] of surface vertices v (all rows below too).
-void add_face_child(const SurfaceTopology& surface, Index f, double weight, std::span<const Index> columns,
-                    RowBuilder& row);
-/// Adds the child of edge e.
-void add_edge_child(const SurfaceTopology& surface, Index e, BoundaryRule rule, std::span<const Index> columns,
-                    RowBuilder& row);
-/// Adds the child of vertex v.
-void add_vertex_child(const SurfaceTopology& surface, Index v, BoundaryRule rule, std::span<const Index> columns,
-                      RowBuilder& row);
+/// Where the rows of a refinement go: surface vertex v is column columns[v], and every weight is scaled.
+struct RowTarget {
+  BoundaryRule rule;
+  std::span<const Index> columns;
+  RowBuilder& row;
+  double scale = 1;
+};
+
+/// Adds the child of face f (its centroid), of edge e, of vertex v.
+void add_face_child(const SurfaceTopology& surface, Index f, const RowTarget& target);
+void add_edge_child(const SurfaceTopology& surface, Index e, const RowTarget& target);
+void add_vertex_child(const SurfaceTopology& surface, Index v, const RowTarget& target);
 
 /// The rule of vertex v with its sharpnesses; crease_ends count edges from surface.vertex_corners[v].
 VertexWeights vertex_weights_at(const SurfaceTopology& surface, Index v, BoundaryRule rule);
 
-/// One refinement of a surface: child vertices [vertices][edges][faces], child quads by (face, corner), each
-/// starting at its parent's corner. Sharpnesses carried.
-struct SurfaceLevel {
-  SparseMap matrix;  ///< children x surface vertices
-  SurfaceTopology fine;
-};
+/// Rows of all children [vertices][edges][faces] by `columns` of `num_cols` (ascending, one per surface vertex).
+SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std::span<const Index> columns,
+                          std::size_t num_cols);
 
-SurfaceLevel refine_surface(const SurfaceTopology& surface, BoundaryRule rule = BoundaryRule::catmull_clark);
+/// The refined surface: one quad per corner, in order, (vertex, edge out, face, edge in). Sharpnesses carried.
+SurfaceTopology refined_topology(const SurfaceTopology& surface);
 
 }  // namespace subvol

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Weights on the ring of a surface vertex v of valence n among quads: [v][e_0 .. e_n-1][f_0 .. f_n-1], where e_i are
+/// its neighbours counter-clockwise and f_i the corner opposite v in the quad between e_i and e_i+1.
+using RingMask = std::vector<double>;
+
+/// The sharpnesses around one vertex: its own, and its edges' in ring order.
+struct RingSharpness {
+  float corner;
+  std::vector<float> edges;
+};
+
+/// Weights of the Catmull-Clark limit position of v; they sum to 1.
+///
+///   smooth (n^2 v + 4 sum e_i + sum f_i) / (n (n + 5)),  crease (e_a + 4 v + e_b) / 6,  corner v
+///
+/// Exact for semi-sharp features (the rules of the levels until they decay are multiplied out) and for darts (the
+/// left eigenvector of eigenvalue 1 of the dart's own ring rules, by repeated squaring). Cost: O(n) weights, O(n^3) work
+/// for semi-sharp and dart rings.
+RingMask limit_mask(const RingSharpness& ring);
+
+/// One side of the surface at v: two directions that span the tangent plane of the quads from `first` to
+/// first + count - 1 (modulo n). u x v points outward, but may be reversed in a sector of more than 180 degrees.
+struct TangentSector {
+  int first, count;
+  RingMask u, v;
+};
+
+/// Tangents at v, one sector per smooth piece of the surface there (the whole ring if fewer than two edges stay sharp
+/// for ever). Weights of each mask sum to 0.
+///
+/// Smooth and crease tangents are the left eigenvectors of the dominant eigenvalues; darts are exact to about 1e-6 of
+/// a radian; at corners they are the crease edges (for up to two quads), which is where the surface ends up.
+/// A crease side of one quad has no proper eigenvector: its mean direction is used.
+std::vector<TangentSector> tangent_masks(const RingSharpness& ring);
+
+}  // namespace subvol
