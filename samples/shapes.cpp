@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "samples/shapes.h"
+
+#include "subvol/boundary.h"
+#include "subvol/features.h"
+#include "subvol/mesh_topology.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+namespace subvol::samples {
+namespace {
+
+constexpr double kTau = 2 * std::numbers::pi;
+constexpr double kCreaseAngleDegrees = 40;
+
+using Lattice = std::array<int, 3>;
+
+// Hexes over unit cubes of a lattice, vertices shared, positions moved by a map.
+template <typename Map>
+VolumeMesh lattice_mesh(const std::vector<Lattice>& cubes, const Map& position) {
+  static constexpr std::array<Lattice, 8> kCorners{
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
+  VolumeMesh mesh;
+  std::map<Lattice, Index> numbers;
+  for (const Lattice& cube : cubes) {
+    std::array<Index, 8> cell{};
+    for (std::size_t c = 0; c < 8; ++c) {
+      const Lattice node{cube[0] + kCorners[c][0], cube[1] + kCorners[c][1], cube[2] + kCorners[c][2]};
+      const auto [entry, added] = numbers.try_emplace(node, static_cast<Index>(mesh.positions.size()));
+      if (added) mesh.positions.push_back(position(Vec3(node[0], node[1], node[2])));
+      cell[c] = entry->second;
+    }
+    mesh.add_cell(CellKind::hex, cell);
+  }
+  return mesh;
+}
+
+TriangleMesh boundary_triangles(const VolumeMesh& mesh) {
+  return triangulate(boundary_surface(mesh, MeshTopology(mesh)));
+}
+
+Vec3 on_torus(double around, double across, double tube_radius) {
+  const double r = 1 + tube_radius * std::cos(across);
+  return {r * std::cos(around), r * std::sin(around), tube_radius * std::sin(across)};
+}
+
+TriangleMesh bumpy_torus(int num_around, int num_across) {
+  TriangleMesh mesh;
+  for (int i = 0; i < num_around; ++i) {
+    for (int j = 0; j < num_across; ++j) {
+      const double u = kTau * i / num_around, v = kTau * j / num_across;
+      mesh.positions.push_back(on_torus(u, v, 0.38 + 0.04 * std::cos(5 * u) * std::sin(2 * v)));
+      const auto node = [&](int a, int b) {
+        return static_cast<Index>((i + a) % num_around * num_across + (j + b) % num_across);
+      };
+      mesh.triangles.push_back({node(0, 0), node(1, 0), node(1, 1)});
+      mesh.triangles.push_back({node(0, 0), node(1, 1), node(0, 1)});
+    }
+  }
+  return mesh;
+}
+
+// Each section: nodes 0..3 of an inner square, 4..7 of an outer one. Hexes run from section to section.
+VolumeMesh torus_ring(int num_sections) {
+  VolumeMesh mesh;
+  for (int s = 0; s < num_sections; ++s) {
+    for (double radius : {0.17, 0.42}) {
+      for (int k = 0; k < 4; ++k) {
+        mesh.positions.push_back(on_torus(kTau * s / num_sections, kTau * (k + 0.5) / 4, radius));
+      }
+    }
+  }
+  for (int s = 0; s < num_sections; ++s) {
+    const int next = (s + 1) % num_sections;
+    const auto add = [&](std::array<int, 4> quad) {
+      std::array<Index, 8> cell{};
+      for (std::size_t k = 0; k < 4; ++k) {
+        cell[k] = static_cast<Index>(8 * next + quad[k]);
+        cell[k + 4] = static_cast<Index>(8 * s + quad[k]);
+      }
+      mesh.add_cell(CellKind::hex, cell);
+    };
+    add({0, 1, 2, 3});
+    for (int k = 0; k < 4; ++k) add({k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4});
+  }
+  return mesh;
+}
+
+// Takes the cube [-1,1]^3 to a ball, spheres about its centre from cubes about it.
+Vec3 cube_to_ball(const Vec3& p) {
+  const double length = p.norm();
+  return length > 0 ? Vec3(p * (p.cwiseAbs().maxCoeff() / length)) : p;
+}
+
+std::vector<Lattice> box_of_cubes(int nx, int ny, int nz) {
+  std::vector<Lattice> cubes;
+  for (int k = 0; k < nz; ++k) {
+    for (int j = 0; j < ny; ++j) {
+      for (int i = 0; i < nx; ++i) cubes.push_back({i, j, k});
+    }
+  }
+  return cubes;
+}
+
+TriangleMesh bumpy_ball(int resolution) {
+  const VolumeMesh cubes = lattice_mesh(box_of_cubes(resolution, resolution, resolution), [&](const Vec3& node) {
+    const Vec3 p = cube_to_ball(Vec3(node * (2.0 / resolution) - Vec3::Ones()));
+    return Vec3(p * (1 + 0.08 * std::sin(4 * p.x()) * std::cos(3 * p.y()) + 0.05 * std::sin(5 * p.z())));
+  });
+  return boundary_triangles(cubes);
+}
+
+VolumeMesh seven_cells() {
+  static constexpr std::array<std::array<Index, 4>, 6> kInnerFaces{
+      {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
+  VolumeMesh mesh = lattice_mesh({{0, 0, 0}}, [](const Vec3& node) { return Vec3(0.45 * (2 * node - Vec3::Ones())); });
+  const std::vector<Index> inner(mesh.cell(0).begin(), mesh.cell(0).end());
+  for (std::size_t v = 0; v < 8; ++v) mesh.positions.push_back(mesh.positions[v].normalized());
+  for (const auto& face : kInnerFaces) {
+    std::array<Index, 8> cell{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      cell[k] = inner[static_cast<std::size_t>(face[k])];
+      cell[k + 4] = cell[k] + 8;
+    }
+    mesh.add_cell(CellKind::hex, cell);
+  }
+  return mesh;
+}
+
+// Cubes of an L that is three long, three high, two wide and one thick, cut `n` times finer.
+std::vector<Lattice> bracket_cubes(int n) {
+  std::vector<Lattice> cubes = box_of_cubes(3 * n, 2 * n, 3 * n);
+  std::erase_if(cubes, [n](const Lattice& cube) { return cube[0] >= n && cube[2] >= n; });
+  return cubes;
+}
+
+// The foot is bowed and the upright leans and widens a little.
+Vec3 bend_bracket(const Vec3& p) {
+  return {p.x() + 0.06 * p.z() * p.z() * (1 - p.x() / 3), (p.y() - 1) * (1 - 0.05 * p.z()),
+          p.z() + 0.08 * std::sin(p.x() * kTau / 6)};
+}
+
+void append_number(std::string& text, double value, char end) {
+  std::array<char, 32> buffer;
+  text.append(buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr);
+  text += end;
+}
+
+}  // namespace
+
+Sample torus_sample() { return {"torus", bumpy_torus(120, 48), torus_ring(12)}; }
+
+Sample ball_sample() { return {"ball", bumpy_ball(24), seven_cells()}; }
+
+Sample bracket_sample() {
+  static constexpr int kFiner = 8;
+  VolumeMesh cells = lattice_mesh(bracket_cubes(1), [](const Vec3& p) { return Vec3(p - Vec3(0, 1, 0)); });
+  cells.tags = features_by_angle(cells, kCreaseAngleDegrees);
+  const VolumeMesh fine =
+      lattice_mesh(bracket_cubes(kFiner), [](const Vec3& p) { return bend_bracket(p / kFiner); });
+  return {"bracket", boundary_triangles(fine), cells};
+}
+
+std::vector<Sample> all_samples() { return {torus_sample(), ball_sample(), bracket_sample()}; }
+
+std::string off_text(const TriangleMesh& mesh) {
+  std::string text =
+      "OFF\n" + std::to_string(mesh.positions.size()) + ' ' + std::to_string(mesh.triangles.size()) + " 0\n";
+  for (const Vec3& p : mesh.positions) {
+    append_number(text, p.x(), ' ');
+    append_number(text, p.y(), ' ');
+    append_number(text, p.z(), '\n');
+  }
+  for (const auto& t : mesh.triangles) {
+    text += "3 " + std::to_string(t[0]) + ' ' + std::to_string(t[1]) + ' ' + std::to_string(t[2]) + '\n';
+  }
+  return text;
+}
+
+}  // namespace subvol::samples

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/triangle_mesh.h"
+#include "subvol/volume_mesh.h"
+
+#include <string>
+#include <vector>
+
+namespace subvol::samples {
+
+/// A surface to reproduce and a coarse template near it.
+struct Sample {
+  std::string name;
+  TriangleMesh target;       ///< closed, outward
+  VolumeMesh template_mesh;  ///< hexes; passes `validate`
+};
+
+/// A torus with bumps: 12 sections of a tube, 5 hexes each (one inside, four around it).
+Sample torus_sample();
+
+/// A ball with bumps: one hex inside, six around it.
+Sample ball_sample();
+
+/// A curved L-shaped bracket with sharp edges: 10 hexes of a grid, all creases tagged.
+Sample bracket_sample();
+
+/// All of the above.
+std::vector<Sample> all_samples();
+
+/// A triangle mesh as the text of an .off file.
+std::string off_text(const TriangleMesh& mesh);
+
+}  // namespace subvol::samples

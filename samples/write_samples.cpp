@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Writes every sample as NAME_target.off and NAME_template.mesh.
+
+#include "samples/shapes.h"
+#include "subvol/atomic_file.h"
+#include "subvol/mesh_io.h"
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+
+int main(int argc, char** argv) try {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: subvol_samples FOLDER\n");
+    return 2;
+  }
+  const std::filesystem::path folder = argv[1];
+  std::filesystem::create_directories(folder);
+  for (const auto& sample : subvol::samples::all_samples()) {
+    subvol::write_file_atomically(folder / (sample.name + "_target.off"), subvol::samples::off_text(sample.target));
+    subvol::write_volume_mesh(folder / (sample.name + "_template.mesh"), sample.template_mesh);
+  }
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "subvol_samples: %s\n", error.what());
+  return 1;
+}
