@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/cell_topology.h"
+#include "fit/cell_lanes.h"
 
 #include <array>
 #include <cmath>
@@ -30,17 +30,6 @@ template <class T>
 Vector<T> mean(const Vector<T>& p, const Vector<T>& q) {
   return {T(0.5 * (p[0] + q[0])), T(0.5 * (p[1] + q[1])), T(0.5 * (p[2] + q[2]))};
 }
-inline double larger(double a, double b) { return a > b ? a : b; }
-inline double smaller(double a, double b) { return a < b ? a : b; }
-template <class Lanes>
-Lanes larger(const Lanes& a, const Lanes& b) {
-  return (a > b).select(a, b);
-}
-template <class Lanes>
-Lanes smaller(const Lanes& a, const Lanes& b) {
-  return (a < b).select(a, b);
-}
-
 /// Squared edge lengths per reference direction: what the rounding margin is measured by.
 template <class T>
 struct EdgeLengths {

@@ -14,9 +14,6 @@ namespace {
 using bernstein::EdgeLengths;
 using bernstein::Vector;
 
-constexpr int kLanes = 8;
-using Lanes = Eigen::Array<double, kLanes, 1>;
-
 /// What the first coefficients say of a cell.
 struct Bounds {
   double coefficient, corner, scale;  // least coefficient, least corner value, unit of the rounding margin
@@ -83,19 +80,13 @@ Bounds bounds(CellKind kind, std::span<const Vec3> corners) {
 
 /// `bounds` of kLanes hexes at once; the same operations in each lane.
 void bounds_of_hexes(std::span<const Vec3> positions, const Index* vertices, Bounds* out) {
-  std::array<Vector<Lanes>, 8> x;
-  for (int lane = 0; lane < kLanes; ++lane)
-    for (int v = 0; v < 8; ++v) {
-      const Vec3& p = positions[vertices[8 * lane + v]];
-      for (int axis = 0; axis < 3; ++axis) x[v][axis][lane] = p[axis];
-    }
   std::array<Lanes, 27> d;
   EdgeLengths<Lanes> lengths;
-  bernstein::hex_coefficients(x, d, lengths);
+  bernstein::hex_coefficients(gather_hexes(positions, vertices), d, lengths);
   Lanes coefficient = d[0], corner = d[0];
   for (int i = 1; i < 27; ++i) {
-    coefficient = bernstein::smaller(coefficient, d[i]);
-    if (is_corner(CellKind::hex, i)) corner = bernstein::smaller(corner, d[i]);
+    coefficient = smaller(coefficient, d[i]);
+    if (is_corner(CellKind::hex, i)) corner = smaller(corner, d[i]);
   }
   for (int lane = 0; lane < kLanes; ++lane) {
     const auto& m = lengths.squared_max;
@@ -107,25 +98,15 @@ void bounds_of_hexes(std::span<const Vec3> positions, const Index* vertices, Bou
 /// Calls visit(cell, bounds) for every cell, in parallel.
 template <class Visit>
 void for_each_cell_bounds(std::span<const Vec3> positions, const VolumeMesh& mesh, const Visit& visit) {
-  const std::size_t num_cells = mesh.num_cells(), num_blocks = (num_cells + kLanes - 1) / kLanes;
-#pragma omp parallel for schedule(static)
-  for (std::size_t block = 0; block < num_blocks; ++block) {
-    const std::size_t begin = block * kLanes, end = std::min(begin + kLanes, num_cells);
-    const bool full = end - begin == kLanes && std::all_of(mesh.kinds.begin() + begin, mesh.kinds.begin() + end,
-                                                           [](CellKind kind) { return kind == CellKind::hex; });
-    if (full) {
-      Bounds result[kLanes];
-      bounds_of_hexes(positions, mesh.cell(begin).data(), result);
-      for (int lane = 0; lane < kLanes; ++lane) visit(begin + lane, result[lane]);
-      continue;
-    }
-    for (std::size_t c = begin; c < end; ++c) {
-      std::array<Vec3, kMaxCellVertices> corners;
-      const auto vertices = mesh.cell(c);
-      for (std::size_t v = 0; v < vertices.size(); ++v) corners[v] = positions[vertices[v]];
-      visit(c, bounds(mesh.kinds[c], {corners.data(), vertices.size()}));
-    }
-  }
+  const auto hexes = [&](std::size_t first) {
+    Bounds result[kLanes];
+    bounds_of_hexes(positions, mesh.cell(first).data(), result);
+    for (int lane = 0; lane < kLanes; ++lane) visit(first + lane, result[lane]);
+  };
+  for_each_cell_block(mesh, hexes, [&](std::size_t c) {
+    const auto corners = gather_cell(positions, mesh, c);
+    visit(c, bounds(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}));
+  });
 }
 
 /// det J in extended precision, and a bound of its error relative to the length scale.
@@ -343,10 +324,8 @@ CertificateSummary certify(std::span<const Vec3> positions, const VolumeMesh& me
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::size_t i = 0; i < summary.not_certified.size(); ++i) {
       const Index c = summary.not_certified[i];
-      std::array<Vec3, kMaxCellVertices> corners;
-      const auto vertices = mesh.cell(c);
-      for (std::size_t v = 0; v < vertices.size(); ++v) corners[v] = positions[vertices[v]];
-      validity[c] = certify_checked(mesh.kinds[c], {corners.data(), vertices.size()}, options).validity;
+      const auto corners = gather_cell(positions, mesh, c);
+      validity[c] = certify_checked(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, options).validity;
     }
   }
   summary.not_certified.clear();
@@ -354,6 +333,7 @@ CertificateSummary certify(std::span<const Vec3> positions, const VolumeMesh& me
     ++(validity[c] == CellValidity::valid     ? summary.certified
        : validity[c] == CellValidity::invalid ? summary.invalid
                                               : summary.undecided);
+    if (validity[c] == CellValidity::invalid) summary.invalid_cells.push_back(static_cast<Index>(c));
     if (validity[c] != CellValidity::valid) summary.not_certified.push_back(static_cast<Index>(c));
   }
   return summary;

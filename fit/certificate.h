@@ -53,6 +53,7 @@ double min_bernstein(CellKind kind, std::span<const Vec3> corners);
 struct CertificateSummary {
   std::size_t certified = 0, invalid = 0, undecided = 0;
   std::vector<Index> not_certified;  ///< cells that are invalid or undecided, ascending
+  std::vector<Index> invalid_cells;  ///< those of them that are invalid, ascending
   bool all_certified() const { return not_certified.empty(); }
 };
 

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/quality.h"
+
+#include "fit/bernstein.h"
+#include "subvol/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+using bernstein::Vector;
+
+/// What is kept of a cell's samples.
+template <class T>
+struct Sampled {
+  T least, sum;
+};
+
+template <class T>
+Vector<T> blend(const Vector<T>& p, const Vector<T>& q, double t) {
+  return {T((1 - t) * p[0] + t * q[0]), T((1 - t) * p[1] + t * q[1]), T((1 - t) * p[2] + t * q[2])};
+}
+
+/// v / |v|, and 0 for 0.
+template <class T>
+Vector<T> direction(const Vector<T>& v) {
+  const T length_squared = bernstein::dot(v, v);
+  const T scale = 1.0 / square_root(larger(length_squared, T(length_squared * 0 + std::numeric_limits<double>::min())));
+  return {T(v[0] * scale), T(v[1] * scale), T(v[2] * scale)};
+}
+
+/// F e2 and F e3 from derivatives along the canonical axes: A^-1 of the equilateral triangle and regular tetrahedron.
+template <class T>
+Vector<T> second_column(const Vector<T>& xu, const Vector<T>& xv) {
+  const double f = 1 / std::sqrt(3.0);
+  Vector<T> result;
+  for (int a = 0; a < 3; ++a) result[a] = f * (2.0 * xv[a] - xu[a]);
+  return result;
+}
+template <class T>
+Vector<T> third_column_of_tet(const Vector<T>& xu, const Vector<T>& xv, const Vector<T>& xw) {
+  const double f = 1 / std::sqrt(6.0);
+  Vector<T> result;
+  for (int a = 0; a < 3; ++a) result[a] = f * (3.0 * xw[a] - xu[a] - xv[a]);
+  return result;
+}
+
+template <class T>
+T triple(const Vector<T>& a, const Vector<T>& b, const Vector<T>& c) {
+  return bernstein::dot(a, bernstein::cross(b, c));
+}
+
+/// Directions of dx/d(axis) on an n x n grid over the two other axes, the lower axis slower.
+template <class T>
+void edge_directions(const std::array<Vector<T>, 8>& x, int axis, int n, std::vector<Vector<T>>& out) {
+  std::array<Vector<T>, 4> edge;
+  for (int m = 0; m < 4; ++m) {
+    const auto corner = [&](int end) {
+      int ijk[3];
+      ijk[axis] = end;
+      ijk[axis == 0 ? 1 : 0] = m / 2;
+      ijk[axis == 2 ? 1 : 2] = m % 2;
+      return x[bernstein::hex_corner(ijk[0], ijk[1], ijk[2])];
+    };
+    edge[m] = bernstein::difference(corner(1), corner(0));
+  }
+  out.clear();
+  for (int p = 0; p < n; ++p) {
+    const double s = p / (n - 1.0);
+    const Vector<T> low = blend(edge[0], edge[2], s), high = blend(edge[1], edge[3], s);
+    for (int q = 0; q < n; ++q) out.push_back(direction(blend(low, high, q / (n - 1.0))));
+  }
+}
+
+/// Buffers of one thread.
+template <class T>
+struct HexSampler {
+  std::array<std::vector<Vector<T>>, 3> directions;
+
+  Sampled<T> run(const std::array<Vector<T>, 8>& x, int n) {
+    for (int axis = 0; axis < 3; ++axis) edge_directions(x, axis, n, directions[axis]);
+    const auto& [du, dv, dw] = directions;
+    Sampled<T> result;
+    bool first = true;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        for (int k = 0; k < n; ++k, first = false) {
+          const T value = triple(du[n * j + k], dv[n * i + k], dw[n * i + j]);
+          result.least = first ? value : smaller(value, result.least);
+          result.sum = first ? value : T(result.sum + value);
+        }
+    return result;
+  }
+};
+
+using Point = Vector<double>;
+
+Point to_point(const Vec3& p) { return {p[0], p[1], p[2]}; }
+
+Sampled<double> sample_prism(std::span<const Vec3> corners, int n) {
+  std::array<Point, 6> x;
+  for (int v = 0; v < 6; ++v) x[v] = to_point(corners[v]);
+  Sampled<double> result{1, 0};
+  for (int k = 0; k < n; ++k) {
+    const double w = k / (n - 1.0);
+    const Point xu = blend(bernstein::difference(x[1], x[0]), bernstein::difference(x[4], x[3]), w);
+    const Point xv = blend(bernstein::difference(x[2], x[0]), bernstein::difference(x[5], x[3]), w);
+    const Point normal = bernstein::cross(direction(xu), direction(second_column(xu, xv)));
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; i + j < n; ++j) {
+        const double u = i / (n - 1.0), v = j / (n - 1.0);
+        Point up;
+        for (int a = 0; a < 3; ++a)
+          up[a] = (1 - u - v) * (x[3][a] - x[0][a]) + u * (x[4][a] - x[1][a]) + v * (x[5][a] - x[2][a]);
+        const double value = bernstein::dot(normal, direction(up));
+        result.least = smaller(value, result.least);
+        result.sum += value;
+      }
+  }
+  return result;
+}
+
+double tet_value(std::span<const Vec3> corners) {
+  const Point xu = to_point(corners[1] - corners[0]), xv = to_point(corners[2] - corners[0]),
+              xw = to_point(corners[3] - corners[0]);
+  return triple(direction(xu), direction(second_column(xu, xv)), direction(third_column_of_tet(xu, xv, xw)));
+}
+
+std::size_t num_samples(CellKind kind, std::size_t n) {
+  if (kind == CellKind::hex) return n * n * n;
+  return kind == CellKind::prism ? n * n * (n + 1) / 2 : n * (n + 1) * (n + 2) / 6;
+}
+
+Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n) {
+  if (kind == CellKind::prism) return sample_prism(corners, n);
+  if (kind == CellKind::tet) {
+    const double value = tet_value(corners);
+    return {value, value * static_cast<double>(num_samples(kind, n))};
+  }
+  std::array<Point, 8> x;
+  for (int v = 0; v < 8; ++v) x[v] = to_point(corners[v]);
+  return HexSampler<double>{}.run(x, n);
+}
+
+/// Samples of every cell; a sum that is not a number means that comparisons have lost the least value too.
+std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n) {
+  std::vector<Sampled<double>> result(mesh.num_cells());
+  const auto keep = [&](std::size_t c, double least, double sum) {
+    const bool finite = std::isfinite(sum);
+    result[c] = {finite ? std::clamp(least, -1.0, 1.0) : -1,
+                 finite ? sum : -static_cast<double>(num_samples(mesh.kinds[c], n))};
+  };
+  const auto hexes = [&](std::size_t first) {
+    thread_local HexSampler<Lanes> sampler;
+    const Sampled<Lanes> s = sampler.run(gather_hexes(mesh.positions, mesh.cell(first).data()), n);
+    for (int lane = 0; lane < kLanes; ++lane) keep(first + lane, s.least[lane], s.sum[lane]);
+  };
+  for_each_cell_block(mesh, hexes, [&](std::size_t c) {
+    const auto corners = gather_cell(mesh.positions, mesh, c);
+    const Sampled<double> s = sample_cell(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, n);
+    keep(c, s.least, s.sum);
+  });
+  return result;
+}
+
+std::vector<QualityReport::WorstCell> worst_of(const VolumeMesh& mesh, const std::vector<double>& minima) {
+  std::vector<Index> order(minima.size());
+  for (std::size_t c = 0; c < order.size(); ++c) order[c] = static_cast<Index>(c);
+  const std::size_t count = std::min<std::size_t>(10, order.size());
+  std::partial_sort(order.begin(), order.begin() + count, order.end(), [&](Index a, Index b) {
+    return minima[a] != minima[b] ? minima[a] < minima[b] : a < b;
+  });
+  std::vector<QualityReport::WorstCell> worst;
+  for (std::size_t i = 0; i < count; ++i) {
+    Vec3 centre = Vec3::Zero();
+    for (const Index v : mesh.cell(order[i])) centre += mesh.positions[v];
+    worst.push_back({order[i], centre / static_cast<double>(mesh.cell(order[i]).size()), minima[order[i]]});
+  }
+  return worst;
+}
+
+}  // namespace
+
+QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction) {
+  const int n = samples_per_direction;
+  if (n < 2)
+    throw InputError("quality: samples_per_direction is " + std::to_string(n) + ", expected 2 or more");
+  QualityReport report;
+  report.num_cells = mesh.num_cells();
+  const std::vector<Sampled<double>> samples = sample_cells(mesh, n);
+  double sum = 0;
+  for (std::size_t c = 0; c < samples.size(); ++c) {
+    const double least = samples[c].least;
+    report.cell_minima.push_back(least);
+    report.min_scaled_jacobian = std::min(report.min_scaled_jacobian, least);
+    report.num_samples += num_samples(mesh.kinds[c], n);
+    sum += samples[c].sum;
+    ++report.histogram[std::min(static_cast<int>((least + 1) * kNumHistogramBins / 2), kNumHistogramBins - 1)];
+    report.inverted_cells += least <= 0;
+  }
+  if (report.num_samples > 0) report.mean_scaled_jacobian = sum / static_cast<double>(report.num_samples);
+  report.certificate = certify(mesh);
+  for (const Index c : report.certificate.invalid_cells) report.inverted_cells += report.cell_minima[c] > 0;
+  report.worst_cells = worst_of(mesh, report.cell_minima);
+  return report;
+}
+
+}  // namespace subvol
