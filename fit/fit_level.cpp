@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/fit_level.h"
+
+#include "subvol/limit_surface.h"
+#include "subvol/mesh_topology.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace subvol {
+
+namespace {
+
+constexpr int kMaxSampleRefinements = 3;
+
+/// The boundary of a hex mesh as samples: its own vertices, without the limit.
+void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
+  const MeshTopology topology(mesh);
+  std::vector<Index> sample_of(mesh.num_vertices(), kNoIndex), rows;
+  for (Index f : topology.boundary_faces()) {
+    const auto face = topology.face(f);
+    std::array<Index, 4> quad;
+    for (int i = 0; i < 4; ++i) {
+      Index& sample = sample_of[face[i]];
+      if (sample == kNoIndex) {
+        sample = static_cast<Index>(rows.size());
+        rows.push_back(face[i]);
+      }
+      quad[i] = sample;
+    }
+    level.sample_triangles.push_back({quad[0], quad[1], quad[2]});
+    level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
+  }
+  level.samples = select_rows(nodes, rows);
+}
+
+}  // namespace
+
+FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
+                        const FitOptions& options, std::size_t min_samples) {
+  FitLevel level;
+  SubdivisionLevel refined = subdivide(control, options.boundary);
+  level.mesh = std::move(refined.fine);
+  level.safe_nodes = compose(refined.linear_split, previous_nodes);
+  level.refine = std::move(refined.matrix);
+  const SparseMap fine_from_unknowns = compose(level.refine, from_unknowns);
+  if (options.surface == FittedSurface::mesh) {
+    level.nodes = fine_from_unknowns;
+    sample_plain_boundary(level.mesh, level.nodes, level);
+    return level;
+  }
+  level.nodes = compose(limit_map(level.mesh), fine_from_unknowns);
+  std::size_t boundary_faces = MeshTopology(level.mesh).boundary_faces().size();
+  int refinements = 0;
+  while (boundary_faces < min_samples && refinements < kMaxSampleRefinements) {
+    boundary_faces *= 4;
+    ++refinements;
+  }
+  BoundaryRefinement boundary = refine_boundary(level.mesh, refinements);
+  level.samples = compose(boundary.positions, fine_from_unknowns);
+  for (const auto& q : boundary.quads) {
+    level.sample_triangles.push_back({q[0], q[1], q[2]});
+    level.sample_triangles.push_back({q[0], q[2], q[3]});
+  }
+  return level;
+}
+
+double cell_volume(const VolumeMesh& mesh, std::size_t c) {
+  const CellTopology& topology = cell_topology(mesh.kinds[c]);
+  const auto cell = mesh.cell(c);
+  const Vec3 origin = mesh.positions[cell[0]];
+  double volume = 0;
+  for (int f = 0; f < topology.num_faces; ++f) {
+    const int n = topology.face_sizes[f];
+    Vec3 center = Vec3::Zero();
+    for (int i = 0; i < n; ++i) center += mesh.positions[cell[topology.faces[f][i]]] - origin;
+    center /= n;
+    for (int i = 0; i < n; ++i) {
+      const Vec3 a = mesh.positions[cell[topology.faces[f][i]]] - origin;
+      const Vec3 b = mesh.positions[cell[topology.faces[f][(i + 1) % n]]] - origin;
+      volume += center.dot(a.cross(b)) / 6;
+    }
+  }
+  return volume;
+}
+
+std::vector<double> child_sizes(const VolumeMesh& template_mesh, double volume, double blend) {
+  std::vector<double> sizes;
+  for (std::size_t c = 0; c < template_mesh.num_cells(); ++c) {
+    const int children = cell_topology(template_mesh.kinds[c]).num_vertices;
+    const double own = std::cbrt(std::max(cell_volume(template_mesh, c), 0.0) / children);
+    sizes.insert(sizes.end(), children, own);
+  }
+  const double common = std::cbrt(volume / static_cast<double>(sizes.size()));
+  double total = 0;
+  for (double& h : sizes) {
+    // A cell of no volume asks for no size of its own.
+    h = std::pow(common, 1 - blend) * std::pow(std::max(h, 1e-3 * common), blend);
+    total += h * h * h;
+  }
+  const double scale = std::cbrt(volume / total);
+  for (double& h : sizes) h *= scale;
+  return sizes;
+}
+
+std::vector<double> refined_sizes(std::span<const double> sizes) {
+  std::vector<double> result;
+  result.reserve(8 * sizes.size());
+  for (double h : sizes) result.insert(result.end(), 8, h / 2);
+  return result;
+}
+
+}  // namespace subvol

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/subdivision_fit.h"
+#include "subvol/sparse_map.h"
+#include "subvol/volume_mesh.h"
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// One level of the recursive fit (paper: section 4.3): a finite element mesh over the vertices of a control mesh.
+///
+///   nodes y = M x,   samples z = N x,   M = P S,  N = P' S' S ...
+///
+/// S refines (`subdivide`), P moves boundary vertices to their limit positions (`limit_map`; the identity for
+/// FittedSurface::mesh), and N goes as many refinements further on the boundary alone as the target's detail asks for.
+struct FitLevel {
+  VolumeMesh mesh;               ///< the finite element mesh: hexes
+  SparseMap refine;              ///< S alone: control vertices to the vertices of the next control mesh
+  SparseMap nodes;               ///< M
+  SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid whenever that mesh is certified
+  SparseMap samples;             ///< N
+  std::vector<std::array<Index, 3>> sample_triangles;
+};
+
+/// Builds the level above a control mesh.
+///
+/// control            the last refined mesh with its tags; `from_unknowns` takes the unknowns to its vertices (the
+///                    identity but for cage-only fits) and `previous_nodes` to the nodes of its finite element mesh.
+/// min_samples        how many boundary samples are wanted at least (reached by refining, at most three times).
+FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
+                        const FitOptions& options, std::size_t min_samples);
+
+/// Ideal edge length of each of the template's cells' children, between common (blend 0) and the cell's own (blend 1):
+///
+///   h_c = common^(1 - blend) * own_c^blend,  rescaled so that the children's volumes h_c^3 sum up to `volume`
+///
+/// One entry per child cell of the first refinement; later levels halve (`refined_sizes`).
+std::vector<double> child_sizes(const VolumeMesh& template_mesh, double volume, double blend);
+/// Eight children of half the size for each entry.
+std::vector<double> refined_sizes(std::span<const double> sizes);
+
+/// Volume of one cell (its quads bilinear), in the mesh's unit cubed; negative when turned inside out.
+double cell_volume(const VolumeMesh& mesh, std::size_t cell);
+
+}  // namespace subvol

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/fit_report.h"
+#include "fit/surface_energy.h"
+#include "fit/volume_energy.h"
+#include "subvol/sparse_map.h"
+
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// The function that a stage minimises over its unknowns x (control vertices, in the target's unit):
+///
+///   E(x) = E_S(N x) + lambda E_W(M x)                                          Paper: Eqs. 1, 10
+///
+/// M takes the unknowns to the nodes of the finite element mesh, N to the samples of its boundary; gradients and
+/// Hessians come back through the transposes. E_S is taken with the Voronoi cells of the last `SurfaceEnergy::assign`.
+struct FitProblem {
+  FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
+             SurfaceEnergy surface_energy, double volume_weight);
+
+  SparseMap nodes, nodes_transposed;      ///< M, M^T
+  SparseMap samples, samples_transposed;  ///< N, N^T
+  const VolumeMesh* mesh;                 ///< cells of the finite element mesh (for the certificate)
+  VolumeEnergy volume;
+  SurfaceEnergy surface;
+  double lambda;                          ///< > 0
+};
+
+struct MinimizerOptions {
+  int max_iterations = 20;
+  double relative_decrease = 1e-3;  ///< converged when two steps in a row decrease E by less than this share of E
+  double cg_tolerance = 0.1;        ///< of the preconditioned residual
+  int cg_max_iterations = 200;
+  /// Called after each step; returns false to stop.
+  std::function<bool(const IterationRecord&)> progress;
+};
+
+enum class MinimizerStop { converged, iteration_limit, cancelled, no_step };
+
+struct MinimizerResult {
+  MinimizerStop stop;
+  std::string explanation;  ///< the test that fired, with its figure
+  std::vector<IterationRecord> iterations;
+};
+
+/// Newton's method with frozen Voronoi cells and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
+/// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`certificate.h`) certified; cells
+/// that stand in the way get a denser quadrature for the steps to come.
+///
+/// x  feasible start (finite E), else `no_step`; receives the result.
+MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+
+/// The reference that Newton is measured against: L-BFGS (m = 10) with a weak Wolfe line search by bisection, which takes
+/// +infinity as too long a step. Cells are reassigned after every ten steps.
+MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+
+}  // namespace subvol

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/certificate.h"
+#include "fit/fit_problem.h"
+#include "fit/vector_math.h"
+
+#include <cmath>
+#include <deque>
+#include <limits>
+
+namespace subvol {
+
+namespace {
+
+constexpr int kHistory = 10, kInnerSteps = 10, kMaxTrials = 40;
+constexpr double kArmijo = 1e-4, kWolfe = 0.9;
+
+struct Value {
+  double surface = 0, volume = 0, energy = std::numeric_limits<double>::infinity();
+};
+
+/// E and its gradient over the unknowns, for frozen cells.
+class Objective {
+ public:
+  explicit Objective(FitProblem& problem)
+      : problem_(problem), nodes_(problem.nodes.num_rows()), samples_(problem.samples.num_rows()),
+        node_gradient_(nodes_.size()), sample_gradient_(samples_.size()), from_samples_(problem.nodes.num_cols) {}
+
+  void assign(std::span<const Vec3> x) {
+    problem_.samples.apply(x, samples_);
+    problem_.surface.assign(samples_);
+  }
+
+  Value evaluate(std::span<const Vec3> x, std::span<Vec3> gradient) {
+    problem_.nodes.apply(x, nodes_);
+    problem_.samples.apply(x, samples_);
+    std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
+    std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
+    Value value;
+    value.volume = problem_.volume.add_gradient(nodes_, problem_.lambda, node_gradient_);
+    if (!std::isfinite(value.volume)) return value;
+    value.surface = problem_.surface.value(samples_);
+    value.energy = value.surface + problem_.lambda * value.volume;
+    problem_.surface.add_gradient(samples_, sample_gradient_);
+    problem_.nodes_transposed.apply(node_gradient_, gradient);
+    problem_.samples_transposed.apply(sample_gradient_, from_samples_);
+    add_scaled(1, from_samples_, gradient);
+    return value;
+  }
+
+  bool certified(std::span<const Vec3> x) {
+    problem_.nodes.apply(x, nodes_);
+    return certify(nodes_, *problem_.mesh).all_certified();
+  }
+
+ private:
+  FitProblem& problem_;
+  std::vector<Vec3> nodes_, samples_, node_gradient_, sample_gradient_, from_samples_;
+};
+
+struct Pair {
+  std::vector<Vec3> s, y;
+  double rho;
+};
+
+/// Two-loop recursion: d = -H g.
+std::vector<Vec3> direction(const std::deque<Pair>& history, const std::vector<Vec3>& gradient) {
+  std::vector<Vec3> d = gradient;
+  std::vector<double> alpha(history.size());
+  for (std::size_t i = history.size(); i-- > 0;) {
+    alpha[i] = history[i].rho * dot(history[i].s, d);
+    add_scaled(-alpha[i], history[i].y, d);
+  }
+  if (!history.empty()) {
+    const double scale = 1 / (history.back().rho * dot(history.back().y, history.back().y));
+    for (Vec3& p : d) p *= scale;
+  }
+  for (std::size_t i = 0; i < history.size(); ++i)
+    add_scaled(alpha[i] - history[i].rho * dot(history[i].y, d), history[i].s, d);
+  for (Vec3& p : d) p = -p;
+  return d;
+}
+
+}  // namespace
+
+MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
+  MinimizerResult result{MinimizerStop::iteration_limit, "iteration limit", {}};
+  Objective objective(problem);
+  std::vector<Vec3> gradient(x.size()), trial_x(x.size()), trial_gradient(x.size());
+  std::deque<Pair> history;
+  objective.assign(x);
+  Value value = objective.evaluate(x, gradient);
+  const bool guard = objective.certified(x);
+  if (!std::isfinite(value.energy)) {
+    result.stop = MinimizerStop::no_step;
+    result.explanation = "the start has a cell that is inverted at a quadrature point";
+    return result;
+  }
+  double energy_at_assign = value.energy;
+  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
+    IterationRecord record;
+    std::vector<Vec3> d = direction(history, gradient);
+    double slope = dot(gradient, d);
+    if (!(slope < 0)) {
+      result.stop = MinimizerStop::converged;
+      result.explanation = "the gradient vanishes";
+      return result;
+    }
+    // Weak Wolfe by bisection: +infinity fails Armijo, so the upper end closes in on the feasible part.
+    double low = 0, high = std::numeric_limits<double>::infinity();
+    double t = history.empty() ? std::min(1.0, 1e-3 * std::sqrt(dot(x, x) / dot(d, d))) : 1;
+    Value trial;
+    bool accepted = false;
+    for (int k = 0; k < kMaxTrials && !accepted; ++k) {
+      for (std::size_t i = 0; i < x.size(); ++i) trial_x[i] = x[i] + t * d[i];
+      trial = objective.evaluate(trial_x, trial_gradient);
+      ++record.evaluations;
+      if (!(trial.energy <= value.energy + kArmijo * t * slope) || (guard && !objective.certified(trial_x)))
+        high = t;
+      else if (dot(trial_gradient, d) < kWolfe * slope && k + 1 < kMaxTrials && std::isinf(high))
+        low = t;
+      else
+        accepted = true;
+      if (!accepted) t = std::isinf(high) ? 2 * low : 0.5 * (low + high);
+    }
+    if (!accepted) {
+      if (history.empty()) {
+        result.stop = MinimizerStop::no_step;
+        result.explanation = "no step along the search direction decreases the energy";
+        return result;
+      }
+      history.clear();
+      continue;
+    }
+    Pair pair{trial_x, trial_gradient, 0};
+    add_scaled(-1, x, pair.s);
+    add_scaled(-1, gradient, pair.y);
+    const double sy = dot(pair.s, pair.y);
+    if (sy > 1e-300) {
+      pair.rho = 1 / sy;
+      history.push_back(std::move(pair));
+      if (history.size() > kHistory) history.pop_front();
+    }
+    x = trial_x;
+    gradient = trial_gradient;
+    value = trial;
+    record.surface_energy = value.surface;
+    record.volume_energy = value.volume;
+    record.step_length = t;
+    result.iterations.push_back(record);
+    if (options.progress && !options.progress(record)) {
+      result.stop = MinimizerStop::cancelled;
+      result.explanation = "stopped by the caller";
+      return result;
+    }
+    if ((iteration + 1) % kInnerSteps == 0) {
+      if (energy_at_assign - value.energy < options.relative_decrease * value.energy) {
+        result.stop = MinimizerStop::converged;
+        result.explanation = "small relative decrease of the energy between two assignments of cells";
+        return result;
+      }
+      objective.assign(x);
+      value = objective.evaluate(x, gradient);
+      energy_at_assign = value.energy;
+    }
+  }
+  return result;
+}
+
+}  // namespace subvol

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/certificate.h"
+#include "fit/fit_problem.h"
+#include "fit/vector_math.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace subvol {
+
+FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
+                       SurfaceEnergy surface_energy, double volume_weight)
+    : nodes(std::move(node_map)),
+      nodes_transposed(transposed(nodes)),
+      samples(std::move(sample_map)),
+      samples_transposed(transposed(samples)),
+      mesh(&elements),
+      volume(std::move(volume_energy)),
+      surface(std::move(surface_energy)),
+      lambda(volume_weight) {}
+
+namespace {
+
+/// Adds the 3x3 diagonal blocks of M^T H M: D_j = sum_ik M_ij H_ik M_kj.
+void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
+                         std::vector<Mat3>& diagonal) {
+#pragma omp parallel
+  {
+    std::vector<double> weight(map.num_rows(), 0.0);  // column j of M, scattered
+#pragma omp for schedule(dynamic, 64)
+    for (std::size_t j = 0; j < map.num_cols; ++j) {
+      const auto rows = map_transposed.row_columns(j);
+      const auto values = map_transposed.row_values(j);
+      for (std::size_t a = 0; a < rows.size(); ++a) weight[rows[a]] = values[a];
+      double sum[9] = {};
+      for (std::size_t a = 0; a < rows.size(); ++a)
+        for (std::size_t k = hessian.offsets[rows[a]]; k < hessian.offsets[rows[a] + 1]; ++k) {
+          const double w = values[a] * weight[hessian.columns[k]];
+          if (w == 0) continue;
+          for (int e = 0; e < 9; ++e) sum[e] += w * hessian.blocks[9 * k + e];
+        }
+      for (int e = 0; e < 9; ++e) diagonal[j](e / 3, e % 3) += sum[e];
+      for (Index i : rows) weight[i] = 0;
+    }
+  }
+}
+
+/// The pulled-back Hessian M^T H_W M + N^T H_S N with its block-Jacobi preconditioner.
+class ReducedHessian {
+ public:
+  ReducedHessian(const FitProblem& problem, const BlockSparse& volume)
+      : problem_(problem),
+        volume_(volume),
+        node_in_(problem.nodes.num_rows()),
+        node_out_(problem.nodes.num_rows()),
+        sample_in_(problem.samples.num_rows()),
+        sample_out_(problem.samples.num_rows()),
+        from_samples_(problem.nodes.num_cols) {
+    inverse_diagonal_.assign(problem.nodes.num_cols, Mat3::Zero());
+    add_diagonal_blocks(problem.nodes, problem.nodes_transposed, volume, inverse_diagonal_);
+    add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface.hessian(), inverse_diagonal_);
+#pragma omp parallel for schedule(static)
+    for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
+      // Vertices of no cell have no energy: they stay.
+      const Mat3 block = inverse_diagonal_[j];
+      inverse_diagonal_[j] = block.trace() > 0 ? Mat3(block.inverse()) : Mat3(Mat3::Zero());
+    }
+  }
+
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) {
+    problem_.nodes.apply(in, node_in_);
+    volume_.multiply(node_in_, node_out_);
+    problem_.nodes_transposed.apply(node_out_, out);
+    problem_.samples.apply(in, sample_in_);
+    problem_.surface.hessian().multiply(sample_in_, sample_out_);
+    problem_.samples_transposed.apply(sample_out_, from_samples_);
+    add_scaled(1, from_samples_, out);
+  }
+
+  void precondition(std::span<const Vec3> in, std::span<Vec3> out) const {
+#pragma omp parallel for schedule(static)
+    for (std::size_t j = 0; j < in.size(); ++j) out[j] = inverse_diagonal_[j] * in[j];
+  }
+
+ private:
+  const FitProblem& problem_;
+  const BlockSparse& volume_;
+  std::vector<Mat3> inverse_diagonal_;
+  std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
+};
+
+/// Solves H d = -g approximately; returns the number of iterations.
+int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient, const MinimizerOptions& options,
+                        std::vector<Vec3>& d) {
+  const std::size_t n = gradient.size();
+  std::vector<Vec3> r(n), z(n), p(n), hp(n);
+  d.assign(n, Vec3::Zero());
+  for (std::size_t i = 0; i < n; ++i) r[i] = -gradient[i];
+  hessian.precondition(r, z);
+  p = z;
+  double rz = dot(r, z);
+  const double stop = options.cg_tolerance * options.cg_tolerance * rz;
+  int iteration = 0;
+  while (iteration < options.cg_max_iterations && rz > stop) {
+    ++iteration;
+    hessian.multiply(p, hp);
+    const double php = dot(p, hp);
+    if (!(php > 0)) break;
+    add_scaled(rz / php, p, d);
+    add_scaled(-rz / php, hp, r);
+    hessian.precondition(r, z);
+    const double next = dot(r, z);
+    const double beta = next / rz;
+    rz = next;
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < n; ++i) p[i] = z[i] + beta * p[i];
+  }
+  return iteration;
+}
+
+std::string describe(const char* form, double value) {
+  char text[128];
+  std::snprintf(text, sizeof text, form, value);
+  return text;
+}
+
+/// Cells of `now` that are not in `before` (both ascending).
+std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vector<Index>& now) {
+  std::vector<Index> result;
+  std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(result));
+  return result;
+}
+
+}  // namespace
+
+MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
+  constexpr double kArmijo = 1e-4;
+  constexpr int kMaxHalvings = 30, kDensePoints = 5;
+  MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
+  const std::size_t n = x.size();
+  BlockSparse hessian = problem.volume.pattern();
+  std::vector<Vec3> y = problem.nodes.apply(x), z = problem.samples.apply(x);
+  std::vector<Vec3> node_gradient(y.size()), sample_gradient(z.size()), gradient(n), from_samples(n), d, dy(y.size()),
+      dz(z.size()), y_trial(y.size()), z_trial(z.size());
+  std::vector<Index> uncertified = certify(y, *problem.mesh).not_certified;
+  int small_steps = 0;
+
+  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
+    IterationRecord record;
+    problem.surface.assign(z);
+    hessian.set_zero();
+    std::fill(node_gradient.begin(), node_gradient.end(), Vec3::Zero());
+    std::fill(sample_gradient.begin(), sample_gradient.end(), Vec3::Zero());
+    const double surface = problem.surface.value(z);
+    const double volume = problem.volume.add_hessian(y, problem.lambda, node_gradient, hessian);
+    const double energy = surface + problem.lambda * volume;
+    if (!std::isfinite(energy)) {
+      result.stop = MinimizerStop::no_step;
+      result.explanation = "the start has a cell that is inverted at a quadrature point";
+      return result;
+    }
+    problem.surface.add_gradient(z, sample_gradient);
+    problem.nodes_transposed.apply(node_gradient, gradient);
+    problem.samples_transposed.apply(sample_gradient, from_samples);
+    add_scaled(1, from_samples, gradient);
+
+    ReducedHessian reduced(problem, hessian);
+    record.linear_iterations = conjugate_gradients(reduced, gradient, options, d);
+    const double slope = dot(gradient, d);
+    if (!(slope < 0)) {
+      result.stop = MinimizerStop::converged;
+      result.explanation = "the gradient vanishes";
+      return result;
+    }
+    problem.nodes.apply(d, dy);
+    problem.samples.apply(d, dz);
+
+    double t = problem.volume.max_step(y, dy), trial = 0, trial_surface = 0, trial_volume = 0;
+    std::vector<Index> blocking, trial_uncertified;
+    bool accepted = false;
+    for (int halving = 0; halving < kMaxHalvings && !accepted; ++halving, t *= accepted ? 1 : 0.5) {
+      for (std::size_t i = 0; i < y.size(); ++i) y_trial[i] = y[i] + t * dy[i];
+      for (std::size_t i = 0; i < z.size(); ++i) z_trial[i] = z[i] + t * dz[i];
+      ++record.evaluations;
+      trial_surface = problem.surface.value(z_trial);
+      trial_volume = problem.volume.value(y_trial);
+      trial = trial_surface + problem.lambda * trial_volume;
+      if (!(trial <= energy + kArmijo * t * slope)) continue;
+      trial_uncertified = certify(y_trial, *problem.mesh).not_certified;
+      const std::vector<Index> failed = newly_failed(uncertified, trial_uncertified);
+      accepted = failed.empty();
+      blocking.insert(blocking.end(), failed.begin(), failed.end());
+    }
+    if (!blocking.empty()) problem.volume.densify(blocking, kDensePoints);
+    if (!accepted) {
+      result.stop = MinimizerStop::no_step;
+      result.explanation = "no step along the search direction decreases the energy";
+      return result;
+    }
+    add_scaled(t, d, x);
+    problem.nodes.apply(x, y);
+    problem.samples.apply(x, z);
+    uncertified = std::move(trial_uncertified);
+    record.surface_energy = trial_surface;
+    record.volume_energy = trial_volume;
+    record.step_length = t;
+    result.iterations.push_back(record);
+    if (options.progress && !options.progress(record)) {
+      result.stop = MinimizerStop::cancelled;
+      result.explanation = "stopped by the caller";
+      return result;
+    }
+    const double decrease = (energy - trial) / energy;
+    small_steps = decrease < options.relative_decrease ? small_steps + 1 : 0;
+    if (small_steps == 2) {
+      result.stop = MinimizerStop::converged;
+      result.explanation = describe("relative decrease of the energy %.2g in two steps running", decrease);
+      return result;
+    }
+  }
+  result.explanation = "iteration limit";
+  return result;
+}
+
+}  // namespace subvol
