@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/subdivision.h"
 
+#include "subvol/crease_sheets.h"
 #include "subvol/error.h"
 #include "subvol/mesh_topology.h"
 #include "subvol/surface_refinement.h"
@@ -131,6 +132,7 @@ class Refiner {
         boundary_(boundary_surface(mesh, topology_)),
         surface_vertex_(inverse(boundary_.vertices, mesh.num_vertices())),
         surface_edge_(inverse(boundary_.edges, topology_.num_edges())),
+        sheets_(mesh, topology_, boundary_),
         vertex_cells_(mesh.num_vertices(), mesh.num_cells(), [&](std::size_t c) { return mesh.cell(c); }),
         edge_cells_(topology_.num_edges(), mesh.num_cells(), [&](std::size_t c) { return topology_.cell_edges(c); }),
         face_cells_(topology_.num_faces(), mesh.num_cells(), [&](std::size_t c) { return topology_.cell_faces(c); }) {}
@@ -173,9 +175,9 @@ class Refiner {
   }
 
   template <class Vertices>
-  static void add_mean(const Vertices& vertices, RowBuilder& row) {
-    const double weight = 1.0 / static_cast<double>(std::size(vertices));
-    for (Index v : vertices) row.add(v, weight);
+  static void add_mean(const Vertices& vertices, RowBuilder& row, double weight = 1) {
+    const double share = weight / static_cast<double>(std::size(vertices));
+    for (Index v : vertices) row.add(v, share);
   }
 
   /// Mean of the masks that the cells around an entity have for it.
@@ -200,17 +202,23 @@ class Refiner {
   }
 
   void edge_row(Index e, RowBuilder& row) const {
-    if (surface_edge_[e] != kNoIndex)
+    if (surface_edge_[e] != kNoIndex) {
       add_edge_child(boundary_.topology, surface_edge_[e], {rule_, boundary_.vertices, row});
-    else
-      add_cell_mean(edge_cells_[e], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.edges[i]; }, row);
+      return;
+    }
+    const double sheet = sheets_.edge_share(e);
+    if (sheet > 0) sheets_.add_edge(e, sheet, row);
+    if (sheet < 1)
+      add_cell_mean(edge_cells_[e], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.edges[i]; },
+                    row);
   }
 
   void face_row(Index f, RowBuilder& row) const {
-    if (topology_.is_boundary_face(f))
-      add_mean(topology_.face(f), row);
-    else
-      add_cell_mean(face_cells_[f], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.faces[i]; }, row);
+    const double sheet = topology_.is_boundary_face(f) ? 1 : sheets_.face_share(f);
+    if (sheet > 0) add_mean(topology_.face(f), row, sheet);
+    if (sheet < 1)
+      add_cell_mean(face_cells_[f], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.faces[i]; },
+                    row);
   }
 
   const VolumeMesh& mesh_;
@@ -218,6 +226,7 @@ class Refiner {
   MeshTopology topology_;
   BoundarySurface boundary_;
   std::vector<Index> surface_vertex_, surface_edge_;
+  CreaseSheets sheets_;
   Incidence vertex_cells_, edge_cells_, face_cells_;
 };
 

@@ -247,6 +247,48 @@ TEST_CASE("renumbering the vertices moves the fine mesh by rounding only", "[sub
   CHECK(distance <= 1e-14 * 3);
 }
 
+TEST_CASE("cells around reflex creases stay positive level by level", "[subdivision]") {
+  struct Case {
+    VolumeMesh mesh;
+    double jitter;
+  };
+  for (const auto& [shape, amount] : {Case{l_shape(3), 0.1}, Case{fan(3, 330, 3), 0.1}, Case{fan(4, 270, 3), 0.1},
+                                      Case{fan(4, 320, 3), 0.1}, Case{fan(2, 250, 3), 0.1}})
+    for (double sharpness : {kInfiniteSharpness, 2.5, 1.3, 0.4}) {
+      VolumeMesh mesh = shape;
+      jitter(mesh, amount);
+      tag_creases(mesh, 40, sharpness);
+      REQUIRE(count_inverted(mesh) == 0);
+      for (int level = 1; level <= 3; ++level) {
+        mesh = subdivide(mesh).fine;
+        CAPTURE(shape.num_cells(), sharpness, level);
+        CHECK(count_inverted(mesh) == 0);
+      }
+    }
+}
+
+TEST_CASE("cells at the middle of a reflex crease keep their shape", "[subdivision]") {
+  // Rows far from the ends of a long crease: the fan of edges there must neither turn nor thin out. The middle sheets
+  // start askew, which is what the plain interior rows amplify.
+  VolumeMesh mesh = fan(3, 270, 8);
+  const Index layer = 8, ray = 1 + 2;  // second ray of each layer
+  for (int k = 0; k <= 8; ++k) {
+    Vec3& p = mesh.positions[layer * k + ray];
+    p = Vec3(p.x() * std::cos(0.6) + p.y() * std::sin(0.6), -p.x() * std::sin(0.6) + p.y() * std::cos(0.6), p.z());
+  }
+  tag_creases(mesh, 40);
+  const std::size_t cell = 3 * 4;  // first sector of layer 4: its corner 0 is in the middle of the crease
+  const double before = min_scaled_jacobian(mesh, cell);
+  REQUIRE(before > 0.2);
+  std::size_t child = cell;
+  for (int level = 1; level <= 4; ++level) {
+    VolumeMesh fine = subdivide(mesh).fine;
+    child = mesh.cell_offsets[child];  // the child of corner 0
+    CHECK(min_scaled_jacobian(fine, child) > 0.9 * before);
+    mesh = std::move(fine);
+  }
+}
+
 TEST_CASE("what cannot be subdivided is refused with its name", "[subdivision]") {
   CHECK_THROWS_AS(subdivide(VolumeMesh{}), InputError);
   VolumeMesh mesh = lattice(2, 1, 1);
