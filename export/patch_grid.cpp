@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/patch_grid.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+namespace subvol {
+namespace {
+
+using Node = std::array<int, 2>;
+using Quads = std::vector<std::array<Index, 4>>;
+
+Node halfway(const Node& a, const Node& b) { return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2}; }
+
+void fill(const Quads& quads, std::size_t quad, int levels, const std::array<Node, 4>& corners, PatchGrid& grid) {
+  if (levels == 0) {
+    for (int k = 0; k < 4; ++k) grid.at(corners[k][0], corners[k][1]) = quads[quad][k];
+    return;
+  }
+  const Node centre = halfway(corners[0], corners[2]);
+  for (int k = 0; k < 4; ++k) {
+    const Node after = halfway(corners[k], corners[(k + 1) % 4]), before = halfway(corners[(k + 3) % 4], corners[k]);
+    fill(quads, 4 * quad + k, levels - 1, {corners[k], after, centre, before}, grid);
+  }
+}
+
+double segment_distance2(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 ab = b - a;
+  const double length2 = ab.squaredNorm();
+  const double t = length2 > 0 ? std::clamp((p - a).dot(ab) / length2, 0.0, 1.0) : 0.0;
+  return (p - a - t * ab).squaredNorm();
+}
+
+/// A triangle prepared for many distances.
+class Triangle {
+ public:
+  Triangle(const Vec3& a, const Vec3& b, const Vec3& c) : corners_{a, b, c}, area_((b - a).cross(c - a)) {}
+
+  double distance2(const Vec3& p) const {
+    const double area2 = area_.squaredNorm();
+    bool inside = area2 > 0;
+    for (int k = 0; inside && k < 3; ++k) {
+      const Vec3 &a = corners_[k], &b = corners_[(k + 1) % 3];
+      inside = (b - a).cross(p - a).dot(area_) >= 0;
+    }
+    if (inside) {
+      const double height = (p - corners_[0]).dot(area_);
+      return height * height / area2;
+    }
+    double least = segment_distance2(p, corners_[2], corners_[0]);
+    for (int k = 0; k < 2; ++k) least = std::min(least, segment_distance2(p, corners_[k], corners_[k + 1]));
+    return least;
+  }
+
+ private:
+  std::array<Vec3, 3> corners_;
+  Vec3 area_;
+};
+
+}  // namespace
+
+PatchGrid patch_grid(const Quads& quads, std::size_t patch, int levels) {
+  PatchGrid grid;
+  grid.size = 1 << levels;
+  grid.nodes.resize(static_cast<std::size_t>(grid.size + 1) * (grid.size + 1));
+  const int n = grid.size;
+  fill(quads, patch, levels, {Node{0, 0}, Node{n, 0}, Node{n, n}, Node{0, n}}, grid);
+  return grid;
+}
+
+double chord_distance(const PatchGrid& grid, const std::vector<Vec3>& points, std::array<int, 2> steps) {
+  const auto point = [&](int i, int j) -> const Vec3& { return points[grid.at(i, j)]; };
+  double largest = 0;
+  for (int j0 = 0; j0 < grid.size; j0 += steps[1])
+    for (int i0 = 0; i0 < grid.size; i0 += steps[0]) {
+      const int i1 = i0 + steps[0], j1 = j0 + steps[1];
+      const Triangle lower(point(i0, j0), point(i1, j0), point(i1, j1));
+      const Triangle upper(point(i0, j0), point(i1, j1), point(i0, j1));
+      for (int j = j0; j <= j1; ++j)
+        for (int i = i0; i <= i1; ++i) {
+          const bool below = (i - i0) * steps[1] >= (j - j0) * steps[0];
+          largest = std::max(largest, (below ? lower : upper).distance2(point(i, j)));
+        }
+    }
+  return std::sqrt(largest);
+}
+
+}  // namespace subvol
