@@ -245,10 +245,9 @@ class VtkParser {
       const std::size_t components = read_count("the number of components"), n = read_count("the number of tuples");
       if (components > 0 && n > scan_.bytes_left() / components) scan_.fail("the file ends within an array");
       const std::string_view type_name = scan_.word("a data type");
-      if (lower_case(type_name) == "string" && !binary_) {
+      if (lower_case(type_name) == "string") {
         scan_.line();
-        for (std::size_t j = 0; j < components * n; ++j)
-          if (!scan_.line()) scan_.fail("the file ends within an array");
+        for (std::size_t j = 0; j < components * n; ++j) skip_string();
         continue;
       }
       const auto* type = std::find_if(std::begin(kVtkTypes), std::end(kVtkTypes),
@@ -260,6 +259,20 @@ class VtkParser {
       }
       read_array(n, components, type->type, references);
     }
+  }
+
+  /// A line in text; in binary its length in 1, 2, 4 or 8 bytes, as the top two bits say, then the characters.
+  void skip_string() {
+    if (!binary_) {
+      if (!scan_.line()) scan_.fail("the file ends within an array");
+      return;
+    }
+    const std::string_view first = scan_.bytes(1, "an array");
+    const auto lead = static_cast<unsigned char>(first[0]);
+    const std::size_t more = (std::size_t{1} << (3 - (lead >> 6))) - 1;
+    std::size_t length = lead & 63u;
+    for (const char c : scan_.bytes(more, "an array")) length = length << 8 | static_cast<unsigned char>(c);
+    scan_.bytes(length, "an array");
   }
 
   void read_array(std::size_t n, std::size_t components, ValueType type, std::vector<std::int64_t>* references) {
