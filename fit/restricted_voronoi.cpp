@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/restricted_voronoi.h"
+
+#include "fit/triangle_cutter.h"
+#include "subvol/error.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kChunk = 256;
+constexpr double kMaxLooseness = 2;  // of the tree's boxes, before it is built anew
+
+Vec3 box_centre(std::span<const Vec3> points) {
+  Vec3 low = points[0], high = points[0];
+  for (const Vec3& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return low + 0.5 * (high - low);
+}
+
+/// Positions relative to a centre, and the nearest site of each. The one before is a near-by start, no more.
+void locate(std::span<const Vec3> positions, const Vec3& centre, std::span<const Vec3> sites, const SiteTree& tree,
+            std::vector<Vec3>& moved, std::vector<Index>& nearest) {
+  moved.resize(positions.size());
+  nearest.resize(positions.size());
+  const std::size_t num_chunks = (positions.size() + kChunk - 1) / kChunk;
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
+    Index before = kNoIndex;
+    for (std::size_t i = chunk * kChunk; i < std::min(positions.size(), (chunk + 1) * kChunk); ++i) {
+      moved[i] = positions[i] - centre;
+      before = before == kNoIndex ? tree.nearest(moved[i]).site
+                                  : tree.nearest(moved[i], (sites[before] - moved[i]).squaredNorm()).site;
+      nearest[i] = before;
+    }
+  }
+}
+
+}  // namespace
+
+RestrictedVoronoi::RestrictedVoronoi(std::span<const Vec3> sites) {
+  if (sites.empty()) throw InputError("RestrictedVoronoi: sites must not be empty");
+  sites_.resize(sites.size());
+  update_sites(sites);
+}
+
+void RestrictedVoronoi::update_sites(std::span<const Vec3> sites) {
+  if (sites.size() != sites_.size()) throw InputError("RestrictedVoronoi::update_sites: the number of sites has changed");
+  for (const Vec3& s : sites)
+    if (!s.allFinite()) throw InputError("RestrictedVoronoi: sites must be finite");
+  centre_ = box_centre(sites);
+  for (std::size_t i = 0; i < sites.size(); ++i) sites_[i] = sites[i] - centre_;
+  if (tree_.num_sites() == sites_.size()) tree_.refit(sites_);
+  if (tree_.num_sites() != sites_.size() || tree_.looseness() > kMaxLooseness) tree_ = SiteTree(sites_);
+}
+
+Index RestrictedVoronoi::nearest_site(const Vec3& point) const { return tree_.nearest(point - centre_).site; }
+
+void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
+                                std::vector<VoronoiPiece>& pieces) const {
+  for (const auto& t : triangles)
+    for (Index v : t)
+      if (v < 0 || static_cast<std::size_t>(v) >= positions.size())
+        throw InputError("RestrictedVoronoi::compute: triangle corners must be in [0, positions.size())");
+  std::vector<Vec3> moved;
+  std::vector<Index> nearest;
+  locate(positions, centre_, sites_, tree_, moved, nearest);
+
+  const std::size_t num_chunks = (triangles.size() + kChunk - 1) / kChunk;
+  struct Segment {
+    int thread;
+    std::size_t begin, end, target;
+  };
+  std::vector<Segment> segments(num_chunks);
+  std::vector<std::vector<VoronoiPiece>> found(static_cast<std::size_t>(omp_get_max_threads()));
+#pragma omp parallel
+  {
+    const int thread = omp_get_thread_num();
+    std::vector<VoronoiPiece>& mine = omp_get_num_threads() == 1 ? pieces : found[thread];
+    mine.clear();
+    TriangleCutter cutter(sites_, tree_);
+#pragma omp for schedule(dynamic)
+    for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
+      segments[chunk] = {thread, mine.size(), 0, 0};
+      for (std::size_t t = chunk * kChunk; t < std::min(triangles.size(), (chunk + 1) * kChunk); ++t) {
+        const auto& v = triangles[t];
+        cutter.cut(static_cast<Index>(t), {moved[v[0]], moved[v[1]], moved[v[2]]},
+                   {nearest[v[0]], nearest[v[1]], nearest[v[2]]}, mine);
+      }
+      segments[chunk].end = mine.size();
+    }
+#pragma omp single
+    if (omp_get_num_threads() > 1) {
+      std::size_t total = 0;
+      for (Segment& s : segments) {
+        s.target = total;
+        total += s.end - s.begin;
+      }
+      pieces.resize(total);
+    }
+    if (omp_get_num_threads() > 1)
+#pragma omp for schedule(dynamic)
+      for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
+        const Segment& s = segments[chunk];
+        const auto from = found[s.thread].begin();
+        std::copy(from + static_cast<std::ptrdiff_t>(s.begin), from + static_cast<std::ptrdiff_t>(s.end),
+                  pieces.begin() + static_cast<std::ptrdiff_t>(s.target));
+      }
+  }
+}
+
+std::vector<VoronoiPiece> RestrictedVoronoi::compute(std::span<const Vec3> positions,
+                                                     std::span<const std::array<Index, 3>> triangles) const {
+  std::vector<VoronoiPiece> pieces;
+  compute(positions, triangles, pieces);
+  return pieces;
+}
+
+}  // namespace subvol

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/block_sparse.h"
+#include "fit/restricted_voronoi.h"
+#include "fit/target_surface.h"
+#include "subvol/types.h"
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Squared distance between the fitted surface S, known by samples z, and the target T; both ways, with frozen cells.
+///
+///   E_S = 1/(2 A L^2) (F_TS + F_ST),  L = V/A                                        Paper: Eq. 9
+///   F_TS = sum_i integral over Vor(z_i) cut with T   of (y - z_i)^T M(y) (y - z_i) dy
+///   F_ST = sum_j integral over Vor(y_j) cut with S~  of (x - y_j)^T M(y_j) (x - y_j) dx
+///   M = n n^T + tau (I - n n^T),  n: unit normal of T's triangle at y, or of the one that y_j was sampled from
+///
+/// A, V, y_j   area, enclosed volume and samples of the target.
+/// S~          triangles between samples; x moves linearly with their corners.
+/// tau         tangential weight in [0, 1]: small where the surfaces are close, so that samples slide along T.
+///
+/// `assign` finds the cells and freezes them: which site every point belongs to, by its barycentric coordinates in its
+/// triangle, and dx. E_S is then a quadratic in z, whose gradient is that of the moving cells for F_TS's cells at tau = 1,
+/// and to the order of the squared distance for the rest. Dimensionless, >= 0, invariant under similarities of both
+/// surfaces. Results have the same bits for any number of threads.
+class SurfaceEnergy {
+ public:
+  /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1].
+  SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles, std::size_t num_samples,
+                double tangential_weight);
+
+  /// Takes the samples' positions (num_samples, finite, else InputError), finds their cells, freezes them. Must come
+  /// before the functions below. Cost: nearly all of a fit's surface part; see `RestrictedVoronoi::compute`.
+  void assign(std::span<const Vec3> samples);
+
+  /// E_S(z) with the frozen cells. Taken relative to the assigned samples, so differences of close-by values are good.
+  double value(std::span<const Vec3> z) const;
+  /// g += dE_S/dz, with the frozen cells: per sample, in 1/length. One product with the Hessian.
+  void add_gradient(std::span<const Vec3> z, std::span<Vec3> g) const;
+  /// d2E_S/dz2, constant between assignments; positive semidefinite but for single precision. Couples the corners of a
+  /// sample triangle; every row has its diagonal block.
+  const BlockSparse& hessian() const { return hessian_; }
+
+  /// The two parts of E_S at the assigned samples.
+  double target_to_surface() const { return target_to_surface_; }
+  double surface_to_target() const { return surface_to_target_; }
+  std::size_t num_samples() const { return incidence_offsets_.size() - 1; }
+  double tangential_weight() const { return tau_; }
+
+ private:
+  struct Row;
+  /// One corner of a sample triangle, seen from the sample there: where its blocks go in the sample's row.
+  struct Incidence {
+    Index triangle;
+    int corner;
+    std::array<Index, 3> entries;
+  };
+
+  void index_pieces();
+  void add_target_pieces(std::size_t sample, Row& row) const;
+  void add_sample_pieces(std::size_t sample, Row& row) const;
+  /// Row i of H (z - assigned samples).
+  Vec3 hessian_times_step(std::span<const Vec3> z, std::size_t i) const;
+
+  const TargetSurface* target_;
+  std::vector<std::array<Index, 3>> triangles_;
+  double tau_, scale_;
+  RestrictedVoronoi target_sites_;
+  std::optional<RestrictedVoronoi> sample_sites_;
+  std::vector<std::size_t> incidence_offsets_;
+  std::vector<Incidence> incidences_;
+
+  std::vector<VoronoiPiece> target_pieces_, sample_pieces_;  ///< of T's triangles; of S~'s
+  std::vector<std::size_t> site_offsets_, triangle_offsets_;
+  std::vector<Index> site_pieces_;                           ///< numbers of `target_pieces_`, by site
+  std::vector<double> triangle_areas_;
+
+  std::vector<Vec3> assigned_, gradient_;
+  BlockSparse hessian_;
+  double target_to_surface_ = 0, surface_to_target_ = 0;
+};
+
+}  // namespace subvol

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/restricted_voronoi.h"
+
+namespace subvol {
+
+/// Cuts one triangle after the other by the Voronoi cells of sites: the inner loop of `RestrictedVoronoi`.
+///
+/// A point of the triangle is its barycentric coordinates l. For a site s with corners' values
+///
+///   e_s[k] = |p_k - s|^2 - |p_k - r|^2                             (r: the triangle's first site)
+///
+/// the difference of squared distances |p - a|^2 - |p - b|^2 is the linear function l . (e_a - e_b): cells are where
+/// l . e_s is lowest. Every corner of a part carries the site found nearest to it.
+///
+/// Why it ends: a part is cut by the bisector of c and b only where b is lower than c by more than rounding at a corner.
+/// In the one half c is then nowhere higher than b at any corner, old or new (the function is linear), in the other
+/// nowhere lower; so on no branch is a pair of sites used twice.
+class TriangleCutter {
+ public:
+  /// Both must outlive the cutter. Cost: one integer per site.
+  TriangleCutter(std::span<const Vec3> sites, const SiteTree& tree);
+
+  /// Appends the pieces of the triangle with the given corners, whose nearest sites are given.
+  void cut(Index triangle, const std::array<Vec3, 3>& positions, const std::array<Index, 3>& nearest,
+           std::vector<VoronoiPiece>& pieces);
+
+ private:
+  using Barycentric = std::array<double, 3>;
+  struct Corner {
+    Barycentric at;
+    int slot;
+  };
+  struct Slot {
+    Index site;
+    Barycentric value;  ///< e_s
+    double noise;       ///< bound on the rounding errors of l . e_s
+    std::array<double, 6> moments;
+  };
+
+  int slot_of(Index site);
+  double value(int slot, const Barycentric& at) const;
+  /// How much lower than slot c the corner's own site is at the corner, beyond rounding.
+  double violation(int c, const Corner& corner) const;
+  /// The site whose cell holds the part on top of the stack; or none, and the pair of sites to cut it by.
+  bool inside_one_cell(int& c, int& b) const;
+  void split(int c, int b);
+  /// Where edge ij of `polygon_` meets the bisector; slot -1 where c and b are nearest.
+  Corner crossing(std::size_t i, std::size_t j, int c, int b);
+  int nearest_slot(const Barycentric& at, int c, int b);
+  void integrate(int slot);
+  void emit(Index triangle, std::vector<VoronoiPiece>& pieces);
+
+  std::span<const Corner> top() const { return {corners_.data() + parts_.back(), corners_.size() - parts_.back()}; }
+
+  std::span<const Vec3> sites_;
+  const SiteTree& tree_;
+  std::vector<int> slot_of_site_;
+  std::vector<Slot> slots_;
+  std::vector<int> slot_order_;
+  std::vector<Corner> corners_;        ///< of the parts still to do, one part after the other
+  std::vector<std::size_t> parts_;     ///< where each begins
+  std::vector<Corner> polygon_;
+  std::vector<double> height_;
+  std::array<Vec3, 3> positions_;
+};
+
+}  // namespace subvol

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/target_surface.h"
+
+#include "fit/enclosed_volume.h"
+#include "subvol/error.h"
+#include "tests/surface_fixtures.h"
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+
+using namespace subvol;
+using namespace subvol::test;
+
+namespace {
+
+/// Every triangle with corners of its own.
+TriangleMesh soup_of(const TriangleMesh& mesh) {
+  TriangleMesh soup;
+  for (const auto& t : mesh.triangles) {
+    const auto v = static_cast<Index>(soup.positions.size());
+    for (Index corner : t) soup.positions.push_back(mesh.positions[corner]);
+    soup.triangles.push_back({v, v + 1, v + 2});
+  }
+  return soup;
+}
+
+}  // namespace
+
+TEST_CASE("a closed target has its area, volume, length and box") {
+  TriangleMesh mesh = cube_surface(4, false);
+  for (Vec3& p : mesh.positions) p += Vec3(1e4, 0, 0);
+  const TargetSurface target(mesh);
+  CHECK(target.area() == Approx(24));
+  CHECK(target.volume() == Approx(8));
+  CHECK(target.volume_source() == VolumeSource::signed_sum);
+  CHECK(target.length() == Approx(1. / 3));
+  CHECK(target.diagonal() == Approx(std::sqrt(12.)));
+  CHECK((target.centre() - Vec3(1e4, 0, 0)).norm() < 1e-9);
+  for (std::size_t t = 0; t < target.triangles().size(); ++t)
+    REQUIRE(target.normals()[t].dot(target.samples()[t] - target.centre()) == Approx(1));
+}
+
+TEST_CASE("a soup of a closed surface has the same volume, inside out or not") {
+  TriangleMesh mesh = soup_of(cube_surface(4, false));
+  CHECK(TargetSurface(mesh).volume() == Approx(8));
+  for (auto& t : mesh.triangles) std::swap(t[0], t[1]);
+  CHECK(TargetSurface(mesh).volume() == Approx(8));
+}
+
+TEST_CASE("triangles turned over: the volume comes from flooding a grid") {
+  TriangleMesh mesh = cube_surface(16, true);
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 2) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
+  const TargetSurface target(mesh);
+  CHECK(target.volume_source() == VolumeSource::flood);
+  CHECK(target.volume() == Approx(4 * std::numbers::pi / 3).epsilon(0.03));
+}
+
+TEST_CASE("a surface that encloses nothing still has a volume to scale by") {
+  const TriangleMesh square{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0)}, {{0, 1, 2}, {0, 2, 3}}};
+  const TargetSurface target(square);
+  CHECK(target.volume_source() == VolumeSource::isoperimetric);
+  CHECK(target.volume() == Approx(1 / std::sqrt(std::numbers::pi) / 12));
+}
+
+TEST_CASE("the flood's volume converges to the enclosed one") {
+  const TriangleMesh mesh = cube_surface(32, true);
+  const double exact = signed_volume(mesh.positions, mesh.triangles);
+  for (int resolution : {16, 32, 64}) {
+    const double error = flooded_volume(mesh.positions, mesh.triangles, resolution) / exact - 1;
+    CHECK(std::abs(error) < 1.5 / resolution);
+  }
+}
+
+TEST_CASE("closed_share counts half-edges without a partner") {
+  const TriangleMesh mesh = cube_surface(2, false);
+  CHECK(closed_share(mesh.positions, mesh.triangles) == 1);
+  auto open = mesh.triangles;
+  open.pop_back();
+  const double num_edges = 3.0 * static_cast<double>(open.size());
+  CHECK(closed_share(mesh.positions, open) == Approx((num_edges - 3) / num_edges));
+}
+
+TEST_CASE("triangles without area are dropped, positions of no triangle are ignored") {
+  TriangleMesh mesh = cube_surface(2, false);
+  mesh.triangles.insert(mesh.triangles.begin(), {0, 0, 1});
+  mesh.positions.push_back(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  const TargetSurface target(mesh);
+  CHECK(target.triangles().size() == mesh.triangles.size() - 1);
+  CHECK(target.diagonal() == Approx(std::sqrt(12.)));
+}
+
+TEST_CASE("samples are barycentres, or those of parts no longer than the spacing") {
+  const TriangleMesh mesh = cube_surface(2, false);
+  CHECK(TargetSurface(mesh).samples().size() == mesh.triangles.size());
+  const TargetSurface target(mesh, {.sample_spacing = 0.3});
+  CHECK(target.samples().size() > 16 * mesh.triangles.size());
+  REQUIRE(target.samples().size() == target.sample_triangles().size());
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t j = 0; j < target.samples().size(); ++j) {
+    const auto& t = target.triangles()[target.sample_triangles()[j]];
+    REQUIRE(std::abs((target.samples()[j] - mesh.positions[t[0]]).dot(target.normals()[target.sample_triangles()[j]])) <
+            1e-15);
+    mean += target.samples()[j];
+  }
+  CHECK((mean / static_cast<double>(target.samples().size())).norm() < 1e-12);
+}
+
+TEST_CASE("what TargetSurface refuses") {
+  const TriangleMesh mesh = cube_surface(2, false);
+  CHECK_THROWS_AS(TargetSurface(TriangleMesh{}), InputError);
+  CHECK_THROWS_AS(TargetSurface(TriangleMesh{mesh.positions, {{0, 0, 1}}}), InputError);
+  CHECK_THROWS_AS(TargetSurface(TriangleMesh{mesh.positions, {{0, 1, 10000}}}), InputError);
+  CHECK_THROWS_AS(TargetSurface(mesh, {.sample_spacing = -1}), InputError);
+  TriangleMesh bad = mesh;
+  bad.positions[3][1] = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(TargetSurface(bad), InputError);
+}
