@@ -16,8 +16,19 @@ struct Chains {
   std::vector<Index> head, next;
 };
 
+/// Ascending, with kNoIndex last.
 std::array<Index, 4> sorted_corners(std::array<Index, 4> corners, int size) {
-  std::sort(corners.begin(), corners.begin() + size);
+  const auto order = [&](int i, int j) {
+    if (corners[i] > corners[j]) std::swap(corners[i], corners[j]);
+  };
+  order(0, 1);
+  if (size == 4) {
+    order(2, 3);
+    order(0, 2);
+    order(1, 3);
+  }
+  order(1, 2);
+  if (size == 3) order(0, 1);
   return corners;
 }
 
@@ -29,9 +40,18 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
   cell_face_offsets_.assign(1, 0);
   cell_edge_offsets_.reserve(num_cells + 1);
   cell_face_offsets_.reserve(num_cells + 1);
+  cell_edges_.reserve(12 * num_cells);  // what hexes need; reserved memory that is not touched costs nothing
+  cell_faces_.reserve(6 * num_cells);
+  edges_.reserve(4 * num_cells);
+  edge_cell_counts_.reserve(4 * num_cells);
+  face_vertices_.reserve(4 * num_cells);
+  face_cells_.reserve(4 * num_cells);
 
   Chains edge_chains(num_vertices_), face_chains(num_vertices_);
   std::vector<std::array<Index, 4>> face_keys;
+  face_keys.reserve(4 * num_cells);
+  edge_chains.next.reserve(4 * num_cells);
+  face_chains.next.reserve(4 * num_cells);
   for (std::size_t c = 0; c < num_cells; ++c) {
     const CellTopology& topology = cell_topology(mesh.kinds[c]);
     const std::span<const Index> cell = mesh.cell(c);

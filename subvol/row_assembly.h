@@ -4,6 +4,7 @@
 #include "subvol/sparse_map.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -61,47 +62,47 @@ class RowBuilder {
 
 /// Builds a map row by row, in parallel: fill(i, builder) adds the weights of row i.
 ///
-/// `fill` must depend on i only. Chunks of rows are independent, so the result does not depend on the thread count.
+/// `fill` must depend on i only and not throw. Chunks of rows are independent and joined in order, so the result does
+/// not depend on the thread count.
 template <class Fill>
 SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill) {
-  constexpr std::size_t kChunkRows = 4096;
+  constexpr std::size_t kChunkRows = 1024, kWaveChunks = 8;
+  constexpr std::size_t kExpectedRowSize = 16;  // what is reserved and not used costs address space only
   struct Chunk {
     std::vector<Index> columns;
     std::vector<double> values;
   };
-  const std::size_t num_chunks = (num_rows + kChunkRows - 1) / kChunkRows;
-  std::vector<Chunk> chunks(num_chunks);
+  std::array<Chunk, kWaveChunks> chunks;  // used again by every wave: fresh memory is what costs most here
   SparseMap map;
   map.num_cols = num_cols;
   map.offsets.resize(num_rows + 1);
   map.offsets[0] = 0;
-#pragma omp parallel if (num_chunks > 1)
+  map.columns.reserve(kExpectedRowSize * num_rows);
+  map.values.reserve(kExpectedRowSize * num_rows);
+#pragma omp parallel if (num_rows > kChunkRows)
   {
     RowBuilder row(num_cols);
-    Chunk scratch;
+    for (std::size_t wave = 0; wave < num_rows; wave += kWaveChunks * kChunkRows) {
 #pragma omp for schedule(dynamic)
-    for (std::size_t c = 0; c < num_chunks; ++c) {
-      scratch.columns.clear();
-      scratch.values.clear();
-      for (std::size_t i = c * kChunkRows; i < std::min(num_rows, (c + 1) * kChunkRows); ++i) {
-        fill(i, row);
-        row.flush(scratch.columns, scratch.values);
-        map.offsets[i + 1] = scratch.columns.size();
+      for (std::size_t c = 0; c < kWaveChunks; ++c) {
+        Chunk& chunk = chunks[c];
+        chunk.columns.clear();
+        chunk.values.clear();
+        const std::size_t first = std::min(num_rows, wave + c * kChunkRows);
+        for (std::size_t i = first; i < std::min(num_rows, first + kChunkRows); ++i) {
+          fill(i, row);
+          row.flush(chunk.columns, chunk.values);
+          map.offsets[i + 1] = chunk.columns.size();
+        }
       }
-      chunks[c] = scratch;
+#pragma omp single
+      for (std::size_t c = 0; c < kWaveChunks; ++c) {
+        const std::size_t start = map.columns.size(), first = std::min(num_rows, wave + c * kChunkRows);
+        for (std::size_t i = first; i < std::min(num_rows, first + kChunkRows); ++i) map.offsets[i + 1] += start;
+        map.columns.insert(map.columns.end(), chunks[c].columns.begin(), chunks[c].columns.end());
+        map.values.insert(map.values.end(), chunks[c].values.begin(), chunks[c].values.end());
+      }
     }
-  }
-  std::vector<std::size_t> starts(num_chunks + 1, 0);
-  for (std::size_t c = 0; c < num_chunks; ++c) starts[c + 1] = starts[c] + chunks[c].columns.size();
-  map.columns.resize(starts.back());
-  map.values.resize(starts.back());
-#pragma omp parallel for schedule(static) if (num_chunks > 1)
-  for (std::size_t c = 0; c < num_chunks; ++c) {
-    for (std::size_t i = c * kChunkRows; i < std::min(num_rows, (c + 1) * kChunkRows); ++i)
-      map.offsets[i + 1] += starts[c];
-    std::copy(chunks[c].columns.begin(), chunks[c].columns.end(), map.columns.begin() + starts[c]);
-    std::copy(chunks[c].values.begin(), chunks[c].values.end(), map.values.begin() + starts[c]);
-    chunks[c] = {};
   }
   return map;
 }
