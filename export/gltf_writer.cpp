@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/gltf_writer.h"
 
+#include "export/text_format.h"
 #include "subvol/atomic_file.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
@@ -284,7 +285,7 @@ std::string gltf_bytes(const Scene& scene, GltfContainer container) {
 }
 
 void write_gltf(const std::filesystem::path& path, const Scene& scene) {
-  const auto extension = path.extension();
+  const std::string extension = lower_case_extension(path);
   if (extension != ".glb" && extension != ".gltf")
     throw InputError(path.string() + ": expected the extension .glb or .gltf");
   write_file_atomically(path, gltf_bytes(scene, extension == ".glb" ? GltfContainer::glb : GltfContainer::gltf));

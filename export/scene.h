@@ -24,11 +24,11 @@ struct SceneAttribute {
 struct ScenePrimitive {
   enum class Topology { triangles, lines };
   Topology topology = Topology::triangles;
-  std::vector<Vec3> positions;             ///< world positions, in the mesh's length unit
-  std::vector<Vec3> normals;               ///< unit, one per position; or empty
-  std::vector<LinearColor> colors;         ///< one per position; or empty
-  std::vector<SceneAttribute> attributes;  ///< each one value per position
-  std::vector<Index> indices;              ///< 3 per triangle (a quad's two stand one after the other), 2 per segment
+  std::vector<Vec3> positions{};           ///< world positions, in the mesh's length unit
+  std::vector<Vec3> normals{};             ///< unit, one per position; or empty
+  std::vector<LinearColor> colors{};       ///< one per position; or empty
+  std::vector<SceneAttribute> attributes{};///< each one value per position
+  std::vector<Index> indices{};            ///< 3 per triangle (a quad's two stand one after the other), 2 per segment
   LinearColor material_color{1, 1, 1, 1};  ///< multiplies `colors`
 };
 
@@ -50,13 +50,13 @@ enum class UpAxis { y, z };
 /// Nodes hang below one root node, which scales mesh units to metres, turns z up into y up where asked, and moves by
 /// `origin`; positions are written relative to `origin`, so that single precision keeps its digits far from zero.
 struct Scene {
-  std::string name;               ///< of the root node
-  std::vector<SceneNode> nodes;
+  std::string name{};             ///< of the root node
+  std::vector<SceneNode> nodes{};
   Vec3 origin = Vec3::Zero();     ///< mesh units; the middle of the bounding box is a good choice
   double metres_per_unit = 1;     ///< > 0
   UpAxis up_axis = UpAxis::y;     ///< default: axes are taken over as they are; z: the root turns -90 degrees about x
-  SceneValues extras;             ///< source, colour map, ...; unit, up_axis and version are added by the writer
-  SceneValues options;            ///< the options in force, written as extras.options
+  SceneValues extras{};           ///< source, colour map, ...; unit, up_axis and version are added by the writer
+  SceneValues options{};          ///< the options in force, written as extras.options
 };
 
 }  // namespace subvol

@@ -21,6 +21,13 @@ void append_vector(std::string& text, const Vec3& vector, const char* separator)
   }
 }
 
+std::string lower_case_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
+  return extension;
+}
+
 void require_polygons(const PolygonMesh& mesh, const std::string& what) {
   if (mesh.face_offsets.size() < 2) throw InputError(what + ": expected at least one face");
   if (mesh.face_offsets.front() != 0 || mesh.face_offsets.back() != mesh.face_vertices.size())

@@ -4,6 +4,7 @@
 #include "subvol/triangle_mesh.h"
 
 #include <concepts>
+#include <filesystem>
 #include <string>
 
 namespace subvol {
@@ -14,6 +15,9 @@ void append_number(std::string& text, std::integral auto value) { text += std::t
 
 /// Appends three numbers with a separator between them.
 void append_vector(std::string& text, const Vec3& vector, const char* separator);
+
+/// The extension with its dot, capitals lowered.
+std::string lower_case_extension(const std::filesystem::path& path);
 
 /// Throws InputError, naming `what`, unless there are faces, each of at least three corners, all in range, and all
 /// positions are finite.

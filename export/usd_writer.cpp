@@ -169,7 +169,7 @@ std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const Usd
 
 void write_usd(const std::filesystem::path& path, const PolygonMesh& cage, const FeatureTags& tags,
                const UsdOptions& options) {
-  if (path.extension() != ".usda") throw InputError(path.string() + ": expected the extension .usda");
+  if (lower_case_extension(path) != ".usda") throw InputError(path.string() + ": expected the extension .usda");
   write_file_atomically(path, usd_text(cage, tags, options));
 }
 

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/export.h"
+
+#include "export/color_map.h"
+#include "export/polygon_shading.h"
+#include "fit/quality.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+#include "subvol/limit_surface.h"
+#include "subvol/mesh_topology.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace subvol {
+namespace {
+
+constexpr LinearColor kWireColor{0.01, 0.01, 0.01, 1};
+constexpr LinearColor kPlainColor{0.6, 0.6, 0.6, 1};
+
+using Segments = std::vector<std::array<Index, 2>>;
+
+Eigen::AlignedBox3d bounding_box(std::span<const Vec3> positions) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : positions) box.extend(p);
+  return box;
+}
+
+/// Lines over vertices of their own.
+ScenePrimitive wire_primitive(const std::vector<Vec3>& positions, const Segments& segments) {
+  ScenePrimitive wire;
+  wire.topology = ScenePrimitive::Topology::lines;
+  wire.material_color = kWireColor;
+  std::vector<Index> number(positions.size(), kNoIndex);
+  for (const auto& segment : segments)
+    for (const Index v : segment) {
+      if (number[v] == kNoIndex) {
+        number[v] = static_cast<Index>(wire.positions.size());
+        wire.positions.push_back(positions[v]);
+      }
+      wire.indices.push_back(number[v]);
+    }
+  return wire;
+}
+
+void color_by_quality(ScenePrimitive& surface, std::vector<double> vertex_quality) {
+  surface.colors.reserve(vertex_quality.size());
+  for (const double quality : vertex_quality) surface.colors.push_back(quality_color(quality));
+  surface.attributes.push_back({"_SCALED_JACOBIAN", std::move(vertex_quality)});
+}
+
+Scene make_scene(ScenePrimitive surface, const Segments& wires, const SurfaceSceneOptions& options) {
+  Scene scene{.name = options.name,
+              .metres_per_unit = options.metres_per_unit,
+              .up_axis = options.up_axis,
+              .options = options.options};
+  const Eigen::AlignedBox3d box = bounding_box(surface.positions);
+  if (!box.isEmpty()) scene.origin = box.center();
+  if (!options.source.empty()) scene.extras.emplace_back("source", options.source);
+  if (surface.colors.empty())
+    surface.material_color = kPlainColor;
+  else
+    scene.extras.emplace_back("colour_map", kQualityColorMap);
+  ScenePrimitive wire = options.wireframe ? wire_primitive(surface.positions, wires) : ScenePrimitive{};
+  scene.nodes.push_back({"surface", std::move(surface)});
+  if (options.wireframe) scene.nodes.push_back({"wireframe", std::move(wire)});
+  return scene;
+}
+
+/// The cell of every boundary face and the local numbers of the face's corners in it.
+struct BoundaryFaceCell {
+  Index cell;
+  std::array<int, 4> corners;
+};
+
+std::vector<BoundaryFaceCell> boundary_face_cells(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  std::vector<BoundaryFaceCell> found;
+  for (const Index f : topology.boundary_faces()) {
+    BoundaryFaceCell entry{topology.face_cells(f)[0], {}};
+    const auto cell = mesh.cell(entry.cell);
+    const auto face = topology.face(f);
+    for (std::size_t k = 0; k < face.size(); ++k)
+      entry.corners[k] = static_cast<int>(std::find(cell.begin(), cell.end(), face[k]) - cell.begin());
+    found.push_back(entry);
+  }
+  return found;
+}
+
+}  // namespace
+
+double chord_length(const VolumeMesh& cage, const SurfaceSceneOptions& options) {
+  if (!(options.max_chord_percent > 0)) throw InputError("max_chord_percent: expected a positive number");
+  const BoundaryRefinement boundary = refine_boundary(cage, 0);
+  return options.max_chord_percent / 100 * bounding_box(boundary.positions.apply(cage.positions)).diagonal().norm();
+}
+
+std::vector<double> patch_quality(const VolumeMesh& cage, const TessellatedSurface& surface,
+                                  std::span<const double> finest_cell_minima) {
+  const std::size_t num_cells = finest_cell_minima.size(), num_children = cage.cell_vertices.size();
+  std::size_t per_child = 1;  // cells of the finest mesh below one child of the cage; 0: it is the cage itself
+  if (num_cells == cage.num_cells()) per_child = 0;
+  while (per_child > 0 && num_children * per_child < num_cells) per_child *= 8;
+  if (per_child > 0 && num_children * per_child != num_cells)
+    throw InputError("finest: expected " + std::to_string(cage.num_cells()) + " cells, or " +
+                     std::to_string(num_children) + " times a power of 8, got " + std::to_string(num_cells));
+  const std::vector<BoundaryFaceCell> face_cells = boundary_face_cells(cage);
+  std::vector<double> quality;
+  for (const SurfacePatch& patch : surface.patches) {
+    const BoundaryFaceCell& face = face_cells.at(patch.face);
+    const std::size_t child = cage.cell_offsets[face.cell] + face.corners[patch.corner];
+    const auto below = per_child > 0 ? finest_cell_minima.subspan(child * per_child, per_child)
+                                     : finest_cell_minima.subspan(face.cell, 1);
+    quality.push_back(*std::min_element(below.begin(), below.end()));
+  }
+  return quality;
+}
+
+Scene surface_scene(const TessellatedSurface& surface, std::span<const double> patch_quality,
+                    const SurfaceSceneOptions& options) {
+  if (!patch_quality.empty() && patch_quality.size() != surface.patches.size())
+    throw InputError("patch_quality: expected one value per patch");
+  ScenePrimitive primitive;
+  primitive.positions = surface.positions;
+  primitive.normals = surface.normals;
+  for (const auto& [a, b, c, d] : surface.quads)
+    primitive.indices.insert(primitive.indices.end(), {a, b, c, a, c, d});
+  if (!patch_quality.empty()) {
+    std::vector<double> quality(surface.positions.size(), 1);
+    for (std::size_t q = 0; q < surface.quads.size(); ++q)
+      for (const Index v : surface.quads[q]) quality[v] = std::min(quality[v], patch_quality[surface.quad_patches[q]]);
+    color_by_quality(primitive, std::move(quality));
+  }
+  Scene scene = make_scene(std::move(primitive), surface.wireframe, options);
+  scene.extras.emplace_back("chord_error", surface.chord_error);
+  return scene;
+}
+
+Scene surface_scene(const VolumeMesh& cage, const VolumeMesh* finest, const SurfaceSceneOptions& options) {
+  const TessellatedSurface surface = tessellate(cage, chord_length(cage, options));
+  const QualityReport quality = measure_quality(finest ? *finest : cage);
+  return surface_scene(surface, patch_quality(cage, surface, quality.cell_minima), options);
+}
+
+Scene polygon_scene(const PolygonMesh& mesh, std::span<const double> face_quality, const SurfaceSceneOptions& options) {
+  const ShadedPolygons shaded = shade_polygons(mesh, options.crease_angle_degrees);
+  if (!face_quality.empty() && face_quality.size() != mesh.num_faces())
+    throw InputError("face_quality: expected one value per face");
+  // Cut by shaded vertices, so that the triangles name those.
+  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices};
+  ScenePrimitive primitive;
+  primitive.positions = shaded.positions;
+  primitive.normals = shaded.normals;
+  for (const auto& triangle : triangulate(split).triangles)
+    primitive.indices.insert(primitive.indices.end(), triangle.begin(), triangle.end());
+  Segments wires;
+  std::set<std::pair<Index, Index>> drawn;
+  std::vector<double> quality(shaded.positions.size(), 1);
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+    for (std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1], k = begin; k < end; ++k) {
+      const std::size_t next = k + 1 < end ? k + 1 : begin;
+      if (drawn.insert(std::minmax(mesh.face_vertices[k], mesh.face_vertices[next])).second)
+        wires.push_back({shaded.corner_vertices[k], shaded.corner_vertices[next]});
+      if (!face_quality.empty()) {
+        double& value = quality[shaded.corner_vertices[k]];
+        value = std::min(value, face_quality[f]);
+      }
+    }
+  if (!face_quality.empty()) color_by_quality(primitive, std::move(quality));
+  return make_scene(std::move(primitive), wires, options);
+}
+
+Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options) {
+  const MeshTopology topology(mesh);
+  const QualityReport quality = measure_quality(mesh);
+  std::vector<double> face_quality;
+  for (const Index f : topology.boundary_faces()) face_quality.push_back(quality.cell_minima[topology.face_cells(f)[0]]);
+  return polygon_scene(boundary_surface(mesh, topology, nullptr), face_quality, options);
+}
+
+}  // namespace subvol

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/polygon_shading.h"
+
+#include "export/text_format.h"
+#include "subvol/error.h"
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <numbers>
+
+namespace subvol {
+namespace {
+
+struct Corner {
+  std::size_t entry;   ///< in face_vertices
+  std::size_t face;
+  Index before, after; ///< the neighbours on the face
+};
+
+std::vector<std::vector<Corner>> corners_of_vertices(const PolygonMesh& mesh) {
+  std::vector<std::vector<Corner>> corners(mesh.positions.size());
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+    for (std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1], k = begin; k < end; ++k)
+      corners[mesh.face_vertices[k]].push_back({k, f, mesh.face_vertices[k == begin ? end - 1 : k - 1],
+                                                mesh.face_vertices[k + 1 == end ? begin : k + 1]});
+  return corners;
+}
+
+std::vector<Vec3> area_vectors(const PolygonMesh& mesh) {
+  std::vector<Vec3> areas(mesh.num_faces(), Vec3::Zero());
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
+    const Vec3& first = mesh.positions[mesh.face_vertices[mesh.face_offsets[f]]];
+    for (std::size_t k = mesh.face_offsets[f] + 1; k + 1 < mesh.face_offsets[f + 1]; ++k)
+      areas[f] += (mesh.positions[mesh.face_vertices[k]] - first)
+                      .cross(mesh.positions[mesh.face_vertices[k + 1]] - first) / 2;
+  }
+  return areas;
+}
+
+bool share_edge(const Corner& a, const Corner& b) {
+  return a.before == b.after || a.after == b.before || a.before == b.before || a.after == b.after;
+}
+
+/// The first corner of the group of each corner: groups grow over smooth edges.
+std::vector<std::size_t> smooth_groups(const std::vector<Corner>& corners, const std::vector<Vec3>& areas,
+                                       double cos_angle) {
+  std::vector<std::size_t> group(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    group[i] = i;
+    for (std::size_t j = 0; j < i; ++j) {
+      const Vec3 &a = areas[corners[i].face], &b = areas[corners[j].face];
+      if (group[i] == group[j] || !share_edge(corners[i], corners[j]) || !(a.dot(b) > cos_angle * a.norm() * b.norm()))
+        continue;
+      const std::size_t keep = std::min(group[i], group[j]), drop = std::max(group[i], group[j]);
+      for (std::size_t k = 0; k <= i; ++k)
+        if (group[k] == drop) group[k] = keep;
+    }
+  }
+  return group;
+}
+
+}  // namespace
+
+ShadedPolygons shade_polygons(const PolygonMesh& mesh, double crease_angle_degrees) {
+  if (!(crease_angle_degrees >= 0 && crease_angle_degrees <= 180))
+    throw InputError("shade_polygons: crease_angle_degrees: expected 0 to 180");
+  require_polygons(mesh, "shade_polygons");
+  const double cos_angle = std::cos(crease_angle_degrees * std::numbers::pi / 180);
+  const std::vector<Vec3> areas = area_vectors(mesh);
+  ShadedPolygons shaded;
+  shaded.corner_vertices.resize(mesh.face_vertices.size());
+  const auto corners_of = corners_of_vertices(mesh);
+  for (std::size_t v = 0; v < corners_of.size(); ++v) {
+    const std::vector<Corner>& corners = corners_of[v];
+    const std::vector<std::size_t> group = smooth_groups(corners, areas, cos_angle);
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      if (group[i] == i) {
+        shaded.corner_vertices[corners[i].entry] = static_cast<Index>(shaded.positions.size());
+        shaded.positions.push_back(mesh.positions[v]);
+        shaded.normals.push_back(Vec3::Zero());
+      } else {
+        shaded.corner_vertices[corners[i].entry] = shaded.corner_vertices[corners[group[i]].entry];
+      }
+      shaded.normals[shaded.corner_vertices[corners[i].entry]] += areas[corners[i].face];
+    }
+  }
+  for (Vec3& normal : shaded.normals) normal = normal.norm() > 0 ? Vec3(normal.stableNormalized()) : Vec3::UnitZ();
+  return shaded;
+}
+
+}  // namespace subvol
