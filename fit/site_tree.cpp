@@ -2,6 +2,12 @@
 #include "fit/site_tree.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
+
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
 namespace subvol {
 
@@ -10,6 +16,20 @@ namespace {
 constexpr std::size_t kLeafSize = 8;
 constexpr double kFarAway = 1e200;  // of the lanes that hold no site: its square is infinite
 constexpr int kMaxLevels = 12;      // 8^12 boxes
+
+// A box may be farther by rounding than a site in it: the slack keeps the result independent of the bound.
+constexpr double kSlack = 1 + 1e-14;
+
+/// Bit k tells whether distances[k] <= limit. `distances` is aligned to its eight lanes.
+unsigned lanes_within(const double* distances, double limit) {
+#ifdef __AVX512F__
+  return _mm512_cmp_pd_mask(_mm512_load_pd(distances), _mm512_set1_pd(limit), _CMP_LE_OQ);
+#else
+  unsigned lanes = 0;
+  for (unsigned k = 0; k < kLeafSize; ++k) lanes |= static_cast<unsigned>(distances[k] <= limit) << k;
+  return lanes;
+#endif
+}
 
 int longest_axis(std::span<const Vec3> sites, std::span<const Index> order) {
   Vec3 low = sites[order[0]], high = low;
@@ -110,64 +130,100 @@ void SiteTree::compute_boxes() {
   }
 }
 
+void SiteTree::leaf_distances(const Leaf& leaf, const Vec3& point, double* distances) {
+  for (int k = 0; k < kWidth; ++k) {
+    const double dx = leaf.x[k] - point[0], dy = leaf.y[k] - point[1], dz = leaf.z[k] - point[2];
+    distances[k] = dx * dx + dy * dy + dz * dz;
+  }
+}
+
+void SiteTree::box_distances(const Boxes& boxes, const Vec3& point, double* distances) {
+  for (int k = 0; k < kWidth; ++k) {
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double below = boxes.low[axis][k] - point[axis], above = point[axis] - boxes.high[axis][k];
+      double gap = below > above ? below : above;
+      gap = gap > 0 ? gap : 0;
+      sum += gap * gap;
+    }
+    distances[k] = sum;
+  }
+}
+
 SiteTree::Nearest SiteTree::nearest(const Vec3& point, double bound) const {
   Nearest best;
   if (num_sites_ == 0) return best;
-  // A box may be farther by rounding than a site in it: the slack keeps the result independent of the bound.
-  constexpr double kSlack = 1 + 1e-14;
-  double limit = bound * kSlack;
+  double limit = std::min(bound * kSlack, std::numeric_limits<double>::max());  // lanes without a box are infinitely far
   struct Entry {
     double distance;
-    std::size_t node;
-    int level;  // -1: a leaf
+    std::uint32_t node;
+    std::int32_t level;  // -1: a leaf
   };
   Entry stack[kMaxLevels * kWidth];
   int size = 0;
-  const int top = static_cast<int>(level_offsets_.size()) - 2;
-  stack[size++] = {0, 0, top};
+  stack[size++] = {0, 0, num_levels() - 1};
+  alignas(64) double d[kWidth];
   while (size > 0) {
     const Entry entry = stack[--size];
     if (entry.distance > limit) continue;
-    alignas(64) double d[kWidth];
     if (entry.level < 0) {
       const Leaf& leaf = leaves_[entry.node];
-      double least = std::numeric_limits<double>::infinity();
-      for (int k = 0; k < kWidth; ++k) {
-        const double dx = leaf.x[k] - point[0], dy = leaf.y[k] - point[1], dz = leaf.z[k] - point[2];
-        d[k] = dx * dx + dy * dy + dz * dz;
-      }
-      for (int k = 0; k < kWidth; ++k) least = d[k] < least ? d[k] : least;
-      if (!(least <= best.squared_distance) || least > limit) continue;
-      for (int k = 0; k < kWidth; ++k)
-        if (d[k] == least && (d[k] < best.squared_distance || leaf.sites[k] < best.site))
+      leaf_distances(leaf, point, d);
+      for (unsigned lanes = lanes_within(d, limit); lanes != 0; lanes &= lanes - 1) {
+        const int k = std::countr_zero(lanes);
+        if (d[k] < best.squared_distance || (d[k] == best.squared_distance && leaf.sites[k] < best.site))
           best = {leaf.sites[k], d[k]};
+      }
       limit = std::min(limit, best.squared_distance * kSlack);
       continue;
     }
-    const Boxes& boxes = boxes_[level_offsets_[entry.level] + entry.node];
-    for (int k = 0; k < kWidth; ++k) {
-      double sum = 0;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double below = boxes.low[axis][k] - point[axis], above = point[axis] - boxes.high[axis][k];
-        double gap = below > above ? below : above;
-        gap = gap > 0 ? gap : 0;
-        sum += gap * gap;
-      }
-      d[k] = sum;
-    }
+    box_distances(boxes_[level_offsets_[entry.level] + entry.node], point, d);
     // The nearest child comes last onto the stack, so it is visited first.
     const int first = size;
-    for (int k = 0; k < kWidth; ++k) {
-      if (!(d[k] <= limit)) continue;
+    for (unsigned lanes = lanes_within(d, limit); lanes != 0; lanes &= lanes - 1) {
+      const int k = std::countr_zero(lanes);
       int place = size++;
-      while (place > first && stack[place - 1].distance < d[k]) {
-        stack[place] = stack[place - 1];
-        --place;
-      }
-      stack[place] = {d[k], entry.node * kWidth + k, entry.level - 1};
+      for (; place > first && stack[place - 1].distance < d[k]; --place) stack[place] = stack[place - 1];
+      stack[place] = {d[k], entry.node * kWidth + static_cast<std::uint32_t>(k), entry.level - 1};
     }
   }
   return best;
+}
+
+bool SiteTree::gather(std::span<const Ball> balls, std::size_t max_count, std::vector<Index>& sites) const {
+  if (num_sites_ == 0) return true;
+  struct Entry {
+    std::uint32_t node;
+    std::int32_t level;
+  };
+  Entry stack[kMaxLevels * kWidth];
+  int size = 0;
+  std::size_t count = 0;
+  stack[size++] = {0, num_levels() - 1};
+  alignas(64) double d[kWidth];
+  while (size > 0) {
+    const Entry entry = stack[--size];
+    unsigned lanes = 0;
+    for (const Ball& ball : balls) {
+      if (entry.level < 0)
+        leaf_distances(leaves_[entry.node], ball.centre, d);
+      else
+        box_distances(boxes_[level_offsets_[entry.level] + entry.node], ball.centre, d);
+      lanes |= lanes_within(d, entry.level < 0 ? ball.squared_radius : ball.squared_radius * kSlack);
+    }
+    if (entry.level < 0) {
+      count += static_cast<std::size_t>(std::popcount(lanes));
+      if (count > max_count) return false;
+    }
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const int k = std::countr_zero(lanes);
+      if (entry.level < 0)
+        sites.push_back(leaves_[entry.node].sites[k]);
+      else
+        stack[size++] = {entry.node * kWidth + static_cast<std::uint32_t>(k), entry.level - 1};
+    }
+  }
+  return true;
 }
 
 }  // namespace subvol

@@ -22,6 +22,11 @@ class SiteTree {
     double squared_distance = std::numeric_limits<double>::infinity();
   };
 
+  struct Ball {
+    Vec3 centre;
+    double squared_radius;
+  };
+
   SiteTree() = default;
   /// Sites are finite; equal ones are allowed. Cost: n log n, about 0.1 microseconds a site.
   explicit SiteTree(std::span<const Vec3> sites);
@@ -40,6 +45,10 @@ class SiteTree {
   ///          the squared distance of the nearest site; where it is smaller, the result may be kNoIndex.
   Nearest nearest(const Vec3& point, double bound = std::numeric_limits<double>::infinity()) const;
 
+  /// Appends to `sites` the sites that lie in one of the balls (their borders included), in no particular order.
+  /// returns whether there were at most `max_count`; if not, `sites` holds some of them.
+  bool gather(std::span<const Ball> balls, std::size_t max_count, std::vector<Index>& sites) const;
+
  private:
   static constexpr int kWidth = 8;
   using Lanes = std::array<double, kWidth>;
@@ -51,6 +60,9 @@ class SiteTree {
     Lanes low[3], high[3];
   };
 
+  static void leaf_distances(const Leaf& leaf, const Vec3& point, double* distances);
+  static void box_distances(const Boxes& boxes, const Vec3& point, double* distances);
+  int num_levels() const { return static_cast<int>(level_offsets_.size()) - 1; }
   void compute_leaves(std::span<const Vec3> sites);
   void compute_boxes();
 

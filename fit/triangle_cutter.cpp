@@ -15,9 +15,9 @@ constexpr std::array<double, 6> kWholeTriangle = {1. / 6, 1. / 12, 1. / 12, 1. /
 // Six products and sums with relative errors of 1.1e-16 each, and as much again for interpolated corners.
 constexpr double kRounding = 4e-15;
 
-double dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+// Of sites that may matter to a part, for which finding its cells at once is tried; and of vain tries in a triangle.
+constexpr std::size_t kMaxCandidates = 160;
+constexpr int kMaxFailures = 16;
 
 }  // namespace
 
@@ -40,11 +40,12 @@ void TriangleCutter::cut(Index triangle, const std::array<Vec3, 3>& positions, c
     corner.at[k] = 1;
     corners_.push_back(corner);
   }
+  num_failures_ = 0;
   while (!parts_.empty()) {
     int c, b;
     if (inside_one_cell(c, b))
       integrate(c);
-    else
+    else if (!part_at_once())
       split(c, b);
   }
   emit(triangle, pieces);
@@ -106,10 +107,9 @@ bool TriangleCutter::inside_one_cell(int& c, int& b) const {
 }
 
 int TriangleCutter::nearest_slot(const Barycentric& at, int c, int b) {
-  const Vec3 point = at[0] * positions_[0] + at[1] * positions_[1] + at[2] * positions_[2];
-  const double bound =
-      std::min((sites_[slots_[c].site] - point).squaredNorm(), (sites_[slots_[b].site] - point).squaredNorm());
-  const Index site = tree_.nearest(point, bound).site;
+  const Vec3 p = point(at);
+  const double bound = std::min((sites_[slots_[c].site] - p).squaredNorm(), (sites_[slots_[b].site] - p).squaredNorm());
+  const Index site = tree_.nearest(p, bound).site;
   if (site == kNoIndex || site == slots_[c].site || site == slots_[b].site) return -1;
   const int slot = slot_of(site);
   const double noise = slots_[slot].noise + slots_[c].noise + slots_[b].noise;
@@ -118,16 +118,13 @@ int TriangleCutter::nearest_slot(const Barycentric& at, int c, int b) {
 
 TriangleCutter::Corner TriangleCutter::crossing(std::size_t i, std::size_t j, int c, int b) {
   const double t = height_[i] / (height_[i] - height_[j]);
-  Corner corner = polygon_[i];
-  for (int k = 0; k < 3; ++k) corner.at[k] += t * (polygon_[j].at[k] - polygon_[i].at[k]);
-  corner.slot = nearest_slot(corner.at, c, b);
-  return corner;
+  const Barycentric at = between(polygon_[i].at, polygon_[j].at, t);
+  return {at, nearest_slot(at, c, b)};
 }
 
 void TriangleCutter::split(int c, int b) {
   polygon_.assign(top().begin(), top().end());
-  corners_.resize(parts_.back());
-  parts_.pop_back();
+  pop();
   Barycentric line;
   for (int k = 0; k < 3; ++k) line[k] = slots_[c].value[k] - slots_[b].value[k];
   const double noise = slots_[c].noise + slots_[b].noise;
@@ -165,20 +162,62 @@ void TriangleCutter::split(int c, int b) {
   corners_.push_back(in_c(to));
 }
 
-void TriangleCutter::integrate(int slot) {
-  const auto part = top();
-  auto& m = slots_[slot].moments;
-  const Barycentric& a = part[0].at;
-  for (std::size_t i = 1; i + 1 < part.size(); ++i) {
-    const Barycentric &b = part[i].at, &c = part[i + 1].at;
-    const double area = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1]);
-    const Barycentric s = {a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]};
-    int k = 0;
-    for (int p = 0; p < 3; ++p)
-      for (int q = p; q < 3; ++q) m[k++] += area / 12 * (a[p] * a[q] + b[p] * b[q] + c[p] * c[q] + s[p] * s[q]);
+bool TriangleCutter::gather(std::span<const Corner> part) {
+  // A site that is farther than c from all corners is so everywhere between them: only sites in the balls through c matter.
+  const Vec3 centre = point(between(between(part[0].at, part[1].at, 0.5), part[2].at, 1. / 3));
+  const Vec3& c = sites_[tree_.nearest(centre, (sites_[slots_[part[0].slot].site] - centre).squaredNorm()).site];
+  balls_.clear();
+  for (const Corner& corner : part) {
+    const Vec3 p = point(corner.at);
+    balls_.push_back({p, (c - p).squaredNorm()});
   }
+  candidates_.clear();
+  return tree_.gather(balls_, kMaxCandidates, candidates_);
+}
+
+bool TriangleCutter::part_at_once() {
+  if (num_failures_ >= kMaxFailures) return false;
+  const auto part = top();
+  ++num_failures_;
+  if (!gather(part)) return false;
+  double noise = 0;
+  int first = -1;
+  const Index first_site = slots_[part[0].slot].site;
+  envelope_.clear();
+  candidate_slots_.clear();
+  for (Index site : candidates_) {
+    const int slot = slot_of(site);
+    if (site == first_site) first = envelope_.size();
+    candidate_slots_.push_back(slot);
+    envelope_.add(slots_[slot].value, site);
+    noise = std::max(noise, slots_[slot].noise);
+  }
+  if (first < 0) return false;
+  outline_.clear();
+  for (const Corner& corner : part) outline_.push_back(corner.at);
+  if (!envelope_.compute(outline_, first, 2 * noise)) return false;
+  for (const CellEnvelope::Cell& cell : envelope_.cells()) {
+    auto& moments = slots_[candidate_slots_[cell.function]].moments;
+    for (int k = 0; k < 6; ++k) moments[k] += cell.moments[k];
+  }
+  num_failures_ = 0;
+  pop();
+  return true;
+}
+
+Vec3 TriangleCutter::point(const Barycentric& at) const {
+  return at[0] * positions_[0] + at[1] * positions_[1] + at[2] * positions_[2];
+}
+
+void TriangleCutter::pop() {
   corners_.resize(parts_.back());
   parts_.pop_back();
+}
+
+void TriangleCutter::integrate(int slot) {
+  const auto part = top();
+  add_moments(part.size(), [&](std::size_t i) -> const Barycentric& { return part[i].at; }, slots_[slot].moments);
+  pop();
 }
 
 void TriangleCutter::emit(Index triangle, std::vector<VoronoiPiece>& pieces) {

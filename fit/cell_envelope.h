@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/barycentric.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace subvol {
+
+/// Parts a convex polygon by which of a set of linear functions is lowest: the Voronoi cells of nearby sites, when they
+/// are known to be few.
+///
+/// Each cell starts as the whole polygon and is cut by the functions found lowest at its corners until there are none
+/// lower than its own. Much cheaper than cutting in two again and again, as cells are not cut by the bisectors of others;
+/// but not safe where functions are alike within rounding, so the areas are checked in the end.
+class CellEnvelope {
+ public:
+  struct Cell {
+    int function;
+    std::array<double, 6> moments;
+  };
+
+  /// Begins a new set of functions.
+  void clear();
+  /// The values at the triangle's corners; `rank` decides between equal functions: the lowest comes first.
+  void add(const Barycentric& values, std::int32_t rank);
+  int size() const { return size_; }
+
+  /// Finds the cells of a polygon.
+  ///
+  /// first   the function lowest at one of the polygon's corners.
+  /// noise   differences of functions below it are rounding.
+  /// returns whether the cells part the polygon's area exactly; where they do not (ties), use something else.
+  bool compute(std::span<const Barycentric> polygon, int first, double noise);
+  const std::vector<Cell>& cells() const { return cells_; }
+
+ private:
+  static constexpr int kWidth = 8, kMaxKnown = 12;
+  struct Corner {
+    Barycentric at;
+    bool checked;
+  };
+  struct Known {
+    int count = 0;
+    bool queued = false;
+    std::array<int, kMaxKnown> neighbours;
+  };
+  struct alignas(64) Block {
+    std::array<double, kWidth> value[3];
+  };
+  enum class Cut { untouched, cut, empty, tie };
+
+  Barycentric values(int function) const;
+  double lowest(const Barycentric& at) const;
+  int lowest_function(const Barycentric& at) const;
+  Cut cut(int inside, int outside, double noise);
+  Cut find_cell(int function, double noise);
+
+  int size_ = 0;
+  std::vector<Block> blocks_;
+  std::vector<std::int32_t> ranks_;
+  std::vector<Known> known_;
+  std::vector<int> queue_;
+  std::vector<Cell> cells_;
+  std::vector<Corner> start_, polygon_, rest_;
+  std::vector<double> height_;
+};
+
+}  // namespace subvol
