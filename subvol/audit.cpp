@@ -104,27 +104,28 @@ double corner_angle(const SurfaceTopology& surface, Index h, std::span<const Vec
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// True where two or more faces between two creases span more than half a turn around a fixed vertex.
-bool folds(const SurfaceTopology& surface, Index v, std::span<const Vec3> points) {
-  const auto sharp = [&](Index h) { return surface.edge_sharpness[surface.corner_edges[h]] > 0; };
-  Index start = surface.vertex_corners[v];
-  const Index first = start;
+/// The smooth edges within spans of more than half a turn between two creases around a fixed vertex.
+std::vector<Index> folding_edges(const SurfaceTopology& surface, Index v, std::span<const Vec3> points) {
+  const auto edge = [&](Index h) { return surface.corner_edges[h]; };
+  const auto sharp = [&](Index h) { return surface.edge_sharpness[edge(h)] > 0; };
+  const Index first = surface.vertex_corners[v];
+  Index start = first;
   while (!sharp(start)) {
     start = surface.rotate(start);
-    if (start == first) return false;
+    if (start == first) return {};
   }
+  std::vector<Index> folding;
   Index h = start;
   do {
-    double span = 0;
-    int faces = 0;
-    do {
+    double span = corner_angle(surface, h, points);
+    std::vector<Index> inside;
+    for (h = surface.rotate(h); !sharp(h); h = surface.rotate(h)) {
       span += corner_angle(surface, h, points);
-      ++faces;
-      h = surface.rotate(h);
-    } while (!sharp(h));
-    if (faces > 1 && span > std::numbers::pi + kSlack) return true;
+      inside.push_back(edge(h));
+    }
+    if (span > std::numbers::pi + kSlack) folding.insert(folding.end(), inside.begin(), inside.end());
   } while (h != start);
-  return false;
+  return folding;
 }
 
 void find_reflex(const VolumeMesh& mesh, const MeshTopology& topology, SubdivisionAudit& result) {
@@ -138,9 +139,14 @@ void find_reflex(const VolumeMesh& mesh, const MeshTopology& topology, Subdivisi
   std::sort(result.reflex_creases.begin(), result.reflex_creases.end());
   for (std::size_t i = 0; i < surface.num_vertices(); ++i) {
     const Index v = static_cast<Index>(i);
-    if (vertex_weights_at(surface, v, BoundaryRule::catmull_clark).fixed() && folds(surface, v, points))
-      result.folding_corners.push_back(boundary.vertices[i]);
+    if (!vertex_weights_at(surface, v, BoundaryRule::catmull_clark).fixed()) continue;
+    const std::vector<Index> edges = folding_edges(surface, v, points);
+    if (!edges.empty()) result.folding_corners.push_back(boundary.vertices[i]);
+    for (Index e : edges) result.folding_edges.push_back(topology.edge(boundary.edges[e]));
   }
+  std::sort(result.folding_edges.begin(), result.folding_edges.end());
+  result.folding_edges.erase(std::unique(result.folding_edges.begin(), result.folding_edges.end()),
+                             result.folding_edges.end());
 }
 
 void warn(SubdivisionAudit& result, std::size_t count, const std::string& what) {
@@ -162,8 +168,17 @@ SubdivisionAudit audit(const VolumeMesh& mesh) {
        "of " + std::to_string(result.num_boundary_edges) +
            " boundary edges are smooth and have one cell: cells flatten there with every refinement");
   warn(result, result.folding_corners.size(),
-       "corners have a smooth reflex span: the subdivision surface folds there; crease an edge within the span");
+       "corners have a smooth reflex span: the subdivision surface folds there; crease the edges within the span");
   return result;
+}
+
+FeatureTags unfolding_tags(const VolumeMesh& mesh, const SubdivisionAudit& found, double sharpness) {
+  FeatureTags tags = mesh.tags;
+  for (const auto& [v0, v1] : found.folding_edges) tags.creases.push_back({v0, v1, sharpness});
+  std::sort(tags.creases.begin(), tags.creases.end(), [](const CreaseEdge& a, const CreaseEdge& b) {
+    return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1);
+  });
+  return tags;
 }
 
 }  // namespace subvol

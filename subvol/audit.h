@@ -20,8 +20,9 @@ struct SubdivisionAudit {
   /// Creases whose faces enclose more than 180 degrees inside the volume. Interior rows are made for them.
   std::vector<std::array<Index, 2>> reflex_creases;
   /// Fixed vertices where two or more boundary faces between two creases span more than 180 degrees: there the
-  /// Catmull-Clark surface itself folds. Remedy: a crease along an edge within the span.
+  /// Catmull-Clark surface itself folds. Remedy: creases along the edges within the span, `folding_edges`.
   std::vector<Index> folding_corners;
+  std::vector<std::array<Index, 2>> folding_edges;
   /// Boundary edges of other than two boundary faces, and vertices of more than one fan: `subdivide` refuses them.
   std::vector<std::array<Index, 2>> nonmanifold_edges;
   std::vector<Index> nonmanifold_vertices;
@@ -35,5 +36,11 @@ struct SubdivisionAudit {
 /// Angles are of mean planes of faces and count from 1 degree beyond straight. On a boundary that is no manifold only
 /// the non-manifold entities and flattened edges are listed. Cost: linear.
 SubdivisionAudit audit(const VolumeMesh& mesh);
+
+/// The mesh's tags with the audit's `folding_edges` as creases too, so that its boundary does not fold at corners.
+///
+/// sharpness  of the added creases, > 0: above 1 the first refinement keeps the span's edges straight, infinite for ever.
+FeatureTags unfolding_tags(const VolumeMesh& mesh, const SubdivisionAudit& found,
+                           double sharpness = kInfiniteSharpness);
 
 }  // namespace subvol

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "data.h"
 #include "opensubdiv_oracle.h"
 #include "sample_meshes.h"
 #include "subvol/error.h"
+#include "subvol/mesh_io.h"
 #include "subvol/subdivision.h"
 
 #include <catch2/catch.hpp>
@@ -101,6 +103,24 @@ TEST_CASE("the boundary is OpenSubdiv's for darts, corners and creases of differ
     CAPTURE(seed);
     CHECK(oracle_distance(mesh, 3) <= kOracleTolerance);
   }
+}
+
+TEST_CASE("the boundary is OpenSubdiv's on real templates of all cell kinds", "[subdivision][opensubdiv][data]") {
+  const auto folder = data_dir();
+  if (!folder) {
+    WARN("no real inputs: set SUBVOL_DATA");
+    return;
+  }
+  for (const char* name : {"hanger139", "bone87", "cad_fandisk49", "joint129", "mixed_fandisk", "mixed_prismlayer_bone",
+                           "mixed_screwdriver", "tet_bone144", "far_ball_spot", "rod59"})
+    for (double sharpness : {0.0, kInfiniteSharpness, 2.5, 1.3, 0.4}) {
+      VolumeMesh mesh = read_volume_mesh(*folder / "fit" / name / "template.mesh");
+      if (sharpness > 0) tag_creases(mesh, 40, sharpness);
+      double extent = 0;
+      for (const Vec3& p : mesh.positions) extent = std::max(extent, p.cwiseAbs().maxCoeff());
+      CAPTURE(name, sharpness);
+      CHECK(oracle_distance(mesh) <= kOracleTolerance * extent);
+    }
 }
 
 TEST_CASE("a fine mesh has one positive hex per cell corner, in order", "[subdivision]") {
