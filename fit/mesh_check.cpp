@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/mesh_check.h"
+
+#include "fit/boundary_triangles.h"
+#include "fit/self_intersection.h"
+#include "subvol/boundary.h"
+#include "subvol/mesh_topology.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdio>
+#include <numeric>
+
+namespace subvol {
+
+namespace {
+
+using Kind = MeshDefect::Kind;
+
+bool has_any(const std::vector<MeshDefect>& defects, std::initializer_list<Kind> kinds) {
+  return std::any_of(defects.begin(), defects.end(), [&](const MeshDefect& defect) {
+    return std::find(kinds.begin(), kinds.end(), defect.kind) != kinds.end();
+  });
+}
+
+/// Sets of numbers that have been joined.
+class Groups {
+ public:
+  explicit Groups(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
+  void join(Index a, Index b) { parent_[root(a)] = root(b); }
+  Index root(Index a) {
+    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
+    return a;
+  }
+
+ private:
+  std::vector<Index> parent_;
+};
+
+void check_topology(const VolumeMesh& mesh, const MeshTopology& topology, MeshCheck& check) {
+  check.has_topology = true;
+  check.num_edges = topology.num_edges();
+  check.num_faces = topology.num_faces();
+  Groups cells(mesh.num_cells()), vertices(mesh.num_vertices());
+  for (std::size_t f = 0; f < topology.num_faces(); ++f) {
+    const Index face = static_cast<Index>(f);
+    const auto [first, second] = topology.face_cells(face);
+    if (second != kNoIndex) cells.join(first, second);
+    if (topology.is_boundary_face(face))
+      for (const Index v : topology.face(face)) vertices.join(v, topology.face(face)[0]);
+  }
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    check.num_components += cells.root(static_cast<Index>(c)) == static_cast<Index>(c);
+  std::vector<char> used(mesh.num_vertices(), 0);
+  for (const Index v : mesh.cell_vertices) used[v] = 1;
+  for (std::size_t i = 0; i < mesh.num_vertices(); ++i) {
+    const Index v = static_cast<Index>(i);
+    if (!topology.is_boundary_vertex(v)) continue;
+    ++check.num_boundary_vertices;
+    check.num_boundary_components += vertices.root(v) == v;
+  }
+  for (std::size_t e = 0; e < topology.num_edges(); ++e)
+    check.num_boundary_edges += topology.is_boundary_edge(static_cast<Index>(e));
+  check.num_boundary_faces = topology.boundary_faces().size();
+  const auto alternate = [](std::size_t v, std::size_t e, std::size_t f, std::size_t c) {
+    return static_cast<long>(v) - static_cast<long>(e) + static_cast<long>(f) - static_cast<long>(c);
+  };
+  check.boundary_euler_number =
+      alternate(check.num_boundary_vertices, check.num_boundary_edges, check.num_boundary_faces, 0);
+  check.euler_number = alternate(static_cast<std::size_t>(std::count(used.begin(), used.end(), 1)), check.num_edges,
+                                 check.num_faces, mesh.num_cells());
+}
+
+double enclosed_volume(const TriangleMesh& surface) {
+  const Vec3 origin = surface.triangles.empty() ? Vec3::Zero() : surface.positions[surface.triangles[0][0]];
+  double sum = 0;
+  for (const auto& [a, b, c] : surface.triangles)
+    sum += (surface.positions[a] - origin)
+               .dot((surface.positions[b] - origin).cross(surface.positions[c] - origin));
+  return sum / 6;
+}
+
+void check_boundary(const PolygonMesh& boundary, const TriangleMesh* target, const MeshCheckOptions& options,
+                    MeshCheck& check) {
+  check.has_boundary_geometry = true;
+  std::vector<Index> face_of_triangle;
+  const TriangleMesh triangles = options.quad_triangles == QuadTriangles::bilinear
+                                     ? refined_triangles(boundary, &face_of_triangle)
+                                     : triangulate(boundary, &face_of_triangle);
+  check.volume = enclosed_volume(triangles);
+  const SelfIntersections found = self_intersections(triangles);
+  check.num_intersecting_triangle_pairs = found.pairs.size();
+  check.num_degenerate_boundary_triangles = found.degenerate.size();
+  auto& faces = check.intersecting_faces;
+  for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
+  std::sort(faces.begin(), faces.end());
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  if (!target) return;
+  check.target_diagonal = bounding_box_diagonal(*target);
+  check.distance = surface_distance(triangles, *target, {.num_samples = options.distance_samples});
+}
+
+/// printf into the end of a string.
+template <class... Values>
+void append(std::string& text, const char* format, Values... values) {
+  const int size = std::snprintf(nullptr, 0, format, values...);
+  std::string line(static_cast<std::size_t>(size) + 1, '\0');
+  std::snprintf(line.data(), line.size(), format, values...);
+  line.pop_back();
+  text += line;
+}
+
+void append_defects(std::string& text, const std::vector<MeshDefect>& defects) {
+  constexpr std::size_t kMaxLines = 20;
+  append(text, "defects             %zu\n", defects.size());
+  for (std::size_t i = 0; i < std::min(defects.size(), kMaxLines); ++i)
+    append(text, "  %s: %s\n", to_string(defects[i].kind), defects[i].message.c_str());
+  if (defects.size() > kMaxLines) append(text, "  ... and %zu more\n", defects.size() - kMaxLines);
+}
+
+void append_topology(std::string& text, const MeshCheck& check) {
+  append(text, "boundary            %zu faces, %zu edges, %zu vertices\n", check.num_boundary_faces,
+         check.num_boundary_edges, check.num_boundary_vertices);
+  append(text, "topology            %zu component(s), Euler number %ld; boundary %zu component(s), Euler number %ld\n",
+         check.num_components, check.euler_number, check.num_boundary_components, check.boundary_euler_number);
+}
+
+void append_quality(std::string& text, const QualityReport& quality) {
+  const CertificateSummary& certificate = quality.certificate;
+  append(text, "scaled Jacobian     min %.4f, mean %.4f (%zu samples)\n", quality.min_scaled_jacobian,
+         quality.mean_scaled_jacobian, quality.num_samples);
+  append(text, "inverted cells      %zu\n", quality.inverted_cells);
+  append(text, "certified cells     %zu of %zu (%zu invalid, %zu undecided)\n", certificate.certified, quality.num_cells,
+         certificate.invalid, certificate.undecided);
+  append(text, "worst cells        ");
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, quality.worst_cells.size()); ++i)
+    append(text, " %d (%.4f)", static_cast<int>(quality.worst_cells[i].cell), quality.worst_cells[i].value);
+  append(text, "\n");
+}
+
+void append_distance(std::string& text, const MeshCheck& check) {
+  const auto& extreme = check.distance->extreme();
+  append(text, "distance            mean %.6g (%.4f %%), max %.6g (%.4f %%) at (%.6g, %.6g, %.6g)\n",
+         check.distance->mean(), check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(),
+         extreme.from[0], extreme.from[1], extreme.from[2]);
+}
+
+}  // namespace
+
+bool MeshCheck::valid() const {
+  const bool sound = std::all_of(defects.begin(), defects.end(),
+                                 [](const MeshDefect& defect) { return defect.kind == Kind::unused_vertex; });
+  return sound && quality && quality->certificate.all_certified() && has_boundary_geometry && intersecting_faces.empty();
+}
+
+MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const MeshCheckOptions& options) {
+  MeshCheck check;
+  check.defects = validate(mesh);
+  check.num_vertices = mesh.num_vertices();
+  check.num_cells = mesh.num_cells();
+  for (const CellKind kind : mesh.kinds) ++check.num_cells_of_kind[static_cast<std::size_t>(kind)];
+  if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
+  check.quality = measure_quality(mesh, options.samples_per_direction);
+  if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
+  const MeshTopology topology(mesh);
+  check_topology(mesh, topology, check);
+  if (!has_any(check.defects, {Kind::not_finite}))
+    check_boundary(boundary_surface(mesh, topology), target, options, check);
+  return check;
+}
+
+std::string to_text(const MeshCheck& check) {
+  std::string text;
+  append(text, "cells               %zu (", check.num_cells);
+  const char* separator = "";
+  for (int kind = kNumCellKinds - 1; kind >= 0; --kind) {
+    if (check.num_cells_of_kind[kind] == 0) continue;
+    append(text, "%s%zu %s", separator, check.num_cells_of_kind[kind], cell_topology(static_cast<CellKind>(kind)).name);
+    separator = ", ";
+  }
+  append(text, "), %zu vertices\n", check.num_vertices);
+  append_defects(text, check.defects);
+  if (check.has_topology) append_topology(text, check);
+  if (check.quality) append_quality(text, *check.quality);
+  if (check.has_boundary_geometry) {
+    append(text, "volume              %.6g\n", check.volume);
+    append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)\n", check.intersecting_faces.size(),
+           check.num_intersecting_triangle_pairs);
+    if (check.num_degenerate_boundary_triangles > 0)
+      append(text, "without area        %zu boundary triangles\n", check.num_degenerate_boundary_triangles);
+  }
+  if (check.distance) append_distance(text, check);
+  append(text, "%s\n", check.valid() ? "valid" : "NOT VALID");
+  return text;
+}
+
+}  // namespace subvol

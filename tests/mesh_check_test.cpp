@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/mesh_check.h"
+#include "fit/boundary_triangles.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+#include "tests/data.h"
+#include "tests/sample_meshes.h"
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+
+#include <limits>
+
+using namespace subvol;
+using subvol::test::lattice;
+using subvol::test::voxels;
+
+namespace {
+
+TriangleMesh boundary_triangles(const VolumeMesh& mesh) {
+  return triangulate(boundary_surface(mesh, MeshTopology(mesh)));
+}
+
+bool has(const MeshCheck& check, MeshDefect::Kind kind) {
+  return std::any_of(check.defects.begin(), check.defects.end(), [&](const MeshDefect& d) { return d.kind == kind; });
+}
+
+}  // namespace
+
+TEST_CASE("a block of cubes passes every check, with its numbers", "[mesh_check]") {
+  const VolumeMesh mesh = lattice(3, 2, 2);
+  const TriangleMesh target = boundary_triangles(mesh);
+  const MeshCheck check = check_mesh(mesh, &target);
+  CHECK(check.valid());
+  CHECK(check.defects.empty());
+  CHECK(check.num_cells == 12);
+  CHECK(check.num_cells_of_kind[static_cast<int>(CellKind::hex)] == 12);
+  CHECK(check.num_boundary_faces == 32);
+  CHECK(check.num_components == 1);
+  CHECK(check.num_boundary_components == 1);
+  CHECK(check.boundary_euler_number == 2);
+  CHECK(check.euler_number == 1);
+  CHECK(check.volume == Approx(12));
+  CHECK(check.quality->min_scaled_jacobian == Approx(1));
+  CHECK(check.intersecting_faces.empty());
+  REQUIRE(check.distance);
+  CHECK(check.distance->max() < 1e-14);
+  CHECK(check.target_diagonal == Approx(std::sqrt(17.0)));
+  const std::string text = to_text(check);
+  CHECK(text.find("12 hex") != std::string::npos);
+  CHECK(text.find("certified cells     12 of 12") != std::string::npos);
+  CHECK(text.ends_with("\nvalid\n"));
+}
+
+TEST_CASE("a ring and a hollow block have their topology", "[mesh_check]") {
+  const MeshCheck ring = check_mesh(voxels(3, 3, 1, [](int i, int j, int) { return i != 1 || j != 1; }));
+  CHECK(ring.valid());
+  CHECK(ring.boundary_euler_number == 0);
+  CHECK(ring.euler_number == 0);
+  const MeshCheck hollow =
+      check_mesh(voxels(3, 3, 3, [](int i, int j, int k) { return i != 1 || j != 1 || k != 1; }));
+  CHECK(hollow.valid());
+  CHECK(hollow.num_boundary_components == 2);
+  CHECK(hollow.boundary_euler_number == 4);
+  CHECK(hollow.euler_number == 2);
+  CHECK(hollow.volume == Approx(26));
+  const MeshCheck apart = check_mesh(voxels(3, 1, 1, [](int i, int, int) { return i != 1; }));
+  CHECK(apart.valid());
+  CHECK(apart.num_components == 2);
+}
+
+TEST_CASE("an inverted cell and a boundary that runs through itself are not valid", "[mesh_check]") {
+  VolumeMesh pushed = lattice(2, 2, 2);
+  for (Vec3& p : pushed.positions)
+    if (p == Vec3(2, 2, 2)) p = Vec3(0.5, 0.5, 0.5);
+  const MeshCheck inverted = check_mesh(pushed);
+  CHECK_FALSE(inverted.valid());
+  CHECK(inverted.quality->inverted_cells == 1);
+  CHECK(inverted.quality->certificate.invalid == 1);
+
+  // Two cubes of a bar bent round until its ends overlap: every cell is sound, the whole is not.
+  VolumeMesh overlapping = voxels(3, 1, 1, [](int i, int, int) { return i != 1; });
+  for (Vec3& p : overlapping.positions)
+    if (p[0] > 1.5) p -= Vec3(1.5, 0.25, 0.25);
+  const MeshCheck crossing = check_mesh(overlapping);
+  CHECK(crossing.quality->certificate.all_certified());
+  CHECK_FALSE(crossing.intersecting_faces.empty());
+  CHECK_FALSE(crossing.valid());
+  CHECK(to_text(crossing).ends_with("\nNOT VALID\n"));
+}
+
+TEST_CASE("distances to a target are told in length and in per cent of the target's diagonal", "[mesh_check]") {
+  const VolumeMesh mesh = lattice(1, 1, 1);
+  TriangleMesh target = boundary_triangles(mesh);
+  for (Vec3& p : target.positions) p = Vec3(0.5, 0.5, 0.5) + 1.2 * (p - Vec3(0.5, 0.5, 0.5));
+  const MeshCheck check = check_mesh(mesh, &target);
+  CHECK(check.distance->max() == Approx(0.1 * std::sqrt(3.0)));
+  CHECK(check.max_distance_percent() == Approx(100 * 0.1 / 1.2));
+  CHECK(check.mean_distance_percent() > 100 * 0.1 / (1.2 * std::sqrt(3.0)));
+}
+
+TEST_CASE("whatever is wrong with a mesh, its check returns", "[mesh_check]") {
+  CHECK_FALSE(check_mesh(VolumeMesh{}).valid());
+  VolumeMesh out_of_range = lattice(1, 1, 1);
+  out_of_range.cell_vertices[3] = 99;
+  CHECK_FALSE(check_mesh(out_of_range).valid());
+  CHECK(has(check_mesh(out_of_range), MeshDefect::Kind::index_out_of_range));
+  VolumeMesh not_finite = lattice(2, 1, 1);
+  not_finite.positions[0][2] = std::numeric_limits<double>::quiet_NaN();
+  const MeshCheck check = check_mesh(not_finite);
+  CHECK_FALSE(check.valid());
+  CHECK(check.has_topology);
+  CHECK_FALSE(check.has_boundary_geometry);
+  VolumeMesh twice = lattice(1, 1, 1);
+  const std::vector<Index> vertices = twice.cell_vertices;
+  twice.add_cell(CellKind::hex, vertices);
+  twice.add_cell(CellKind::hex, vertices);
+  CHECK_FALSE(check_mesh(twice).valid());
+  CHECK_FALSE(to_text(check_mesh(twice)).empty());
+  CHECK_THROWS_AS(check_mesh(lattice(1, 1, 1), nullptr, {.samples_per_direction = 1}), InputError);
+}
+
+TEST_CASE("refined triangles pass through the bilinear centres and stay watertight", "[boundary_triangles]") {
+  VolumeMesh mesh = lattice(2, 2, 1);
+  for (Vec3& p : mesh.positions) p += 0.2 * Vec3(std::sin(3 * p[1] + p[2]), std::sin(2 * p[0]), std::cos(p[0] * p[1]));
+  const PolygonMesh boundary = boundary_surface(mesh, MeshTopology(mesh));
+  std::vector<Index> polygon;
+  const TriangleMesh triangles = refined_triangles(boundary, &polygon);
+  CHECK(triangles.triangles.size() == 8 * boundary.num_faces());
+  CHECK(polygon.size() == triangles.triangles.size());
+  const std::size_t corners = boundary.positions.size(), edges = 2 * boundary.num_faces();
+  CHECK(triangles.positions.size() == corners + edges + boundary.num_faces());
+  Vec3 area = Vec3::Zero();
+  for (const auto& [a, b, c] : triangles.triangles)
+    area += (triangles.positions[b] - triangles.positions[a]).cross(triangles.positions[c] - triangles.positions[a]);
+  CHECK(area.norm() < 1e-13);
+  const ClosestPoint tree(triangles);
+  for (std::size_t f = 0; f < boundary.num_faces(); ++f) {
+    const auto corner = [&](int k) { return boundary.positions[boundary.face_vertices[boundary.face_offsets[f] + k]]; };
+    const double bound = (corner(0) - corner(1) + corner(2) - corner(3)).norm() / 16;
+    CHECK(tree.closest(0.25 * (corner(0) + corner(1) + corner(2) + corner(3))).distance < 1e-14);
+    for (double u : {0.1, 0.25, 0.7})
+      for (double v : {0.3, 0.5, 0.75}) {
+        const Vec3 p = (1 - v) * ((1 - u) * corner(0) + u * corner(1)) + v * ((1 - u) * corner(3) + u * corner(2));
+        CHECK(tree.closest(p).distance <= bound + 1e-14);
+      }
+  }
+}
+
+TEST_CASE("refined triangles of a tet are four to a face", "[boundary_triangles]") {
+  VolumeMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.add_cell(CellKind::tet, std::vector<Index>{0, 1, 2, 3});
+  const TriangleMesh triangles = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
+  CHECK(triangles.triangles.size() == 16);
+  CHECK(triangles.positions.size() == 10);
+  CHECK(check_mesh(mesh).volume == Approx(1 / 6.0));
+  CHECK(check_mesh(mesh).valid());
+}
