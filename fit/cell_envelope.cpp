@@ -2,14 +2,15 @@
 #include "fit/cell_envelope.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace subvol {
 
 namespace {
 
-constexpr double kNever = 1e300;        // of the lanes that hold no function
-constexpr double kAreaTolerance = 1e-13;  // of the triangle's area
+constexpr double kNever = 1e300;          // of the lanes that hold no function
+constexpr double kAreaTolerance = 1e-14;  // of the triangle's area
 
 }  // namespace
 
@@ -20,10 +21,10 @@ void CellEnvelope::clear() {
 }
 
 void CellEnvelope::add(const Barycentric& values, std::int32_t rank) {
-  const int lane = size_ % kWidth;
+  const int lane = size_ % kWide;
   if (lane == 0) {
     blocks_.emplace_back();
-    for (auto& lanes : blocks_.back().value) lanes.fill(kNever);
+    for (Wide& value : blocks_.back().value) value = Wide{} + kNever;
   }
   for (int k = 0; k < 3; ++k) blocks_.back().value[k][lane] = values[k];
   ranks_.push_back(rank);
@@ -31,99 +32,104 @@ void CellEnvelope::add(const Barycentric& values, std::int32_t rank) {
 }
 
 Barycentric CellEnvelope::values(int function) const {
-  const Block& block = blocks_[function / kWidth];
-  const int lane = function % kWidth;
-  return {block.value[0][lane], block.value[1][lane], block.value[2][lane]};
+  const double* first = reinterpret_cast<const double*>(&blocks_[function / kWide]) + function % kWide;
+  return {first[0], first[kWide], first[2 * kWide]};
 }
 
 double CellEnvelope::lowest(const Barycentric& at) const {
-  alignas(64) double low[kWidth];
-  for (double& v : low) v = kNever;
+  Wide low = Wide{} + kNever;
   for (const Block& block : blocks_)
-    for (int k = 0; k < kWidth; ++k) {
-      const double v = at[0] * block.value[0][k] + at[1] * block.value[1][k] + at[2] * block.value[2][k];
-      low[k] = v < low[k] ? v : low[k];
-    }
-  return *std::min_element(low, low + kWidth);
+    take_lower(low, at[0] * block.value[0] + at[1] * block.value[1] + at[2] * block.value[2]);
+  return lowest_lane(low);
 }
 
-int CellEnvelope::lowest_function(const Barycentric& at) const {
-  double least = kNever;
-  int best = 0;
-  for (int f = 0; f < size_; ++f) {
-    const double v = dot(at, values(f));
-    if (v > least || (v == least && ranks_[f] > ranks_[best])) continue;
-    least = v;
-    best = f;
+int CellEnvelope::lowest_function(const Barycentric& at, double value) const {
+  int best = -1;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const Block& block = blocks_[b];
+    const Wide v = at[0] * block.value[0] + at[1] * block.value[1] + at[2] * block.value[2];
+    for (unsigned lanes = lanes_within(v, value); lanes != 0; lanes &= lanes - 1) {
+      const int function = static_cast<int>(b) * kWide + std::countr_zero(lanes);
+      if (best < 0 || ranks_[function] < ranks_[best]) best = function;
+    }
   }
   return best;
 }
 
-CellEnvelope::Cut CellEnvelope::cut(int inside, int outside, double noise) {
+CellEnvelope::Cut CellEnvelope::cut(int inside, int outside) {
   const Barycentric line = values(inside) - values(outside);
-  height_.resize(polygon_.size());
-  double low = 0, high = 0;
-  for (std::size_t i = 0; i < polygon_.size(); ++i) {
-    const double h = dot(polygon_[i].at, line);
-    height_[i] = std::abs(h) <= noise ? 0 : h;
-    low = std::min(low, height_[i]);
-    high = std::max(high, height_[i]);
+  const int n = polygon_.size;
+  double height[kMaxCorners];
+  std::uint32_t in = 0, out = 0;
+  for (int i = 0; i < n; ++i) {
+    height[i] = dot(polygon_.at[i], line);
+    in |= static_cast<std::uint32_t>(height[i] < -noise_) << i;
+    out |= static_cast<std::uint32_t>(height[i] > noise_) << i;
   }
-  if (high == 0) return low == 0 ? Cut::tie : Cut::untouched;
-  if (low == 0) return Cut::empty;
-  rest_.clear();
-  for (std::size_t i = 0; i < polygon_.size(); ++i) {
-    const std::size_t j = i + 1 < polygon_.size() ? i + 1 : 0;
-    if (height_[i] <= 0) rest_.push_back(polygon_[i]);
-    if ((height_[i] < 0 && height_[j] > 0) || (height_[i] > 0 && height_[j] < 0))
-      rest_.push_back({between(polygon_[i].at, polygon_[j].at, height_[i] / (height_[i] - height_[j])), false});
+  if (out == 0) return in == 0 ? Cut::tie : Cut::untouched;
+  if (in == 0) return Cut::empty;
+  if (n == kMaxCorners) return Cut::tie;
+  rest_.size = 0;
+  rest_.checked = 0;
+  for (int i = 0; i < n; ++i) {
+    const int j = i + 1 < n ? i + 1 : 0;
+    if (!(out >> i & 1)) {
+      rest_.checked |= (polygon_.checked >> i & 1) << rest_.size;
+      rest_.at[rest_.size++] = polygon_.at[i];
+    }
+    if ((in >> i & out >> j & 1) || (out >> i & in >> j & 1))
+      rest_.at[rest_.size++] = between(polygon_.at[i], polygon_.at[j], height[i] / (height[i] - height[j]));
   }
-  polygon_.swap(rest_);
+  std::swap(polygon_, rest_);
   return Cut::cut;
 }
 
-CellEnvelope::Cut CellEnvelope::find_cell(int function, double noise) {
+CellEnvelope::Cut CellEnvelope::find_cell(int function) {
   polygon_ = start_;
+  const Barycentric own = values(function);
   for (int k = 0; k < known_[function].count; ++k) {
-    const Cut result = cut(function, known_[function].neighbours[k], noise);
+    const Cut result = cut(function, known_[function].neighbours[k]);
     if (result == Cut::empty || result == Cut::tie) return result;
   }
-  for (std::size_t i = 0; i < polygon_.size();) {
-    if (polygon_[i].checked) {
-      ++i;
+  for (std::uint32_t open; (open = ~polygon_.checked & ((1u << polygon_.size) - 1)) != 0;) {
+    const int i = std::countr_zero(open);
+    const Barycentric& at = polygon_.at[i];
+    const double low = lowest(at);
+    if (low >= dot(at, own) - 2 * noise_) {
+      polygon_.checked |= 1u << i;
       continue;
     }
-    if (lowest(polygon_[i].at) >= dot(polygon_[i].at, values(function)) - 2 * noise) {
-      polygon_[i++].checked = true;
-      continue;
-    }
-    const int other = lowest_function(polygon_[i].at);
-    Known& known = known_[other];
-    if (!known.queued) queue_.push_back(other);
-    known.queued = true;
-    if (known.count < kMaxKnown) known.neighbours[known.count++] = function;
-    const Cut result = cut(function, other, noise);
+    const int other = lowest_function(at, low);
+    note_neighbours(function, other);
+    const Cut result = cut(function, other);
     if (result == Cut::empty || result == Cut::tie) return result;
-    i = 0;
   }
   return Cut::cut;
+}
+
+void CellEnvelope::note_neighbours(int cell, int found) {
+  Known& known = known_[found];
+  if (known.count < kMaxKnown) known.neighbours[known.count++] = cell;
+  if (std::find(queue_.begin(), queue_.end(), found) == queue_.end()) queue_.push_back(found);
 }
 
 bool CellEnvelope::compute(std::span<const Barycentric> polygon, int first, double noise) {
-  start_.clear();
-  for (const Barycentric& at : polygon) start_.push_back({at, false});
+  if (polygon.size() > kMaxCorners) return false;
+  start_.size = static_cast<int>(polygon.size());
+  std::copy(polygon.begin(), polygon.end(), start_.at.begin());
+  noise_ = noise;
   known_.assign(static_cast<std::size_t>(size_), Known{});
   cells_.clear();
   queue_.assign(1, first);
-  known_[first].queued = true;
   double area = 0;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) area += share(polygon[0], polygon[i], polygon[i + 1]);
   for (std::size_t q = 0; q < queue_.size(); ++q) {
-    const Cut result = find_cell(queue_[q], noise);
+    const Cut result = find_cell(queue_[q]);
     if (result == Cut::tie) return false;
     if (result == Cut::empty) continue;
     Cell cell{queue_[q], {}};
-    add_moments(polygon_.size(), [this](std::size_t i) -> const Barycentric& { return polygon_[i].at; }, cell.moments);
+    add_moments(static_cast<std::size_t>(polygon_.size),
+                [this](std::size_t i) -> const Barycentric& { return polygon_.at[i]; }, cell.moments);
     area -= total(cell.moments);
     cells_.push_back(cell);
   }

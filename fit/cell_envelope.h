@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/barycentric.h"
+#include "fit/wide.h"
 
 #include <cstdint>
 #include <vector>
@@ -36,35 +37,36 @@ class CellEnvelope {
   const std::vector<Cell>& cells() const { return cells_; }
 
  private:
-  static constexpr int kWidth = 8, kMaxKnown = 12;
-  struct Corner {
-    Barycentric at;
-    bool checked;
+  static constexpr int kMaxCorners = 24, kMaxKnown = 7;
+  struct Polygon {
+    int size = 0;
+    std::array<Barycentric, kMaxCorners> at;
+    std::uint32_t checked = 0;  ///< bit i: no function is lower at corner i than the cell's
   };
   struct Known {
     int count = 0;
-    bool queued = false;
     std::array<int, kMaxKnown> neighbours;
   };
-  struct alignas(64) Block {
-    std::array<double, kWidth> value[3];
+  struct Block {
+    Wide value[3];
   };
   enum class Cut { untouched, cut, empty, tie };
 
   Barycentric values(int function) const;
   double lowest(const Barycentric& at) const;
-  int lowest_function(const Barycentric& at) const;
-  Cut cut(int inside, int outside, double noise);
-  Cut find_cell(int function, double noise);
+  int lowest_function(const Barycentric& at, double value) const;
+  Cut cut(int inside, int outside);
+  Cut find_cell(int function);
+  void note_neighbours(int cell, int found);
 
   int size_ = 0;
+  double noise_ = 0;
   std::vector<Block> blocks_;
   std::vector<std::int32_t> ranks_;
   std::vector<Known> known_;
   std::vector<int> queue_;
   std::vector<Cell> cells_;
-  std::vector<Corner> start_, polygon_, rest_;
-  std::vector<double> height_;
+  Polygon start_, polygon_, rest_;
 };
 
 }  // namespace subvol

@@ -26,8 +26,7 @@ Vec3 box_centre(std::span<const Vec3> points) {
 }
 
 /// Positions relative to a centre, and the nearest site of each. The one before is a near-by start, no more.
-void locate(std::span<const Vec3> positions, const Vec3& centre, std::span<const Vec3> sites, const SiteTree& tree,
-            std::vector<Vec3>& moved, std::vector<Index>& nearest) {
+void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree& tree, std::vector<Vec3>& moved, std::vector<Index>& nearest) {
   moved.resize(positions.size());
   nearest.resize(positions.size());
   const std::size_t num_chunks = (positions.size() + kChunk - 1) / kChunk;
@@ -36,8 +35,8 @@ void locate(std::span<const Vec3> positions, const Vec3& centre, std::span<const
     Index before = kNoIndex;
     for (std::size_t i = chunk * kChunk; i < std::min(positions.size(), (chunk + 1) * kChunk); ++i) {
       moved[i] = positions[i] - centre;
-      before = before == kNoIndex ? tree.nearest(moved[i]).site
-                                  : tree.nearest(moved[i], (sites[before] - moved[i]).squaredNorm()).site;
+      before = before == kNoIndex ? tree.nearest(moved[i]).place
+                                  : tree.nearest(moved[i], (tree.position(before) - moved[i]).squaredNorm()).place;
       nearest[i] = before;
     }
   }
@@ -47,21 +46,28 @@ void locate(std::span<const Vec3> positions, const Vec3& centre, std::span<const
 
 RestrictedVoronoi::RestrictedVoronoi(std::span<const Vec3> sites) {
   if (sites.empty()) throw InputError("RestrictedVoronoi: sites must not be empty");
-  sites_.resize(sites.size());
-  update_sites(sites);
+  take_sites(sites);
 }
 
 void RestrictedVoronoi::update_sites(std::span<const Vec3> sites) {
-  if (sites.size() != sites_.size()) throw InputError("RestrictedVoronoi::update_sites: the number of sites has changed");
+  if (sites.size() != num_sites()) throw InputError("RestrictedVoronoi::update_sites: the number of sites has changed");
+  take_sites(sites);
+}
+
+void RestrictedVoronoi::take_sites(std::span<const Vec3> sites) {
   for (const Vec3& s : sites)
     if (!s.allFinite()) throw InputError("RestrictedVoronoi: sites must be finite");
   centre_ = box_centre(sites);
-  for (std::size_t i = 0; i < sites.size(); ++i) sites_[i] = sites[i] - centre_;
-  if (tree_.num_sites() == sites_.size()) tree_.refit(sites_);
-  if (tree_.num_sites() != sites_.size() || tree_.looseness() > kMaxLooseness) tree_ = SiteTree(sites_);
+  std::vector<Vec3> moved(sites.size());
+  for (std::size_t i = 0; i < sites.size(); ++i) moved[i] = sites[i] - centre_;
+  if (num_sites() == moved.size()) tree_.refit(moved);
+  if (num_sites() != moved.size() || tree_.looseness() > kMaxLooseness) tree_ = SiteTree(moved);
 }
 
-Index RestrictedVoronoi::nearest_site(const Vec3& point) const { return tree_.nearest(point - centre_).site; }
+Index RestrictedVoronoi::nearest_site(const Vec3& point) const { 
+  const Index place = tree_.nearest(point - centre_).place;
+  return place == kNoIndex ? kNoIndex : tree_.site(place);
+}
 
 void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
                                 std::vector<VoronoiPiece>& pieces) const {
@@ -71,7 +77,7 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
         throw InputError("RestrictedVoronoi::compute: triangle corners must be in [0, positions.size())");
   std::vector<Vec3> moved;
   std::vector<Index> nearest;
-  locate(positions, centre_, sites_, tree_, moved, nearest);
+  locate(positions, centre_, tree_, moved, nearest);
 
   const std::size_t num_chunks = (triangles.size() + kChunk - 1) / kChunk;
   struct Segment {
@@ -85,7 +91,7 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
     const int thread = omp_get_thread_num();
     std::vector<VoronoiPiece>& mine = omp_get_num_threads() == 1 ? pieces : found[thread];
     mine.clear();
-    TriangleCutter cutter(sites_, tree_);
+    TriangleCutter cutter(tree_);
 #pragma omp for schedule(dynamic)
     for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
       segments[chunk] = {thread, mine.size(), 0, 0};

@@ -47,9 +47,9 @@ class RestrictedVoronoi {
   /// Moves the sites (as many as before, else InputError); cheaper than building anew. The results are the same.
   void update_sites(std::span<const Vec3> sites);
 
-  std::size_t num_sites() const { return sites_.size(); }
+  std::size_t num_sites() const { return tree_.num_sites(); }
 
-  /// The nearest site, of equally near ones the lowest number.
+  /// The nearest site, of equally near ones the lowest number. Points are finite.
   Index nearest_site(const Vec3& point) const;
 
   /// The pieces of all triangles, by triangle, then by site; at most one per pair.
@@ -65,8 +65,9 @@ class RestrictedVoronoi {
                                     std::span<const std::array<Index, 3>> triangles) const;
 
  private:
+  void take_sites(std::span<const Vec3> sites);
+
   Vec3 centre_ = Vec3::Zero();  ///< sites and triangles are handled relative to it, or far origins would cost digits
-  std::vector<Vec3> sites_;
   SiteTree tree_;
 };
 

@@ -21,15 +21,14 @@ constexpr int kMaxFailures = 16;
 
 }  // namespace
 
-TriangleCutter::TriangleCutter(std::span<const Vec3> sites, const SiteTree& tree)
-    : sites_(sites), tree_(tree), slot_of_site_(sites.size(), -1) {}
+TriangleCutter::TriangleCutter(const SiteTree& tree) : tree_(tree), slot_of_place_(tree.num_sites(), -1) {}
 
 void TriangleCutter::cut(Index triangle, const std::array<Vec3, 3>& positions, const std::array<Index, 3>& nearest,
                          std::vector<VoronoiPiece>& pieces) {
   const Vec3 normal = (positions[1] - positions[0]).cross(positions[2] - positions[0]);
   if (normal == Vec3::Zero()) return;
   if (nearest[0] == nearest[1] && nearest[0] == nearest[2]) {
-    pieces.push_back({triangle, nearest[0], kWholeTriangle});
+    pieces.push_back({triangle, tree_.site(nearest[0]), kWholeTriangle});
     return;
   }
   positions_ = positions;
@@ -51,13 +50,13 @@ void TriangleCutter::cut(Index triangle, const std::array<Vec3, 3>& positions, c
   emit(triangle, pieces);
 }
 
-int TriangleCutter::slot_of(Index site) {
-  int& slot = slot_of_site_[site];
+int TriangleCutter::slot_of(Index place) {
+  int& slot = slot_of_place_[place];
   if (slot >= 0) return slot;
   slot = static_cast<int>(slots_.size());
-  Slot s{site, {0, 0, 0}, 0, {}};
+  Slot s{place, {0, 0, 0}, 0, {}};
   if (slot > 0) {
-    const Vec3 &a = sites_[site], &r = sites_[slots_[0].site], difference = a - r;
+    const Vec3 &a = tree_.position(place), &r = position(0), difference = a - r;
     double reach = 0;
     for (int k = 0; k < 3; ++k) {
       const Vec3 sum = (a - positions_[k]) + (r - positions_[k]);
@@ -108,10 +107,10 @@ bool TriangleCutter::inside_one_cell(int& c, int& b) const {
 
 int TriangleCutter::nearest_slot(const Barycentric& at, int c, int b) {
   const Vec3 p = point(at);
-  const double bound = std::min((sites_[slots_[c].site] - p).squaredNorm(), (sites_[slots_[b].site] - p).squaredNorm());
-  const Index site = tree_.nearest(p, bound).site;
-  if (site == kNoIndex || site == slots_[c].site || site == slots_[b].site) return -1;
-  const int slot = slot_of(site);
+  const double bound = std::min((position(c) - p).squaredNorm(), (position(b) - p).squaredNorm());
+  const Index place = tree_.nearest(p, bound).place;
+  if (place == kNoIndex || place == slots_[c].place || place == slots_[b].place) return -1;
+  const int slot = slot_of(place);
   const double noise = slots_[slot].noise + slots_[c].noise + slots_[b].noise;
   return value(slot, at) + noise < std::min(value(c, at), value(b, at)) ? slot : -1;
 }
@@ -165,7 +164,7 @@ void TriangleCutter::split(int c, int b) {
 bool TriangleCutter::gather(std::span<const Corner> part) {
   // A site that is farther than c from all corners is so everywhere between them: only sites in the balls through c matter.
   const Vec3 centre = point(between(between(part[0].at, part[1].at, 0.5), part[2].at, 1. / 3));
-  const Vec3& c = sites_[tree_.nearest(centre, (sites_[slots_[part[0].slot].site] - centre).squaredNorm()).site];
+  const Vec3& c = tree_.position(tree_.nearest(centre, (position(part[0].slot) - centre).squaredNorm()).place);
   balls_.clear();
   for (const Corner& corner : part) {
     const Vec3 p = point(corner.at);
@@ -182,14 +181,14 @@ bool TriangleCutter::part_at_once() {
   if (!gather(part)) return false;
   double noise = 0;
   int first = -1;
-  const Index first_site = slots_[part[0].slot].site;
+  const Index first_place = slots_[part[0].slot].place;
   envelope_.clear();
   candidate_slots_.clear();
-  for (Index site : candidates_) {
-    const int slot = slot_of(site);
-    if (site == first_site) first = envelope_.size();
+  for (Index place : candidates_) {
+    const int slot = slot_of(place);
+    if (place == first_place) first = envelope_.size();
     candidate_slots_.push_back(slot);
-    envelope_.add(slots_[slot].value, site);
+    envelope_.add(slots_[slot].value, tree_.site(place));
     noise = std::max(noise, slots_[slot].noise);
   }
   if (first < 0) return false;
@@ -221,15 +220,14 @@ void TriangleCutter::integrate(int slot) {
 }
 
 void TriangleCutter::emit(Index triangle, std::vector<VoronoiPiece>& pieces) {
-  slot_order_.resize(slots_.size());
-  for (std::size_t k = 0; k < slots_.size(); ++k) slot_order_[k] = static_cast<int>(k);
-  std::sort(slot_order_.begin(), slot_order_.end(), [&](int a, int b) { return slots_[a].site < slots_[b].site; });
-  for (int k : slot_order_) {
-    const VoronoiPiece piece{triangle, slots_[k].site, slots_[k].moments};
-    if (piece.share() > 0) pieces.push_back(piece);
+  const std::size_t begin = pieces.size();
+  for (const Slot& slot : slots_) {
+    slot_of_place_[slot.place] = -1;
+    if (total(slot.moments) > 0) pieces.push_back({triangle, tree_.site(slot.place), slot.moments});
   }
-  for (const Slot& slot : slots_) slot_of_site_[slot.site] = -1;
   slots_.clear();
+  std::sort(pieces.begin() + static_cast<std::ptrdiff_t>(begin), pieces.end(),
+            [](const VoronoiPiece& a, const VoronoiPiece& b) { return a.site < b.site; });
 }
 
 }  // namespace subvol

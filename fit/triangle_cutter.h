@@ -24,10 +24,10 @@ namespace subvol {
 /// nowhere lower; so on no branch is a pair of sites used twice.
 class TriangleCutter {
  public:
-  /// Both must outlive the cutter. Cost: one integer per site.
-  TriangleCutter(std::span<const Vec3> sites, const SiteTree& tree);
+  /// The tree must outlive the cutter. Cost: one integer per site.
+  explicit TriangleCutter(const SiteTree& tree);
 
-  /// Appends the pieces of the triangle with the given corners, whose nearest sites are given.
+  /// Appends the pieces of the triangle with the given corners, whose nearest sites' places are given.
   void cut(Index triangle, const std::array<Vec3, 3>& positions, const std::array<Index, 3>& nearest,
            std::vector<VoronoiPiece>& pieces);
 
@@ -37,14 +37,15 @@ class TriangleCutter {
     int slot;
   };
   struct Slot {
-    Index site;
+    Index place;
     Barycentric value;  ///< e_s
     double noise;       ///< bound on the rounding errors of l . e_s
     std::array<double, 6> moments;
   };
 
-  int slot_of(Index site);
+  int slot_of(Index place);
   double value(int slot, const Barycentric& at) const;
+  const Vec3& position(int slot) const { return tree_.position(slots_[slot].place); }
   /// How much lower than slot c the corner's own site is at the corner, beyond rounding.
   double violation(int c, const Corner& corner) const;
   /// The site whose cell holds the part on top of the stack; or none, and the pair of sites to cut it by.
@@ -63,11 +64,9 @@ class TriangleCutter {
 
   std::span<const Corner> top() const { return {corners_.data() + parts_.back(), corners_.size() - parts_.back()}; }
 
-  std::span<const Vec3> sites_;
   const SiteTree& tree_;
-  std::vector<int> slot_of_site_;
+  std::vector<int> slot_of_place_;
   std::vector<Slot> slots_;
-  std::vector<int> slot_order_;
   std::vector<Corner> corners_;        ///< of the parts still to do, one part after the other
   std::vector<std::size_t> parts_;     ///< where each begins
   std::vector<Corner> polygon_;
