@@ -56,7 +56,8 @@ int main() {
     std::vector<std::uint8_t> positive(mesh.num_cells());
     for (int threads = 1; threads <= max_threads; threads *= 2) {
       omp_set_num_threads(threads);
-      const double plain = best_us_per_cell(mesh.num_cells(), [&] { positive_bernstein(mesh.positions, mesh, positive); });
+      const double plain =
+          best_us_per_cell(mesh.num_cells(), [&] { positive_bernstein(mesh.positions, mesh, positive); });
       CertificateSummary summary;
       const double full = best_us_per_cell(mesh.num_cells(), [&] { summary = certify(mesh); });
       std::printf("%s\n  {\"cells\": %zu, \"amplitude\": %g, \"threads\": %d, \"coefficients_us_per_cell\": %.4f, "

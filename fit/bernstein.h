@@ -126,13 +126,13 @@ inline double length_scale(const EdgeLengths<double>& lengths) {
 
 /// Bound on the error of a computed coefficient, after `level` halvings.
 ///
-/// Each of the products summed in a coefficient carries at most 12 roundings (three edge differences, cross product, two
-/// means, dot product), so with u = 2^-53
+/// Each of the products summed in a coefficient carries at most 12 roundings (three edge differences, cross product,
+/// two means, dot product), so with u = 2^-53
 ///
 ///   |error| <= 12u/(1 - 12u) perm(|a|,|b|,|c|) <= 12.1 u (6/3^1.5) |a||b||c| < 14 u |a||b||c|
 ///
-/// (the permanent's bound is Carlen, Lieb and Loss's). A halving averages six times in a row at most and averages do not
-/// enlarge errors: 6 u |a||b||c| more per level. `scale` itself is good to 10 u, which the rounded-up factors cover.
+/// (the permanent's bound is Carlen, Lieb and Loss's). A halving averages six times in a row at most, and averages do
+/// not enlarge errors: 6 u |a||b||c| more per level. `scale` itself is good to 10 u, which the factors cover.
 inline double rounding_margin(double scale, int level) {
   constexpr double u = std::numeric_limits<double>::epsilon() / 2;
   return (16 + 6.5 * level) * u * scale;

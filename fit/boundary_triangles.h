@@ -9,9 +9,9 @@ namespace subvol {
 
 /// Triangles that follow the faces of linear cells: a quad face means the bilinear patch of its corners.
 ///
-/// Every edge is halved. A triangle becomes four; a quad, or a larger polygon, becomes the fan of its centre (the mean of
-/// its corners, which lies on the patch) over its halved border: eight triangles. They leave the patch of corners p_i by
-/// |p_0 - p_1 + p_2 - p_3| / 16 at most, a quarter of what a diagonal does. Neighbours share the points of their edges.
+/// Every edge is halved. A triangle becomes four; a quad, or a larger polygon, becomes the fan of its centre (the mean
+/// of its corners, which lies on the patch) over its halved border: eight triangles. They leave the patch of corners p
+/// by |p_0 - p_1 + p_2 - p_3| / 16 at most, a quarter of what a diagonal does. Neighbours share their edges' points.
 ///
 /// polygons             each of at least 3 corners, or it gives nothing.
 /// polygon_of_triangle  if given: the polygon each triangle comes from. The triangles of one polygon are consecutive.

@@ -212,7 +212,8 @@ class Search {
     for (std::size_t next = 0; next < queue.size() && !refuted_; ++next) {
       box = queue[next];
       const double bound = look_at(box);
-      const bool may_split = box.level < options.max_depth && queue.size() < static_cast<std::size_t>(options.max_boxes);
+      const bool may_split =
+          box.level < options.max_depth && queue.size() < static_cast<std::size_t>(options.max_boxes);
       if (bound > 0 || !may_split) {
         result_.lower_bound = std::min(result_.lower_bound, bound);
         open = open || !(bound > 0);

@@ -68,7 +68,8 @@ CertificateSummary certify(const VolumeMesh& mesh, const CertificateOptions& opt
 /// The cheap half of `certify`: per cell, whether the coefficients alone prove det J > 0 (1) or not (0).
 ///
 /// positive  num_cells() entries, written. Returns the number of zeros. InputError: wrong sizes.
-std::size_t positive_bernstein(std::span<const Vec3> positions, const VolumeMesh& mesh, std::span<std::uint8_t> positive);
+std::size_t positive_bernstein(std::span<const Vec3> positions, const VolumeMesh& mesh,
+                               std::span<std::uint8_t> positive);
 
 /// Least Bernstein coefficient of each cell, into num_cells() entries. InputError: wrong sizes.
 void min_bernstein(std::span<const Vec3> positions, const VolumeMesh& mesh, std::span<double> minima);

@@ -56,8 +56,8 @@ void check(const TriangleMesh& mesh) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const Index v : mesh.triangles[t]) {
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
-        throw InputError("closest point: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) + " of " +
-                         std::to_string(mesh.positions.size()));
+        throw InputError("closest point: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
+                         " of " + std::to_string(mesh.positions.size()));
       if (!mesh.positions[v].allFinite())
         throw InputError("closest point: vertex " + std::to_string(v) + " is not finite");
     }

@@ -130,8 +130,8 @@ void append_quality(std::string& text, const QualityReport& quality) {
   append(text, "scaled Jacobian     min %.4f, mean %.4f (%zu samples)\n", quality.min_scaled_jacobian,
          quality.mean_scaled_jacobian, quality.num_samples);
   append(text, "inverted cells      %zu\n", quality.inverted_cells);
-  append(text, "certified cells     %zu of %zu (%zu invalid, %zu undecided)\n", certificate.certified, quality.num_cells,
-         certificate.invalid, certificate.undecided);
+  append(text, "certified cells     %zu of %zu (%zu invalid, %zu undecided)\n", certificate.certified,
+         quality.num_cells, certificate.invalid, certificate.undecided);
   append(text, "worst cells        ");
   for (std::size_t i = 0; i < std::min<std::size_t>(5, quality.worst_cells.size()); ++i)
     append(text, " %d (%.4f)", static_cast<int>(quality.worst_cells[i].cell), quality.worst_cells[i].value);
@@ -150,7 +150,8 @@ void append_distance(std::string& text, const MeshCheck& check) {
 bool MeshCheck::valid() const {
   const bool sound = std::all_of(defects.begin(), defects.end(),
                                  [](const MeshDefect& defect) { return defect.kind == Kind::unused_vertex; });
-  return sound && quality && quality->certificate.all_certified() && has_boundary_geometry && intersecting_faces.empty();
+  const bool certified = quality && quality->certificate.all_certified();
+  return sound && certified && has_boundary_geometry && intersecting_faces.empty();
 }
 
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const MeshCheckOptions& options) {
@@ -164,6 +165,7 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const M
   if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
+  check.subdivision_audit = audit(mesh);
   if (!has_any(check.defects, {Kind::not_finite}))
     check_boundary(boundary_surface(mesh, topology), target, options, check);
   return check;
@@ -181,11 +183,14 @@ std::string to_text(const MeshCheck& check) {
   append(text, "), %zu vertices\n", check.num_vertices);
   append_defects(text, check.defects);
   if (check.has_topology) append_topology(text, check);
+  if (check.subdivision_audit)
+    for (const std::string& warning : check.subdivision_audit->warnings)
+      append(text, "warning             %s\n", warning.c_str());
   if (check.quality) append_quality(text, *check.quality);
   if (check.has_boundary_geometry) {
     append(text, "volume              %.6g\n", check.volume);
-    append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)\n", check.intersecting_faces.size(),
-           check.num_intersecting_triangle_pairs);
+    append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)\n",
+           check.intersecting_faces.size(), check.num_intersecting_triangle_pairs);
     if (check.num_degenerate_boundary_triangles > 0)
       append(text, "without area        %zu boundary triangles\n", check.num_degenerate_boundary_triangles);
   }

@@ -3,6 +3,7 @@
 
 #include "fit/quality.h"
 #include "fit/surface_distance.h"
+#include "subvol/audit.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
@@ -39,13 +40,15 @@ struct MeshCheck {
   std::size_t num_components = 0;                            ///< of the cells, through common faces
   std::size_t num_boundary_components = 0;                   ///< through common vertices
   long boundary_euler_number = 0;                            ///< V - E + F of the boundary
-  long euler_number = 0;                                     ///< V - E + F - C of the cells; unused vertices do not count
+  long euler_number = 0;                                     ///< V - E + F - C of the cells, unused vertices left out
+
+  std::optional<SubdivisionAudit> subdivision_audit;         ///< what works against subdividing it; no defect
 
   std::optional<QualityReport> quality;                      ///< with the certificate
 
   bool has_boundary_geometry = false;                        ///< whether the parts below were looked at
   double volume = 0;                                         ///< enclosed by the boundary's triangles, signed
-  std::vector<std::array<Index, 2>> intersecting_faces;      ///< by number in `boundary_faces()`, ascending; may be equal
+  std::vector<std::array<Index, 2>> intersecting_faces;      ///< places in `boundary_faces()`, ascending; may be equal
   std::size_t num_intersecting_triangle_pairs = 0;
   std::size_t num_degenerate_boundary_triangles = 0;         ///< without area
 
@@ -66,7 +69,8 @@ struct MeshCheck {
 /// target   what the boundary should be, or null.
 /// InputError: options out of range; a target that `ClosestPoint` refuses. Never for what is wrong with the mesh.
 /// Deterministic for any number of threads. Cost: per boundary quad about 15 us, per hex 2 us, on one core.
-MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr, const MeshCheckOptions& options = {});
+MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,
+                     const MeshCheckOptions& options = {});
 
 /// The same as a text of some lines for people, the verdict last.
 std::string to_text(const MeshCheck& check);

@@ -34,7 +34,7 @@ struct QualityReport {
 ///
 /// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2).
 ///
-/// samples_per_direction  n >= 2: n^3 points of a hex, n^2 (n+1)/2 of a prism, n(n+1)(n+2)/6 of a tet, corners included.
+/// samples_per_direction  n >= 2: n^3 points of a hex, n^2 (n+1)/2 of a prism, n(n+1)(n+2)/6 of a tet, with corners.
 /// returns   values in [-1, 1]; 1 for ideal cells at any size and orientation, 0 where a column of F vanishes, -1 where
 ///           a coordinate is not finite.
 /// InputError: n < 2. The mesh must have valid vertex numbers. Parallel, same bits for any number of threads.

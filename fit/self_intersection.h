@@ -17,9 +17,9 @@ struct SelfIntersections {
 
 /// Finds all pairs of triangles that meet in more than their common corners and edge.
 ///
-/// Corners are common when they have the same number, so weld a soup first: triangles that
-/// touch in different vertices at the same place count as meeting. Two triangles with a common edge meet improperly when
-/// they lie folded onto each other; two with three common corners always do.
+/// Corners are common when they have the same number, so weld a soup first: triangles that touch in different vertices
+/// at the same place count as meeting. Two triangles with a common edge meet improperly when they lie folded onto each
+/// other; two with three common corners always do.
 ///
 /// Exact: predicates are evaluated as if without rounding. A quad has no surface of its own here: the answer is one
 /// about the triangulation given. InputError: a vertex number out of range, a position that is not finite.

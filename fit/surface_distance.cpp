@@ -121,7 +121,8 @@ OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const
 SurfaceDistance surface_distance(const TriangleMesh& a, const ClosestPoint& tree_a, const TriangleMesh& b,
                                  const ClosestPoint& tree_b, const SurfaceDistanceOptions& options) {
   if (options.num_samples < 1)
-    throw InputError("surface distance: num_samples is " + std::to_string(options.num_samples) + ", expected 1 or more");
+    throw InputError("surface distance: num_samples is " + std::to_string(options.num_samples) +
+                     ", expected 1 or more");
   const OneSided forth = one_sided(a, tree_a.order(), tree_b, options.num_samples);
   const OneSided back = one_sided(b, tree_b.order(), tree_a, options.num_samples);
   return {forth.mean, back.mean, forth.max, back.max};

@@ -35,8 +35,9 @@ struct SurfaceDistance {
 /// it is a lower bound, by less than the distance between samples. Triangles without area weigh nothing.
 ///
 /// InputError: as `ClosestPoint` for either surface; num_samples < 1. Deterministic, parallel, same bits for any number
-/// of threads. Cost: about 0.5 us a sample on one core, plus both trees.
-SurfaceDistance surface_distance(const TriangleMesh& a, const TriangleMesh& b, const SurfaceDistanceOptions& options = {});
+/// of threads. Cost: about 0.4 us a sample on one core, plus both trees.
+SurfaceDistance surface_distance(const TriangleMesh& a, const TriangleMesh& b,
+                                 const SurfaceDistanceOptions& options = {});
 
 /// The same with trees built before: for a target that is asked many times.
 SurfaceDistance surface_distance(const TriangleMesh& a, const ClosestPoint& tree_a, const TriangleMesh& b,

@@ -3,6 +3,8 @@
 #include "fit/boundary_triangles.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/mesh_io.h"
+#include "subvol/surface_io.h"
 #include "tests/data.h"
 #include "tests/sample_meshes.h"
 
@@ -156,4 +158,28 @@ TEST_CASE("refined triangles of a tet are four to a face", "[boundary_triangles]
   CHECK(triangles.positions.size() == 10);
   CHECK(check_mesh(mesh).volume == Approx(1 / 6.0));
   CHECK(check_mesh(mesh).valid());
+}
+
+TEST_CASE("checks of published templates agree with what is known of them", "[mesh_check][data]") {
+  const auto folder = test::data_dir();
+  if (!folder) {
+    WARN("no SUBVOL_DATA: skipped");
+    return;
+  }
+  struct Known {
+    const char* name;
+    double min_scaled_jacobian, mean_distance;
+  };
+  // Figures of INDEX.tsv, found by another program: least scaled Jacobian, and the average of the two one-sided means of
+  // the distance per diagonal, quads cut by a diagonal. Four digits are given.
+  for (const Known& known : {Known{"bone87", 0.469, 0.0142}, {"hanger139", 0.674, 0.0022}, {"rod59", 0.239, 0.0123}}) {
+    INFO(known.name);
+    const VolumeMesh mesh = read_volume_mesh(*folder / "fit" / known.name / "template.mesh");
+    const TriangleMesh target = read_triangle_mesh(*folder / "fit" / known.name / "target.off");
+    const MeshCheck check = check_mesh(mesh, &target, {.quad_triangles = QuadTriangles::diagonal});
+    CHECK(check.valid());
+    CHECK(check.quality->min_scaled_jacobian == Approx(known.min_scaled_jacobian).margin(0.001));
+    const double average = (check.distance->mean_a_to_b + check.distance->mean_b_to_a) / 2 / check.target_diagonal;
+    CHECK(average == Approx(known.mean_distance).margin(0.0001));
+  }
 }

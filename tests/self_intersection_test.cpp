@@ -48,7 +48,8 @@ TEST_CASE("surfaces that cross or touch are found with their triangles", "[self_
 }
 
 TEST_CASE("neighbours intersect only when folded or crossing beyond what they share", "[self_intersection]") {
-  const std::vector<Vec3> flat = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0.5, 0}, {0.5, -1, 0}, {0.3, 0.3, 1}, {0.3, 0.2, -1}};
+  const std::vector<Vec3> flat = {{0, 0, 0},    {1, 0, 0},     {0, 1, 0},      {0.5, 0.5, 0},
+                                  {0.5, -1, 0}, {0.3, 0.3, 1}, {0.3, 0.2, -1}};
   const auto pairs = [&](Index a, Index b, Index c) {
     return self_intersections({flat, {{0, 1, 2}, {a, b, c}}}).pairs.size();
   };
@@ -71,7 +72,7 @@ TEST_CASE("triangles without area are listed and take part in no pair", "[self_i
   CHECK(result.degenerate == std::vector<Index>{0, 2});
 }
 
-TEST_CASE("self-intersections of a random soup do not depend on threads, numbering or position", "[self_intersection]") {
+TEST_CASE("self-intersections of a soup do not depend on threads, numbering or position", "[self_intersection]") {
   std::mt19937_64 engine(4);
   std::normal_distribution<double> normal;
   TriangleMesh soup;

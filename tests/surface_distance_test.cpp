@@ -61,7 +61,8 @@ TEST_CASE("closest points agree with a search of all triangles, with and without
     for (int k = 0; k < 3; ++k) {
       const Vec3 offset = 0.2 * Vec3(normal(engine), normal(engine), normal(engine));
       const bool point = t % 50 == 7, needle = t % 50 == 9;
-      soup.positions.push_back(point ? centre : needle ? Vec3(centre + offset[0] * Vec3(1, 1, 0)) : Vec3(centre + offset));
+      const Vec3 kept = point ? Vec3::Zero() : needle ? Vec3(offset[0], offset[0], 0) : offset;
+      soup.positions.push_back(centre + kept);
     }
     soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   }
