@@ -54,10 +54,10 @@ void print_level(const VolumeMesh& control, int level, bool last) {
   const double vertices = static_cast<double>(fine.size()), cells = static_cast<double>(refined.fine.num_cells());
   std::printf("    {\"level\": %d, \"cells\": %zu, \"vertices\": %zu, \"nonzeros_per_row\": %.2f,\n", level,
               refined.fine.num_cells(), fine.size(), refined.matrix.num_nonzeros() / vertices);
-  std::printf("     \"build_million_cells_per_second\": %.2f, \"control_topology_seconds\": %.4f,\n", cells / build * 1e-6,
-              topology);
-  std::printf("     \"apply_ns_per_vertex\": %.2f, \"apply_transposed_ns_per_vertex\": %.2f}%s\n", apply / vertices * 1e9,
-              transposed / vertices * 1e9, last ? "" : ",");
+  std::printf("     \"build_million_cells_per_second\": %.2f, \"control_topology_seconds\": %.4f,\n",
+              cells / build * 1e-6, topology);
+  std::printf("     \"apply_ns_per_vertex\": %.2f, \"apply_transposed_ns_per_vertex\": %.2f}%s\n",
+              apply / vertices * 1e9, transposed / vertices * 1e9, last ? "" : ",");
 }
 
 }  // namespace

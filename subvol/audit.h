@@ -39,7 +39,7 @@ SubdivisionAudit audit(const VolumeMesh& mesh);
 
 /// The mesh's tags with the audit's `folding_edges` as creases too, so that its boundary does not fold at corners.
 ///
-/// sharpness  of the added creases, > 0: above 1 the first refinement keeps the span's edges straight, infinite for ever.
+/// sharpness  of the added creases, > 0: above 1 the first refinement keeps the span straight, infinite for ever.
 FeatureTags unfolding_tags(const VolumeMesh& mesh, const SubdivisionAudit& found,
                            double sharpness = kInfiniteSharpness);
 

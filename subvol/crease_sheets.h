@@ -14,11 +14,11 @@ namespace subvol {
 ///   lambda = (5 + c + sqrt((c + 9)(c + 1))) / 16,   c = cos(pi / k)
 ///
 /// against 1/2 of the two boundary faces there. For k = 2 it is 1/2 too, but coupled to theirs (a Jordan block): the
-/// interior face that leaves the crease (its *sheet*) turns without end towards the mean of the boundary faces. For k = 3
-/// it is .5797: the sheets shrink more slowly than the boundary and all turn one way. Either inverts cells, level by
-/// level, where the crease is reflex. Weights >= 0 that couple the sheets cannot cure it: with a dominant eigenvalue of
-/// 1/2 or less the sheets become positive combinations of the boundary faces, which lie outside a reflex sector. So the
-/// sheets are uncoupled where they meet a crease, each refined as a surface of its own:
+/// interior face that leaves the crease (its *sheet*) turns without end towards the mean of the boundary faces. For
+/// k = 3 it is .5797: the sheets shrink more slowly than the boundary and all turn one way. Either inverts cells, level
+/// by level, where the crease is reflex. Weights >= 0 that couple the sheets cannot cure it: with a dominant eigenvalue
+/// of 1/2 or less the sheets become positive combinations of the boundary faces, which lie outside a reflex sector. So
+/// the sheets are uncoupled where they meet a crease, each refined as a surface of its own:
 ///
 ///   face of a sheet      its centroid
 ///   edge of a sheet with one end at the crease

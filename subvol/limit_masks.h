@@ -22,8 +22,8 @@ struct RingSharpness {
 ///   smooth (n^2 v + 4 sum e_i + sum f_i) / (n (n + 5)),  crease (e_a + 4 v + e_b) / 6,  corner v
 ///
 /// Exact for semi-sharp features (the rules of the levels until they decay are multiplied out) and for darts (the
-/// left eigenvector of eigenvalue 1 of the dart's own ring rules, by repeated squaring). Cost: O(n) weights, O(n^3) work
-/// for semi-sharp and dart rings.
+/// left eigenvector of eigenvalue 1 of the dart's own ring rules, by repeated squaring). Cost: O(n) weights, O(n^3)
+/// work for semi-sharp and dart rings.
 RingMask limit_mask(const RingSharpness& ring);
 
 /// One side of the surface at v: two directions that span the tangent plane of the quads from `first` to
@@ -36,9 +36,9 @@ struct TangentSector {
 /// Tangents at v, one sector per smooth piece of the surface there (the whole ring if fewer than two edges stay sharp
 /// for ever). Weights of each mask sum to 0.
 ///
-/// Smooth and crease tangents are the left eigenvectors of the dominant eigenvalues; darts are exact to about 1e-6 of
-/// a radian; at corners they are the crease edges (for up to two quads), which is where the surface ends up.
-/// A crease side of one quad has no proper eigenvector: its mean direction is used.
+/// Smooth and crease tangents are the left eigenvectors of the dominant eigenvalues; normals at darts are good to 2e-5.
+/// At corners they are the crease edges (for up to two quads), which is where the surface ends up. A crease side of one
+/// quad flattens out only logarithmically: its mean direction is used, good to a few hundredths.
 std::vector<TangentSector> tangent_masks(const RingSharpness& ring);
 
 }  // namespace subvol

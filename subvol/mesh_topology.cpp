@@ -89,7 +89,8 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
         face_chains.head[key[0]] = f;
       } else {
         if (face_cells_[f][1] != kNoIndex)
-          throw InputError("MeshTopology: cell " + std::to_string(c) + " has a face that two other cells share already");
+          throw InputError("MeshTopology: cell " + std::to_string(c) +
+                           " has a face that two other cells share already");
         face_cells_[f][1] = static_cast<Index>(c);
       }
       cell_faces_.push_back(f);

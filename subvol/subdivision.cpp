@@ -51,7 +51,8 @@ std::int8_t find_local_face(const CellTopology& cell, int a, int b, int c) {
 
 ChildHex make_child(const CellTopology& cell, int corner) {
   const auto& n = cell.corner_neighbors[corner];
-  return {{find_local_edge(cell, corner, n[0]), find_local_edge(cell, corner, n[1]), find_local_edge(cell, corner, n[2])},
+  return {{find_local_edge(cell, corner, n[0]), find_local_edge(cell, corner, n[1]),
+           find_local_edge(cell, corner, n[2])},
           {find_local_face(cell, corner, n[0], n[1]), find_local_face(cell, corner, n[0], n[2]),
            find_local_face(cell, corner, n[1], n[2])}};
 }
@@ -101,7 +102,8 @@ const CellTables& cell_tables(CellKind kind) {
 class Incidence {
  public:
   template <class EntitiesOfCell>
-  Incidence(std::size_t num_entities, std::size_t num_cells, EntitiesOfCell&& entities) : offsets_(num_entities + 1, 0) {
+  Incidence(std::size_t num_entities, std::size_t num_cells, EntitiesOfCell&& entities)
+      : offsets_(num_entities + 1, 0) {
     for (std::size_t c = 0; c < num_cells; ++c)
       for (Index entity : entities(c)) ++offsets_[entity + 1];
     for (std::size_t i = 0; i < num_entities; ++i) offsets_[i + 1] += offsets_[i];

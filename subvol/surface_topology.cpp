@@ -99,7 +99,8 @@ BoundarySurface boundary_surface(const VolumeMesh& mesh, const MeshTopology& top
     for (Index v : topology.face(f)) corners.push_back(number[v]);
     offsets.push_back(static_cast<Index>(corners.size()));
   }
-  boundary.topology = build_surface(boundary.vertices.size(), std::move(offsets), std::move(corners), boundary.vertices);
+  boundary.topology =
+      build_surface(boundary.vertices.size(), std::move(offsets), std::move(corners), boundary.vertices);
 
   SurfaceTopology& surface = boundary.topology;
   std::vector<Index> surface_edge(topology.num_edges(), kNoIndex);

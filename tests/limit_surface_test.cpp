@@ -113,6 +113,30 @@ TEST_CASE("limit positions and normals are OpenSubdiv's", "[limit][opensubdiv]")
     }
 }
 
+TEST_CASE("normals are the same before and after refinement, at darts nearly so", "[limit]") {
+  constexpr double kDartTolerance = 5e-5;  // what 24 refinements of a dart's ring leave
+  VolumeMesh mesh = lattice(3, 2, 2);
+  jitter(mesh, 0.1);
+  const auto normals_at_vertices = [&](int levels) {
+    const BoundaryRefinement refined = refine_boundary(mesh, levels, true);
+    const std::vector<Vec3> normals =
+        limit_normals(refined, mesh.positions, refined.positions.apply(mesh.positions));
+    std::vector<Vec3> result(refined.vertices.size(), Vec3::Zero());
+    for (std::size_t q = 0; q < refined.quads.size(); ++q)
+      for (int i = 0; i < 4; ++i)
+        if (refined.quads[q][i] < static_cast<Index>(result.size()))
+          result[refined.quads[q][i]] = normals[refined.quad_sites[q][i]];
+    return result;
+  };
+  for (bool dart : {false, true}) {
+    mesh.tags = {};
+    if (dart) mesh.tags.creases = {{0, 1, kInfiniteSharpness}};
+    const std::vector<Vec3> coarse = normals_at_vertices(0), fine = normals_at_vertices(2);
+    for (std::size_t v = 0; v < coarse.size(); ++v)
+      CHECK((coarse[v] - fine[v]).norm() <= (dart ? kDartTolerance : kRounding));
+  }
+}
+
 TEST_CASE("normals at the sides of creases are the limits of normals nearby", "[limit]") {
   VolumeMesh mesh = lattice(3, 2, 2);
   jitter(mesh, 0.1);

@@ -103,7 +103,8 @@ OracleLevels oracle_refine(const VolumeMesh& mesh, int levels) {
   std::vector<Point> limit(points.back().size()), du(points.back().size()), dv(points.back().size());
   primvars.Limit(points.back(), limit, du, dv);
   result.limit_positions = values(limit);
-  for (std::size_t i = 0; i < du.size(); ++i) result.limit_normals.push_back(du[i].value.cross(dv[i].value).normalized());
+  for (std::size_t i = 0; i < du.size(); ++i)
+    result.limit_normals.push_back(du[i].value.cross(dv[i].value).normalized());
   return result;
 }
 

@@ -29,9 +29,10 @@ VolumeMesh voxels(int nx, int ny, int nz, Keep&& keep) {
     for (int j = 0; j < ny; ++j)
       for (int i = 0; i < nx; ++i)
         if (keep(i, j, k))
-          mesh.add_cell(CellKind::hex, std::array<Index, 8>{vertex(i, j, k), vertex(i + 1, j, k), vertex(i + 1, j + 1, k),
-                                                            vertex(i, j + 1, k), vertex(i, j, k + 1), vertex(i + 1, j, k + 1),
-                                                            vertex(i + 1, j + 1, k + 1), vertex(i, j + 1, k + 1)});
+          mesh.add_cell(CellKind::hex,
+                        std::array<Index, 8>{vertex(i, j, k), vertex(i + 1, j, k), vertex(i + 1, j + 1, k),
+                                             vertex(i, j + 1, k), vertex(i, j, k + 1), vertex(i + 1, j, k + 1),
+                                             vertex(i + 1, j + 1, k + 1), vertex(i, j + 1, k + 1)});
   return mesh;
 }
 

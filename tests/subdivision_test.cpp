@@ -46,7 +46,8 @@ double oracle_distance(VolumeMesh mesh, int levels = 2) {
     };
     for (std::size_t i = 0; i < oracle.vertices.size(); ++i) compare(oracle.vertices[i], oracle.vertex_children[i]);
     for (std::size_t e = 0; e < oracle.edges.size(); ++e)
-      compare(mesh.num_vertices() + topology.find_edge(oracle.edges[e][0], oracle.edges[e][1]), oracle.edge_children[e]);
+      compare(mesh.num_vertices() + topology.find_edge(oracle.edges[e][0], oracle.edges[e][1]),
+              oracle.edge_children[e]);
     mesh = refined.fine;
   }
   return distance;
