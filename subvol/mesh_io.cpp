@@ -99,7 +99,7 @@ void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {
 std::string volume_mesh_formats() {
   std::string text;
   for (const Format& format : kFormats)
-    text += std::string(text.empty() ? "" : ", ") + format.extension + " (" + format.description + ")";
+    text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
   return text;
 }
 

@@ -250,9 +250,9 @@ void append_cells(std::string& text, const VolumeMesh& mesh, const CellSection& 
 
 void append_sharpness(std::string& text, std::string_view opening, std::size_t number, double sharpness) {
   if (sharpness >= kInfiniteSharpness) return;
-  text += "#" + std::string(opening) + " " + std::to_string(number) + " ";
+  text.append("#").append(opening).append(" ").append(std::to_string(number)).append(" ");
   append_number(text, sharpness);
-  text += "\n";
+  text += '\n';
 }
 
 void append_tags(std::string& text, const FeatureTags& tags) {

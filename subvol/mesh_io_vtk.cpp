@@ -368,8 +368,9 @@ std::string format_legacy_vtk(const VolumeMesh& mesh) {
     const auto cell = mesh.cell(c);
     const auto& corner = vtk_cell_of(mesh.kinds[c]).corner;  // each of these orders is its own inverse
     text += std::to_string(cell.size());
-    for (std::size_t i = 0; i < cell.size(); ++i) text += " " + std::to_string(cell[static_cast<std::size_t>(corner[i])]);
-    text += "\n";
+    for (std::size_t i = 0; i < cell.size(); ++i)
+      text.append(" ").append(std::to_string(cell[static_cast<std::size_t>(corner[i])]));
+    text += '\n';
   }
   text += "CELL_TYPES " + std::to_string(mesh.num_cells()) + "\n";
   for (const CellKind kind : mesh.kinds) text += std::to_string(vtk_cell_of(kind).type) + "\n";

@@ -181,7 +181,7 @@ TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* 
 std::string surface_formats() {
   std::string text;
   for (const Format& format : kFormats)
-    text += std::string(text.empty() ? "" : ", ") + format.extension + " (" + format.description + ")";
+    text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
   return text;
 }
 

@@ -21,7 +21,10 @@ constexpr double kOnEdge = 1e-6;
 template <class Range>
 std::string list(const Range& vertices) {
   std::string text;
-  for (const Index v : vertices) text += (text.empty() ? "" : " ") + std::to_string(v);
+  for (const Index v : vertices) {
+    if (!text.empty()) text += ' ';
+    text += std::to_string(v);
+  }
   return text;
 }
 
