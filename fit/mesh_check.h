@@ -68,7 +68,8 @@ struct MeshCheck {
 ///
 /// target   what the boundary should be, or null.
 /// InputError: options out of range; a target that `ClosestPoint` refuses. Never for what is wrong with the mesh.
-/// Deterministic for any number of threads. Cost: per boundary quad about 15 us, per hex 2 us, on one core.
+/// Deterministic for any number of threads. Cost on one core: per hex about 2 us, per boundary quad 50 us without
+/// and 80 us with a target.
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {});
 

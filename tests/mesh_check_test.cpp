@@ -170,8 +170,8 @@ TEST_CASE("checks of published templates agree with what is known of them", "[me
     const char* name;
     double min_scaled_jacobian, mean_distance;
   };
-  // Figures of INDEX.tsv, found by another program: least scaled Jacobian, and the average of the two one-sided means of
-  // the distance per diagonal, quads cut by a diagonal. Four digits are given.
+  // Figures of INDEX.tsv, found by another program: least scaled Jacobian, and the average of the two one-sided means
+  // of the distance per diagonal, quads cut by a diagonal. Four digits are given.
   for (const Known& known : {Known{"bone87", 0.469, 0.0142}, {"hanger139", 0.674, 0.0022}, {"rod59", 0.239, 0.0123}}) {
     INFO(known.name);
     const VolumeMesh mesh = read_volume_mesh(*folder / "fit" / known.name / "template.mesh");
