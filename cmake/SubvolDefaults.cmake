@@ -24,8 +24,8 @@ add_library(subvol_defaults INTERFACE)
 target_compile_options(subvol_defaults INTERFACE -Wall -Wextra -Wpedantic -Wshadow)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # GCC 12 sees std::sort of a few elements run past the end of a small array, and its own AVX-512 headers read what
-  # they have not set.
-  target_compile_options(subvol_defaults INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized)
+  # they have not set, and a string put before another overlap it.
+  target_compile_options(subvol_defaults INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-restrict)
 endif()
 if(SUBVOL_NATIVE)
   target_compile_options(subvol_defaults INTERFACE -march=native)

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/check_report.h"
+
+namespace subvol::cli {
+namespace {
+
+Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
+
+Json quality_json(const QualityReport& quality) {
+  Json worst = Json::array();
+  for (const auto& cell : quality.worst_cells) {
+    worst.push_back({{"cell", cell.cell}, {"centre", point_json(cell.centre)}, {"scaled_jacobian", cell.value}});
+  }
+  return {{"cells", quality.num_cells},
+          {"min_scaled_jacobian", quality.min_scaled_jacobian},
+          {"mean_scaled_jacobian", quality.mean_scaled_jacobian},
+          {"inverted_cells", quality.inverted_cells},
+          {"certified_cells", quality.certificate.certified},
+          {"invalid_cells", quality.certificate.invalid},
+          {"undecided_cells", quality.certificate.undecided},
+          {"worst_cells", std::move(worst)},
+          {"histogram", quality.histogram}};
+}
+
+Json topology_json(const MeshCheck& check) {
+  return {{"components", check.num_components},
+          {"boundary_components", check.num_boundary_components},
+          {"boundary_vertices", check.num_boundary_vertices},
+          {"boundary_edges", check.num_boundary_edges},
+          {"boundary_faces", check.num_boundary_faces},
+          {"boundary_euler_number", check.boundary_euler_number},
+          {"euler_number", check.euler_number}};
+}
+
+Json defects_json(const MeshCheck& check) {
+  Json defects = Json::array();
+  for (const MeshDefect& defect : check.defects) {
+    defects.push_back({{"kind", to_string(defect.kind)}, {"entity", defect.entity}, {"message", defect.message}});
+  }
+  return defects;
+}
+
+}  // namespace
+
+Json check_json(const MeshCheck& check) {
+  Json json{{"valid", check.valid()}};
+  if (check.distance) json["distance"] = distance_json(*check.distance, check.target_diagonal);
+  if (check.quality) json["quality"] = quality_json(*check.quality);
+  if (check.has_boundary_geometry) {
+    json["boundary_self_intersections"] = check.num_intersecting_triangle_pairs;
+    json["intersecting_boundary_faces"] = check.intersecting_faces;
+    json["degenerate_boundary_triangles"] = check.num_degenerate_boundary_triangles;
+    json["volume"] = check.volume;
+  }
+  if (check.has_topology) json["topology"] = topology_json(check);
+  json["defects"] = defects_json(check);
+  return json;
+}
+
+Json distance_json(const SurfaceDistance& distance, double diagonal) {
+  const double percent = 100 / diagonal;
+  const auto& farthest = distance.extreme();
+  return {{"mean_percent", distance.mean() * percent},
+          {"max_percent", distance.max() * percent},
+          {"mean", distance.mean()},
+          {"max", distance.max()},
+          {"mean_to_target_percent", distance.mean_a_to_b * percent},
+          {"mean_from_target_percent", distance.mean_b_to_a * percent},
+          {"max_to_target_percent", distance.max_a_to_b.distance * percent},
+          {"max_from_target_percent", distance.max_b_to_a.distance * percent},
+          {"farthest", {{"from", point_json(farthest.from)}, {"to", point_json(farthest.to)}}}};
+}
+
+}  // namespace subvol::cli

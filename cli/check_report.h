@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/run_options.h"
+#include "fit/mesh_check.h"
+#include "fit/surface_distance.h"
+
+namespace subvol::cli {
+
+/// A check as it stands in reports: defects, topology, quality, certificate, self-intersections, distance.
+Json check_json(const MeshCheck& check);
+
+/// A distance in the mesh's unit and in per cent of a diagonal; `a` is ours, `b` the target.
+Json distance_json(const SurfaceDistance& distance, double diagonal);
+
+}  // namespace subvol::cli

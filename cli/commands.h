@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <functional>
+
+namespace subvol::cli {
+
+/// What to do once the command line is understood; returns an ExitStatus. Set by the verb that was named.
+using Action = std::function<int()>;
+
+/// One verb each: its options, its help, and its action.
+void add_fit_command(CLI::App& app, Action& action);
+void add_subdivide_command(CLI::App& app, Action& action);
+void add_check_command(CLI::App& app, Action& action);
+void add_convert_command(CLI::App& app, Action& action);
+
+}  // namespace subvol::cli

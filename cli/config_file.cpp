@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/config_file.h"
+
+#include <string>
+
+namespace subvol::cli {
+
+std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const {
+  const auto verbs = app_.get_subcommands();
+  const std::string verb = verbs.empty() ? "" : verbs.front()->get_name();
+  const auto names_a_verb = [&](const std::string& name) {
+    return !app_.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == name; }).empty();
+  };
+  std::vector<CLI::ConfigItem> kept;
+  for (CLI::ConfigItem& item : CLI::ConfigTOML::from_config(input)) {
+    if (item.name == "++" || item.name == "--") continue;
+    if (item.parents.empty()) item.parents = {verb};
+    if (item.parents.front() != verb && names_a_verb(item.parents.front())) continue;
+    kept.push_back(std::move(item));
+  }
+  return kept;
+}
+
+}  // namespace subvol::cli

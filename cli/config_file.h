@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <istream>
+#include <vector>
+
+namespace subvol::cli {
+
+/// Reads --config files: keys are the long options of the verb in use, without a section or in one named after the verb.
+///
+/// Sections of other verbs are passed over, so that one file can serve several. The command line wins over the file.
+class VerbConfig : public CLI::ConfigTOML {
+ public:
+  explicit VerbConfig(const CLI::App& app) : app_(app) {}
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override;
+
+ private:
+  const CLI::App& app_;
+};
+
+}  // namespace subvol::cli

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/commands.h"
+#include "cli/exit_status.h"
+#include "cli/loading.h"
+#include "cli/outputs.h"
+#include "cli/writing.h"
+#include "subvol/mesh_io.h"
+#include "subvol/surface_io.h"
+
+#include <iostream>
+#include <memory>
+
+namespace subvol::cli {
+namespace {
+
+struct ConvertArguments {
+  RunOptions run;
+  WritingOptions writing;
+  std::string input;
+  bool limit = false;
+};
+
+void convert_volume(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
+                    std::vector<std::string>& warnings) {
+  const VolumeMesh mesh = load_volume(arguments.input, warnings);
+  for (const Output& output : outputs) {
+    if (arguments.limit) {
+      write_output(output, mesh, mesh, writing);
+    } else {
+      write_output(output, mesh, writing);
+    }
+  }
+}
+
+void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
+                     std::vector<std::string>& warnings) {
+  for (const Output& output : outputs) {
+    if (output.is_volume()) {
+      throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
+    }
+  }
+  const PolygonMesh surface = load_polygons(arguments.input, warnings);
+  for (const Output& output : outputs) write_output(output, surface, writing);
+}
+
+int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
+  const std::vector<Output> outputs = checked_outputs(arguments.run, false);
+  apply_threads(arguments.run);
+  WritingOptions writing = arguments.writing;
+  writing.source = arguments.input;
+  writing.options = options_in_force(verb);
+  std::vector<std::string> warnings;
+  if (is_volume_file(arguments.input)) {
+    convert_volume(arguments, outputs, writing, warnings);
+  } else {
+    convert_surface(arguments, outputs, writing, warnings);
+  }
+  if (!arguments.run.quiet) {
+    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_convert_command(CLI::App& app, Action& action) {
+  CLI::App* verb = app.add_subcommand("convert", "Write a mesh in another format");
+  const auto arguments = std::make_shared<ConvertArguments>();
+  verb->add_option("IN", arguments->input, "Volume mesh: " + volume_mesh_formats() + "; or surface: " + surface_formats())
+      ->required()
+      ->type_name("FILE");
+  verb->add_flag("--limit", arguments->limit,
+                 "Surface formats show the limit surface of the mesh as a control cage, not its flat faces");
+  add_output_options(*verb, arguments->run,
+                     "Where to, the extension choosing the format: " + output_formats() + "; may be given several times");
+  verb->get_option("--output")->required();
+  add_writing_options(*verb, arguments->writing);
+  verb->footer(R"(Surface formats take the boundary of a volume mesh; .usda keeps it a subdivision cage with its creases.
+
+Examples:
+  subvol convert cage.vtk -o cage.mesh
+  subvol convert cage.mesh --limit -o smooth.glb)");
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_convert(*arguments, *verb); }; });
+}
+
+}  // namespace subvol::cli

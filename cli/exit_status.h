@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <stdexcept>
+
+namespace subvol::cli {
+
+/// What the program's exit status means; scripts rely on it.
+enum ExitStatus : int {
+  kDone = 0,
+  kFailed = 1,         ///< something could not be done, or the mesh is not valid
+  kUsage = 2,          ///< the command line does not make sense
+  kRejected = 3,       ///< an input cannot be used
+  kNotConverged = 4,   ///< the best result so far has been written
+  kInterrupted = 130,  ///< by Ctrl-C; the best result so far has been written
+};
+
+/// The command line does not make sense in a way the parser cannot see. Exit status kUsage.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace subvol::cli

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/check_report.h"
+#include "cli/commands.h"
+#include "cli/exit_status.h"
+#include "cli/interrupt.h"
+#include "cli/loading.h"
+#include "cli/outputs.h"
+#include "cli/progress.h"
+#include "cli/report.h"
+#include "cli/writing.h"
+#include "fit/subdivision_fit.h"
+#include "subvol/mesh_io.h"
+#include "subvol/surface_io.h"
+#include "subvol/version.h"
+
+#include <chrono>
+#include <iostream>
+#include <memory>
+
+namespace subvol::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct FitArguments {
+  RunOptions run;
+  WritingOptions writing;
+  FitOptions fit;
+  std::string target, template_mesh;
+  std::string surface = "limit", boundary = "catmull-clark", solver = "newton";
+};
+
+/// One fit from its files to its files.
+class FitRun {
+ public:
+  FitRun(const FitArguments& arguments, const CLI::App& verb) : arguments_(arguments), verb_(verb) {}
+  int run();
+
+ private:
+  void load();
+  void fit();
+  void write();
+  void check();
+  void write_report() const;
+  void summarise() const;
+  int status() const;
+  void warn(std::size_t first = 0) const;
+
+  const FitArguments& arguments_;
+  const CLI::App& verb_;
+  Clock::time_point start_ = Clock::now();
+  std::vector<Output> outputs_;
+  std::vector<std::string> warnings_;
+  TriangleMesh target_;
+  VolumeMesh template_mesh_;
+  FitResult result_;
+  MeshCheck mesh_check_;
+  SurfaceDistance limit_distance_;
+  double chord_error_ = 0;
+};
+
+void FitRun::warn(std::size_t first) const {
+  if (arguments_.run.quiet) return;
+  for (std::size_t i = first; i < warnings_.size(); ++i) std::cerr << "subvol: warning: " << warnings_[i] << '\n';
+}
+
+void FitRun::load() {
+  target_ = load_target(arguments_.target, warnings_);
+  template_mesh_ = load_volume(arguments_.template_mesh, warnings_);
+  warn();
+}
+
+void FitRun::fit() {
+  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
+  FitOptions options = arguments_.fit;
+  options.surface = arguments_.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
+  options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
+  options.solver = arguments_.solver == "lbfgs" ? SolverKind::lbfgs : SolverKind::newton;
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  catch_interrupt();
+  result_ = fit_subdivision_volume(target_, template_mesh_, options);
+  teller.finish();
+  const std::size_t before = warnings_.size();
+  warnings_.insert(warnings_.end(), result_.report.warnings.begin(), result_.report.warnings.end());
+  warn(before);
+}
+
+void FitRun::write() {
+  WritingOptions writing = arguments_.writing;
+  writing.source = arguments_.target;
+  writing.options = options_in_force(verb_);
+  for (const Output& output : outputs_) write_output(output, result_.cage, result_.mesh, writing);
+}
+
+// What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
+void FitRun::check() {
+  VolumeMesh reread;
+  const VolumeMesh* mesh = &result_.mesh;
+  for (const Output& output : outputs_) {
+    if (output.cage || output.extension != ".mesh") continue;
+    reread = read_volume_mesh(output.path, {.check = false});
+    mesh = &reread;
+    break;
+  }
+  mesh_check_ = check_mesh(*mesh, &target_);
+  const TessellatedSurface limit = tessellated_limit(result_.cage, arguments_.writing);
+  chord_error_ = limit.chord_error;
+  limit_distance_ = surface_distance(triangles_of(limit), target_);
+}
+
+void FitRun::write_report() const {
+  const FitReport& report = result_.report;
+  const double diagonal = bounding_box_diagonal(target_);
+  Json seconds = seconds_json(report);
+  seconds["total"] = std::chrono::duration<double>(Clock::now() - start_).count();
+  Json json{{"subvol", version()},
+            {"command", "fit"},
+            {"options", options_in_force(verb_)},
+            {"input",
+             {{"target", describe(arguments_.target, target_)},
+              {"template", describe(arguments_.template_mesh, template_mesh_)}}},
+            {"stop_reason", to_string(report.stop_reason)},
+            {"explanation", report.explanation},
+            {"converged", report.stop_reason == StopReason::converged},
+            {"stages", stages_json(report)},
+            {"initial_distance",
+             {{"mean_percent", report.initial_distance_mean_percent},
+              {"max_percent", report.initial_distance_max_percent}}}};
+  json.update(check_json(mesh_check_));
+  json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
+  json["limit_surface_distance"]["chord_error_percent"] = 100 * chord_error_ / diagonal;
+  json["cage"] = describe("", result_.cage);
+  json["warnings"] = warnings_;
+  json["seconds"] = std::move(seconds);
+  json["peak_memory_bytes"] = peak_memory_bytes();
+  json["outputs"] = output_names(arguments_.run);
+  cli::write_report(arguments_.run.report, json);
+}
+
+void FitRun::summarise() const {
+  const FitReport& report = result_.report;
+  const double percent = 100 / bounding_box_diagonal(target_);
+  std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
+            << to_text(mesh_check_) << "limit surface to target: mean " << limit_distance_.mean() * percent << " %, max "
+            << limit_distance_.max() * percent << " % of the diagonal\n";
+  for (const auto& name : output_names(arguments_.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+}
+
+int FitRun::status() const {
+  if (result_.report.stop_reason == StopReason::cancelled) return kInterrupted;
+  if (!mesh_check_.valid()) return kFailed;
+  return result_.report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+}
+
+int FitRun::run() {
+  if (arguments_.run.outputs.empty() && arguments_.run.report.empty()) {
+    throw UsageError("fit: nothing to write; give -o FILE or --report FILE");
+  }
+  outputs_ = checked_outputs(arguments_.run, true);
+  apply_threads(arguments_.run);
+  load();
+  fit();
+  write();
+  check();
+  if (!arguments_.run.report.empty()) write_report();
+  if (!arguments_.run.quiet) summarise();
+  return status();
+}
+
+void add_method_options(CLI::App& verb, FitArguments& arguments) {
+  FitOptions& fit = arguments.fit;
+  verb.add_option("--levels", fit.levels, "Times the template is subdivided")
+      ->check(CLI::Range(1, 6))
+      ->type_name("L")
+      ->capture_default_str();
+  verb.add_option("--tolerance", fit.tolerance_percent,
+                  "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
+      ->check(CLI::Range(1e-9, 100.0))
+      ->type_name("PERCENT");
+  verb.add_option("--surface", arguments.surface,
+                  "What is to agree with the target: the cage's limit surface, or the finest mesh itself")
+      ->check(CLI::IsMember({"limit", "mesh"}))
+      ->type_name("limit|mesh")
+      ->capture_default_str();
+  verb.add_option("--boundary", arguments.boundary, "How boundary vertices are subdivided")
+      ->check(CLI::IsMember({"catmull-clark", "averaging"}))
+      ->type_name("catmull-clark|averaging")
+      ->capture_default_str();
+  verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
+  verb.add_option("--crease-angle", fit.crease_angle_degrees,
+                  "Edges of the template's boundary sharper than this become creases (default: only those the file tags)")
+      ->check(CLI::Range(0.0, 180.0))
+      ->type_name("DEGREES");
+}
+
+void add_solver_options(CLI::App& verb, FitArguments& arguments) {
+  FitOptions& fit = arguments.fit;
+  const auto group = "Solver";
+  verb.add_option("--lambda-far", fit.lambda_far, "Weight of the cells' shape while the template is far away")
+      ->check(CLI::Range(1e-9, 1e9))
+      ->type_name("W")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage")
+      ->check(CLI::Range(1e-9, 1e9))
+      ->type_name("W")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--solver", arguments.solver, "How energies are minimised")
+      ->check(CLI::IsMember({"newton", "lbfgs"}))
+      ->type_name("newton|lbfgs")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
+      ->check(CLI::Range(1, 1'000'000))
+      ->type_name("N")
+      ->group(group);
+  verb.add_option("--time-limit", fit.time_limit_seconds, "Stop after this time with the best result so far")
+      ->check(CLI::Range(1e-3, 1e9))
+      ->type_name("SECONDS")
+      ->group(group);
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app, Action& action) {
+  CLI::App* verb = app.add_subcommand("fit", "Deform a template until its boundary reproduces a surface");
+  const auto arguments = std::make_shared<FitArguments>();
+  verb->add_option("TARGET", arguments->target,
+                   "Surface to reproduce: " + surface_formats() + "; or a volume mesh, for its boundary")
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--template", arguments->template_mesh, "Coarse mesh to start from: " + volume_mesh_formats())
+      ->required()
+      ->type_name("MESH");
+  add_method_options(*verb, *arguments);
+  add_solver_options(*verb, *arguments);
+  add_output_options(*verb, arguments->run,
+                     "Finest mesh, or its surface, by extension: " + output_formats() +
+                         "; cage:FILE for the control cage; may be given several times");
+  add_writing_options(*verb, arguments->writing);
+  add_long_run_options(*verb, arguments->run);
+  verb->footer(R"(Example:
+  subvol fit bone.off --template bone.mesh --levels 3 -o bone.glb -o cage:bone_cage.usda -o bone_fine.mesh
+
+Ctrl-C once ends the fit with the best result so far (exit status 130), twice ends the program.
+--config FILE.toml reads options from a file: key = value, keys being the long names above.)");
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return FitRun(*arguments, *verb).run(); }; });
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/loading.h"
+
+#include "fit/surface_distance.h"
+#include "subvol/boundary.h"
+#include "subvol/mesh_io.h"
+#include "subvol/mesh_topology.h"
+#include "subvol/surface_io.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+
+namespace subvol::cli {
+
+bool is_volume_file(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".mesh" || extension == ".vtk";
+}
+
+TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  return is_volume_file(path) ? triangulate(load_polygons(path, warnings)) : read_triangle_mesh(path, &warnings);
+}
+
+PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (!is_volume_file(path)) return read_polygon_mesh(path, &warnings);
+  const VolumeMesh mesh = load_volume(path, warnings);
+  return boundary_surface(mesh, MeshTopology(mesh));
+}
+
+VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check) {
+  return read_volume_mesh(path, {.check = check, .warnings = &warnings});
+}
+
+Json describe(const std::string& path, const TriangleMesh& mesh) {
+  return {{"path", path},
+          {"vertices", mesh.positions.size()},
+          {"triangles", mesh.triangles.size()},
+          {"bounding_box_diagonal", bounding_box_diagonal(mesh)}};
+}
+
+Json describe(const std::string& path, const VolumeMesh& mesh) {
+  std::array<std::size_t, kNumCellKinds> counts{};
+  for (CellKind kind : mesh.kinds) ++counts[static_cast<std::size_t>(kind)];
+  return {{"path", path},
+          {"vertices", mesh.num_vertices()},
+          {"cells", mesh.num_cells()},
+          {"hexes", counts[static_cast<std::size_t>(CellKind::hex)]},
+          {"prisms", counts[static_cast<std::size_t>(CellKind::prism)]},
+          {"tets", counts[static_cast<std::size_t>(CellKind::tet)]},
+          {"creases", mesh.tags.creases.size()},
+          {"corners", mesh.tags.corners.size()}};
+}
+
+}  // namespace subvol::cli

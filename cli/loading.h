@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/run_options.h"
+#include "subvol/triangle_mesh.h"
+#include "subvol/volume_mesh.h"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace subvol::cli {
+
+/// Whether a path's extension is one of a volume mesh.
+bool is_volume_file(const std::filesystem::path& path);
+
+/// A surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
+TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
+PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
+
+/// A volume mesh that is sound but for inverted cells and unused vertices (or, unchecked, just readable).
+VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true);
+
+/// What stands under "input" in a report.
+Json describe(const std::string& path, const TriangleMesh& mesh);
+Json describe(const std::string& path, const VolumeMesh& mesh);
+
+}  // namespace subvol::cli

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/commands.h"
+#include "cli/config_file.h"
+#include "cli/exit_status.h"
+#include "subvol/error.h"
+#include "subvol/version.h"
+
+#include <iostream>
+#include <memory>
+#include <new>
+
+namespace subvol::cli {
+namespace {
+
+constexpr const char* kFooter = R"(Examples:
+  subvol fit bone.off --template bone.mesh -o bone.glb -o cage:bone_cage.mesh --report bone.json
+  subvol check bone_fine.mesh --target bone.off
+  subvol convert cage.mesh -o cage.usda
+
+Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not converged (best result written);
+             130 interrupted (best result written).
+"subvol VERB --help" tells more.)";
+
+int complain(const char* what, int status) {
+  std::cerr << "subvol: " << what << '\n';
+  return status;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Fits subdivision volumes: hexahedral meshes whose boundary reproduces a surface.", "subvol"};
+  app.footer(kFooter);
+  app.set_version_flag("--version", std::string("subvol ") + version());
+  app.require_subcommand(1);
+  app.fallthrough(false);
+  app.set_config("--config", "", "Read options from FILE.toml");
+  app.get_config_ptr()->type_name("FILE.toml");
+  app.config_formatter(std::make_shared<VerbConfig>(app));
+  app.allow_config_extras(CLI::config_extras_mode::error);
+
+  Action action;
+  add_fit_command(app, action);
+  add_subdivide_command(app, action);
+  add_check_command(app, action);
+  add_convert_command(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  return action();
+}
+
+}  // namespace
+}  // namespace subvol::cli
+
+int main(int argc, char** argv) {
+  using namespace subvol::cli;
+  try {
+    return run(argc, argv);
+  } catch (const UsageError& error) {
+    return complain(error.what(), kUsage);
+  } catch (const subvol::InputError& error) {
+    return complain(error.what(), kRejected);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory", kFailed);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kFailed);
+  }
+}

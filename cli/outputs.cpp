@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/outputs.h"
+
+#include "cli/exit_status.h"
+#include "subvol/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <set>
+#include <string_view>
+
+#include <stdlib.h>
+#include <unistd.h>
+
+namespace subvol::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kCagePrefix = "cage:";
+constexpr std::array<std::string_view, 2> kVolumeExtensions{".mesh", ".vtk"};
+constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
+
+template <std::size_t N>
+bool contains(const std::array<std::string_view, N>& list, std::string_view item) {
+  return std::find(list.begin(), list.end(), item) != list.end();
+}
+
+Output parse_output(const std::string& text) {
+  Output output;
+  output.cage = text.starts_with(kCagePrefix);
+  output.path = output.cage ? text.substr(kCagePrefix.size()) : text;
+  output.extension = output.path.extension().string();
+  std::transform(output.extension.begin(), output.extension.end(), output.extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (!contains(kVolumeExtensions, output.extension) && !contains(kSurfaceExtensions, output.extension)) {
+    throw UsageError("-o " + text + ": the extension must be one of " + output_formats());
+  }
+  return output;
+}
+
+// A file is really made: access() promises root what a read-only file system will not keep.
+void require_writable_folder(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  std::string probe = (folder / ".subvol-probe-XXXXXX").string();
+  const int descriptor = mkstemp(probe.data());
+  if (descriptor < 0) {
+    throw IoError(file.string() + ": its folder cannot be written to: " + std::strerror(errno));
+  }
+  close(descriptor);
+  unlink(probe.c_str());
+}
+
+void require_free(const fs::path& file, bool force) {
+  std::error_code ignored;
+  if (fs::is_directory(file, ignored)) throw UsageError(file.string() + ": is a folder");
+  if (!force && fs::is_regular_file(file, ignored)) {
+    throw UsageError(file.string() + ": exists; give --force to replace it");
+  }
+  if (!fs::exists(file, ignored) || fs::is_regular_file(file, ignored)) require_writable_folder(file);
+}
+
+}  // namespace
+
+bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }
+
+std::string output_formats() {
+  std::string list;
+  for (std::string_view extension : kVolumeExtensions) list.append(list.empty() ? "" : " ").append(extension);
+  for (std::string_view extension : kSurfaceExtensions) list.append(" ").append(extension);
+  return list;
+}
+
+std::vector<Output> checked_outputs(const RunOptions& options, bool allow_cage) {
+  std::vector<Output> outputs;
+  std::set<fs::path> seen;
+  const auto claim = [&](const fs::path& path) {
+    if (!seen.insert(fs::absolute(path).lexically_normal()).second) {
+      throw UsageError(path.string() + ": named twice as an output");
+    }
+    require_free(path, options.force);
+  };
+  for (const std::string& text : options.outputs) {
+    outputs.push_back(parse_output(text));
+    if (outputs.back().cage && !allow_cage) throw UsageError("-o " + text + ": there is no cage here");
+    claim(outputs.back().path);
+  }
+  if (!options.report.empty()) claim(options.report);
+  return outputs;
+}
+
+Json output_names(const RunOptions& options) {
+  Json names = Json::array();
+  for (const std::string& text : options.outputs) {
+    names.push_back(text.starts_with(kCagePrefix) ? text.substr(kCagePrefix.size()) : text);
+  }
+  return names;
+}
+
+}  // namespace subvol::cli

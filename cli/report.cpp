@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/report.h"
+
+#include "subvol/atomic_file.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <sys/resource.h>
+
+namespace subvol::cli {
+namespace {
+
+void require_finite(const Json& value, const std::string& where) {
+  if (value.is_number_float() && !std::isfinite(value.get<double>())) {
+    throw std::runtime_error("report entry " + where + " is not a finite number");
+  }
+  if (!value.is_structured()) return;
+  for (const auto& [key, item] : value.items()) require_finite(item, where + '/' + key);
+}
+
+Json energy_json(const StageRecord& stage, const IterationRecord& iteration) {
+  return {{"total", iteration.surface_energy + stage.lambda * iteration.volume_energy},
+          {"surface", iteration.surface_energy},
+          {"volume", iteration.volume_energy}};
+}
+
+Json iteration_json(const StageRecord& stage, const IterationRecord& iteration) {
+  return {{"energy", energy_json(stage, iteration)},
+          {"step_length", iteration.step_length},
+          {"linear_iterations", iteration.linear_iterations},
+          {"evaluations", iteration.evaluations}};
+}
+
+Json stage_json(const StageRecord& stage) {
+  Json history = Json::array();
+  int evaluations = 0;
+  for (const IterationRecord& iteration : stage.iterations) {
+    history.push_back(iteration_json(stage, iteration));
+    evaluations += iteration.evaluations;
+  }
+  Json json{{"name", stage.name},
+            {"level", stage.level},
+            {"lambda", stage.lambda},
+            {"tangential_weight", stage.tangential_weight},
+            {"unknowns", stage.unknowns},
+            {"cells", stage.cells},
+            {"iterations", stage.iterations.size()},
+            {"evaluations", evaluations}};
+  if (!stage.iterations.empty()) json["energy"] = energy_json(stage, stage.iterations.back());
+  json["stop"] = stage.stop;
+  json["kept"] = stage.kept;
+  json["seconds"] = stage.seconds;
+  json["history"] = std::move(history);
+  return json;
+}
+
+}  // namespace
+
+Json stages_json(const FitReport& report) {
+  Json stages = Json::array();
+  for (const StageRecord& stage : report.stages) stages.push_back(stage_json(stage));
+  return stages;
+}
+
+Json seconds_json(const FitReport& report) {
+  Json seconds = Json::object();
+  for (const auto& [part, value] : report.seconds) seconds[part] = value;
+  return seconds;
+}
+
+std::size_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
+}
+
+std::string json_text(const Json& report) {
+  require_finite(report, "");
+  // File names need not be UTF-8.
+  return report.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+void write_report(const std::filesystem::path& path, const Json& report) {
+  write_file_atomically(path, json_text(report));
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/run_options.h"
+#include "fit/fit_report.h"
+
+#include <filesystem>
+#include <string>
+
+namespace subvol::cli {
+
+/// The stages of a fit, with every iteration.
+Json stages_json(const FitReport& report);
+
+/// Seconds by part.
+Json seconds_json(const FitReport& report);
+
+/// Largest amount of memory this process has held.
+std::size_t peak_memory_bytes();
+
+/// JSON text of a report. std::runtime_error, naming the entry, where a number is not finite: JSON has no word for it.
+std::string json_text(const Json& report);
+
+/// Writes a report, all of it or nothing. IoError: the file cannot be written.
+void write_report(const std::filesystem::path& path, const Json& report);
+
+}  // namespace subvol::cli

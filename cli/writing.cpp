@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/writing.h"
+
+#include "cli/exit_status.h"
+#include "export/export.h"
+#include "export/gltf_writer.h"
+#include "export/obj_writer.h"
+#include "export/usd_writer.h"
+#include "fit/surface_distance.h"
+#include "subvol/boundary.h"
+#include "subvol/mesh_io.h"
+#include "subvol/mesh_topology.h"
+
+#include <algorithm>
+
+namespace subvol::cli {
+namespace {
+
+struct Boundary {
+  PolygonMesh polygons;
+  FeatureTags tags;  ///< by the polygons' vertex numbers
+};
+
+Boundary boundary_with_tags(const VolumeMesh& mesh) {
+  std::vector<Index> volume_vertex;
+  Boundary boundary{boundary_surface(mesh, MeshTopology(mesh), &volume_vertex), {}};
+  // volume_vertex ascends, so the order of tags is kept.
+  const auto number = [&](Index v) {
+    return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
+  };
+  for (const CreaseEdge& crease : mesh.tags.creases) {
+    boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
+  }
+  for (const CornerVertex& corner : mesh.tags.corners) {
+    boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
+  }
+  return boundary;
+}
+
+SceneValue scene_value(const Json& value) {
+  if (value.is_boolean()) return value.get<bool>();
+  if (value.is_number()) return value.get<double>();
+  return value.get<std::string>();
+}
+
+SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options) {
+  SurfaceSceneOptions scene{.name = output.path.stem().string(),
+                            .max_chord_percent = options.chord_percent,
+                            .metres_per_unit = options.metres_per_unit,
+                            .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
+                            .source = options.source.filename().string()};
+  for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
+  return scene;
+}
+
+void write_cells(const Output& output, const VolumeMesh& mesh) {
+  write_volume_mesh(output.path, mesh);
+}
+
+void write_polygons(const Output& output, const PolygonMesh& surface, const FeatureTags& tags,
+                    const WritingOptions& options) {
+  if (output.extension == ".obj") return write_obj(output.path, surface);
+  const SurfaceSceneOptions scene = scene_options(output, options);
+  write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
+}
+
+bool is_scene(const Output& output) { return output.extension == ".glb" || output.extension == ".gltf"; }
+
+}  // namespace
+
+void add_writing_options(CLI::App& verb, WritingOptions& options) {
+  const auto group = "Surfaces for DCC tools";
+  verb.add_option("--chord", options.chord_percent,
+                  "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
+      ->check(CLI::Range(1e-4, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--unit", options.metres_per_unit, "Length of the mesh's unit")
+      ->check(CLI::Range(1e-12, 1e12))
+      ->type_name("METRES")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--up", options.up_axis, "Axis of the mesh that points up")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->type_name("y|z")
+      ->capture_default_str()
+      ->group(group);
+}
+
+void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const WritingOptions& options) {
+  if (output.cage) return write_output(output, cage, options);
+  if (!is_scene(output)) return write_output(output, mesh, options);
+  write_gltf(output.path, surface_scene(cage, &mesh, scene_options(output, options)));
+}
+
+void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
+  if (output.is_volume()) return write_cells(output, mesh);
+  if (is_scene(output)) return write_gltf(output.path, boundary_scene(mesh, scene_options(output, options)));
+  const Boundary boundary = boundary_with_tags(mesh);
+  write_polygons(output, boundary.polygons, boundary.tags, options);
+}
+
+void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
+  if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
+  if (is_scene(output)) return write_gltf(output.path, polygon_scene(surface, {}, scene_options(output, options)));
+  write_polygons(output, surface, {}, options);
+}
+
+TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options) {
+  return tessellate(cage, chord_length(cage, {.max_chord_percent = options.chord_percent}));
+}
+
+TriangleMesh triangles_of(const TessellatedSurface& surface) {
+  TriangleMesh mesh{surface.positions, {}};
+  for (const auto& quad : surface.quads) {
+    mesh.triangles.push_back({quad[0], quad[1], quad[2]});
+    mesh.triangles.push_back({quad[0], quad[2], quad[3]});
+  }
+  return mesh;
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/outputs.h"
+#include "export/tessellate.h"
+#include "subvol/triangle_mesh.h"
+#include "subvol/volume_mesh.h"
+
+#include <filesystem>
+#include <string>
+
+namespace subvol::cli {
+
+/// How surfaces for DCC tools are written.
+struct WritingOptions {
+  double chord_percent = 0.005;   ///< largest chord error of a tessellation, per cent of its bounding box's diagonal
+  double metres_per_unit = 1;
+  std::string up_axis = "y";
+  std::filesystem::path source;   ///< file the result was made from, kept in the file
+  Json options = Json::object();  ///< options in force, kept in the file
+};
+
+/// --chord, --unit, --up.
+void add_writing_options(CLI::App& verb, WritingOptions& options);
+
+/// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
+/// coloured by quality, .obj and .usda as the boundary's polygons, .usda as a subdivision surface for the cage.
+void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const WritingOptions& options);
+
+/// Writes one mesh as it stands: its cells, or the flat faces of its boundary (.usda: as a subdivision cage).
+void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);
+
+/// Writes polygons as they stand. UsageError: a format that holds cells.
+void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options);
+
+/// The limit surface of a cage as it is written to .glb.
+TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options);
+TriangleMesh triangles_of(const TessellatedSurface& surface);
+
+}  // namespace subvol::cli
