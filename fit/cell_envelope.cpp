@@ -58,45 +58,47 @@ int CellEnvelope::lowest_function(const Barycentric& at, double value) const {
 
 CellEnvelope::Cut CellEnvelope::cut(int inside, int outside) {
   const Barycentric line = values(inside) - values(outside);
-  const int n = polygon_.size;
+  const int n = polygon_->size;
   double height[kMaxCorners];
   std::uint32_t in = 0, out = 0;
   for (int i = 0; i < n; ++i) {
-    height[i] = dot(polygon_.at[i], line);
+    height[i] = dot(polygon_->at[i], line);
     in |= static_cast<std::uint32_t>(height[i] < -noise_) << i;
     out |= static_cast<std::uint32_t>(height[i] > noise_) << i;
   }
   if (out == 0) return in == 0 ? Cut::tie : Cut::untouched;
   if (in == 0) return Cut::empty;
   if (n == kMaxCorners) return Cut::tie;
-  rest_.size = 0;
-  rest_.checked = 0;
+  rest_->size = 0;
+  rest_->checked = 0;
   for (int i = 0; i < n; ++i) {
     const int j = i + 1 < n ? i + 1 : 0;
     if (!(out >> i & 1)) {
-      rest_.checked |= (polygon_.checked >> i & 1) << rest_.size;
-      rest_.at[rest_.size++] = polygon_.at[i];
+      rest_->checked |= (polygon_->checked >> i & 1) << rest_->size;
+      rest_->at[rest_->size++] = polygon_->at[i];
     }
     if ((in >> i & out >> j & 1) || (out >> i & in >> j & 1))
-      rest_.at[rest_.size++] = between(polygon_.at[i], polygon_.at[j], height[i] / (height[i] - height[j]));
+      rest_->at[rest_->size++] = between(polygon_->at[i], polygon_->at[j], height[i] / (height[i] - height[j]));
   }
   std::swap(polygon_, rest_);
   return Cut::cut;
 }
 
-CellEnvelope::Cut CellEnvelope::find_cell(int function) {
-  polygon_ = start_;
+CellEnvelope::Cut CellEnvelope::find_cell(int function, std::span<const Barycentric> whole) {
+  polygon_->size = static_cast<int>(whole.size());
+  polygon_->checked = 0;
+  std::copy(whole.begin(), whole.end(), polygon_->at.begin());
   const Barycentric own = values(function);
   for (int k = 0; k < known_[function].count; ++k) {
     const Cut result = cut(function, known_[function].neighbours[k]);
     if (result == Cut::empty || result == Cut::tie) return result;
   }
-  for (std::uint32_t open; (open = ~polygon_.checked & ((1u << polygon_.size) - 1)) != 0;) {
+  for (std::uint32_t open; (open = ~polygon_->checked & ((1u << polygon_->size) - 1)) != 0;) {
     const int i = std::countr_zero(open);
-    const Barycentric& at = polygon_.at[i];
+    const Barycentric& at = polygon_->at[i];
     const double low = lowest(at);
     if (low >= dot(at, own) - 2 * noise_) {
-      polygon_.checked |= 1u << i;
+      polygon_->checked |= 1u << i;
       continue;
     }
     const int other = lowest_function(at, low);
@@ -115,8 +117,6 @@ void CellEnvelope::note_neighbours(int cell, int found) {
 
 bool CellEnvelope::compute(std::span<const Barycentric> polygon, int first, double noise) {
   if (polygon.size() > kMaxCorners) return false;
-  start_.size = static_cast<int>(polygon.size());
-  std::copy(polygon.begin(), polygon.end(), start_.at.begin());
   noise_ = noise;
   known_.assign(static_cast<std::size_t>(size_), Known{});
   cells_.clear();
@@ -124,12 +124,12 @@ bool CellEnvelope::compute(std::span<const Barycentric> polygon, int first, doub
   double area = 0;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) area += share(polygon[0], polygon[i], polygon[i + 1]);
   for (std::size_t q = 0; q < queue_.size(); ++q) {
-    const Cut result = find_cell(queue_[q]);
+    const Cut result = find_cell(queue_[q], polygon);
     if (result == Cut::tie) return false;
     if (result == Cut::empty) continue;
     Cell cell{queue_[q], {}};
-    add_moments(static_cast<std::size_t>(polygon_.size),
-                [this](std::size_t i) -> const Barycentric& { return polygon_.at[i]; }, cell.moments);
+    add_moments(static_cast<std::size_t>(polygon_->size),
+                [this](std::size_t i) -> const Barycentric& { return polygon_->at[i]; }, cell.moments);
     area -= total(cell.moments);
     cells_.push_back(cell);
   }

@@ -17,6 +17,10 @@ namespace subvol {
 /// but not safe where functions are alike within rounding, so the areas are checked in the end.
 class CellEnvelope {
  public:
+  CellEnvelope() = default;
+  CellEnvelope(const CellEnvelope&) = delete;
+  CellEnvelope& operator=(const CellEnvelope&) = delete;
+
   struct Cell {
     int function;
     std::array<double, 6> moments;
@@ -56,7 +60,7 @@ class CellEnvelope {
   double lowest(const Barycentric& at) const;
   int lowest_function(const Barycentric& at, double value) const;
   Cut cut(int inside, int outside);
-  Cut find_cell(int function);
+  Cut find_cell(int function, std::span<const Barycentric> whole);
   void note_neighbours(int cell, int found);
 
   int size_ = 0;
@@ -66,7 +70,9 @@ class CellEnvelope {
   std::vector<Known> known_;
   std::vector<int> queue_;
   std::vector<Cell> cells_;
-  Polygon start_, polygon_, rest_;
+  Polygon buffers_[2];
+  Polygon* polygon_ = &buffers_[0];  ///< the cell so far
+  Polygon* rest_ = &buffers_[1];     ///< the next, while it is cut
 };
 
 }  // namespace subvol

@@ -18,6 +18,8 @@ constexpr double kRounding = 4e-15;
 // Of sites that may matter to a part, for which finding its cells at once is tried; and of vain tries in a triangle.
 constexpr std::size_t kMaxCandidates = 160;
 constexpr int kMaxFailures = 16;
+// The site on a ball's border must not be missed by rounding.
+constexpr double kBallSlack = 1 + 1e-12;
 
 }  // namespace
 
@@ -162,13 +164,19 @@ void TriangleCutter::split(int c, int b) {
 }
 
 bool TriangleCutter::gather(std::span<const Corner> part) {
-  // A site that is farther than c from all corners is so everywhere between them: only sites in the balls through c matter.
-  const Vec3 centre = point(between(between(part[0].at, part[1].at, 0.5), part[2].at, 1. / 3));
-  const Vec3& c = tree_.position(tree_.nearest(centre, (position(part[0].slot) - centre).squaredNorm()).place);
+  // A site that is farther than c from all corners is so everywhere between them: only sites in the balls through c
+  // matter. The smaller the balls, the better.
+  Barycentric sum{};
+  for (const Corner& corner : part)
+    for (int k = 0; k < 3; ++k) sum[k] += corner.at[k];
+  int central = part[0].slot;
+  for (const Corner& corner : part)
+    if (value(corner.slot, sum) < value(central, sum)) central = corner.slot;
+  const Vec3& c = position(central);
   balls_.clear();
   for (const Corner& corner : part) {
     const Vec3 p = point(corner.at);
-    balls_.push_back({p, (c - p).squaredNorm()});
+    balls_.push_back({p, kBallSlack * (c - p).squaredNorm()});
   }
   candidates_.clear();
   return tree_.gather(balls_, kMaxCandidates, candidates_);
