@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Restricted Voronoi diagram: nanoseconds per pair (triangle, cell) with sites near the target and far from it, both ways.
-// The target is a bumpy sphere; times are those of the process's processors, so with one thread other jobs disturb little.
+// Restricted Voronoi diagram: nanoseconds per pair (triangle, cell) with sites near the target and far from it, both
+// ways. The target is a bumpy sphere; times are those of the process's processors, so with one thread other jobs
+// disturb little.
 #include "fit/restricted_voronoi.h"
 #include "subvol/triangle_mesh.h"
 
@@ -82,11 +83,12 @@ void report(const char* name, const TriangleMesh& mesh, const std::vector<Vec3>&
   double area = 0;
   for (const VoronoiPiece& piece : pieces) area += piece.share();
   const double lost = std::abs(area / static_cast<double>(mesh.triangles.size()) - 1);
-  std::printf("  {\"case\": \"%s\", \"triangles\": %zu, \"sites\": %zu, \"pairs\": %zu, \"build_s\": %.5f, \"refit_s\": %.5f, "
-              "\"cut_s\": %.5f, \"ns_per_pair\": %.1f, \"us_per_site\": %.3f, \"lost_share\": %.1e}%s\n",
-              name, mesh.triangles.size(), sites.size(), pieces.size(), build, refit, cut,
-              1e9 * cut / static_cast<double>(pieces.size()), 1e6 * (cut + refit) / static_cast<double>(sites.size()), lost,
-              last ? "" : ",");
+  std::printf(
+      "  {\"case\": \"%s\", \"triangles\": %zu, \"sites\": %zu, \"pairs\": %zu, \"build_s\": %.5f, \"refit_s\": %.5f, "
+      "\"cut_s\": %.5f, \"ns_per_pair\": %.1f, \"us_per_site\": %.3f, \"lost_share\": %.1e}%s\n",
+      name, mesh.triangles.size(), sites.size(), pieces.size(), build, refit, cut,
+      1e9 * cut / static_cast<double>(pieces.size()), 1e6 * (cut + refit) / static_cast<double>(sites.size()), lost,
+      last ? "" : ",");
 }
 
 std::vector<Vec3> barycentres(const TriangleMesh& mesh) {

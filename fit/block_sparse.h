@@ -16,7 +16,7 @@ namespace subvol {
 struct BlockSparse {
   std::vector<std::size_t> offsets{0};  ///< num_rows() + 1 entries
   std::vector<Index> columns;
-  std::vector<float> blocks;            ///< 9 per entry, row-major
+  std::vector<float> blocks;  ///< 9 per entry, row-major
 
   std::size_t num_rows() const { return offsets.size() - 1; }
   std::size_t num_entries() const { return columns.size(); }
@@ -33,7 +33,8 @@ struct BlockSparse {
   void set_zero();
 };
 
-/// The pattern in which the nodes of every element are coupled with one another, and every node with itself; zero blocks.
+/// The pattern in which the nodes of every element are coupled with one another, and every node with itself; zero
+/// blocks.
 ///
 /// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], each in [0, num_rows), else InputError.
 BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes);

@@ -128,8 +128,9 @@ bool CellEnvelope::compute(std::span<const Barycentric> polygon, int first, doub
     if (result == Cut::tie) return false;
     if (result == Cut::empty) continue;
     Cell cell{queue_[q], {}};
-    add_moments(static_cast<std::size_t>(polygon_->size),
-                [this](std::size_t i) -> const Barycentric& { return polygon_->at[i]; }, cell.moments);
+    add_moments(
+        static_cast<std::size_t>(polygon_->size),
+        [this](std::size_t i) -> const Barycentric& { return polygon_->at[i]; }, cell.moments);
     area -= total(cell.moments);
     cells_.push_back(cell);
   }

@@ -13,8 +13,8 @@ namespace subvol {
 /// are known to be few.
 ///
 /// Each cell starts as the whole polygon and is cut by the functions found lowest at its corners until there are none
-/// lower than its own. Much cheaper than cutting in two again and again, as cells are not cut by the bisectors of others;
-/// but not safe where functions are alike within rounding, so the areas are checked in the end.
+/// lower than its own. Much cheaper than cutting in two again and again, as cells are not cut by the bisectors of
+/// others; but not safe where functions are alike within rounding, so the areas are checked in the end.
 class CellEnvelope {
  public:
   CellEnvelope() = default;

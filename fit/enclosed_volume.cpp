@@ -74,9 +74,7 @@ class Grid {
   }
 
  private:
-  std::size_t number(int i, int j, int k) const {
-    return (static_cast<std::size_t>(k) * size_[1] + j) * size_[0] + i;
-  }
+  std::size_t number(int i, int j, int k) const { return (static_cast<std::size_t>(k) * size_[1] + j) * size_[0] + i; }
   double cell_;
   Vec3 origin_;
   int size_[3];
@@ -113,8 +111,8 @@ double closed_share(std::span<const Vec3> positions, std::span<const std::array<
   std::size_t matched = 0;
   for (std::size_t first = 0, last; first < edges.size(); first = last) {
     std::size_t num_forward = 0;
-    for (last = first; last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high;
-         ++last)
+    for (last = first;
+         last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high; ++last)
       num_forward += edges[last].forward;
     // Surfaces may touch along an edge: as many one way as the other is fine.
     matched += 2 * std::min(num_forward, last - first - num_forward);
@@ -122,7 +120,8 @@ double closed_share(std::span<const Vec3> positions, std::span<const std::array<
   return static_cast<double>(matched) / static_cast<double>(edges.size());
 }
 
-double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, int resolution) {
+double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
+                      int resolution) {
   if (triangles.empty()) return 0;
   Vec3 low = positions[triangles[0][0]], high = low;
   for (const auto& t : triangles)
@@ -137,7 +136,8 @@ double flooded_volume(std::span<const Vec3> positions, std::span<const std::arra
     const double longest = std::max({u.norm(), v.norm(), (u - v).norm()});
     const int n = static_cast<int>(std::ceil(3 * longest / grid.cell())) + 1;
     for (int i = 0; i <= n; ++i)
-      for (int j = 0; j <= n - i; ++j) grid.mark(a + (static_cast<double>(i) / n) * u + (static_cast<double>(j) / n) * v);
+      for (int j = 0; j <= n - i; ++j)
+        grid.mark(a + (static_cast<double>(i) / n) * u + (static_cast<double>(j) / n) * v);
   }
   grid.flood();
   return grid.inside_volume();

@@ -8,19 +8,19 @@
 
 namespace subvol {
 
-/// |1/6 sum of det(a, b, c)| over the triangles, taken about the first corner. The enclosed volume of a closed, oriented
-/// surface; meaningless for others.
+/// |1/6 sum of det(a, b, c)| over the triangles, taken about the first corner. The enclosed volume of a closed,
+/// oriented surface; meaningless for others.
 double signed_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
 
-/// Share of the triangles' half-edges that pair up with an opposite half-edge, in [0, 1]. Positions decide, not numbers,
-/// so a soup of a closed, oriented surface has 1.
+/// Share of the triangles' half-edges that pair up with an opposite half-edge, in [0, 1]. Positions decide, not
+/// numbers, so a soup of a closed, oriented surface has 1.
 double closed_share(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
 
 /// Volume of the grid cells that cannot be reached from outside without crossing the surface, and half of those that it
 /// passes through.
 ///
-/// The box of the surface has `resolution` cells along its longest side, >= 1. Orientation does not matter; holes smaller
-/// than a cell close themselves. Relative error about area * cell / volume / 10.
+/// The box of the surface has `resolution` cells along its longest side, >= 1. Orientation does not matter; holes
+/// smaller than a cell close themselves. Relative error about area * cell / volume / 10.
 double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, int resolution);
 
 }  // namespace subvol

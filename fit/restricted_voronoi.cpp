@@ -26,7 +26,8 @@ Vec3 box_centre(std::span<const Vec3> points) {
 }
 
 /// Positions relative to a centre, and the nearest site of each. The one before is a near-by start, no more.
-void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree& tree, std::vector<Vec3>& moved, std::vector<Index>& nearest) {
+void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree& tree, std::vector<Vec3>& moved,
+            std::vector<Index>& nearest) {
   moved.resize(positions.size());
   nearest.resize(positions.size());
   const std::size_t num_chunks = (positions.size() + kChunk - 1) / kChunk;
@@ -64,7 +65,7 @@ void RestrictedVoronoi::take_sites(std::span<const Vec3> sites) {
   if (num_sites() != moved.size() || tree_.looseness() > kMaxLooseness) tree_ = SiteTree(moved);
 }
 
-Index RestrictedVoronoi::nearest_site(const Vec3& point) const { 
+Index RestrictedVoronoi::nearest_site(const Vec3& point) const {
   const Index place = tree_.nearest(point - centre_).place;
   return place == kNoIndex ? kNoIndex : tree_.site(place);
 }

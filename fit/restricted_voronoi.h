@@ -31,15 +31,15 @@ struct VoronoiPiece {
 
 /// The Voronoi diagram of sites in space, restricted to triangles.
 ///
-///   Vor(i) cut with t = { y in t : |y - x_i| <= |y - x_j| for all j }            Paper: section 3.3; Eq. 9 integrates it
+///   Vor(i) cut with t = { y in t : |y - x_i| <= |y - x_j| for all j }         Paper: Eq. 9 integrates over it
 ///
-/// A triangle's cells are found among the few sites that may matter to it, and accepted where they part its area exactly.
-/// Elsewhere (ties, crowds of sites) it is cut in two by bisectors until every part lies in one cell, which, cells being
-/// convex, its corners decide: so no area is lost or counted twice in whatever position the sites are, and nearest-site
-/// queries are enough however far away they are. Shares of a triangle add up to 1 within a few roundings.
+/// A triangle's cells are found among the few sites that may matter to it, and accepted where they part its area
+/// exactly. Elsewhere (ties, crowds of sites) it is cut in two by bisectors until every part lies in one cell, which,
+/// cells being convex, its corners decide: so no area is lost or counted twice in whatever position the sites are, and
+/// nearest-site queries are enough however far away they are. Shares of a triangle add up to 1 within a few roundings.
 ///
-/// Ties: where sites are equally near within rounding, on a set of positive area (equal sites, a triangle in a bisector),
-/// one of them gets it all; of equal sites the one with the lowest number.
+/// Ties: where sites are equally near within rounding, on a set of positive area (equal sites, a triangle in a
+/// bisector), one of them gets it all; of equal sites the one with the lowest number.
 class RestrictedVoronoi {
  public:
   /// Sites are finite and there is at least one, else InputError. Equal sites are allowed.
@@ -59,8 +59,8 @@ class RestrictedVoronoi {
   /// pieces                 receives the result; its memory is used again.
   ///
   /// Triangles without area have no pieces. Runs in parallel over triangles; same bits for any number of threads.
-  /// Cost: a query per position, some 0.1 microseconds, and 0.2 to 0.8 microseconds per piece of the triangles that more
-  /// than one cell meets.
+  /// Cost: a query per position, some 0.1 microseconds, and 0.2 to 0.8 microseconds per piece of the triangles that
+  /// more than one cell meets.
   void compute(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
                std::vector<VoronoiPiece>& pieces) const;
   std::vector<VoronoiPiece> compute(std::span<const Vec3> positions,

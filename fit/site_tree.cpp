@@ -34,9 +34,9 @@ void order_sites(std::span<const Vec3> sites, std::span<Index> order, std::size_
   const std::size_t num_units = (order.size() + unit - 1) / unit;
   const std::size_t half = (num_units / 2) * unit;
   const int axis = longest_axis(sites, order);
-  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(), [&](Index a, Index b) {
-    return sites[a][axis] != sites[b][axis] ? sites[a][axis] < sites[b][axis] : a < b;
-  });
+  std::nth_element(
+      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(),
+      [&](Index a, Index b) { return sites[a][axis] != sites[b][axis] ? sites[a][axis] < sites[b][axis] : a < b; });
   order_sites(sites, order.first(half), unit);
   order_sites(sites, order.subspan(half), unit);
 }

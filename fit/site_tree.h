@@ -32,8 +32,8 @@ class SiteTree {
   /// Sites are finite; equal ones are allowed. Cost: n log n, about 0.2 microseconds a site.
   explicit SiteTree(std::span<const Vec3> sites);
 
-  /// Takes the sites' new positions (as many as before), keeping their order. Cost: one pass. Queries stay exact for any
-  /// movement, and become slower as neighbours drift apart: `looseness` says how far.
+  /// Takes the sites' new positions (as many as before), keeping their order. Cost: one pass. Queries stay exact for
+  /// any movement, and become slower as neighbours drift apart: `looseness` says how far.
   void refit(std::span<const Vec3> sites);
   /// Sum of the leaf boxes' diagonals over that of the build: 1 where nothing has moved.
   double looseness() const { return built_extent_ > 0 ? extent_ / built_extent_ : 1; }
@@ -44,8 +44,8 @@ class SiteTree {
 
   /// The site nearest to a point, of equally near ones the one with the lowest number.
   ///
-  /// bound    squared distance beyond which sites do not matter. The result is the same for every bound that is at least
-  ///          the squared distance of the nearest site; where it is smaller, the result may be kNoIndex.
+  /// bound    squared distance beyond which sites do not matter. The result is the same for every bound of at least the
+  ///          squared distance of the nearest site; with a smaller one it may be kNoIndex.
   Nearest nearest(const Vec3& point, double bound = std::numeric_limits<double>::infinity()) const;
 
   /// Appends to `places` the sites that lie in one of the balls (their borders included), in no particular order.
@@ -66,8 +66,8 @@ class SiteTree {
   void compute_leaves();
   void compute_boxes();
 
-  std::vector<Index> sites_;                ///< by place
-  std::vector<Vec3> positions_;             ///< by place
+  std::vector<Index> sites_;     ///< by place
+  std::vector<Vec3> positions_;  ///< by place
   std::vector<Leaf> leaves_;
   std::vector<Boxes> boxes_;                ///< level by level, lowest first
   std::vector<std::size_t> level_offsets_;  ///< of `boxes_`

@@ -26,14 +26,14 @@ namespace subvol {
 /// tau         tangential weight in [0, 1]: small where the surfaces are close, so that samples slide along T.
 ///
 /// `assign` finds the cells and freezes them: which site every point belongs to, by its barycentric coordinates in its
-/// triangle, and dx. E_S is then a quadratic in z, whose gradient is that of the moving cells for F_TS's cells at tau = 1,
-/// and to the order of the squared distance for the rest. Dimensionless, >= 0, invariant under similarities of both
-/// surfaces. Results have the same bits for any number of threads.
+/// triangle, and dx. E_S is then a quadratic in z. Its gradient is that of moving cells for F_TS with tau = 1; otherwise
+/// it leaves out how cells and dx move, which is considerable for small tau. Dimensionless, >= 0, invariant under
+/// similarities of both surfaces. Results have the same bits for any number of threads.
 class SurfaceEnergy {
  public:
   /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1].
-  SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles, std::size_t num_samples,
-                double tangential_weight);
+  SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
+                std::size_t num_samples, double tangential_weight);
 
   /// Takes the samples' positions (num_samples, finite, else InputError), finds their cells, freezes them. Must come
   /// before the functions below. Cost: nearly all of a fit's surface part; see `RestrictedVoronoi::compute`.
@@ -78,7 +78,7 @@ class SurfaceEnergy {
 
   std::vector<VoronoiPiece> target_pieces_, sample_pieces_;  ///< of T's triangles; of S~'s
   std::vector<std::size_t> site_offsets_, triangle_offsets_;
-  std::vector<Index> site_pieces_;                           ///< numbers of `target_pieces_`, by site
+  std::vector<Index> site_pieces_;  ///< numbers of `target_pieces_`, by site
   std::vector<double> triangle_areas_;
 
   std::vector<Vec3> assigned_, gradient_;

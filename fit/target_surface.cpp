@@ -15,8 +15,8 @@ namespace subvol {
 
 namespace {
 
-constexpr double kClosedEnough = 0.95;     // share of paired half-edges above which the signed sum is trusted
-constexpr double kFlatness = 1e-6;         // of the isoperimetric bound: below it, nothing is enclosed
+constexpr double kClosedEnough = 0.95;  // share of paired half-edges above which the signed sum is trusted
+constexpr double kFlatness = 1e-6;      // of the isoperimetric bound: below it, nothing is enclosed
 constexpr int kFloodResolution = 96;
 constexpr std::size_t kMaxSamples = std::size_t{1} << 27;
 
@@ -50,8 +50,7 @@ TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOption
     for (Index v : corners) {
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
         throw InputError("target: triangle " + std::to_string(t) + " has a corner outside [0, number of positions)");
-      if (!mesh.positions[v].allFinite())
-        throw InputError("target: position " + std::to_string(v) + " is not finite");
+      if (!mesh.positions[v].allFinite()) throw InputError("target: position " + std::to_string(v) + " is not finite");
     }
     const Vec3 &a = positions_[corners[0]], &b = positions_[corners[1]], &c = positions_[corners[2]];
     const Vec3 normal = (b - a).cross(c - a);

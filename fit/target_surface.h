@@ -16,9 +16,9 @@ struct TargetSurfaceOptions {
 
 /// How the enclosed volume was found.
 enum class VolumeSource {
-  signed_sum,     ///< sum of the triangles' signed tetrahedra: the surface is (nearly) closed and oriented
-  flood,          ///< cells of a grid that the outside does not reach: not oriented, holes smaller than a cell
-  isoperimetric   ///< half the volume of the sphere of equal area: the surface encloses nothing
+  signed_sum,    ///< sum of the triangles' signed tetrahedra: the surface is (nearly) closed and oriented
+  flood,         ///< cells of a grid that the outside does not reach: not oriented, holes smaller than a cell
+  isoperimetric  ///< half the volume of the sphere of equal area: the surface encloses nothing
 };
 
 /// The surface to fit, as the energies need it: triangles with normals, area A, enclosed volume V, samples.
@@ -26,7 +26,8 @@ enum class VolumeSource {
 /// A soup is welcome: neither connectivity nor orientation nor closedness matters, but for V (see `VolumeSource`).
 class TargetSurface {
  public:
-  /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area, else
+  /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area,
+  /// else
   ///        InputError. Triangles without area are dropped; the others keep their order.
   explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
 

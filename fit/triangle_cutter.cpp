@@ -130,22 +130,29 @@ void TriangleCutter::split(int c, int b) {
   for (int k = 0; k < 3; ++k) line[k] = slots_[c].value[k] - slots_[b].value[k];
   const double noise = slots_[c].noise + slots_[b].noise;
   const auto height = [&](const Corner& corner) { return dot(corner.at, line); };
-  std::rotate(polygon_.begin(), std::max_element(polygon_.begin(), polygon_.end(), [&](const auto& p, const auto& q) {
-                return height(p) < height(q);
-              }), polygon_.end());
+  std::rotate(polygon_.begin(),
+              std::max_element(polygon_.begin(), polygon_.end(),
+                               [&](const auto& p, const auto& q) { return height(p) < height(q); }),
+              polygon_.end());
   const std::size_t n = polygon_.size();
   height_.resize(n);
   for (std::size_t i = 0; i < n; ++i) height_[i] = height(polygon_[i]);
-  const auto in_b = [&](Corner corner) { return corner.slot == c || corner.slot < 0 ? (corner.slot = b, corner) : corner; };
-  const auto in_c = [&](Corner corner) { return corner.slot == b || corner.slot < 0 ? (corner.slot = c, corner) : corner; };
+  // In one half, corners of the other's site are as near to its own or nearer.
+  const auto relabelled = [](Corner corner, int other, int own) {
+    if (corner.slot == other || corner.slot < 0) corner.slot = own;
+    return corner;
+  };
+  const auto in_b = [&](const Corner& corner) { return relabelled(corner, c, b); };
+  const auto in_c = [&](const Corner& corner) { return relabelled(corner, b, c); };
 
   parts_.push_back(corners_.size());
   if (*std::min_element(height_.begin(), height_.end()) >= -noise) {
     for (const Corner& corner : polygon_) corners_.push_back(in_b(corner));
     return;
   }
-  // One chord parts the polygon, whatever rounding has done to its shape, so the parts' areas add up to its own. Its ends
-  // are where the corners cease to be b's, seen both ways from the one that is most so; near the bisector they are corners.
+  // One chord parts the polygon, whatever rounding has done to its shape, so the parts' areas add up to its own. Its
+  // ends are where the corners cease to be b's, seen both ways from the one that is most so; near the bisector they are
+  // corners.
   std::size_t first = 1, last = n - 1;
   while (height_[first] > noise) ++first;
   while (height_[last] > noise) --last;
@@ -223,7 +230,8 @@ void TriangleCutter::pop() {
 
 void TriangleCutter::integrate(int slot) {
   const auto part = top();
-  add_moments(part.size(), [&](std::size_t i) -> const Barycentric& { return part[i].at; }, slots_[slot].moments);
+  add_moments(
+      part.size(), [&](std::size_t i) -> const Barycentric& { return part[i].at; }, slots_[slot].moments);
   pop();
 }
 

@@ -16,12 +16,12 @@ namespace subvol {
 /// the difference of squared distances |p - a|^2 - |p - b|^2 is the linear function l . (e_a - e_b): cells are where
 /// l . e_s is lowest. Every corner of a part carries the site found nearest to it.
 ///
-/// Where the sites that could matter to a part are few, its cells are found at once (`CellEnvelope`); otherwise, and where
-/// sites are equally near within rounding, the part is cut in two.
+/// Where the sites that could matter to a part are few, its cells are found at once (`CellEnvelope`); otherwise, and
+/// where sites are equally near within rounding, the part is cut in two.
 ///
-/// Why it ends: a part is cut by the bisector of c and b only where b is lower than c by more than rounding at a corner.
-/// In the one half c is then nowhere higher than b at any corner, old or new (the function is linear), in the other
-/// nowhere lower; so on no branch is a pair of sites used twice.
+/// Why it ends: a part is cut by the bisector of c and b only where b is lower than c by more than rounding at a
+/// corner. In the one half c is then nowhere higher than b at any corner, old or new (the function is linear), in the
+/// other nowhere lower; so on no branch is a pair of sites used twice.
 class TriangleCutter {
  public:
   /// The tree must outlive the cutter. Cost: one integer per site.
@@ -67,15 +67,15 @@ class TriangleCutter {
   const SiteTree& tree_;
   std::vector<int> slot_of_place_;
   std::vector<Slot> slots_;
-  std::vector<Corner> corners_;        ///< of the parts still to do, one part after the other
-  std::vector<std::size_t> parts_;     ///< where each begins
+  std::vector<Corner> corners_;     ///< of the parts still to do, one part after the other
+  std::vector<std::size_t> parts_;  ///< where each begins
   std::vector<Corner> polygon_;
   CellEnvelope envelope_;
   std::vector<SiteTree::Ball> balls_;
   std::vector<Index> candidates_;
   std::vector<int> candidate_slots_;
   std::vector<Barycentric> outline_;
-  int num_failures_ = 0;               ///< of `part_at_once`, in a row
+  int num_failures_ = 0;  ///< of `part_at_once`, in a row
   std::vector<double> height_;
   std::array<Vec3, 3> positions_;
 };

@@ -27,7 +27,8 @@ Polygon clip_by_all(const std::vector<Vec3>& sites, Index site, const std::array
   Polygon polygon{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
   for (const Vec3& other : sites) {
     Vec3 height;
-    for (int k = 0; k < 3; ++k) height[k] = (corners[k] - sites[site]).squaredNorm() - (corners[k] - other).squaredNorm();
+    for (int k = 0; k < 3; ++k)
+      height[k] = (corners[k] - sites[site]).squaredNorm() - (corners[k] - other).squaredNorm();
     Polygon rest;
     for (std::size_t i = 0; i < polygon.size(); ++i) {
       const Vec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
@@ -169,7 +170,8 @@ TEST_CASE("many cells in one triangle are all found") {
   RandomPoints random(seed);
   TriangleMesh mesh{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)}, {{0, 1, 2}}};
   std::vector<Vec3> sites;
-  for (int i = 0; i < 1500; ++i) sites.push_back(Vec3(random.number(0, 1), random.number(0, 1), 0.01 * random.number()));
+  for (int i = 0; i < 1500; ++i)
+    sites.push_back(Vec3(random.number(0, 1), random.number(0, 1), 0.01 * random.number()));
   compare_with_twin(mesh, sites);
 }
 
@@ -229,7 +231,7 @@ TEST_CASE("moments of a half triangle have their closed form") {
   const auto pieces = RestrictedVoronoi(sites).compute(mesh.positions, mesh.triangles);
   REQUIRE(pieces.size() == 2);
   CHECK(pieces[1].share() == Approx(0.25));
-  // In the corner piece lambda_0 = a/2 + ..., exactly: lambda = (a/2, 1/2 + b..): corners (1/2,1/2,0), (0,1,0), (0,1/2,1/2).
+  // Its corners are (1/2, 1/2, 0), (0, 1, 0) and (0, 1/2, 1/2).
   const double third = 1. / 3;
   CHECK(pieces[1].first_moment(0) == Approx(0.25 * 0.5 * third));
   CHECK(pieces[1].first_moment(1) == Approx(0.25 * 2 * third));
@@ -311,7 +313,8 @@ TEST_CASE("permuting the triangles only permutes the pieces") {
   std::reverse(mesh.triangles.begin(), mesh.triangles.end());
   auto backward = voronoi.compute(mesh.positions, mesh.triangles);
   for (VoronoiPiece& piece : backward) piece.triangle = static_cast<Index>(mesh.triangles.size()) - 1 - piece.triangle;
-  std::stable_sort(backward.begin(), backward.end(), [](const auto& a, const auto& b) { return a.triangle < b.triangle; });
+  std::stable_sort(backward.begin(), backward.end(),
+                   [](const auto& a, const auto& b) { return a.triangle < b.triangle; });
   CHECK(same_bits(forward, backward));
 }
 

@@ -42,10 +42,12 @@ double sampled_energy(const TargetSurface& target, const TriangleMesh& samples, 
     const double along = normal.dot(d);
     return tau * d.squaredNorm() + (1 - tau) * along * along;
   };
-  const auto over = [&](const std::vector<Vec3>& positions, const std::vector<std::array<Index, 3>>& triangles, auto f) {
+  const auto over = [&](const std::vector<Vec3>& positions, const std::vector<std::array<Index, 3>>& triangles,
+                        auto f) {
     double sum = 0;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
-      const Vec3 &a = positions[triangles[t][0]], u = positions[triangles[t][1]] - a, v = positions[triangles[t][2]] - a;
+      const Vec3 &a = positions[triangles[t][0]], u = positions[triangles[t][1]] - a,
+                 v = positions[triangles[t][2]] - a;
       for (int i = 0; i < n; ++i)
         for (int j = 0; j < 2 * (n - i) - 1; ++j) {
           const double shift = j % 2 ? 2. / 3 : 1. / 3;

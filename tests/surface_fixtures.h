@@ -12,7 +12,8 @@
 namespace subvol::test {
 
 /// The unit cube's surface with n x n squares on each side, each square in two triangles, as if by reflection in the
-/// coordinate planes: the mesh is its own mirror image in x, y and z for even n. Outward. `round`: pushed to the sphere.
+/// coordinate planes: the mesh is its own mirror image in x, y and z for even n. Outward. `round`: pushed to the
+/// sphere.
 inline TriangleMesh cube_surface(int n, bool round) {
   TriangleMesh mesh;
   std::map<std::array<int, 3>, Index> numbers;
