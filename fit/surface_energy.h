@@ -26,9 +26,9 @@ namespace subvol {
 /// tau         tangential weight in [0, 1]: small where the surfaces are close, so that samples slide along T.
 ///
 /// `assign` finds the cells and freezes them: which site every point belongs to, by its barycentric coordinates in its
-/// triangle, and dx. E_S is then a quadratic in z. Its gradient is that of moving cells for F_TS with tau = 1; otherwise
-/// it leaves out how cells and dx move, which is considerable for small tau. Dimensionless, >= 0, invariant under
-/// similarities of both surfaces. Results have the same bits for any number of threads.
+/// triangle, and dx. E_S is then a quadratic in z. Its gradient is that of moving cells for F_TS with tau = 1;
+/// otherwise it leaves out how cells and dx move, which is considerable for small tau. Dimensionless, >= 0, invariant
+/// under similarities of both surfaces. Results have the same bits for any number of threads.
 class SurfaceEnergy {
  public:
   /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1].
