@@ -26,6 +26,8 @@ void fill(const Quads& quads, std::size_t quad, int levels, const std::array<Nod
   }
 }
 
+constexpr double kNeighbourReach = 0.25;  // of the triangle's size; further out the neighbour may bend away
+
 double segment_distance2(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 ab = b - a;
   const double length2 = ab.squaredNorm();
@@ -33,21 +35,25 @@ double segment_distance2(const Vec3& p, const Vec3& a, const Vec3& b) {
   return (p - a - t * ab).squaredNorm();
 }
 
-/// A triangle prepared for many distances.
+/// A triangle prepared for many distances; edge k runs from corner k to corner k + 1.
 class Triangle {
  public:
-  Triangle(const Vec3& a, const Vec3& b, const Vec3& c) : corners_{a, b, c}, area_((b - a).cross(c - a)) {}
+  Triangle(const Vec3& a, const Vec3& b, const Vec3& c, int hard_edge)
+      : corners_{a, b, c}, area_((b - a).cross(c - a)) {
+    const double area2 = area_.squaredNorm();
+    flat_ = !(area2 > 0);
+    if (!flat_) area_ /= std::sqrt(area2);
+    const double size = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    for (int k = 0; k < 3; ++k) {
+      inward_[k] = area_.cross(corners_[(k + 1) % 3] - corners_[k]).normalized();
+      reach_[k] = k == hard_edge ? 0 : kNeighbourReach * size;
+    }
+  }
 
   double distance2(const Vec3& p) const {
-    const double area2 = area_.squaredNorm();
-    bool inside = area2 > 0;
-    for (int k = 0; inside && k < 3; ++k) {
-      const Vec3 &a = corners_[k], &b = corners_[(k + 1) % 3];
-      inside = (b - a).cross(p - a).dot(area_) >= 0;
-    }
-    if (inside) {
+    if (!flat_ && is_covered(p)) {
       const double height = (p - corners_[0]).dot(area_);
-      return height * height / area2;
+      return height * height;
     }
     double least = segment_distance2(p, corners_[2], corners_[0]);
     for (int k = 0; k < 2; ++k) least = std::min(least, segment_distance2(p, corners_[k], corners_[k + 1]));
@@ -55,8 +61,17 @@ class Triangle {
   }
 
  private:
-  std::array<Vec3, 3> corners_;
+  /// Projects into the triangle or a neighbour's share.
+  bool is_covered(const Vec3& p) const {
+    for (int k = 0; k < 3; ++k)
+      if ((p - corners_[k]).dot(inward_[k]) < -reach_[k]) return false;
+    return true;
+  }
+
+  std::array<Vec3, 3> corners_, inward_;
   Vec3 area_;
+  std::array<double, 3> reach_;
+  bool flat_;
 };
 
 }  // namespace
@@ -70,14 +85,15 @@ PatchGrid patch_grid(const Quads& quads, std::size_t patch, int levels) {
   return grid;
 }
 
-double chord_distance(const PatchGrid& grid, const std::vector<Vec3>& points, std::array<int, 2> steps) {
+double chord_distance(const PatchGrid& grid, const std::vector<Vec3>& points, const ChordQuery& query) {
+  const auto& steps = query.steps;
   const auto point = [&](int i, int j) -> const Vec3& { return points[grid.at(i, j)]; };
   double largest = 0;
   for (int j0 = 0; j0 < grid.size; j0 += steps[1])
     for (int i0 = 0; i0 < grid.size; i0 += steps[0]) {
       const int i1 = i0 + steps[0], j1 = j0 + steps[1];
-      const Triangle lower(point(i0, j0), point(i1, j0), point(i1, j1));
-      const Triangle upper(point(i0, j0), point(i1, j1), point(i0, j1));
+      const Triangle lower(point(i0, j0), point(i1, j0), point(i1, j1), query.hard_sides[0] && j0 == 0 ? 0 : -1);
+      const Triangle upper(point(i0, j0), point(i1, j1), point(i0, j1), query.hard_sides[1] && i0 == 0 ? 2 : -1);
       for (int j = j0; j <= j1; ++j)
         for (int i = i0; i <= i1; ++i) {
           const bool below = (i - i0) * steps[1] >= (j - j0) * steps[0];

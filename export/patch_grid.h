@@ -25,13 +25,20 @@ struct PatchGrid {
 ///         (size, 0), (size, size), (0, size).
 PatchGrid patch_grid(const std::vector<std::array<Index, 4>>& quads, std::size_t patch, int levels);
 
+/// A coarser tessellation of a patch, to be judged.
+struct ChordQuery {
+  std::array<int, 2> steps;          ///< fine quads along each side of a coarse one, powers of two up to the grid's size
+  std::array<bool, 2> hard_sides{};  ///< whether a crease runs along j = 0, and along i = 0
+};
+
 /// Largest distance from points of a limit surface to a coarser tessellation of the same patch.
 ///
 ///   max over p of the distance of p to the triangle that holds its parameters
 ///
-/// grid    nodes of the fine grid, numbers of `points`.
-/// steps   fine quads along each side of a coarse one, powers of two up to grid.size; coarse quads are cut from their
-///         first to their third corner.
-double chord_distance(const PatchGrid& grid, const std::vector<Vec3>& points, std::array<int, 2> steps);
+/// A point beyond an edge of that triangle is covered by the neighbour there, so only its height over the triangle's
+/// plane counts, unless the edge lies on a hard side or the point is out by more than a quarter of the longest edge.
+///
+/// grid    nodes of the fine grid, numbers of `points`; coarse quads are cut from their first to their third corner.
+double chord_distance(const PatchGrid& grid, const std::vector<Vec3>& points, const ChordQuery& query);
 
 }  // namespace subvol

@@ -4,6 +4,7 @@
 #include "export/patch_grid.h"
 #include "subvol/error.h"
 #include "subvol/limit_surface.h"
+#include "subvol/mesh_topology.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +16,8 @@ namespace {
 
 constexpr int kMaxLevels = 7;             // one below what refine_boundary makes: the measure looks one level further
 constexpr double kBetweenSamples = 4.0 / 3;  // see the header: what a quadratic patch may add between the samples
+constexpr double kSlowDecay = 0.5;           // of the error from look to look, where smooth parts have 1/4 a level
+constexpr double kSingularShare = 0.01;      // of the patches, for which all are not refined again
 
 /// Side k of a patch runs from its corner k to corner k + 1; sides 0 and 2 share their count, and so do 1 and 3.
 class Strips {
@@ -65,13 +68,19 @@ struct RefinedBoundary {
   BoundaryRefinement refinement;
   std::vector<Vec3> points;
   int patch_levels;  ///< refinements of a patch
+  std::vector<SurfacePatch> patches;
 
   RefinedBoundary(const VolumeMesh& cage, int levels, bool with_tangents = false)
       : refinement(refine_boundary(cage, levels, with_tangents)),
         points(refinement.positions.apply(cage.positions)),
-        patch_levels(levels - 1) {}
+        patch_levels(levels - 1) {
+    for (std::size_t q = 0; q < refinement.quads.size(); q += std::size_t{1} << (2 * patch_levels)) {
+      const bool same = !patches.empty() && patches.back().face == refinement.face_of_quad[q];
+      patches.push_back({refinement.face_of_quad[q], same ? patches.back().corner + 1 : 0});
+    }
+  }
 
-  std::size_t num_patches() const { return refinement.quads.size() >> (2 * patch_levels); }
+  std::size_t num_patches() const { return patches.size(); }
   PatchGrid grid(std::size_t patch) const { return patch_grid(refinement.quads, patch, patch_levels); }
 
   std::vector<std::array<Index, 4>> patch_corners() const {
@@ -85,10 +94,27 @@ struct RefinedBoundary {
   }
 };
 
+using HardSides = std::vector<std::array<bool, 2>>;
+
+/// For every patch, whether its sides along cage edges (j = 0, then i = 0) are tagged.
+HardSides hard_sides(const VolumeMesh& cage, const std::vector<SurfacePatch>& patches) {
+  const MeshTopology topology(cage);
+  std::vector<char> tagged(topology.num_edges(), 0);
+  for (const CreaseEdge& crease : cage.tags.creases) tagged[topology.find_edge(crease.v0, crease.v1)] = 1;
+  HardSides hard;
+  for (const SurfacePatch& patch : patches) {
+    const auto face = topology.face(topology.boundary_faces()[patch.face]);
+    const std::size_t n = face.size(), k = patch.corner;
+    const auto is_tagged = [&](std::size_t other) { return tagged[topology.find_edge(face[k], face[other % n])] != 0; };
+    hard.push_back({is_tagged(k + 1), is_tagged(k + n - 1)});
+  }
+  return hard;
+}
+
 /// Chord errors of every patch with 2^a x 2^b quads, a and b up to one level below the refinement's.
 class ChordErrors {
  public:
-  explicit ChordErrors(const RefinedBoundary& fine) : num_counts_(fine.patch_levels) {
+  ChordErrors(const RefinedBoundary& fine, const HardSides& hard) : num_counts_(fine.patch_levels) {
     const auto num_patches = static_cast<std::ptrdiff_t>(fine.num_patches());
     errors_.resize(num_patches * num_counts_ * num_counts_);
 #pragma omp parallel for schedule(static)
@@ -96,7 +122,8 @@ class ChordErrors {
       const PatchGrid grid = fine.grid(p);
       for (int b = 0; b < num_counts_; ++b)
         for (int a = 0; a < num_counts_; ++a)
-          errors_[slot(p, {a, b})] = kBetweenSamples * chord_distance(grid, fine.points, {grid.size >> a, grid.size >> b});
+          errors_[slot(p, {a, b})] =
+              kBetweenSamples * chord_distance(grid, fine.points, {{grid.size >> a, grid.size >> b}, hard[p]});
     }
   }
 
@@ -112,28 +139,44 @@ class ChordErrors {
   std::vector<double> errors_;
 };
 
-/// The largest chord error of a uniform tessellation one level coarser than `fine`.
-double uniform_error(const RefinedBoundary& fine) {
+/// Chord errors of a uniform tessellation one level coarser than `fine`: the largest, and the share of patches above a
+/// bound.
+struct UniformError {
+  double largest = 0, failing_share = 0;
+};
+
+UniformError uniform_error(const RefinedBoundary& fine, const HardSides& hard, double bound) {
   const auto num_patches = static_cast<std::ptrdiff_t>(fine.num_patches());
   double largest = 0;
-#pragma omp parallel for schedule(static) reduction(max : largest)
-  for (std::ptrdiff_t p = 0; p < num_patches; ++p)
-    largest = std::max(largest, chord_distance(fine.grid(p), fine.points, {2, 2}));
-  return kBetweenSamples * largest;
+  std::ptrdiff_t num_failing = 0;
+#pragma omp parallel for schedule(static) reduction(max : largest) reduction(+ : num_failing)
+  for (std::ptrdiff_t p = 0; p < num_patches; ++p) {
+    const double error = kBetweenSamples * chord_distance(fine.grid(p), fine.points, {{2, 2}, hard[p]});
+    largest = std::max(largest, error);
+    num_failing += error > bound;
+  }
+  return {largest, static_cast<double>(num_failing) / static_cast<double>(num_patches)};
 }
 
-/// The uniform refinement that shows how fine the tessellation must be: one level finer than it.
-RefinedBoundary refine_until(const VolumeMesh& cage, double max_chord_error, std::size_t max_refined_quads) {
+/// Levels to add before looking again: a level divides the error of a smooth part by four.
+int further_levels(const UniformError& now, double error_before, double bound) {
+  if (now.largest <= bound) return 0;
+  if (now.largest > kSlowDecay * error_before && now.failing_share < kSingularShare) return 0;
+  return std::max(1, static_cast<int>(std::min(std::log2(now.largest / bound) / 2, 1.0 * kMaxLevels)));
+}
+
+/// Measured on the uniform refinement that shows how fine the tessellation must be: one level finer than it.
+ChordErrors measure_until(const VolumeMesh& cage, double max_chord_error, std::size_t max_refined_quads) {
+  double error_before = INFINITY;
   for (int levels = 1;;) {
-    RefinedBoundary fine(cage, levels + 1);
-    const double error = uniform_error(fine);
-    int further = 0;
-    if (error > max_chord_error)  // a level divides the error by four
-      further = std::max(1, static_cast<int>(std::min(std::log2(error / max_chord_error) / 2, 1.0 * kMaxLevels)));
-    further = std::min(further, kMaxLevels - levels);
+    const RefinedBoundary fine(cage, levels + 1);
+    const HardSides hard = hard_sides(cage, fine.patches);
+    const UniformError error = uniform_error(fine, hard, max_chord_error);
+    int further = std::min(further_levels(error, error_before, max_chord_error), kMaxLevels - levels);
     while (further > 0 && fine.refinement.quads.size() > (max_refined_quads >> (2 * further))) --further;
-    if (further == 0) return fine;
+    if (further == 0) return ChordErrors(fine, hard);
     levels += further;
+    error_before = error.largest;
   }
 }
 
@@ -199,28 +242,18 @@ class Assembler {
   std::vector<Index> number_of_site_;
 };
 
-std::vector<SurfacePatch> list_patches(const RefinedBoundary& boundary) {
-  std::vector<SurfacePatch> patches;
-  for (std::size_t p = 0; p < boundary.num_patches(); ++p) {
-    const Index face = boundary.refinement.face_of_quad[p << (2 * boundary.patch_levels)];
-    const bool same = !patches.empty() && patches.back().face == face;
-    patches.push_back({face, same ? patches.back().corner + 1 : 0});
-  }
-  return patches;
-}
-
 }  // namespace
 
 TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_refined_quads) {
   if (!(max_chord_error > 0)) throw InputError("tessellate: max_chord_error: expected a positive length");
-  const ChordErrors errors(refine_until(cage, max_chord_error, max_refined_quads));
+  const ChordErrors errors = measure_until(cage, max_chord_error, max_refined_quads);
   const RefinedBoundary boundary(cage, errors.max_level() + 1, true);
   const Strips strips(boundary.patch_corners());
   const std::vector<int> levels = strip_levels(errors, strips, max_chord_error);
   const std::vector<Vec3> normals = limit_normals(boundary.refinement, cage.positions, boundary.points);
 
   TessellatedSurface surface;
-  surface.patches = list_patches(boundary);
+  surface.patches = boundary.patches;
   Assembler assembler(boundary, normals, surface);
   std::vector<char> drawn(strips.num_sides(), 0);
   for (std::size_t p = 0; p < boundary.num_patches(); ++p) {

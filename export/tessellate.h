@@ -34,13 +34,17 @@ struct TessellatedSurface {
 ///
 /// Every patch becomes a grid of 2^a x 2^b quads. The two counts belong to the strips of patches that cross opposite
 /// sides, so neighbours agree along their common edge: no cracks, no T-junctions, quads only. A strip is cut as finely
-/// as its most curved patch needs, measured at the points of a uniform refinement that is one level finer; the measure
-/// is raised by a third, the most by which a quadratic patch can exceed it between those points.
+/// as its most curved patch needs, measured at the points of a uniform refinement that is one level finer (see
+/// `chord_distance`); the measure is raised by a third, the most by which a quadratic patch can exceed it between them.
 ///
 /// max_chord_error    > 0, in the mesh's length unit.
 /// max_refined_quads  bounds that uniform refinement, which takes about 300 bytes a quad; a cage that would need more is
 ///                    cut as finely as this allows and `chord_error` is above `max_chord_error`. At least two
 ///                    refinements are always made.
+///
+/// At a corner or crease with three or more faces on one side the limit surface itself is singular: its error falls by
+/// a factor of 0.6 a level, not 0.25. Where only such places (less than one patch in a hundred) are left, refinement stops, and
+/// `chord_error` tells.
 ///
 /// Normals part across creases of infinite sharpness only. Where the tangents are parallel (the one face at an untagged
 /// boundary vertex, say) the normal is the mean one of the quads around.

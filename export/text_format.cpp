@@ -3,16 +3,7 @@
 
 #include "subvol/error.h"
 
-#include <array>
-#include <charconv>
-
 namespace subvol {
-
-void append_number(std::string& text, double value) {
-  std::array<char, 32> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  text.append(digits.data(), end);
-}
 
 void append_vector(std::string& text, const Vec3& vector, const char* separator) {
   for (int k = 0; k < 3; ++k) {
@@ -22,10 +13,7 @@ void append_vector(std::string& text, const Vec3& vector, const char* separator)
 }
 
 std::string lower_case_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
-  return extension;
+  return lower_case(path.extension().string());
 }
 
 void require_polygons(const PolygonMesh& mesh, const std::string& what) {

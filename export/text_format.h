@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/text_scanner.h"
 #include "subvol/triangle_mesh.h"
 
 #include <concepts>
@@ -9,8 +10,7 @@
 
 namespace subvol {
 
-/// Appends the shortest decimal that reads back as the same number, whatever the locale.
-void append_number(std::string& text, double value);
+/// Appends a whole number.
 void append_number(std::string& text, std::integral auto value) { text += std::to_string(value); }
 
 /// Appends three numbers with a separator between them.
