@@ -24,8 +24,9 @@ void convert_volume(const ConvertArguments& arguments, const std::vector<Output>
                     std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.input, warnings);
   for (const Output& output : outputs) {
-    if (arguments.limit) {
-      write_output(output, mesh, mesh, writing);
+    if (arguments.limit && needs_limit(output)) {
+      const TessellatedSurface limit = tessellated_limit(mesh, writing);
+      write_output(output, mesh, mesh, &limit, writing);
     } else {
       write_output(output, mesh, writing);
     }

@@ -44,6 +44,8 @@ class FitRun {
   void write_report() const;
   void summarise() const;
   int status() const;
+  /// Does one part and notes how long it took.
+  void timed(const char* part, void (FitRun::*work)());
   void warn(std::size_t first = 0) const;
 
   const FitArguments& arguments_;
@@ -55,9 +57,16 @@ class FitRun {
   VolumeMesh template_mesh_;
   FitResult result_;
   MeshCheck mesh_check_;
+  TessellatedSurface limit_;
   SurfaceDistance limit_distance_;
-  double chord_error_ = 0;
+  Json seconds_ = Json::object();
 };
+
+void FitRun::timed(const char* part, void (FitRun::*work)()) {
+  const auto begin = Clock::now();
+  (this->*work)();
+  seconds_[part] = std::chrono::duration<double>(Clock::now() - begin).count();
+}
 
 void FitRun::warn(std::size_t first) const {
   if (arguments_.run.quiet) return;
@@ -92,7 +101,8 @@ void FitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
   writing.options = options_in_force(verb_);
-  for (const Output& output : outputs_) write_output(output, result_.cage, result_.mesh, writing);
+  limit_ = tessellated_limit(result_.cage, writing);
+  for (const Output& output : outputs_) write_output(output, result_.cage, result_.mesh, &limit_, writing);
 }
 
 // What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
@@ -106,15 +116,14 @@ void FitRun::check() {
     break;
   }
   mesh_check_ = check_mesh(*mesh, &target_);
-  const TessellatedSurface limit = tessellated_limit(result_.cage, arguments_.writing);
-  chord_error_ = limit.chord_error;
-  limit_distance_ = surface_distance(triangles_of(limit), target_);
+  limit_distance_ = surface_distance(triangles_of(limit_), target_);
 }
 
 void FitRun::write_report() const {
   const FitReport& report = result_.report;
   const double diagonal = bounding_box_diagonal(target_);
-  Json seconds = seconds_json(report);
+  Json seconds = seconds_;
+  seconds.update(seconds_json(report));
   seconds["total"] = std::chrono::duration<double>(Clock::now() - start_).count();
   Json json{{"subvol", version()},
             {"command", "fit"},
@@ -131,7 +140,7 @@ void FitRun::write_report() const {
               {"max_percent", report.initial_distance_max_percent}}}};
   json.update(check_json(mesh_check_));
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
-  json["limit_surface_distance"]["chord_error_percent"] = 100 * chord_error_ / diagonal;
+  json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
   json["cage"] = describe("", result_.cage);
   json["warnings"] = warnings_;
   json["seconds"] = std::move(seconds);
@@ -161,10 +170,10 @@ int FitRun::run() {
   }
   outputs_ = checked_outputs(arguments_.run, true);
   apply_threads(arguments_.run);
-  load();
-  fit();
-  write();
-  check();
+  timed("read", &FitRun::load);
+  timed("fit", &FitRun::fit);
+  timed("write", &FitRun::write);
+  timed("check", &FitRun::check);
   if (!arguments_.run.report.empty()) write_report();
   if (!arguments_.run.quiet) summarise();
   return status();
@@ -178,7 +187,7 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str();
   verb.add_option("--tolerance", fit.tolerance_percent,
                   "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
-      ->check(CLI::Range(1e-9, 100.0))
+      ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
   verb.add_option("--surface", arguments.surface,
                   "What is to agree with the target: the cage's limit surface, or the finest mesh itself")
@@ -192,7 +201,7 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
   verb.add_option("--crease-angle", fit.crease_angle_degrees,
                   "Edges of the template's boundary sharper than this become creases (default: only those the file tags)")
-      ->check(CLI::Range(0.0, 180.0))
+      ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
 }
 
@@ -200,12 +209,12 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
   const auto group = "Solver";
   verb.add_option("--lambda-far", fit.lambda_far, "Weight of the cells' shape while the template is far away")
-      ->check(CLI::Range(1e-9, 1e9))
+      ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
       ->group(group);
   verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage")
-      ->check(CLI::Range(1e-9, 1e9))
+      ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
       ->group(group);
@@ -219,7 +228,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("N")
       ->group(group);
   verb.add_option("--time-limit", fit.time_limit_seconds, "Stop after this time with the best result so far")
-      ->check(CLI::Range(1e-3, 1e9))
+      ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS")
       ->group(group);
 }

@@ -26,12 +26,23 @@ int complain(const char* what, int status) {
   return status;
 }
 
+// The parser would only say that a verb is missing.
+void require_known_verb(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  std::string verbs;
+  for (const CLI::App* verb : app.get_subcommands({})) {
+    if (verb->get_name() == argv[1]) return;
+    verbs += ' ' + verb->get_name();
+  }
+  throw UsageError(std::string("there is no verb '") + argv[1] + "'; there are:" + verbs);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Fits subdivision volumes: hexahedral meshes whose boundary reproduces a surface.", "subvol"};
   app.footer(kFooter);
   app.set_version_flag("--version", std::string("subvol ") + version());
   app.require_subcommand(1);
-  app.fallthrough(false);
+  app.fallthrough();  // --config may stand after the verb
   app.set_config("--config", "", "Read options from FILE.toml");
   app.get_config_ptr()->type_name("FILE.toml");
   app.config_formatter(std::make_shared<VerbConfig>(app));
@@ -42,6 +53,7 @@ int run(int argc, char** argv) {
   add_subdivide_command(app, action);
   add_check_command(app, action);
   add_convert_command(app, action);
+  require_known_verb(app, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

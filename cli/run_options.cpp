@@ -3,6 +3,9 @@
 
 #include <omp.h>
 
+#include <charconv>
+#include <sstream>
+
 namespace subvol::cli {
 namespace {
 
@@ -35,6 +38,19 @@ void add_long_run_options(CLI::App& verb, RunOptions& options) {
 
 void apply_threads(const RunOptions& options) {
   if (options.threads > 0) omp_set_num_threads(options.threads);
+}
+
+CLI::Validator number_in(double low, double high) {
+  std::ostringstream range;
+  range << low << " .. " << high;
+  const auto check = [low, high, text = range.str()](const std::string& word) -> std::string {
+    double value = 0;
+    const char* end = word.data() + word.size();
+    const auto [rest, error] = std::from_chars(word.data(), end, value);
+    if (error == std::errc{} && rest == end && value >= low && value <= high) return {};
+    return "must be a number in " + text + ", not " + word;
+  };
+  return CLI::Validator(check, "");
 }
 
 Json options_in_force(const CLI::App& verb) {

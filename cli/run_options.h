@@ -29,6 +29,8 @@ void add_output_options(CLI::App& verb, RunOptions& options, const std::string& 
 void add_long_run_options(CLI::App& verb, RunOptions& options);
 /// --threads alone sets OpenMP's number of threads, here and nowhere else.
 void apply_threads(const RunOptions& options);
+/// Accepts numbers from low to high, and nothing else (NaN passes CLI::Range).
+CLI::Validator number_in(double low, double high);
 /// The options of a verb that have a value, by long name: given or default.
 Json options_in_force(const CLI::App& verb);
 

@@ -12,6 +12,7 @@
 #include "subvol/subdivision.h"
 #include "subvol/version.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <limits>
@@ -57,7 +58,9 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   WritingOptions writing = arguments.writing;
   writing.source = arguments.mesh;
   writing.options = options_in_force(verb);
-  for (const Output& output : outputs) write_output(output, cage, fine, writing);
+  TessellatedSurface limit;
+  if (std::any_of(outputs.begin(), outputs.end(), needs_limit)) limit = tessellated_limit(cage, writing);
+  for (const Output& output : outputs) write_output(output, cage, fine, &limit, writing);
 
   const QualityReport quality = measure_quality(fine);
   if (!arguments.run.report.empty()) {
@@ -101,7 +104,7 @@ void add_subdivide_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--crease-angle", arguments->crease_angle_degrees,
                    "Boundary edges sharper than this become creases (default: only those the file tags)")
-      ->check(CLI::Range(0.0, 180.0))
+      ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
   add_output_options(*verb, arguments->run,
                      "Refined mesh, or its surface, by extension: " + output_formats() +

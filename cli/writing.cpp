@@ -6,7 +6,7 @@
 #include "export/gltf_writer.h"
 #include "export/obj_writer.h"
 #include "export/usd_writer.h"
-#include "fit/surface_distance.h"
+#include "fit/quality.h"
 #include "subvol/boundary.h"
 #include "subvol/mesh_io.h"
 #include "subvol/mesh_topology.h"
@@ -72,12 +72,12 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
   const auto group = "Surfaces for DCC tools";
   verb.add_option("--chord", options.chord_percent,
                   "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
-      ->check(CLI::Range(1e-4, 100.0))
+      ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str()
       ->group(group);
   verb.add_option("--unit", options.metres_per_unit, "Length of the mesh's unit")
-      ->check(CLI::Range(1e-12, 1e12))
+      ->check(number_in(1e-12, 1e12))
       ->type_name("METRES")
       ->capture_default_str()
       ->group(group);
@@ -88,10 +88,14 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->group(group);
 }
 
-void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const WritingOptions& options) {
+bool needs_limit(const Output& output) { return !output.cage && is_scene(output); }
+
+void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
+                  const WritingOptions& options) {
   if (output.cage) return write_output(output, cage, options);
   if (!is_scene(output)) return write_output(output, mesh, options);
-  write_gltf(output.path, surface_scene(cage, &mesh, scene_options(output, options)));
+  const std::vector<double> quality = patch_quality(cage, *limit, measure_quality(mesh).cell_minima);
+  write_gltf(output.path, surface_scene(*limit, quality, scene_options(output, options)));
 }
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {

@@ -24,8 +24,11 @@ struct WritingOptions {
 void add_writing_options(CLI::App& verb, WritingOptions& options);
 
 /// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
-/// coloured by quality, .obj and .usda as the boundary's polygons, .usda as a subdivision surface for the cage.
-void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const WritingOptions& options);
+/// coloured by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is asked
+/// for where a scene is to be written (`needs_limit`) and may be null elsewhere.
+void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
+                  const WritingOptions& options);
+bool needs_limit(const Output& output);
 
 /// Writes one mesh as it stands: its cells, or the flat faces of its boundary (.usda: as a subdivision cage).
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);

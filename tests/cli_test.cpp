@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The program as its users run it: files in, files out, exit status.
+
+#include "samples/shapes.h"
+#include "subvol/mesh_io.h"
+#include "tests/data.h"
+#include "tests/glb_reader.h"
+#include "tests/temporary_folder.h"
+#include "tests/usda_reader.h"
+
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <cstdlib>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+using subvol::test::content_of;
+using subvol::test::TemporaryFolder;
+
+namespace {
+
+struct Run {
+  int status = -1;
+  std::string out, err;
+  double seconds = 0;
+};
+
+/// A folder with one sample in it, in which the program is run.
+class Workplace {
+ public:
+  explicit Workplace(const subvol::samples::Sample& sample = subvol::samples::ball_sample()) {
+    folder_.file("target.off", subvol::samples::off_text(sample.target));
+    subvol::write_volume_mesh(folder_ / "template.mesh", sample.template_mesh);
+  }
+
+  pid_t start(const std::string& arguments) const {
+    std::vector<std::string> words{SUBVOL_PROGRAM};
+    std::istringstream stream(arguments);
+    for (std::string word; stream >> word;) words.push_back(word);
+    const pid_t child = fork();
+    if (child != 0) return child;
+    if (chdir(folder_.path().c_str()) != 0) _exit(99);
+    redirect("stdout.txt", STDOUT_FILENO);
+    redirect("stderr.txt", STDERR_FILENO);
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    execv(argv[0], argv.data());
+    _exit(98);
+  }
+
+  Run finish(pid_t child) const {
+    int status = 0;
+    waitpid(child, &status, 0);
+    // A shell's convention, so that a crash is no status of ours.
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), content_of(folder_ / "stdout.txt"),
+            content_of(folder_ / "stderr.txt"), 0};
+  }
+
+  Run run(const std::string& arguments) const {
+    const auto begin = std::chrono::steady_clock::now();
+    Run result = finish(start(arguments));
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return result;
+  }
+
+  fs::path operator/(const char* name) const { return folder_ / name; }
+  fs::path file(const std::string& name, const std::string& text) const { return folder_.file(name, text); }
+  bool has(const char* name) const { return fs::exists(folder_ / name); }
+  nlohmann::json json(const char* name) const { return nlohmann::json::parse(content_of(folder_ / name)); }
+
+  std::set<std::string> names() const {
+    std::set<std::string> all;
+    for (const auto& entry : fs::directory_iterator(folder_.path())) {
+      const std::string name = entry.path().filename().string();
+      if (name != "stdout.txt" && name != "stderr.txt") all.insert(name);
+    }
+    return all;
+  }
+
+ private:
+  static void redirect(const char* name, int descriptor) {
+    const int file = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    dup2(file, descriptor);
+  }
+
+  TemporaryFolder folder_;
+};
+
+constexpr const char* kFit = "fit target.off --template template.mesh ";
+
+}  // namespace
+
+TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the truth", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) +
+                            "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  CHECK(run.out.empty());
+
+  const subvol::VolumeMesh mesh = subvol::read_volume_mesh(place / "out.mesh");
+  CHECK(mesh.num_cells() == 7 * 64);
+  CHECK(subvol::read_volume_mesh(place / "cage.mesh").num_cells() == 7 * 8);
+
+  const subvol_tests::GlbFile glb(content_of(place / "out.glb"));
+  CHECK(glb.primitive("surface").at("attributes").contains("_SCALED_JACOBIAN"));
+  CHECK(glb.attribute<float>("surface", "POSITION").size() % 3 == 0);
+
+  const auto report = place.json("report.json");
+  CHECK(report.at("command") == "fit");
+  CHECK(report.at("converged") == true);
+  CHECK(report.at("stop_reason") == "converged");
+  CHECK(report.at("options").at("levels") == 2);
+  CHECK(report.at("quality").at("cells") == 7 * 64);
+  CHECK(report.at("quality").at("certified_cells") == 7 * 64);
+  CHECK(report.at("quality").at("inverted_cells") == 0);
+  CHECK(report.at("quality").at("histogram").size() == 20);
+  CHECK(report.at("boundary_self_intersections") == 0);
+  CHECK(report.at("limit_surface_distance").at("mean_percent") < report.at("initial_distance").at("mean_percent"));
+  CHECK(report.at("limit_surface_distance").at("mean_percent") < 0.5);
+  CHECK(report.at("distance").at("max_percent") < 5);
+  CHECK(report.at("peak_memory_bytes") > 1'000'000);
+  CHECK(report.at("seconds").at("total") > 0);
+  CHECK(report.at("outputs").size() == 4);
+  REQUIRE(!report.at("stages").empty());
+  for (const auto& stage : report.at("stages")) {
+    for (const char* key : {"name", "level", "lambda", "iterations", "evaluations", "seconds"}) CHECK(stage.contains(key));
+  }
+  CHECK(report.at("stages").back().at("energy").at("total") > 0);
+}
+
+TEST_CASE("A fit is the same bits for one thread and for two", "[cli]") {
+  const Workplace place;
+  REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 1 -o one.mesh -o one.obj").status == 0);
+  REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 2 -o two.mesh -o two.obj").status == 0);
+  CHECK(content_of(place / "one.mesh") == content_of(place / "two.mesh"));
+  CHECK(content_of(place / "one.obj") == content_of(place / "two.obj"));
+}
+
+TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) + "--levels 1 --tolerance 0.000001 -o out.mesh --report report.json");
+  INFO(run.err);
+  CHECK(run.status == 4);
+  CHECK(place.has("out.mesh"));
+  CHECK(place.json("report.json").at("converged") == false);
+}
+
+TEST_CASE("A time limit ends with status 4 and the best result", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) + "--levels 3 --time-limit 0.01 -o out.mesh --report report.json");
+  INFO(run.err);
+  CHECK(run.status == 4);
+  CHECK(place.has("out.mesh"));
+  CHECK(place.json("report.json").at("stop_reason") == "time_limit");
+}
+
+TEST_CASE("Ctrl-C ends a fit with the best result and status 130", "[cli]") {
+  const Workplace place(subvol::samples::torus_sample());
+  const pid_t child = place.start(std::string(kFit) + "--levels 4 --progress json -o out.mesh --report report.json");
+  // The first line of progress says that the fit is under way.
+  for (int i = 0; i < 600 && content_of(place / "stdout.txt").empty(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  kill(child, SIGINT);
+  const Run run = place.finish(child);
+  INFO(run.err);
+  CHECK(run.status == 130);
+  CHECK(place.has("out.mesh"));
+  CHECK(place.json("report.json").at("stop_reason") == "cancelled");
+}
+
+TEST_CASE("What stands in no file is refused before any work, and nothing is written", "[cli]") {
+  const Workplace place;
+  const auto before = place.names();
+  const auto refuses = [&](const std::string& arguments, int status, const std::string& word) {
+    const Run run = place.run(arguments);
+    INFO(arguments << '\n' << run.err);
+    CHECK(run.status == status);
+    CHECK(run.err.find(word) != std::string::npos);
+    CHECK(run.seconds < 5);
+    CHECK(place.names() == before);
+  };
+  refuses("", 2, "subcommand");
+  refuses("frobnicate", 2, "frobnicate");
+  refuses("fit target.off -o out.glb", 2, "--template");
+  refuses("fit target.off --template template.mesh", 2, "-o");
+  refuses(std::string(kFit) + "--levels 0 -o out.glb", 2, "levels");
+  refuses(std::string(kFit) + "--levels 7 -o out.glb", 2, "levels");
+  refuses(std::string(kFit) + "--levels two -o out.glb", 2, "levels");
+  refuses(std::string(kFit) + "--tolerance -1 -o out.glb", 2, "tolerance");
+  refuses(std::string(kFit) + "--tolerance nan -o out.glb", 2, "tolerance");
+  refuses(std::string(kFit) + "--crease-angle 181 -o out.glb", 2, "crease-angle");
+  refuses(std::string(kFit) + "--surface sphere -o out.glb", 2, "surface");
+  refuses(std::string(kFit) + "--solver magic -o out.glb", 2, "solver");
+  refuses(std::string(kFit) + "--progress loud -o out.glb", 2, "progress");
+  refuses(std::string(kFit) + "--threads 0 -o out.glb", 2, "threads");
+  refuses(std::string(kFit) + "--order 3 -o out.glb", 2, "order");
+  refuses(std::string(kFit) + "-o out.docx", 2, "out.docx");
+  refuses(std::string(kFit) + "-o out", 2, "out");
+  refuses(std::string(kFit) + "-o out.mesh -o ./out.mesh", 2, "twice");
+  refuses(std::string(kFit) + "-o template.mesh", 2, "template.mesh");
+  refuses(std::string(kFit) + "-o out.glb --config none.toml", 2, "none.toml");
+  refuses(std::string(kFit) + "-o nowhere/out.glb", 1, "nowhere/out.glb");
+  refuses(std::string(kFit) + "-o out.glb --report nowhere/report.json", 1, "nowhere/report.json");
+  refuses("fit none.off --template template.mesh -o out.glb", 3, "none.off");
+  refuses("fit target.off --template none.mesh -o out.glb", 3, "none.mesh");
+  refuses("fit target.off --template target.off -o out.glb", 3, "target.off");
+  refuses("check none.mesh", 3, "none.mesh");
+  refuses("check template.mesh --target none.off", 3, "none.off");
+  refuses("convert target.off -o out.mesh", 2, "out.mesh");
+  refuses("convert template.mesh -o cage:out.obj", 2, "cage");
+  refuses("convert template.mesh", 2, "output");
+  refuses("subdivide template.mesh", 2, "-o");
+  refuses("subdivide template.mesh --levels 9 -o out.mesh", 2, "levels");
+}
+
+TEST_CASE("An output that exists is replaced only with --force", "[cli]") {
+  const Workplace place;
+  place.file("out.obj", "mine");
+  const Run refused = place.run("convert template.mesh -o out.obj");
+  CHECK(refused.status == 2);
+  CHECK(refused.err.find("out.obj") != std::string::npos);
+  CHECK(content_of(place / "out.obj") == "mine");
+  CHECK(place.run("convert template.mesh -o out.obj --force").status == 0);
+  CHECK(content_of(place / "out.obj") != "mine");
+}
+
+TEST_CASE("A folder that cannot be written to is found before the work", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) + "-o /proc/out.mesh");
+  CHECK(run.status == 1);
+  CHECK(run.err.find("/proc/out.mesh") != std::string::npos);
+  CHECK(run.seconds < 5);
+}
+
+TEST_CASE("Options may come from a file; the command line wins and unknown keys are errors", "[cli]") {
+  const Workplace place;
+  place.file("good.toml", "levels = 1\ntarget = \"unused.off\"\n");
+  place.file("table.toml", "[subdivide]\nlevels = 2\n[check]\njson = true\n");
+  place.file("flat.toml", "levels = 2\n");
+  place.file("wrong.toml", "levles = 2\n");
+  CHECK(place.run("--config good.toml subdivide template.mesh -o a.mesh").status == 2);
+  CHECK(place.run("--config wrong.toml subdivide template.mesh -o a.mesh").status == 2);
+  CHECK(!place.has("a.mesh"));
+  REQUIRE(place.run("subdivide template.mesh --config flat.toml -o b.mesh").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "b.mesh").num_cells() == 7 * 64);
+  REQUIRE(place.run("subdivide template.mesh --config table.toml -o c.mesh").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "c.mesh").num_cells() == 7 * 64);
+  REQUIRE(place.run("subdivide template.mesh --config flat.toml --levels 1 -o d.mesh").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 7 * 8);
+}
+
+TEST_CASE("Every verb explains itself", "[cli]") {
+  const Workplace place;
+  const Run all = place.run("--help");
+  CHECK(all.status == 0);
+  for (const std::string verb : {"fit", "subdivide", "check", "convert"}) {
+    CHECK(all.out.find("\n  " + verb) != std::string::npos);
+    const Run run = place.run(verb + " --help");
+    INFO(run.out);
+    CHECK(run.status == 0);
+    CHECK(run.out.find("Example") != std::string::npos);
+    CHECK(run.out.find(".mesh") != std::string::npos);
+  }
+  const Run version = place.run("--version");
+  CHECK(version.status == 0);
+  CHECK(version.out.starts_with("subvol "));
+}
+
+TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]") {
+  const Workplace place;
+  const Run words = place.run("check template.mesh --target target.off");
+  CHECK(words.status == 0);
+  CHECK(!words.out.empty());
+  const Run run = place.run("check template.mesh --target target.off --json --report report.json");
+  CHECK(run.status == 0);
+  const auto json = nlohmann::json::parse(run.out);
+  CHECK(json == place.json("report.json"));
+  CHECK(json.at("valid") == true);
+  CHECK(json.at("quality").at("certified_cells") == 7);
+  CHECK(json.at("distance").at("mean_percent") > 0);
+
+  subvol::VolumeMesh inverted = subvol::read_volume_mesh(place / "template.mesh");
+  for (subvol::Vec3& p : inverted.positions) p.x() = -p.x();
+  subvol::write_volume_mesh(place / "inverted.mesh", inverted);
+  const Run bad = place.run("check inverted.mesh --json");
+  CHECK(bad.status == 1);
+  CHECK(nlohmann::json::parse(bad.out).at("quality").at("inverted_cells") == 7);
+}
+
+TEST_CASE("convert writes every format, and what can be read back is the same", "[cli]") {
+  const Workplace place(subvol::samples::bracket_sample());
+  const Run run =
+      place.run("convert template.mesh -o a.mesh -o a.vtk -o a.obj -o a.usda -o a.glb -o a.gltf");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const subvol::VolumeMesh mesh = subvol::read_volume_mesh(place / "template.mesh");
+  CHECK(subvol::read_volume_mesh(place / "a.mesh").tags == mesh.tags);
+  CHECK(subvol::read_volume_mesh(place / "a.vtk").cell_vertices == mesh.cell_vertices);
+  CHECK_NOTHROW(subvol_tests::GlbFile(content_of(place / "a.glb")));
+  CHECK(place.run("convert target.off -o t.obj -o t.glb -o t.usda").status == 0);
+  CHECK(place.run("convert template.mesh --limit -o l.glb").status == 0);
+  CHECK(content_of(place / "l.glb") != content_of(place / "a.glb"));
+}
+
+TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
+  const Workplace place(subvol::samples::bracket_sample());
+  REQUIRE(place.run("subdivide template.mesh --levels 2 -o fine.mesh -o fine.glb --report r.json").status == 0);
+  const subvol::VolumeMesh fine = subvol::read_volume_mesh(place / "fine.mesh");
+  CHECK(fine.num_cells() == 640);
+  CHECK(!fine.tags.creases.empty());
+  CHECK(place.json("r.json").at("result").at("cells") == 640);
+  CHECK(place.run("subdivide template.mesh --boundary averaging -o plain.mesh").status == 0);
+}
+
+TEST_CASE("Bad files are refused by every verb, quickly and without a trace", "[cli][data]") {
+  const auto data = subvol::test::data_dir();
+  if (!data) {
+    WARN("skipped: no folder of real inputs");
+    return;
+  }
+  const Workplace place;
+  std::istringstream list(content_of(*data / "bad" / "EXPECT.txt"));
+  for (std::string line; std::getline(list, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    const std::string name = line.substr(0, line.find('\t'));
+    const bool must_refuse = line.substr(name.size() + 1).starts_with("reject\t");
+    const std::string path = (*data / "bad" / name).string();
+    const bool volume = name.ends_with(".mesh");
+    const std::vector<std::string> commands =
+        volume ? std::vector<std::string>{"fit target.off --levels 1 --template " + path + " -o out.mesh",
+                                          "check " + path, "convert " + path + " -o out.vtk"}
+               : std::vector<std::string>{"fit " + path + " --levels 1 --template template.mesh -o out.mesh",
+                                          "check template.mesh --target " + path, "convert " + path + " -o out.obj"};
+    for (const std::string& command : commands) {
+      for (const char* output : {"out.mesh", "out.vtk", "out.obj"}) fs::remove(place / output);
+      const auto before = place.names();
+      const Run run = place.run(command);
+      INFO(command << '\n' << run.err);
+      const bool is_check = command.starts_with("check");
+      CHECK(run.seconds < 5);
+      if (run.status == 0) {
+        CHECK(!must_refuse);
+      } else {
+        // A readable but unsound mesh is an answer of `check`, not a refusal.
+        CHECK((run.status == 3 || (is_check && volume && run.status == 1)));
+        CHECK(!(run.err.empty() && run.out.empty()));
+        CHECK(place.names() == before);
+      }
+    }
+  }
+}
