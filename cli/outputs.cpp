@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kCagePrefix = "cage:";
-constexpr std::array<std::string_view, 2> kVolumeExtensions{".mesh", ".vtk"};
+constexpr std::array<std::string_view, 4> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh"};
 constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
 
 template <std::size_t N>

@@ -6,6 +6,7 @@
 #include "export/gltf_writer.h"
 #include "export/obj_writer.h"
 #include "export/usd_writer.h"
+#include "export/volume_writer.h"
 #include "fit/quality.h"
 #include "subvol/boundary.h"
 #include "subvol/mesh_io.h"
@@ -54,7 +55,11 @@ SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& op
 }
 
 void write_cells(const Output& output, const VolumeMesh& mesh) {
-  write_volume_mesh(output.path, mesh);
+  if (output.extension == ".vtu" || output.extension == ".msh") {
+    write_volume(output.path, mesh, measure_quality(mesh).cell_minima);
+  } else {
+    write_volume_mesh(output.path, mesh);
+  }
 }
 
 void write_polygons(const Output& output, const PolygonMesh& surface, const FeatureTags& tags,

@@ -301,7 +301,7 @@ TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]")
 TEST_CASE("convert writes every format, and what can be read back is the same", "[cli]") {
   const Workplace place(subvol::samples::bracket_sample());
   const Run run =
-      place.run("convert template.mesh -o a.mesh -o a.vtk -o a.obj -o a.usda -o a.glb -o a.gltf");
+      place.run("convert template.mesh -o a.mesh -o a.vtk -o a.vtu -o a.msh -o a.obj -o a.usda -o a.glb -o a.gltf");
   INFO(run.err);
   REQUIRE(run.status == 0);
   const subvol::VolumeMesh mesh = subvol::read_volume_mesh(place / "template.mesh");
