@@ -34,12 +34,41 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
     level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
   }
   level.samples = select_rows(nodes, rows);
+  level.limit_samples = level.samples;
+}
+
+/// Boundary nodes -> vertices of the boundary refined once, by bilinear interpolation in its quads.
+SparseMap bilinear_refinement(const BoundaryRefinement& once, std::size_t num_nodes) {
+  // A child quad has one old vertex, then the midpoint of the edge that leaves it, the face point, and the midpoint of
+  // the edge that arrives. So each edge point meets its two ends, and each face point its four corners.
+  std::vector<std::vector<Index>> parents(once.positions.num_rows());
+  const auto num_old = static_cast<Index>(once.vertices.size());
+  for (const auto& quad : once.quads) {
+    int corner = 0;
+    while (quad[corner] >= num_old) ++corner;
+    const Index node = once.vertices[quad[corner]];
+    for (int i = 0; i < 4; ++i) {
+      std::vector<Index>& list = parents[quad[(corner + i) % 4]];
+      if (std::find(list.begin(), list.end(), node) == list.end()) list.push_back(node);
+    }
+  }
+  SparseMap map;
+  map.num_cols = num_nodes;
+  for (std::vector<Index>& list : parents) {
+    std::sort(list.begin(), list.end());
+    for (Index node : list) {
+      map.columns.push_back(node);
+      map.values.push_back(1.0 / static_cast<double>(list.size()));
+    }
+    map.offsets.push_back(map.columns.size());
+  }
+  return map;
 }
 
 }  // namespace
 
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
-                        const FitOptions& options, std::size_t min_samples) {
+                        const FitOptions& options, std::size_t min_samples, bool finest) {
   FitLevel level;
   SubdivisionLevel refined = subdivide(control, options.boundary);
   level.mesh = std::move(refined.fine);
@@ -58,8 +87,14 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     boundary_faces *= 4;
     ++refinements;
   }
-  BoundaryRefinement boundary = refine_boundary(level.mesh, refinements);
+  if (finest) refinements = 1;
+  const BoundaryRefinement boundary = refine_boundary(level.mesh, refinements);
   level.samples = compose(boundary.positions, fine_from_unknowns);
+  level.limit_samples = level.samples;
+  if (finest) {
+    const SparseMap bilinear = bilinear_refinement(boundary, level.mesh.num_vertices());
+    level.samples = blend(level.samples, compose(bilinear, level.nodes), 0.5);
+  }
   for (const auto& q : boundary.quads) {
     level.sample_triangles.push_back({q[0], q[1], q[2]});
     level.sample_triangles.push_back({q[0], q[2], q[3]});

@@ -13,16 +13,19 @@ namespace subvol {
 
 /// One level of the recursive fit (paper: section 4.3): a finite element mesh over the vertices of a control mesh.
 ///
-///   nodes y = M x,   samples z = N x,   M = P S,  N = P' S' S ...
+///   nodes y = M x,   samples z = N x,   M = P S
 ///
 /// S refines (`subdivide`), P moves boundary vertices to their limit positions (`limit_map`; the identity for
-/// FittedSurface::mesh), and N goes as many refinements further on the boundary alone as the target's detail asks for.
+/// FittedSurface::mesh). N goes further refinements down on the boundary alone, to as many points of the limit surface
+/// as the target's detail asks for. On the finest level, where the mesh itself is a result as well, N is the mean of
+/// the limit surface and of the mesh's bilinear quads, which leaves either half of the gap between the two.
 struct FitLevel {
   VolumeMesh mesh;               ///< the finite element mesh: hexes
   SparseMap refine;              ///< S alone: control vertices to the vertices of the next control mesh
   SparseMap nodes;               ///< M
   SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid whenever that mesh is certified
   SparseMap samples;             ///< N
+  SparseMap limit_samples;       ///< the same points on the limit surface (rows of `samples` on coarser levels)
   std::vector<std::array<Index, 3>> sample_triangles;
 };
 
@@ -31,8 +34,9 @@ struct FitLevel {
 /// control            the last refined mesh with its tags; `from_unknowns` takes the unknowns to its vertices (the
 ///                    identity but for cage-only fits) and `previous_nodes` to the nodes of its finite element mesh.
 /// min_samples        how many boundary samples are wanted at least (reached by refining, at most three times).
+/// finest             whether this is the last level.
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
-                        const FitOptions& options, std::size_t min_samples);
+                        const FitOptions& options, std::size_t min_samples, bool finest);
 
 /// Ideal edge length of each of the template's cells' children, between common (blend 0) and the cell's own (blend 1):
 ///

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/subdivision_fit.h"
 
+#include "fit/boundary_triangles.h"
 #include "fit/certificate.h"
+#include "fit/closest_point.h"
 #include "fit/fit_level.h"
 #include "fit/fit_problem.h"
+#include "fit/fit_schedule.h"
 #include "fit/surface_distance.h"
 #include "fit/target_surface.h"
+#include "subvol/audit.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/features.h"
@@ -16,8 +20,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <memory>
+#include <map>
+#include <optional>
 
 namespace subvol {
 
@@ -27,197 +31,307 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// One minimisation of the schedule.
-struct Stage {
-  double lambda, tangential_weight;
-  int max_iterations = 20;
-  double relative_decrease = 1e-3;
-};
-
-std::string stage_name(int level, const Stage& stage) {
-  char text[96];
-  std::snprintf(text, sizeof text, "level %d, lambda %g, tangential weight %g", level, stage.lambda,
-                stage.tangential_weight);
+template <class... Values>
+std::string format(const char* form, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof text, form, values...);
   return text;
 }
 
+/// Centred coordinates in which the target's box has the diagonal 1: nothing depends on the origin or the unit.
+struct Normalisation {
+  Vec3 centre = Vec3::Zero();
+  double diagonal = 1;
+
+  explicit Normalisation(const TriangleMesh& target) {
+    diagonal = bounding_box_diagonal(target);
+    if (!(diagonal > 0) || !std::isfinite(diagonal))
+      throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");
+    centre = TargetSurface(target).centre();
+  }
+  std::vector<Vec3> to_unit(std::vector<Vec3> points) const {
+    for (Vec3& p : points) p = (p - centre) / diagonal;
+    return points;
+  }
+  std::vector<Vec3> from_unit(std::vector<Vec3> points) const {
+    for (Vec3& p : points) p = centre + diagonal * p;
+    return points;
+  }
+};
+
+TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation) {
+  mesh.positions = normalisation.to_unit(std::move(mesh.positions));
+  return mesh;
+}
+
+void check_options(const FitOptions& options) {
+  const auto in_range = [](const char* name, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw InputError(format("FitOptions::%s must be in [%g, %g], got %g", name, low, high, value));
+  };
+  in_range("levels", options.levels, 1, 6);
+  in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
+  in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
+  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
+  if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
+}
+
+/// The recursive fit, in normalised coordinates.
 class SubdivisionFit {
  public:
   SubdivisionFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options);
   FitResult run();
 
  private:
-  bool start_level(FitLevel& level, int number);
-  bool run_stage(FitLevel& level, int number, const Stage& stage, std::string name = "");
-  std::unique_ptr<FitProblem> make_problem(const FitLevel& level, const SparseMap& nodes, int number,
-                                           const Stage& stage) const;
-  std::vector<Stage> stages_of(int number) const;
-  bool out_of_time() const { return options_.time_limit_seconds > 0 && seconds_since(start_) > options_.time_limit_seconds; }
+  void look_over_template();
+  void prepare_level();
+  bool start_level();
+  bool run_stage(const Stage& stage, const std::string& name);
+  bool run_stages();
+  bool lower_lambda();
+  double measured_mean();
+  bool meets_tolerance();
+  void store_result();
+  void next_control();
+  void sample_target(std::size_t num_samples);
+  std::string stage_name(const Stage& stage) const;
+  bool finest() const { return number_ == options_.levels; }
 
   FitOptions options_;
-  TargetSurface target_;
+  Normalisation normalisation_;
+  TriangleMesh target_mesh_;
+  ClosestPoint target_tree_;
+  TargetSurface target_;           ///< sampled for the current level
   VolumeMesh control_;             ///< the control mesh (its last refinement, for cage-only fits)
+  VolumeMesh cage_;                ///< the mesh whose vertices are the unknowns
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
   std::vector<double> sizes_;      ///< ideal sizes of the current level's cells
-  FitReport report_;
+  FitSchedule schedule_;
+  int number_ = 0;                 ///< of the level of the finite element mesh
+  FitLevel level_;
+  double lambda_ = 0;              ///< of the last stage
+  std::optional<double> mean_;     ///< percent, of the current state
+  FitResult result_;
+  std::map<std::string, double> seconds_;
   Clock::time_point start_ = Clock::now();
 };
 
 SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options)
-    : options_(options), target_(target), control_(template_mesh) {
-  const auto in_range = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw InputError(std::string("FitOptions::") + name + " must be in [" + std::to_string(low) + ", " +
-                       std::to_string(high) + "], got " + std::to_string(value));
-  };
-  in_range("levels", options.levels, 1, 6);
-  in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
-  in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
-  if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
+    : options_((check_options(options), options)),
+      normalisation_(target),
+      target_mesh_(normalised(target, normalisation_)),
+      target_tree_(target_mesh_),
+      target_(target_mesh_),
+      control_(template_mesh) {
   for (const MeshDefect& defect : validate(template_mesh))
-    if (defect.kind != MeshDefect::Kind::unused_vertex)
-      throw InputError("template mesh: " + defect.message);
-  if (options.crease_angle_degrees)
+    if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
+  control_.positions = normalisation_.to_unit(control_.positions);
+  if (options.crease_angle_degrees) {
     control_.tags = merge_tags(control_.tags, features_by_angle(control_, *options.crease_angle_degrees));
+    control_.tags = unfolding_tags(control_, audit(control_));
+  }
+  cage_ = control_;
   unknowns_ = control_.positions;
   from_unknowns_ = identity_map(unknowns_.size());
   previous_nodes_ = from_unknowns_;
 }
 
-std::vector<Stage> SubdivisionFit::stages_of(int number) const {
-  std::vector<Stage> stages;
-  const double close = options_.lambda_close, coarse = std::max(0.05, close);
-  if (number == 1) {
-    stages.push_back({coarse, 0.1});
-    stages.push_back({coarse, 0.003});
-  } else {
-    stages.push_back({coarse, 0.003});
-  }
-  if (number == options_.levels && close < coarse) stages.push_back({close, 0.003});
-  return stages;
+/// What the report says of the input, and what the schedule makes of it.
+void SubdivisionFit::look_over_template() {
+  FitReport& report = result_.report;
+  report.warnings = audit(control_).warnings;
+  const TriangleMesh boundary = refined_triangles(boundary_surface(control_, MeshTopology(control_)));
+  const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), target_mesh_, target_tree_);
+  report.initial_distance_mean_percent = 100 * distance.mean();
+  report.initial_distance_max_percent = 100 * distance.max();
+  schedule_ = make_schedule(options_, distance.mean() / target_.length());
+  if (target_.volume_source() != VolumeSource::signed_sum)
+    report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
 }
 
-std::unique_ptr<FitProblem> SubdivisionFit::make_problem(const FitLevel& level, const SparseMap& nodes, int number,
-                                                         const Stage& stage) const {
-  // Nested quadrature: the points of a level are among those of its parents, so no child starts inverted at one.
-  const int points = number == 1 ? 5 : number == 2 ? 3 : 2;
-  return std::make_unique<FitProblem>(nodes, level.samples, level.mesh, VolumeEnergy(level.mesh, sizes_, points),
-                                      SurfaceEnergy(target_, level.sample_triangles, level.samples.num_rows(),
-                                                    stage.tangential_weight),
-                                      stage.lambda);
+/// Samples the target about as densely as the fitted surface: sparse sites on large facets would claim points of the
+/// surface that belong to a neighbouring facet.
+void SubdivisionFit::sample_target(std::size_t num_samples) {
+  const double spacing = 2.4 * std::sqrt(target_.area() / static_cast<double>(num_samples));
+  target_ = TargetSurface(target_mesh_, {.sample_spacing = spacing});
 }
 
-bool SubdivisionFit::run_stage(FitLevel& level, int number, const Stage& stage, std::string name) {
+void SubdivisionFit::prepare_level() {
+  const Clock::time_point begin = Clock::now();
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size(), finest());
+  sample_target(level_.samples.num_rows());
+  sizes_ = number_ == 1 ? child_sizes(control_, target_.volume(), schedule_.size_blend) : refined_sizes(sizes_);
+  seconds_["levels"] += seconds_since(begin);
+}
+
+std::string SubdivisionFit::stage_name(const Stage& stage) const {
+  return format("level %d, lambda %g, tangential weight %g", number_, stage.lambda, stage.tangential_weight);
+}
+
+/// Runs one minimisation over the current level's maps. False when the fit must end.
+bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   const Clock::time_point begin = Clock::now();
   StageRecord record;
-  record.name = name.empty() ? stage_name(number, stage) : name;
-  record.level = number;
-  record.lambda = stage.lambda;
+  record.name = name;
+  record.level = number_;
+  record.lambda = lambda_ = stage.lambda;
   record.tangential_weight = stage.tangential_weight;
   record.unknowns = unknowns_.size();
-  record.cells = level.mesh.num_cells();
-  auto problem = make_problem(level, level.nodes, number, stage);
+  record.cells = level_.mesh.num_cells();
+
+  FitProblem problem(level_.nodes, level_.samples, level_.mesh,
+                     VolumeEnergy(level_.mesh, sizes_, schedule_.quadrature_points(number_)),
+                     SurfaceEnergy(target_, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight),
+                     stage.lambda);
   MinimizerOptions options;
   options.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
+  if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) options.max_iterations *= kLbfgsSteps;
   options.relative_decrease = stage.relative_decrease;
-  bool cancelled = false, timed_out = false;
   int iteration = 0;
-  options.progress = [&](const IterationRecord& r) {
-    timed_out = out_of_time();
-    if (options_.progress)
-      cancelled = !options_.progress({record.name.c_str(), number, ++iteration,
-                                      r.surface_energy + stage.lambda * r.volume_energy,
-                                      double(number - 1) / options_.levels});
-    return !cancelled && !timed_out;
+  bool timed_out = false;
+  options.progress = [&](const IterationRecord& step) {
+    timed_out = options_.time_limit_seconds > 0 && seconds_since(start_) > options_.time_limit_seconds;
+    const double energy = step.surface_energy + stage.lambda * step.volume_energy;
+    const bool going = !options_.progress ||
+                       options_.progress({name.c_str(), number_, ++iteration, energy, schedule_.fraction(number_)});
+    return going && !timed_out;
   };
-  MinimizerResult result = minimize_newton(*problem, unknowns_, options);
-  record.iterations = std::move(result.iterations);
-  record.stop = result.explanation;
+  const MinimizerResult solved = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, unknowns_, options)
+                                                                      : minimize_newton(problem, unknowns_, options);
+  mean_.reset();
+  record.iterations = solved.iterations;
+  record.stop = solved.explanation;
   record.seconds = seconds_since(begin);
-  if (std::getenv("SUBVOL_TRACE")) {
-    int cg = 0;
-    for (auto& r : record.iterations) cg += r.linear_iterations;
-    std::fprintf(stderr, "%-50s its %2zu cg %4d E_S %.4g E_W %.4g %.2fs %s\n", record.name.c_str(), record.iterations.size(), cg,
-                 record.iterations.empty() ? 0 : record.iterations.back().surface_energy,
-                 record.iterations.empty() ? 0 : record.iterations.back().volume_energy, record.seconds,
-                 record.stop.c_str());
-  }
-  report_.stages.push_back(std::move(record));
-  if (cancelled) report_.stop_reason = StopReason::cancelled;
-  if (timed_out) report_.stop_reason = StopReason::time_limit;
-  return !cancelled && !timed_out;
-}
-
-/// Makes the level's start valid by continuation from the linear split of the level below:
-///   M_t = (1 - t) L + t M, a few steps of the minimiser at each t that is feasible.
-bool SubdivisionFit::start_level(FitLevel& level, int number) {
-  const Stage stage{0.05, 0.1, 4};
-  const SparseMap target_map = level.nodes;
-  const auto feasible = [&](double t) {
-    return certify(blend(level.safe_nodes, target_map, t).apply(unknowns_), level.mesh).all_certified();
-  };
-  double t = 0;
-  for (int round = 0; round < 40; ++round) {
-    double next = 1;
-    while (!feasible(next) && next - t > 1e-3) next = t + 0.6 * (next - t);
-    if (next - t <= 1e-3) break;
-    t = next;
-    if (std::getenv("SUBVOL_TRACE")) std::fprintf(stderr, "level %d start t=%g\n", number, t);
-    if (t == 1) {
-      level.nodes = target_map;
-      return true;
-    }
-    level.nodes = blend(level.safe_nodes, target_map, t);
-    char name[64];
-    std::snprintf(name, sizeof name, "level %d, continuation t=%.3f", number, t);
-    if (!run_stage(level, number, stage, name)) break;
-  }
-  level.nodes = blend(level.safe_nodes, target_map, t);
+  seconds_["solve"] += record.seconds;
+  result_.report.stages.push_back(std::move(record));
+  if (solved.stop != MinimizerStop::cancelled) return true;
+  result_.report.stop_reason = timed_out ? StopReason::time_limit : StopReason::cancelled;
+  result_.report.explanation = (timed_out ? "time limit reached in " : "cancelled in ") + name;
   return false;
 }
 
-FitResult SubdivisionFit::run() {
-  FitResult result;
-  double blend = 0.5;
-  if (const char* e = std::getenv("SUBVOL_BLEND")) blend = std::atof(e);
-  const std::size_t min_samples = target_.triangles().size();
-  for (int number = 1; number <= options_.levels; ++number) {
-    auto t0 = Clock::now();
-    FitLevel level = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, min_samples);
-    sizes_ = number == 1 ? child_sizes(control_, target_.volume(), blend) : refined_sizes(sizes_);
-    if (std::getenv("SUBVOL_TRACE")) std::fprintf(stderr, "build %.2fs samples %zu\n", seconds_since(t0), level.samples.num_rows());
-    bool going = start_level(level, number);
-    if (!going && report_.stop_reason == StopReason::converged) {
-      report_.stop_reason = StopReason::stalled;
-      report_.explanation = "level " + std::to_string(number) + " could not be started without inverting a cell";
-    }
-    for (const Stage& stage : stages_of(number)) {
-      if (!going) break;
-      going = run_stage(level, number, stage);
-    }
-    result.mesh = level.mesh;
-    result.mesh.positions = level.nodes.apply(unknowns_);
-    if (options_.cage_only) {
-      if (number == 1) result.cage = control_;
-      result.cage.positions = unknowns_;
-      from_unknowns_ = compose(level.refine, from_unknowns_);
-      previous_nodes_ = level.nodes;
-    } else {
-      result.cage = control_;
-      result.cage.positions = unknowns_;
-      unknowns_ = level.refine.apply(unknowns_);
-      from_unknowns_ = identity_map(unknowns_.size());
-      previous_nodes_ = options_.surface == FittedSurface::limit ? limit_map(level.mesh) : from_unknowns_;
-    }
-    VolumeMesh next = std::move(level.mesh);
-    control_ = std::move(next);
-    control_.positions = from_unknowns_.apply(unknowns_);
-    if (!going) break;
+/// Makes the level's start valid by continuation from the linear split L of the level below:
+///   M_t = (1 - t) L + t M, a few steps of the minimiser at each t that is feasible, until t = 1.
+bool SubdivisionFit::start_level() {
+  constexpr int kMaxRounds = 60;
+  constexpr double kBackOff = 0.6, kLeastProgress = 1e-3;
+  const SparseMap nodes = level_.nodes;
+  const std::vector<Index> failing_before =
+      certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
+  const auto feasible = [&](double t) {
+    const SparseMap map = blend(level_.safe_nodes, nodes, t);
+    const std::vector<Index> failing = certify(map.apply(unknowns_), level_.mesh).not_certified;
+    return std::includes(failing_before.begin(), failing_before.end(), failing.begin(), failing.end());
+  };
+  double t = 0;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    double next = 1;
+    while (next - t > kLeastProgress && !feasible(next)) next = t + kBackOff * (next - t);
+    if (next - t <= kLeastProgress) break;
+    t = next;
+    level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
+    if (t == 1) return true;
+    if (!run_stage(schedule_.continuation, format("level %d, continuation t = %.3f", number_, t))) return false;
   }
-  result.report = std::move(report_);
-  return result;
+  level_.nodes = blend(level_.safe_nodes, nodes, t);
+  result_.report.stop_reason = StopReason::stalled;
+  result_.report.explanation =
+      format("level %d could not be reached without inverting a cell (%.0f %% of the way)", number_, 100 * t);
+  return false;
+}
+
+/// Mean distance between the target and what is fitted, in per cent of the diagonal: the larger of those of the finite
+/// element mesh and of the limit surface.
+double SubdivisionFit::measured_mean() {
+  if (mean_) return *mean_;
+  const Clock::time_point begin = Clock::now();
+  VolumeMesh mesh = level_.mesh;
+  mesh.positions = level_.nodes.apply(unknowns_);
+  const TriangleMesh boundary = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
+  const TriangleMesh limit{level_.limit_samples.apply(unknowns_), level_.sample_triangles};
+  double mean = 0;
+  for (const TriangleMesh* surface : {&boundary, &limit})
+    mean = std::max(mean, surface_distance(*surface, ClosestPoint(*surface), target_mesh_, target_tree_).mean());
+  mean_ = 100 * mean;
+  seconds_["distance"] += seconds_since(begin);
+  return *mean_;
+}
+
+bool SubdivisionFit::meets_tolerance() {
+  return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
+}
+
+/// The finest level, once more and more with less weight on the cells' shape, while the accuracy wanted is not met.
+bool SubdivisionFit::lower_lambda() {
+  const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
+  const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
+  double mean = measured_mean();
+  for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
+    const Stage stage = schedule_.final_stage(lambda);
+    if (!run_stage(stage, stage_name(stage))) return false;
+    const double before = mean;
+    mean = measured_mean();
+    if (mean > kLeastGain * before) break;
+  }
+  return true;
+}
+
+bool SubdivisionFit::run_stages() {
+  for (const Stage& stage : schedule_.stages(number_)) {
+    if (!run_stage(stage, stage_name(stage))) return false;
+    if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) return true;
+  }
+  return !finest() || lower_lambda();
+}
+
+void SubdivisionFit::store_result() {
+  result_.mesh = level_.mesh;
+  result_.mesh.positions = normalisation_.from_unit(level_.nodes.apply(unknowns_));
+  result_.cage = cage_;
+  result_.cage.positions = normalisation_.from_unit(unknowns_);
+}
+
+/// The refined mesh becomes the next control mesh (paper: section 4.3), unless the unknowns stay where they are.
+void SubdivisionFit::next_control() {
+  control_ = std::move(level_.mesh);
+  if (options_.cage_only) {
+    from_unknowns_ = compose(level_.refine, from_unknowns_);
+    previous_nodes_ = level_.nodes;
+    control_.positions = from_unknowns_.apply(unknowns_);
+    return;
+  }
+  unknowns_ = level_.refine.apply(unknowns_);
+  control_.positions = unknowns_;
+  cage_ = control_;
+  from_unknowns_ = identity_map(unknowns_.size());
+  previous_nodes_ = options_.surface == FittedSurface::limit ? limit_map(control_) : from_unknowns_;
+}
+
+FitResult SubdivisionFit::run() {
+  FitReport& report = result_.report;
+  look_over_template();
+  bool going = true;
+  for (number_ = 1; going; ++number_) {
+    prepare_level();
+    going = start_level() && run_stages();
+    store_result();
+    if (finest() || (going && meets_tolerance())) break;
+    if (going) next_control();
+  }
+  if (going) {
+    const double mean = measured_mean();
+    const bool missed = options_.tolerance_percent && mean > *options_.tolerance_percent;
+    report.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
+    report.explanation = missed ? format("mean distance %.4g %% is above the tolerance of %.4g %%", mean,
+                                         *options_.tolerance_percent)
+                                : format("all stages done, mean distance %.4g %%", mean);
+  }
+  report.seconds.assign(seconds_.begin(), seconds_.end());
+  return std::move(result_);
 }
 
 }  // namespace

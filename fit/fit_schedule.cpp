@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/fit_schedule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace subvol {
+
+namespace {
+
+/// Measured on real templates: below, sizes between common and own give better cells; above, own sizes are misleading.
+constexpr double kCloseDistance = 0.4;
+constexpr double kCoarseLambda = 0.05;
+constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
+
+}  // namespace
+
+std::vector<Stage> FitSchedule::stages(int number) const {
+  std::vector<Stage> result = number == 1 ? first : middle;
+  if (number == levels) result.insert(result.end(), last.begin(), last.end());
+  return result;
+}
+
+Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight}; }
+
+double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
+
+FitSchedule make_schedule(const FitOptions& options, double distance) {
+  FitSchedule schedule;
+  schedule.levels = options.levels;
+  schedule.size_blend = distance < kCloseDistance ? 0.5 : 0;
+  if (const char* e = std::getenv("SUBVOL_BLEND")) schedule.size_blend = std::atof(e);
+  const double coarse = std::max(kCoarseLambda, options.lambda_close);
+  schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
+  schedule.middle = {{coarse, kCloseTangentialWeight}};
+  if (options.lambda_close < coarse) schedule.last = {schedule.final_stage(options.lambda_close)};
+  schedule.continuation = {coarse, kFarTangentialWeight, 4};
+  return schedule;
+}
+
+}  // namespace subvol

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/subdivision_fit.h"
+
+#include <vector>
+
+namespace subvol {
+
+/// One minimisation: weights, and when it ends.
+struct Stage {
+  double lambda, tangential_weight;
+  int max_iterations = 20;
+  double relative_decrease = 1e-3;
+};
+
+/// Mean distance, in per cent of the diagonal, down to which a fit without a tolerance lowers lambda further.
+inline constexpr double kDefaultAccuracyPercent = 0.02;
+/// How far below `FitOptions::lambda_close` lambda may go for that, and for a tolerance that was asked for.
+inline constexpr double kLeastDefaultLambdaShare = 1.0 / 8, kLeastLambdaShare = 1e-3;
+/// Lowering lambda ends when a stage leaves more than this share of the mean distance.
+inline constexpr double kLeastGain = 0.99;
+/// L-BFGS steps allowed for each Newton step of a stage.
+inline constexpr int kLbfgsSteps = 30;
+
+/// Which minimisations a recursive fit runs, decided from the template's initial distance.
+///
+/// A stiff start (lambda > 0.05) shrinks and rounds the template and loses features that never come back, so it is kept
+/// for templates that are really far.
+struct FitSchedule {
+  double size_blend = 0;  ///< ideal sizes: 0 common, 1 each template cell's own (see `child_sizes`)
+  int levels = 0;
+  std::vector<Stage> first, middle, last;  ///< of level 1, of the levels between, of the finest level
+  Stage continuation;
+
+  std::vector<Stage> stages(int number) const;
+  /// The last stage with another lambda.
+  Stage final_stage(double lambda) const;
+  /// Quadrature points per direction: nested from level to level, so that no child starts inverted at one of its points.
+  int quadrature_points(int number) const { return number == 1 ? 5 : number == 2 ? 3 : 2; }
+  /// Rough share of the work that is done when a level begins.
+  double fraction(int number) const;
+};
+
+/// distance  mean distance of template and target by the target's length V/A.
+FitSchedule make_schedule(const FitOptions& options, double distance);
+
+}  // namespace subvol
