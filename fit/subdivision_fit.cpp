@@ -218,7 +218,7 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
 ///   M_t = (1 - t) L + t M, a few steps of the minimiser at each t that is feasible, until t = 1.
 bool SubdivisionFit::start_level() {
   constexpr int kMaxRounds = 60;
-  constexpr double kBackOff = 0.6, kLeastProgress = 1e-3;
+  constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
   const SparseMap nodes = level_.nodes;
   const std::vector<Index> failing_before =
       certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
@@ -227,15 +227,19 @@ bool SubdivisionFit::start_level() {
     const std::vector<Index> failing = certify(map.apply(unknowns_), level_.mesh).not_certified;
     return std::includes(failing_before.begin(), failing_before.end(), failing.begin(), failing.end());
   };
+  Stage stage = schedule_.continuation;
   double t = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
     double next = 1;
     while (next - t > kLeastProgress && !feasible(next)) next = t + kBackOff * (next - t);
-    if (next - t <= kLeastProgress) break;
-    t = next;
+    // Cells that stop the way need better shapes before they can follow.
+    const bool slow = next - t < kSlowShare * (1 - t);
+    if (next - t > kLeastProgress) t = next;
+    else if (stage.lambda >= options_.lambda_far) break;
+    if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
     level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
     if (t == 1) return true;
-    if (!run_stage(schedule_.continuation, format("level %d, continuation t = %.3f", number_, t))) return false;
+    if (!run_stage(stage, format("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda))) return false;
   }
   level_.nodes = blend(level_.safe_nodes, nodes, t);
   result_.report.stop_reason = StopReason::stalled;
