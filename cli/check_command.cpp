@@ -31,6 +31,7 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Vo
             {"valid", check.valid()}};
   if (!arguments.target.empty()) json["input"]["target"] = arguments.target;
   json.update(check_json(check));
+  if (check.has_topology) json["audit"] = audit_json(audit(mesh));
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = peak_memory_bytes();
   return json;

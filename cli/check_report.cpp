@@ -57,6 +57,14 @@ Json check_json(const MeshCheck& check) {
   return json;
 }
 
+Json audit_json(const SubdivisionAudit& found) {
+  return {{"boundary_edges", found.num_boundary_edges},
+          {"flattened_edges", found.flattened_edges.size()},
+          {"reflex_creases", found.reflex_creases.size()},
+          {"folding_corners", found.folding_corners},
+          {"warnings", found.warnings}};
+}
+
 Json distance_json(const SurfaceDistance& distance, double diagonal) {
   const double percent = 100 / diagonal;
   const auto& farthest = distance.extreme();

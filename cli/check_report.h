@@ -4,11 +4,15 @@
 #include "cli/run_options.h"
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
+#include "subvol/audit.h"
 
 namespace subvol::cli {
 
 /// A check as it stands in reports: defects, topology, quality, certificate, self-intersections, distance.
 Json check_json(const MeshCheck& check);
+
+/// What in a mesh's boundary works against good cells under subdivision.
+Json audit_json(const SubdivisionAudit& found);
 
 /// A distance in the mesh's unit and in per cent of a diagonal; `a` is ours, `b` the target.
 Json distance_json(const SurfaceDistance& distance, double diagonal);

@@ -142,6 +142,7 @@ void FitRun::write_report() const {
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
   json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
   json["cage"] = describe("", result_.cage);
+  json["audit"] = audit_json(audit(template_mesh_));
   json["warnings"] = warnings_;
   json["seconds"] = std::move(seconds);
   json["peak_memory_bytes"] = peak_memory_bytes();
