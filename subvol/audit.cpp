@@ -129,7 +129,7 @@ std::vector<Index> folding_edges(const SurfaceTopology& surface, Index v, std::s
 }
 
 void find_reflex(const VolumeMesh& mesh, const MeshTopology& topology, SubdivisionAudit& result) {
-  const BoundarySurface boundary = boundary_surface(mesh, topology);
+  const BoundarySurface boundary = tagged_boundary(mesh, topology);
   const SurfaceTopology& surface = boundary.topology;
   std::vector<Vec3> points;
   for (Index v : boundary.vertices) points.push_back(mesh.positions[v]);

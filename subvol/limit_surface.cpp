@@ -155,7 +155,7 @@ std::array<Index, 4> face_entries(const SurfaceTopology& surface, Index f, std::
 }  // namespace
 
 SparseMap limit_map(const VolumeMesh& mesh) {
-  const BoundarySurface boundary = boundary_surface(mesh, MeshTopology(mesh));
+  const BoundarySurface boundary = tagged_boundary(mesh, MeshTopology(mesh));
   std::vector<Index> surface_vertex(mesh.num_vertices(), kNoIndex);
   for (std::size_t i = 0; i < boundary.vertices.size(); ++i)
     surface_vertex[boundary.vertices[i]] = static_cast<Index>(i);
@@ -171,7 +171,7 @@ BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with
   if (levels < 0 || levels > kMaxBoundaryLevels)
     throw InputError("refine_boundary: levels must be 0 to " + std::to_string(kMaxBoundaryLevels) + ", got " +
                      std::to_string(levels));
-  BoundarySurface boundary = boundary_surface(mesh, MeshTopology(mesh));
+  BoundarySurface boundary = tagged_boundary(mesh, MeshTopology(mesh));
   SurfaceTopology surface = std::move(boundary.topology);
   std::vector<Index> columns = boundary.vertices;
   std::size_t num_cols = mesh.num_vertices();

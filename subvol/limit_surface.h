@@ -15,7 +15,7 @@ namespace subvol {
 ///
 /// Square, num_vertices() rows; boundary rows sum to 1 and use boundary vertices only. Exact for smooth vertices,
 /// creases, corners, semi-sharp features and darts, beside quads and triangles.
-/// InputError: as `boundary_surface` (a boundary that is not a manifold, bad tags). Cost: linear.
+/// InputError: as `tagged_boundary` (a boundary that is not a manifold, bad tags). Cost: linear.
 SparseMap limit_map(const VolumeMesh& mesh);
 
 /// The boundary of a volume mesh refined by itself, its vertices at limit positions.

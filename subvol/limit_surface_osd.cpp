@@ -96,7 +96,7 @@ struct LimitSurface::Implementation {
 };
 
 LimitSurface::LimitSurface(const VolumeMesh& mesh) {
-  const BoundarySurface boundary = boundary_surface(mesh, MeshTopology(mesh));
+  const BoundarySurface boundary = tagged_boundary(mesh, MeshTopology(mesh));
   for (std::size_t f = 0; f < boundary.faces.size(); ++f)
     if (boundary.topology.face_size(static_cast<Index>(f)) != 4)
       throw InputError("LimitSurface: boundary face " + std::to_string(f) + " is no quad; subdivide the mesh once");

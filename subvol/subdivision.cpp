@@ -131,7 +131,7 @@ class Refiner {
       : mesh_(mesh),
         rule_(rule),
         topology_(mesh),
-        boundary_(boundary_surface(mesh, topology_)),
+        boundary_(tagged_boundary(mesh, topology_)),
         surface_vertex_(inverse(boundary_.vertices, mesh.num_vertices())),
         surface_edge_(inverse(boundary_.edges, topology_.num_edges())),
         sheets_(mesh, topology_, boundary_),

@@ -85,7 +85,7 @@ SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_
   return surface;
 }
 
-BoundarySurface boundary_surface(const VolumeMesh& mesh, const MeshTopology& topology) {
+BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology) {
   BoundarySurface boundary;
   std::vector<Index> number(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v) {

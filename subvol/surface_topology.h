@@ -61,6 +61,6 @@ struct BoundarySurface {
 };
 
 /// Cost: linear. InputError: as `build_surface`, or a tag that is no boundary edge or vertex, or sharpness <= 0 or NaN.
-BoundarySurface boundary_surface(const VolumeMesh& mesh, const MeshTopology& topology);
+BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology);
 
 }  // namespace subvol
