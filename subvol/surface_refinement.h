@@ -30,6 +30,25 @@ SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std
                           std::size_t num_cols);
 
 /// The refined surface: one quad per corner, in order, (vertex, edge out, face, edge in). Sharpnesses carried.
+///
+/// Works on open pieces as well (see `surface_piece`): sides of border faces get no twin.
 SurfaceTopology refined_topology(const SurfaceTopology& surface);
+
+/// Points of all children [vertices][edges][faces] by the Catmull-Clark rules: `refinement_rows` applied, but without
+/// the rows.
+///
+/// surface  may be an open piece: children of border vertices and border edges are then meaningless.
+/// points   one per surface vertex.
+std::vector<Vec3> refined_points(const SurfaceTopology& surface, std::span<const Vec3> points);
+
+/// Some faces of a surface and all that share a vertex with them, as an open surface with its own numbers.
+struct SurfacePiece {
+  SurfaceTopology topology;      ///< border edges have one corner, whose twin is kNoIndex
+  std::vector<Index> vertices;   ///< of the whole surface, for each vertex of the piece
+};
+
+/// faces  chosen faces: they come first, in this order, and keep their first corners. None of their vertices may lie on
+///        a border.
+SurfacePiece surface_piece(const SurfaceTopology& surface, std::span<const Index> faces);
 
 }  // namespace subvol

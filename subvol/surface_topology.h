@@ -18,6 +18,8 @@ namespace subvol {
 ///           |  face(h)
 ///           v
 ///        h (v) ------> next(h)       twin(h) lies on the other side of the edge and runs back
+///
+/// Pieces cut out of a surface (`surface_piece`) are the one exception to closed: twins are kNoIndex along their border.
 struct SurfaceTopology {
   std::vector<Index> face_offsets{0};
   std::vector<Index> corner_vertices, corner_faces, twins, corner_edges;

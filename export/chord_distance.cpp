@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/patch_grid.h"
+#include "export/chord_distance.h"
 
 #include <Eigen/Geometry>
 
@@ -8,23 +8,6 @@
 
 namespace subvol {
 namespace {
-
-using Node = std::array<int, 2>;
-using Quads = std::vector<std::array<Index, 4>>;
-
-Node halfway(const Node& a, const Node& b) { return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2}; }
-
-void fill(const Quads& quads, std::size_t quad, int levels, const std::array<Node, 4>& corners, PatchGrid& grid) {
-  if (levels == 0) {
-    for (int k = 0; k < 4; ++k) grid.at(corners[k][0], corners[k][1]) = quads[quad][k];
-    return;
-  }
-  const Node centre = halfway(corners[0], corners[2]);
-  for (int k = 0; k < 4; ++k) {
-    const Node after = halfway(corners[k], corners[(k + 1) % 4]), before = halfway(corners[(k + 3) % 4], corners[k]);
-    fill(quads, 4 * quad + k, levels - 1, {corners[k], after, centre, before}, grid);
-  }
-}
 
 constexpr double kNeighbourReach = 0.25;  // of the triangle's size; further out the neighbour may bend away
 
@@ -76,28 +59,20 @@ class Triangle {
 
 }  // namespace
 
-PatchGrid patch_grid(const Quads& quads, std::size_t patch, int levels) {
-  PatchGrid grid;
-  grid.size = 1 << levels;
-  grid.nodes.resize(static_cast<std::size_t>(grid.size + 1) * (grid.size + 1));
-  const int n = grid.size;
-  fill(quads, patch, levels, {Node{0, 0}, Node{n, 0}, Node{n, n}, Node{0, n}}, grid);
-  return grid;
-}
-
-double chord_distance(const PatchGrid& grid, const std::vector<Vec3>& points, const ChordQuery& query) {
+double chord_distance(const CellSamples& samples, const ChordQuery& query) {
   const auto& steps = query.steps;
-  const auto point = [&](int i, int j) -> const Vec3& { return points[grid.at(i, j)]; };
   double largest = 0;
-  for (int j0 = 0; j0 < grid.size; j0 += steps[1])
-    for (int i0 = 0; i0 < grid.size; i0 += steps[0]) {
+  for (int j0 = 0; j0 < kCellSteps; j0 += steps[1])
+    for (int i0 = 0; i0 < kCellSteps; i0 += steps[0]) {
       const int i1 = i0 + steps[0], j1 = j0 + steps[1];
-      const Triangle lower(point(i0, j0), point(i1, j0), point(i1, j1), query.hard_sides[0] && j0 == 0 ? 0 : -1);
-      const Triangle upper(point(i0, j0), point(i1, j1), point(i0, j1), query.hard_sides[1] && i0 == 0 ? 2 : -1);
+      const Vec3 &a = samples.at(i0, j0), &c = samples.at(i1, j1);
+      const Triangle lower(a, samples.at(i1, j0), c, query.hard_sides[0] && j0 == 0 ? 0 : -1);
+      const Triangle upper(a, c, samples.at(i0, j1), query.hard_sides[1] && i0 == 0 ? 2 : -1);
       for (int j = j0; j <= j1; ++j)
         for (int i = i0; i <= i1; ++i) {
+          if ((i == i0 || i == i1) && (j == j0 || j == j1)) continue;
           const bool below = (i - i0) * steps[1] >= (j - j0) * steps[0];
-          largest = std::max(largest, (below ? lower : upper).distance2(point(i, j)));
+          largest = std::max(largest, (below ? lower : upper).distance2(samples.at(i, j)));
         }
     }
   return std::sqrt(largest);

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/limit_patches.h"
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Where every patch of a limit surface is cut, so that neighbours agree.
+///
+/// A strip is a chain of patches joined at opposite sides; all of them are cut across at the same parameters.
+class StripCuts {
+ public:
+  /// Uncut: from 0 to LimitPatches::kUnits.
+  explicit StripCuts(const LimitPatches& patches);
+
+  std::size_t num_strips() const { return cuts_.size(); }
+  /// The strips whose cuts are at constant u, and at constant v.
+  const std::array<Index, 2>& strips(Index patch) const { return strips_[patch]; }
+  /// Cuts of a strip with its ends, ascending.
+  std::span<const int> cuts(Index strip) const { return cuts_[strip]; }
+  std::size_t num_intervals(Index strip) const { return cuts_[strip].size() - 1; }
+
+  /// Halves intervals of a strip, given one flag for each.
+  void halve(Index strip, std::span<const char> chosen);
+
+ private:
+  std::vector<std::array<Index, 2>> strips_;
+  std::vector<std::vector<int>> cuts_;
+};
+
+/// Cuts until no quad is further from the surface than a bound.
+struct CutResult {
+  StripCuts cuts;
+  double chord_error;  ///< reached
+};
+
+/// max_quads  and depth: as `tessellate`. `patches` is made ready as deep as needed.
+CutResult cut_strips(LimitPatches& patches, double max_chord_error, std::size_t max_quads);
+
+}  // namespace subvol
