@@ -14,6 +14,8 @@ namespace subvol {
 namespace {
 
 constexpr int kMaxSampleRefinements = 3;
+/// How far the finest level's samples lie from the limit surface (0) towards the mesh (1).
+constexpr double kMeshShare = 0.4;
 
 /// The boundary of a hex mesh as samples: its own vertices, without the limit.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
@@ -93,7 +95,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   level.limit_samples = level.samples;
   if (finest) {
     const SparseMap bilinear = bilinear_refinement(boundary, level.mesh.num_vertices());
-    level.samples = blend(level.samples, compose(bilinear, level.nodes), 0.5);
+    level.samples = blend(level.samples, compose(bilinear, level.nodes), kMeshShare);
   }
   for (const auto& q : boundary.quads) {
     level.sample_triangles.push_back({q[0], q[1], q[2]});

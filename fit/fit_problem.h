@@ -2,11 +2,12 @@
 #pragma once
 
 #include "fit/fit_report.h"
-#include "fit/surface_energy.h"
+#include "fit/surface_term.h"
 #include "fit/volume_energy.h"
 #include "subvol/sparse_map.h"
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -17,16 +18,16 @@ namespace subvol {
 ///   E(x) = E_S(N x) + lambda E_W(M x)                                          Paper: Eqs. 1, 10
 ///
 /// M takes the unknowns to the nodes of the finite element mesh, N to the samples of its boundary; gradients and
-/// Hessians come back through the transposes. E_S is taken with the Voronoi cells of the last `SurfaceEnergy::assign`.
+/// Hessians come back through the transposes. E_S is taken with the correspondences of the last `SurfaceTerm::assign`.
 struct FitProblem {
   FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
-             SurfaceEnergy surface_energy, double volume_weight);
+             std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight);
 
   SparseMap nodes, nodes_transposed;      ///< M, M^T
   SparseMap samples, samples_transposed;  ///< N, N^T
   const VolumeMesh* mesh;                 ///< cells of the finite element mesh (for the certificate)
   VolumeEnergy volume;
-  SurfaceEnergy surface;
+  std::unique_ptr<SurfaceTerm> surface;
   double lambda;                          ///< > 0
 };
 
@@ -47,7 +48,7 @@ struct MinimizerResult {
   std::vector<IterationRecord> iterations;
 };
 
-/// Newton's method with frozen Voronoi cells and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
+/// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
 /// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`certificate.h`) certified; cells
 /// that stand in the way get a denser quadrature for the steps to come.
 ///
@@ -55,7 +56,7 @@ struct MinimizerResult {
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 /// The reference that Newton is measured against: L-BFGS (m = 10) with a weak Wolfe line search by bisection, which takes
-/// +infinity as too long a step. Cells are reassigned after every ten steps.
+/// +infinity as too long a step. Correspondences are found anew after every ten steps.
 MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 }  // namespace subvol

@@ -39,6 +39,7 @@ struct StageRecord {
   std::string stop;                ///< which test ended it, with its figure
   bool kept = true;                ///< false: undone, because a cell could not be certified
   double seconds = 0;
+  double mean_distance_percent = -1;  ///< after the stage, per cent of the diagonal; negative: not measured
 };
 
 /// What a fit did, and what is true of its result.

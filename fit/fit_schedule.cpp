@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 namespace subvol {
 
@@ -13,6 +12,7 @@ namespace {
 constexpr double kCloseDistance = 0.4;
 constexpr double kCoarseLambda = 0.05;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
+constexpr double kCoarseDecrease = 1e-3, kFinalDecrease = 1e-4;
 
 }  // namespace
 
@@ -22,7 +22,7 @@ std::vector<Stage> FitSchedule::stages(int number) const {
   return result;
 }
 
-Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight}; }
+Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight, 30, kFinalDecrease}; }
 
 double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
 
@@ -30,10 +30,9 @@ FitSchedule make_schedule(const FitOptions& options, double distance) {
   FitSchedule schedule;
   schedule.levels = options.levels;
   schedule.size_blend = distance < kCloseDistance ? 0.5 : 0;
-  if (const char* e = std::getenv("SUBVOL_BLEND")) schedule.size_blend = std::atof(e);
   const double coarse = std::max(kCoarseLambda, options.lambda_close);
-  schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
-  schedule.middle = {{coarse, kCloseTangentialWeight}};
+  schedule.first = {{coarse, kFarTangentialWeight, 40, kCoarseDecrease}, {coarse, kCloseTangentialWeight, 40, kCoarseDecrease}};
+  schedule.middle = {{coarse, kCloseTangentialWeight, 40, kCoarseDecrease}};
   if (options.lambda_close < coarse) schedule.last = {schedule.final_stage(options.lambda_close)};
   schedule.continuation = {coarse, kFarTangentialWeight, 4};
   return schedule;

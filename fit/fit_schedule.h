@@ -17,9 +17,11 @@ struct Stage {
 /// Mean distance, in per cent of the diagonal, down to which a fit without a tolerance lowers lambda further.
 inline constexpr double kDefaultAccuracyPercent = 0.02;
 /// How far below `FitOptions::lambda_close` lambda may go for that, and for a tolerance that was asked for.
-inline constexpr double kLeastDefaultLambdaShare = 1.0 / 8, kLeastLambdaShare = 1e-3;
-/// Lowering lambda ends when a stage leaves more than this share of the mean distance.
-inline constexpr double kLeastGain = 0.99;
+inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;
+/// Lowering lambda ends when a stage takes less than this share off the mean distance.
+inline constexpr double kLeastGain = 0.01;
+/// The target is sampled at least about so many times.
+inline constexpr std::size_t kLeastTargetSamples = 20000;
 /// L-BFGS steps allowed for each Newton step of a stage.
 inline constexpr int kLbfgsSteps = 30;
 

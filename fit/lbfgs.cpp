@@ -27,7 +27,7 @@ class Objective {
 
   void assign(std::span<const Vec3> x) {
     problem_.samples.apply(x, samples_);
-    problem_.surface.assign(samples_);
+    problem_.surface->assign(samples_);
   }
 
   Value evaluate(std::span<const Vec3> x, std::span<Vec3> gradient) {
@@ -38,9 +38,9 @@ class Objective {
     Value value;
     value.volume = problem_.volume.add_gradient(nodes_, problem_.lambda, node_gradient_);
     if (!std::isfinite(value.volume)) return value;
-    value.surface = problem_.surface.value(samples_);
+    value.surface = problem_.surface->value(samples_);
     value.energy = value.surface + problem_.lambda * value.volume;
-    problem_.surface.add_gradient(samples_, sample_gradient_);
+    problem_.surface->add_gradient(samples_, sample_gradient_);
     problem_.nodes_transposed.apply(node_gradient_, gradient);
     problem_.samples_transposed.apply(sample_gradient_, from_samples_);
     add_scaled(1, from_samples_, gradient);

@@ -13,7 +13,7 @@
 namespace subvol {
 
 FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
-                       SurfaceEnergy surface_energy, double volume_weight)
+                       std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight)
     : nodes(std::move(node_map)),
       nodes_transposed(transposed(nodes)),
       samples(std::move(sample_map)),
@@ -52,17 +52,20 @@ void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, 
 /// The pulled-back Hessian M^T H_W M + N^T H_S N with its block-Jacobi preconditioner.
 class ReducedHessian {
  public:
-  ReducedHessian(const FitProblem& problem, const BlockSparse& volume)
+  /// inverse_diagonal  of an earlier Hessian of the same problem, to be used again; empty: computed.
+  ReducedHessian(const FitProblem& problem, const BlockSparse& volume, std::vector<Mat3>& inverse_diagonal)
       : problem_(problem),
         volume_(volume),
+        inverse_diagonal_(inverse_diagonal),
         node_in_(problem.nodes.num_rows()),
         node_out_(problem.nodes.num_rows()),
         sample_in_(problem.samples.num_rows()),
         sample_out_(problem.samples.num_rows()),
         from_samples_(problem.nodes.num_cols) {
+    if (!inverse_diagonal_.empty()) return;
     inverse_diagonal_.assign(problem.nodes.num_cols, Mat3::Zero());
     add_diagonal_blocks(problem.nodes, problem.nodes_transposed, volume, inverse_diagonal_);
-    add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface.hessian(), inverse_diagonal_);
+    add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
 #pragma omp parallel for schedule(static)
     for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
       // Vertices of no cell have no energy: they stay.
@@ -76,7 +79,7 @@ class ReducedHessian {
     volume_.multiply(node_in_, node_out_);
     problem_.nodes_transposed.apply(node_out_, out);
     problem_.samples.apply(in, sample_in_);
-    problem_.surface.hessian().multiply(sample_in_, sample_out_);
+    problem_.surface->hessian().multiply(sample_in_, sample_out_);
     problem_.samples_transposed.apply(sample_out_, from_samples_);
     add_scaled(1, from_samples_, out);
   }
@@ -89,7 +92,7 @@ class ReducedHessian {
  private:
   const FitProblem& problem_;
   const BlockSparse& volume_;
-  std::vector<Mat3> inverse_diagonal_;
+  std::vector<Mat3>& inverse_diagonal_;
   std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
 };
 
@@ -139,23 +142,24 @@ std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vec
 
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
   constexpr double kArmijo = 1e-4;
-  constexpr int kMaxHalvings = 30, kDensePoints = 5;
+  constexpr int kMaxHalvings = 30, kDensePoints = 5, kPreconditionerLife = 4;
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
   const std::size_t n = x.size();
   BlockSparse hessian = problem.volume.pattern();
   std::vector<Vec3> y = problem.nodes.apply(x), z = problem.samples.apply(x);
   std::vector<Vec3> node_gradient(y.size()), sample_gradient(z.size()), gradient(n), from_samples(n), d, dy(y.size()),
       dz(z.size()), y_trial(y.size()), z_trial(z.size());
+  std::vector<Mat3> inverse_diagonal;
   std::vector<Index> uncertified = certify(y, *problem.mesh).not_certified;
   int small_steps = 0;
 
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     IterationRecord record;
-    problem.surface.assign(z);
+    problem.surface->assign(z);
     hessian.set_zero();
     std::fill(node_gradient.begin(), node_gradient.end(), Vec3::Zero());
     std::fill(sample_gradient.begin(), sample_gradient.end(), Vec3::Zero());
-    const double surface = problem.surface.value(z);
+    const double surface = problem.surface->value(z);
     const double volume = problem.volume.add_hessian(y, problem.lambda, node_gradient, hessian);
     const double energy = surface + problem.lambda * volume;
     if (!std::isfinite(energy)) {
@@ -163,12 +167,14 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       result.explanation = "the start has a cell that is inverted at a quadrature point";
       return result;
     }
-    problem.surface.add_gradient(z, sample_gradient);
+    problem.surface->add_gradient(z, sample_gradient);
     problem.nodes_transposed.apply(node_gradient, gradient);
     problem.samples_transposed.apply(sample_gradient, from_samples);
     add_scaled(1, from_samples, gradient);
 
-    ReducedHessian reduced(problem, hessian);
+    // The diagonal changes slowly once the first steps are done.
+    if (iteration < 2 || iteration % kPreconditionerLife == 0) inverse_diagonal.clear();
+    ReducedHessian reduced(problem, hessian, inverse_diagonal);
     record.linear_iterations = conjugate_gradients(reduced, gradient, options, d);
     const double slope = dot(gradient, d);
     if (!(slope < 0)) {
@@ -186,7 +192,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       for (std::size_t i = 0; i < y.size(); ++i) y_trial[i] = y[i] + t * dy[i];
       for (std::size_t i = 0; i < z.size(); ++i) z_trial[i] = z[i] + t * dz[i];
       ++record.evaluations;
-      trial_surface = problem.surface.value(z_trial);
+      trial_surface = problem.surface->value(z_trial);
       trial_volume = problem.volume.value(y_trial);
       trial = trial_surface + problem.lambda * trial_volume;
       if (!(trial <= energy + kArmijo * t * slope)) continue;

@@ -4,10 +4,12 @@
 #include "fit/boundary_triangles.h"
 #include "fit/certificate.h"
 #include "fit/closest_point.h"
+#include "fit/closest_point_energy.h"
 #include "fit/fit_level.h"
 #include "fit/fit_problem.h"
 #include "fit/fit_schedule.h"
 #include "fit/surface_distance.h"
+#include "fit/surface_energy.h"
 #include "fit/target_surface.h"
 #include "subvol/audit.h"
 #include "subvol/boundary.h"
@@ -21,6 +23,7 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
+#include <memory>
 #include <optional>
 
 namespace subvol {
@@ -88,6 +91,7 @@ class SubdivisionFit {
   void look_over_template();
   void prepare_level();
   bool start_level();
+  std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   bool run_stage(const Stage& stage, const std::string& name);
   bool run_stages();
   bool lower_lambda();
@@ -156,13 +160,13 @@ void SubdivisionFit::look_over_template() {
 /// Samples the target about as densely as the fitted surface: sparse sites on large facets would claim points of the
 /// surface that belong to a neighbouring facet.
 void SubdivisionFit::sample_target(std::size_t num_samples) {
-  const double spacing = 2.4 * std::sqrt(target_.area() / static_cast<double>(num_samples));
+  const double spacing = 1.8 * std::sqrt(target_.area() / static_cast<double>(std::max(num_samples, kLeastTargetSamples)));
   target_ = TargetSurface(target_mesh_, {.sample_spacing = spacing});
 }
 
 void SubdivisionFit::prepare_level() {
   const Clock::time_point begin = Clock::now();
-  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size(), finest());
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size() / 2, finest());
   sample_target(level_.samples.num_rows());
   sizes_ = number_ == 1 ? child_sizes(control_, target_.volume(), schedule_.size_blend) : refined_sizes(sizes_);
   seconds_["levels"] += seconds_since(begin);
@@ -170,6 +174,15 @@ void SubdivisionFit::prepare_level() {
 
 std::string SubdivisionFit::stage_name(const Stage& stage) const {
   return format("level %d, lambda %g, tangential weight %g", number_, stage.lambda, stage.tangential_weight);
+}
+
+std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
+  const std::size_t num_samples = level_.samples.num_rows();
+  if (options_.correspondence == Correspondence::voronoi)
+    return std::make_unique<SurfaceEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight);
+  const int points = level_.sample_triangles.size() > 2 * target_.triangles().size() ? 1 : 3;
+  return std::make_unique<ClosestPointEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight,
+                                              points);
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
@@ -185,8 +198,7 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
 
   FitProblem problem(level_.nodes, level_.samples, level_.mesh,
                      VolumeEnergy(level_.mesh, sizes_, schedule_.quadrature_points(number_)),
-                     SurfaceEnergy(target_, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight),
-                     stage.lambda);
+                     surface_term(stage), stage.lambda);
   MinimizerOptions options;
   options.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
   if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) options.max_iterations *= kLbfgsSteps;
@@ -261,6 +273,7 @@ double SubdivisionFit::measured_mean() {
   for (const TriangleMesh* surface : {&boundary, &limit})
     mean = std::max(mean, surface_distance(*surface, ClosestPoint(*surface), target_mesh_, target_tree_).mean());
   mean_ = 100 * mean;
+  if (!result_.report.stages.empty()) result_.report.stages.back().mean_distance_percent = *mean_;
   seconds_["distance"] += seconds_since(begin);
   return *mean_;
 }
@@ -269,17 +282,23 @@ bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
-/// The finest level, once more and more with less weight on the cells' shape, while the accuracy wanted is not met.
+/// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
+/// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
 bool SubdivisionFit::lower_lambda() {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
-  double mean = measured_mean();
+  const auto distortion = [this] {
+    const auto& iterations = result_.report.stages.back().iterations;
+    return iterations.empty() ? 0 : iterations.back().volume_energy;
+  };
+  double mean = measured_mean(), volume = distortion();
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
     if (!run_stage(stage, stage_name(stage))) return false;
-    const double before = mean;
+    const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
     mean = measured_mean();
-    if (mean > kLeastGain * before) break;
+    volume = distortion();
+    if (gain < (options_.tolerance_percent ? kLeastGain : std::max(kLeastGain, cost))) break;
   }
   return true;
 }

@@ -19,6 +19,12 @@ enum class FittedSurface {
 
 enum class SolverKind { newton, lbfgs };
 
+/// What pulls at what in the surface energy.
+enum class Correspondence {
+  closest,  ///< exact closest points, both ways (`ClosestPointEnergy`): better cells at the same distance (default)
+  voronoi   ///< the paper's restricted Voronoi cells (`SurfaceEnergy`)
+};
+
 /// Told at every step; `fraction` is an estimate of the share done, in [0, 1].
 struct FitProgress {
   const char* stage;
@@ -35,6 +41,7 @@ struct FitOptions {
   double lambda_far = 1.0, lambda_close = 0.005; ///< > 0; close may be lowered further when a tolerance asks for it
   std::optional<double> crease_angle_degrees;    ///< tags the template's boundary edges sharper than this, (0, 180)
   SolverKind solver = SolverKind::newton;
+  Correspondence correspondence = Correspondence::closest;
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/block_sparse.h"
 #include "fit/restricted_voronoi.h"
+#include "fit/surface_term.h"
 #include "fit/target_surface.h"
 #include "subvol/types.h"
 
@@ -29,61 +29,29 @@ namespace subvol {
 /// triangle, and dx. E_S is then a quadratic in z. Its gradient is that of moving cells for F_TS with tau = 1;
 /// otherwise it leaves out how cells and dx move, which is considerable for small tau. Dimensionless, >= 0, invariant
 /// under similarities of both surfaces. Results have the same bits for any number of threads.
-class SurfaceEnergy {
+class SurfaceEnergy final : public SurfaceTerm {
  public:
   /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1].
   SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                 std::size_t num_samples, double tangential_weight);
 
-  /// Takes the samples' positions (num_samples, finite, else InputError), finds their cells, freezes them. Must come
-  /// before the functions below. Cost: nearly all of a fit's surface part; see `RestrictedVoronoi::compute`.
-  void assign(std::span<const Vec3> samples);
+  /// Cost: nearly all of a fit's surface part; see `RestrictedVoronoi::compute`.
+  void assign(std::span<const Vec3> samples) override;
 
-  /// E_S(z) with the frozen cells. Taken relative to the assigned samples, so differences of close-by values are good.
-  double value(std::span<const Vec3> z) const;
-  /// g += dE_S/dz, with the frozen cells: per sample, in 1/length. One product with the Hessian.
-  void add_gradient(std::span<const Vec3> z, std::span<Vec3> g) const;
-  /// d2E_S/dz2, constant between assignments; positive semidefinite but for single precision. Couples the corners of a
-  /// sample triangle; every row has its diagonal block.
-  const BlockSparse& hessian() const { return hessian_; }
-
-  /// The two parts of E_S at the assigned samples.
-  double target_to_surface() const { return target_to_surface_; }
-  double surface_to_target() const { return surface_to_target_; }
-  std::size_t num_samples() const { return incidence_offsets_.size() - 1; }
   double tangential_weight() const { return tau_; }
 
  private:
-  struct Row;
-  /// One corner of a sample triangle, seen from the sample there: where its blocks go in the sample's row.
-  struct Incidence {
-    Index triangle;
-    int corner;
-    std::array<Index, 3> entries;
-  };
-
   void index_pieces();
   void add_target_pieces(std::size_t sample, Row& row) const;
   void add_sample_pieces(std::size_t sample, Row& row) const;
-  /// Row i of H (z - assigned samples).
-  Vec3 hessian_times_step(std::span<const Vec3> z, std::size_t i) const;
 
   const TargetSurface* target_;
-  std::vector<std::array<Index, 3>> triangles_;
   double tau_, scale_;
   RestrictedVoronoi target_sites_;
   std::optional<RestrictedVoronoi> sample_sites_;
-  std::vector<std::size_t> incidence_offsets_;
-  std::vector<Incidence> incidences_;
-
   std::vector<VoronoiPiece> target_pieces_, sample_pieces_;  ///< of T's triangles; of S~'s
   std::vector<std::size_t> site_offsets_, triangle_offsets_;
   std::vector<Index> site_pieces_;  ///< numbers of `target_pieces_`, by site
-  std::vector<double> triangle_areas_;
-
-  std::vector<Vec3> assigned_, gradient_;
-  BlockSparse hessian_;
-  double target_to_surface_ = 0, surface_to_target_ = 0;
 };
 
 }  // namespace subvol

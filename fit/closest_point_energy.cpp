@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/closest_point_energy.h"
+
+#include "subvol/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+namespace subvol {
+
+namespace {
+
+/// Barycentric coordinates of a point in a triangle's plane, clamped to the triangle; (1, 0, 0) where it has no area.
+std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 u = b - a, v = c - a, w = p - a, n = u.cross(v);
+  const double area = n.squaredNorm();
+  if (!(area > 0)) return {1, 0, 0};
+  const double second = std::clamp(w.cross(v).dot(n) / area, 0.0, 1.0);
+  const double third = std::clamp(u.cross(w).dot(n) / area, 0.0, 1.0 - second);
+  return {1 - second - third, second, third};
+}
+
+}  // namespace
+
+ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
+                                       std::size_t num_samples, double tangential_weight, int points_per_triangle)
+    : SurfaceTerm(std::move(sample_triangles), num_samples),
+      target_(&target),
+      target_tree_(TriangleMesh{target.positions(), target.triangles()}),
+      tau_(tangential_weight),
+      scale_(1 / (2 * target.area() * target.length() * target.length())),
+      points_per_triangle_(points_per_triangle) {
+  if (!(tau_ >= 0 && tau_ <= 1)) throw InputError("ClosestPointEnergy: tangential_weight must be in [0, 1]");
+  if (points_per_triangle != 1 && points_per_triangle != 3)
+    throw InputError("ClosestPointEnergy: points_per_triangle must be 1 or 3");
+  std::vector<int> samples_of(target.triangles().size(), 0);
+  for (Index t : target.sample_triangles()) ++samples_of[t];
+  for (Index t : target.sample_triangles()) sample_areas_.push_back(target.areas()[t] / samples_of[t]);
+}
+
+void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
+  const std::vector<std::array<Index, 3>> corners(triangles().begin(), triangles().end());
+  const ClosestPoint tree(TriangleMesh{{samples.begin(), samples.end()}, corners});
+  const std::vector<Vec3>& points = target_->samples();
+  std::vector<ClosestPoint::Hit> hits(points.size());
+  tree.closest(points, hits);
+  target_offsets_.assign(triangles().size() + 1, 0);
+  for (const auto& hit : hits) ++target_offsets_[hit.triangle + 1];
+  for (std::size_t t = 0; t < triangles().size(); ++t) target_offsets_[t + 1] += target_offsets_[t];
+  std::vector<std::size_t> next(target_offsets_.begin(), target_offsets_.end() - 1);
+  target_links_.resize(points.size());
+  for (std::size_t j = 0; j < points.size(); ++j) {
+    const Index t = hits[j].triangle;
+    const auto& q = corners[t];
+    target_links_[next[t]++] = {t, barycentric(hits[j].point, samples[q[0]], samples[q[1]], samples[q[2]]), points[j],
+                                target_->normals()[target_->sample_triangles()[j]], sample_areas_[j]};
+  }
+}
+
+void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
+  constexpr double kThird = 1.0 / 3, kSixth = 1.0 / 6, kTwoThirds = 2.0 / 3;
+  constexpr std::array<std::array<double, 3>, 3> kThree = {
+      {{kTwoThirds, kSixth, kSixth}, {kSixth, kTwoThirds, kSixth}, {kSixth, kSixth, kTwoThirds}}};
+  const int n = points_per_triangle_;
+  surface_links_.resize(n * triangles().size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t t = 0; t < triangles().size(); ++t) {
+    const auto& q = triangles()[t];
+    Index hint = kNoIndex;
+    for (int k = 0; k < n; ++k) {
+      const std::array<double, 3> l = n == 1 ? std::array<double, 3>{kThird, kThird, kThird} : kThree[k];
+      const Vec3 x = l[0] * samples[q[0]] + l[1] * samples[q[1]] + l[2] * samples[q[2]];
+      const ClosestPoint::Hit hit = target_tree_.closest(x, hint);
+      hint = hit.triangle;
+      surface_links_[n * t + k] = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
+                                   triangle_area(t) / n};
+    }
+  }
+}
+
+void ClosestPointEnergy::add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const {
+  const double own = link.barycentric[incidence.corner];
+  if (own == 0) return;
+  const auto& q = triangles()[link.triangle];
+  Vec3 d = -link.point;
+  for (int l = 0; l < 3; ++l) d += link.barycentric[l] * assigned()[q[l]];
+  const double height = link.normal.dot(d), weight = own * link.area;
+  const Vec3 pull = ((1 - tau_) * height) * link.normal + tau_ * d;
+  value += weight * pull.dot(d);
+  row.gradient += 2 * weight * pull;
+  for (int l = 0; l < 3; ++l) {
+    const double w = 2 * weight * link.barycentric[l];
+    Mat3& block = row.blocks[incidence.entries[l]];
+    block += ((1 - tau_) * w) * link.normal * link.normal.transpose();
+    block.diagonal().array() += tau_ * w;
+  }
+}
+
+void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
+  begin_assign(samples);
+  link_target(samples);
+  link_surface(samples);
+  assemble(scale_, [this](std::size_t i, Row& row) {
+    for (const Incidence& incidence : incidences(i)) {
+      const auto t = static_cast<std::size_t>(incidence.triangle);
+      for (std::size_t k = target_offsets_[t]; k < target_offsets_[t + 1]; ++k)
+        add_link(target_links_[k], incidence, row, row.target_to_surface);
+      for (int k = 0; k < points_per_triangle_; ++k)
+        add_link(surface_links_[points_per_triangle_ * t + k], incidence, row, row.surface_to_target);
+    }
+  });
+}
+
+}  // namespace subvol

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/closest_point.h"
+#include "fit/surface_term.h"
+#include "fit/target_surface.h"
+
+namespace subvol {
+
+/// The surface energy of Eq. 9 with exact closest points in place of Voronoi cells.
+///
+///   E_S = 1/(2 A L^2) (sum_j a_j (y_j - s(y_j))^T M (y_j - s(y_j)) + sum_q b_q (x_q - t(x_q))^T M (x_q - t(x_q)))
+///   M = n n^T + tau (I - n n^T),  n: unit normal of the target at y_j or t(x_q)
+///
+/// y_j, a_j   samples of the target and the area each stands for;  s(y): closest point of the triangulated surface S~
+/// x_q, b_q   quadrature points of S~'s triangles with their areas;  t(x): closest point of the target
+///
+/// Where Voronoi cells hand every point of the target to one *sample*, here it pulls at the place of S~ that is closest,
+/// between the samples: the pull is spread over the corners, and cells are left better shaped at the same distance.
+/// Frozen: the barycentric coordinates of s(y_j), the points t(x_q), normals and areas. Same bits for any thread count.
+class ClosestPointEnergy final : public SurfaceTerm {
+ public:
+  /// target must outlive the energy. points_per_triangle: 1 or 3. InputError: as `SurfaceEnergy`.
+  ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
+                     std::size_t num_samples, double tangential_weight, int points_per_triangle);
+
+  /// Cost: one closest-point query per target sample and per quadrature point, and a tree over S~.
+  void assign(std::span<const Vec3> samples) override;
+
+ private:
+  /// A point of the target tied to a point of one sample triangle.
+  struct Link {
+    Index triangle;
+    std::array<double, 3> barycentric;
+    Vec3 point, normal;
+    double area;
+  };
+
+  void link_target(std::span<const Vec3> samples);
+  void link_surface(std::span<const Vec3> samples);
+  void add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const;
+
+  const TargetSurface* target_;
+  ClosestPoint target_tree_;
+  double tau_, scale_;
+  int points_per_triangle_;
+  std::vector<double> sample_areas_;         ///< a_j
+  std::vector<Link> target_links_;           ///< by sample triangle
+  std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
+  std::vector<Link> surface_links_;          ///< points_per_triangle_ for each sample triangle
+};
+
+}  // namespace subvol

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/boundary_triangles.h"
+#include "fit/certificate.h"
+#include "fit/fit_level.h"
+#include "fit/subdivision_fit.h"
+#include "fit/surface_distance.h"
+#include "samples/shapes.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+#include "subvol/limit_surface.h"
+#include "tests/data.h"
+#include "tests/sample_meshes.h"
+
+#include "subvol/mesh_io.h"
+#include "subvol/surface_io.h"
+
+#include <catch2/catch.hpp>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+
+using namespace subvol;
+using namespace subvol::test;
+
+namespace {
+
+/// Mean distance of a mesh's boundary, or of a cage's limit surface, to the target, in per cent of the diagonal.
+double mesh_percent(const VolumeMesh& mesh, const TriangleMesh& target) {
+  const TriangleMesh boundary = refined_triangles(boundary_surface(mesh, MeshTopology(mesh), nullptr));
+  return 100 * surface_distance(boundary, target).mean() / bounding_box_diagonal(target);
+}
+
+double limit_percent(const VolumeMesh& cage, const TriangleMesh& target) {
+  const BoundaryRefinement refinement = refine_boundary(cage, 4);
+  TriangleMesh limit;
+  limit.positions = refinement.positions.apply(cage.positions);
+  for (const auto& q : refinement.quads) {
+    limit.triangles.push_back({q[0], q[1], q[2]});
+    limit.triangles.push_back({q[0], q[2], q[3]});
+  }
+  return 100 * surface_distance(limit, target).mean() / bounding_box_diagonal(target);
+}
+
+FitOptions quick(int levels = 2) {
+  FitOptions options;
+  options.levels = levels;
+  return options;
+}
+
+}  // namespace
+
+TEST_CASE("A fit reproduces the samples' surfaces with certified cells") {
+  for (const samples::Sample& sample : samples::all_samples()) {
+    CAPTURE(sample.name);
+    const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
+    CHECK(result.report.stop_reason == StopReason::converged);
+    CHECK(certify(result.mesh).all_certified());
+    // Two levels on a coarse template: the bumps are there to a tenth of what the template misses.
+    CHECK(mesh_percent(result.mesh, sample.target) < 0.1 * result.report.initial_distance_mean_percent);
+    CHECK(limit_percent(result.cage, sample.target) < 0.1 * result.report.initial_distance_mean_percent);
+    CHECK(result.mesh.num_cells() == 64 * sample.template_mesh.num_cells());
+    CHECK(result.cage.num_cells() == 8 * sample.template_mesh.num_cells());
+    CHECK(result.cage.tags.creases.empty() == sample.template_mesh.tags.creases.empty());
+  }
+}
+
+TEST_CASE("A cage-only fit keeps the template's cells") {
+  const samples::Sample sample = samples::torus_sample();
+  FitOptions options = quick();
+  options.cage_only = true;
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(result.cage.cell_vertices == sample.template_mesh.cell_vertices);
+  CHECK(result.mesh.num_cells() == 64 * sample.template_mesh.num_cells());
+  CHECK(certify(result.mesh).all_certified());
+  CHECK(limit_percent(result.cage, sample.target) < 0.3 * result.report.initial_distance_mean_percent);
+}
+
+TEST_CASE("The written mesh is the cage subdivided, with its boundary at limit positions") {
+  const samples::Sample sample = samples::ball_sample();
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
+  const SubdivisionLevel level = subdivide(result.cage);
+  const std::vector<Vec3> expected = limit_map(level.fine).apply(level.fine.positions);
+  REQUIRE(expected.size() == result.mesh.positions.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) CHECK((expected[i] - result.mesh.positions[i]).norm() < 1e-12);
+}
+
+TEST_CASE("A fit does not depend on the unit or the origin") {
+  const samples::Sample sample = samples::ball_sample();
+  const FitResult plain = fit_subdivision_volume(sample.target, sample.template_mesh, quick(1));
+  samples::Sample moved = sample;
+  const auto move = [](Vec3& p) { p = 1e3 * p + Vec3(1e5, -2e5, 3e5); };
+  for (Vec3& p : moved.target.positions) move(p);
+  for (Vec3& p : moved.template_mesh.positions) move(p);
+  const FitResult other = fit_subdivision_volume(moved.target, moved.template_mesh, quick(1));
+  double worst = 0;
+  for (std::size_t i = 0; i < plain.cage.positions.size(); ++i) {
+    Vec3 p = plain.cage.positions[i];
+    move(p);
+    worst = std::max(worst, (p - other.cage.positions[i]).norm());
+  }
+  // Coordinates of 3e5 carry 6e-11 each; steps amplify that.
+  CHECK(worst < 1e-3);
+}
+
+TEST_CASE("A fit has the same bits with one and two threads") {
+  const samples::Sample sample = samples::torus_sample();
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const FitResult one = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
+  omp_set_num_threads(2);
+  const FitResult two = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
+  omp_set_num_threads(before);
+  CHECK(one.cage.positions == two.cage.positions);
+  CHECK(one.mesh.positions == two.mesh.positions);
+}
+
+TEST_CASE("The plain surface of the paper can be fitted instead of the limit surface") {
+  const samples::Sample sample = samples::ball_sample();
+  for (BoundaryRule rule : {BoundaryRule::catmull_clark, BoundaryRule::averaging}) {
+    FitOptions options = quick();
+    options.surface = FittedSurface::mesh;
+    options.boundary = rule;
+    const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+    CHECK(certify(result.mesh).all_certified());
+    CHECK(mesh_percent(result.mesh, sample.target) < 0.1 * result.report.initial_distance_mean_percent);
+    const SubdivisionLevel level = subdivide(result.cage, rule);
+    double worst = 0;
+    for (std::size_t i = 0; i < level.fine.positions.size(); ++i)
+      worst = std::max(worst, (level.fine.positions[i] - result.mesh.positions[i]).norm());
+    CHECK(worst < 1e-12);
+  }
+}
+
+TEST_CASE("L-BFGS decreases the energy as well and ends with certified cells") {
+  const samples::Sample sample = samples::ball_sample();
+  FitOptions options = quick(1);
+  options.solver = SolverKind::lbfgs;
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(certify(result.mesh).all_certified());
+  CHECK(mesh_percent(result.mesh, sample.target) < 0.5 * result.report.initial_distance_mean_percent);
+}
+
+TEST_CASE("A tolerance that is met ends the fit, one out of reach is said to be missed") {
+  const samples::Sample sample = samples::ball_sample();
+  FitOptions options = quick();
+  options.tolerance_percent = 0.5;
+  const FitResult met = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(met.report.stop_reason == StopReason::converged);
+  CHECK(mesh_percent(met.mesh, sample.target) <= 0.5);
+  options.levels = 1;
+  options.tolerance_percent = 1e-6;
+  const FitResult missed = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(missed.report.stop_reason == StopReason::tolerance_missed);
+  CHECK(certify(missed.mesh).all_certified());
+}
+
+TEST_CASE("A cancelled fit returns the best state so far") {
+  const samples::Sample sample = samples::ball_sample();
+  FitOptions options = quick();
+  int calls = 0;
+  options.progress = [&](const FitProgress& progress) {
+    CHECK(progress.fraction >= 0);
+    CHECK(progress.fraction <= 1);
+    return ++calls < 3;
+  };
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(calls == 3);
+  CHECK(result.report.stop_reason == StopReason::cancelled);
+  CHECK(result.mesh.num_cells() == 8 * sample.template_mesh.num_cells());
+  CHECK(certify(result.mesh).all_certified());
+}
+
+TEST_CASE("A time limit ends the fit with a result") {
+  const samples::Sample sample = samples::ball_sample();
+  FitOptions options = quick(3);
+  options.time_limit_seconds = 1e-3;
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(result.report.stop_reason == StopReason::time_limit);
+  CHECK(certify(result.mesh).all_certified());
+}
+
+TEST_CASE("A fit refuses options out of range, empty targets and unusable templates") {
+  const samples::Sample sample = samples::ball_sample();
+  const auto refused = [&](const FitOptions& options) {
+    CHECK_THROWS_AS(fit_subdivision_volume(sample.target, sample.template_mesh, options), InputError);
+  };
+  FitOptions options;
+  options.levels = 0;
+  refused(options);
+  options = {};
+  options.lambda_close = 0;
+  refused(options);
+  options = {};
+  options.lambda_far = std::nan("");
+  refused(options);
+  options = {};
+  options.tolerance_percent = -1;
+  refused(options);
+  CHECK_THROWS_AS(fit_subdivision_volume(TriangleMesh{}, sample.template_mesh, {}), InputError);
+  CHECK_THROWS_AS(fit_subdivision_volume(sample.target, VolumeMesh{}, {}), InputError);
+  VolumeMesh inverted = sample.template_mesh;
+  for (Vec3& p : inverted.positions) p[0] = -p[0];
+  CHECK_THROWS_AS(fit_subdivision_volume(sample.target, inverted, {}), InputError);
+}
+
+TEST_CASE("Ideal sizes fill the volume asked for at any blend") {
+  const VolumeMesh mesh = mixed_cells();
+  for (double blend : {0.0, 0.5, 1.0}) {
+    const std::vector<double> sizes = child_sizes(mesh, 3.0, blend);
+    double total = 0;
+    for (double h : sizes) total += h * h * h;
+    CHECK(total == Approx(3).epsilon(1e-12));
+    double refined = 0;
+    for (double h : refined_sizes(sizes)) refined += h * h * h;
+    CHECK(refined == Approx(3).epsilon(1e-12));
+  }
+}
+
+TEST_CASE("Real cases fit with certified cells", "[data]") {
+  const auto data = data_dir();
+  if (!data) {
+    WARN("skipped: no folder with real data");
+    return;
+  }
+  for (const char* name : {"doubletorus17", "mixed_fandisk"}) {
+    CAPTURE(name);
+    const TriangleMesh target = read_triangle_mesh(*data / "fit" / name / "target.off");
+    const VolumeMesh template_mesh = read_volume_mesh(*data / "fit" / name / "template.mesh");
+    const FitResult result = fit_subdivision_volume(target, template_mesh, quick());
+    CHECK(result.report.stop_reason == StopReason::converged);
+    CHECK(certify(result.mesh).all_certified());
+    CHECK(mesh_percent(result.mesh, target) < 0.12);
+  }
+}
