@@ -11,7 +11,7 @@ namespace subvol {
 namespace {
 
 constexpr double kBetweenSamples = 16.0 / 15;  // a quadratic's largest value over a triangle against that at quarters
-constexpr double kAlike = 0.5;                 // errors of two ways to cut that do not tell them apart
+constexpr double kAlike = 0.7;                 // errors of two ways to cut that do not tell them apart
 constexpr int kShortest = kCellSteps;          // quads have samples between their corners
 
 /// An interval of a strip that should be halved for a quad's sake.
@@ -54,7 +54,8 @@ class PatchJudge {
         if (error <= max_chord_error) continue;
         const bool may[2] = {can_halve(0, i), can_halve(1, j)};
         const double if_u = error_with(kCellSteps / 2, kCellSteps), if_v = error_with(kCellSteps, kCellSteps / 2);
-        const bool both = std::min(if_u, if_v) > max_chord_error && std::min(if_u, if_v) > kAlike * std::max(if_u, if_v);
+        const double better = std::min(if_u, if_v), worse = std::max(if_u, if_v);
+        const bool both = better > max_chord_error && better > kAlike * worse;
         if (may[0] && (both || if_u <= if_v || !may[1])) state.wishes.push_back({strips_[0], i, error});
         if (may[1] && (both || if_v < if_u || !may[0])) state.wishes.push_back({strips_[1], j, error});
       }

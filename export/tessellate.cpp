@@ -63,7 +63,9 @@ class Assembler {
     }
   };
 
-  Index add_vertex(const Grid& grid, std::size_t place) { return add_vertex(grid.positions[place], grid.normals[place]); }
+  Index add_vertex(const Grid& grid, std::size_t place) {
+    return add_vertex(grid.positions[place], grid.normals[place]);
+  }
   Index add_vertex(const Vec3& position, const Vec3& normal) {
     out_.positions.push_back(position);
     out_.normals.push_back(normal);

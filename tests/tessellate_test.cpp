@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/tessellate.h"
 
+#include "fit/closest_point.h"
 #include "subvol/error.h"
 #include "subvol/limit_surface.h"
 #include "subvol/mesh_topology.h"
@@ -26,7 +27,8 @@ std::array<double, 3> key(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 std::vector<Index> weld(const std::vector<Vec3>& positions) {
   std::map<std::array<double, 3>, Index> numbers;
   std::vector<Index> welded;
-  for (const Vec3& p : positions) welded.push_back(numbers.try_emplace(key(p), static_cast<Index>(numbers.size())).first->second);
+  for (const Vec3& p : positions)
+    welded.push_back(numbers.try_emplace(key(p), static_cast<Index>(numbers.size())).first->second);
   return welded;
 }
 
@@ -48,36 +50,17 @@ bool watertight(const TessellatedSurface& surface) {
   });
 }
 
-double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  double least = std::numeric_limits<double>::infinity();
-  const Vec3 area = (b - a).cross(c - a);
-  const std::array<Vec3, 3> corners{a, b, c};
-  bool inside = area.norm() > 0;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3 edge = corners[(k + 1) % 3] - corners[k], to = p - corners[k];
-    inside = inside && edge.cross(to).dot(area) >= 0;
-    const double t = edge.norm() > 0 ? std::clamp(to.dot(edge) / edge.squaredNorm(), 0.0, 1.0) : 0.0;
-    least = std::min(least, (to - t * edge).norm());
-  }
-  return inside ? std::abs((p - a).dot(area)) / area.norm() : least;
-}
-
 /// Distance from the points of a dense uniform refinement to the nearest of all triangles.
-double brute_chord_error(const VolumeMesh& cage, const TessellatedSurface& surface, int levels) {
+double dense_chord_error(const VolumeMesh& cage, const TessellatedSurface& surface, int levels) {
   const BoundaryRefinement dense = refine_boundary(cage, levels);
-  double largest = 0;
-  for (const Vec3& p : dense.positions.apply(cage.positions)) {
-    double least = std::numeric_limits<double>::infinity();
-    for (const auto& quad : surface.quads) {
-      const auto corner = [&](int k) -> const Vec3& { return surface.positions[quad[k]]; };
-      const Vec3 low = corner(0).cwiseMin(corner(1)).cwiseMin(corner(2)).cwiseMin(corner(3));
-      const Vec3 high = corner(0).cwiseMax(corner(1)).cwiseMax(corner(2)).cwiseMax(corner(3));
-      if ((low - p).cwiseMax(p - high).cwiseMax(0.0).norm() >= least) continue;
-      least = std::min(least, distance_to_triangle(p, corner(0), corner(1), corner(2)));
-      least = std::min(least, distance_to_triangle(p, corner(0), corner(2), corner(3)));
-    }
-    largest = std::max(largest, least);
+  TriangleMesh triangles{surface.positions, {}};
+  for (const auto& [a, b, c, d] : surface.quads) {
+    triangles.triangles.push_back({a, b, c});
+    triangles.triangles.push_back({a, c, d});
   }
+  const ClosestPoint tree(triangles);
+  double largest = 0;
+  for (const Vec3& p : dense.positions.apply(cage.positions)) largest = std::max(largest, tree.closest(p).distance);
   return largest;
 }
 
@@ -114,7 +97,7 @@ TEST_CASE("the stated chord error holds against a dense refinement") {
   for (const VolumeMesh& cage : {bumpy(), mixed_cells(), semi_sharp})
     for (const double bound : {0.03, 0.003}) {
       const TessellatedSurface surface = tessellate(cage, bound);
-      const double measured = brute_chord_error(cage, surface, 5);
+      const double measured = dense_chord_error(cage, surface, 5);
       CHECK(measured <= surface.chord_error);
       CHECK(surface.chord_error <= bound);
       CHECK(surface.chord_error > 0.2 * bound);  // not much finer than asked for
@@ -127,7 +110,7 @@ TEST_CASE("the bound holds at singular corners, with few quads more") {
   jitter(cage, 0.1);
   const TessellatedSurface coarse = tessellate(cage, 0.01), fine = tessellate(cage, 0.001);
   CHECK(fine.chord_error <= 0.001);
-  CHECK(brute_chord_error(cage, fine, 6) <= fine.chord_error);
+  CHECK(dense_chord_error(cage, fine, 6) <= fine.chord_error);
   CHECK(fine.quads.size() < 20 * coarse.quads.size());  // 10 where nothing is singular
 }
 
@@ -243,7 +226,7 @@ TEST_CASE("a bound on the quads is kept, and the error reached is told") {
   CHECK(surface.quads.size() <= 3'000);
   CHECK(surface.quads.size() > 1'000);
   CHECK(surface.chord_error > 1e-9);
-  CHECK(brute_chord_error(bumpy(), surface, 5) <= surface.chord_error);
+  CHECK(dense_chord_error(bumpy(), surface, 5) <= surface.chord_error);
 }
 
 TEST_CASE("a chord error that is not positive is refused") {
