@@ -27,7 +27,7 @@ struct FitArguments {
   WritingOptions writing;
   FitOptions fit;
   std::string target, template_mesh;
-  std::string surface = "limit", boundary = "catmull-clark", solver = "newton";
+  std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
 };
 
 /// One fit from its files to its files.
@@ -84,6 +84,8 @@ void FitRun::fit() {
   FitOptions options = arguments_.fit;
   options.surface = arguments_.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
   options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
+  options.correspondence =
+      arguments_.correspondence == "voronoi" ? Correspondence::voronoi : Correspondence::closest;
   options.solver = arguments_.solver == "lbfgs" ? SolverKind::lbfgs : SolverKind::newton;
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
@@ -214,7 +216,8 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("W")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage")
+  verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
+                  "(0.02 where none is given) and falls by more than the cells' distortion rises")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
@@ -222,6 +225,12 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_option("--solver", arguments.solver, "How energies are minimised")
       ->check(CLI::IsMember({"newton", "lbfgs"}))
       ->type_name("newton|lbfgs")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--correspondence", arguments.correspondence,
+                  "What pulls at what: exact closest points both ways, or the restricted Voronoi cells of the paper")
+      ->check(CLI::IsMember({"closest", "voronoi"}))
+      ->type_name("closest|voronoi")
       ->capture_default_str()
       ->group(group);
   verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")

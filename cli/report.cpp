@@ -48,6 +48,7 @@ Json stage_json(const StageRecord& stage) {
             {"iterations", stage.iterations.size()},
             {"evaluations", evaluations}};
   if (!stage.iterations.empty()) json["energy"] = energy_json(stage, stage.iterations.back());
+  if (stage.mean_distance_percent >= 0) json["mean_distance_percent"] = stage.mean_distance_percent;
   json["stop"] = stage.stop;
   json["kept"] = stage.kept;
   json["seconds"] = stage.seconds;
