@@ -39,7 +39,7 @@ class LimitPatches {
   const std::array<bool, 2>& sharp_sides(Index patch) const { return sharp_sides_[patch]; }
 
   /// Makes ready for parameters that are multiples of kUnits / 2^depth; 0 <= depth <= kMaxDepth. Does work once per
-  /// depth, for the quads that are still irregular there: few, unless semi-sharp creases are long.
+  /// depth, for the quads that are still irregular there: few, but along semi-sharp creases 2^depth a quad.
   void prepare(int depth);
 
   /// Points of the limit surface at u.size() x v.size() parameters, u fastest; normals too unless null.
