@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMaxSampleRefinements = 3;
 /// How far the finest level's samples lie from the limit surface (0) towards the mesh (1).
-constexpr double kMeshShare = 0.4;
+constexpr double kMeshShare = 0.35;
 
 /// The boundary of a hex mesh as samples: its own vertices, without the limit.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
@@ -36,7 +36,6 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
     level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
   }
   level.samples = select_rows(nodes, rows);
-  level.limit_samples = level.samples;
 }
 
 /// Boundary nodes -> vertices of the boundary refined once, by bilinear interpolation in its quads.
@@ -92,7 +91,6 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   if (finest) refinements = 1;
   const BoundaryRefinement boundary = refine_boundary(level.mesh, refinements);
   level.samples = compose(boundary.positions, fine_from_unknowns);
-  level.limit_samples = level.samples;
   if (finest) {
     const SparseMap bilinear = bilinear_refinement(boundary, level.mesh.num_vertices());
     level.samples = blend(level.samples, compose(bilinear, level.nodes), kMeshShare);

@@ -25,7 +25,6 @@ struct FitLevel {
   SparseMap nodes;               ///< M
   SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid whenever that mesh is certified
   SparseMap samples;             ///< N
-  SparseMap limit_samples;       ///< the same points on the limit surface (rows of `samples` on coarser levels)
   std::vector<std::array<Index, 3>> sample_triangles;
 };
 

@@ -3,6 +3,7 @@
 
 #include "fit/subdivision_fit.h"
 
+#include <span>
 #include <vector>
 
 namespace subvol {
@@ -15,7 +16,7 @@ struct Stage {
 };
 
 /// Mean distance, in per cent of the diagonal, down to which a fit without a tolerance lowers lambda further.
-inline constexpr double kDefaultAccuracyPercent = 0.02;
+inline constexpr double kDefaultAccuracyPercent = 0.025;
 /// How far below `FitOptions::lambda_close` lambda may go for that, and for a tolerance that was asked for.
 inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;
 /// Lowering lambda ends when a stage takes less than this share off the mean distance.
@@ -44,7 +45,11 @@ struct FitSchedule {
   double fraction(int number) const;
 };
 
-/// distance  mean distance of template and target by the target's length V/A.
-FitSchedule make_schedule(const FitOptions& options, double distance);
+/// distance     mean distance of template and target by the target's length V/A.
+/// size_spread  standard deviation of the logarithm of the template cells' own sizes (`child_sizes` with blend 1).
+FitSchedule make_schedule(const FitOptions& options, double distance, double size_spread);
+
+/// Standard deviation of the logarithms of positive numbers; 0 for none.
+double logarithmic_spread(std::span<const double> sizes);
 
 }  // namespace subvol

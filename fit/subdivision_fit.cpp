@@ -95,6 +95,7 @@ class SubdivisionFit {
   bool run_stage(const Stage& stage, const std::string& name);
   bool run_stages();
   bool lower_lambda();
+  TriangleMesh limit_triangles();
   double measured_mean();
   bool meets_tolerance();
   void store_result();
@@ -117,6 +118,7 @@ class SubdivisionFit {
   FitSchedule schedule_;
   int number_ = 0;                 ///< of the level of the finite element mesh
   FitLevel level_;
+  std::optional<BoundaryRefinement> limit_check_;  ///< of level_.mesh, made when first measured
   double lambda_ = 0;              ///< of the last stage
   std::optional<double> mean_;     ///< percent, of the current state
   FitResult result_;
@@ -152,7 +154,8 @@ void SubdivisionFit::look_over_template() {
   const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), target_mesh_, target_tree_);
   report.initial_distance_mean_percent = 100 * distance.mean();
   report.initial_distance_max_percent = 100 * distance.max();
-  schedule_ = make_schedule(options_, distance.mean() / target_.length());
+  schedule_ = make_schedule(options_, distance.mean() / target_.length(),
+                            logarithmic_spread(child_sizes(control_, target_.volume(), 1)));
   if (target_.volume_source() != VolumeSource::signed_sum)
     report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
 }
@@ -167,6 +170,7 @@ void SubdivisionFit::sample_target(std::size_t num_samples) {
 void SubdivisionFit::prepare_level() {
   const Clock::time_point begin = Clock::now();
   level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size() / 2, finest());
+  limit_check_.reset();
   sample_target(level_.samples.num_rows());
   sizes_ = number_ == 1 ? child_sizes(control_, target_.volume(), schedule_.size_blend) : refined_sizes(sizes_);
   seconds_["levels"] += seconds_since(begin);
@@ -260,6 +264,19 @@ bool SubdivisionFit::start_level() {
   return false;
 }
 
+/// The limit surface, refined twice beyond the finite element mesh: its chords are a sixteenth of that mesh's.
+TriangleMesh SubdivisionFit::limit_triangles() {
+  constexpr int kRefinements = 2;
+  if (!limit_check_) limit_check_ = refine_boundary(level_.mesh, kRefinements);
+  TriangleMesh limit;
+  limit.positions = limit_check_->positions.apply(level_.refine.apply(from_unknowns_.apply(unknowns_)));
+  for (const auto& q : limit_check_->quads) {
+    limit.triangles.push_back({q[0], q[1], q[2]});
+    limit.triangles.push_back({q[0], q[2], q[3]});
+  }
+  return limit;
+}
+
 /// Mean distance between the target and what is fitted, in per cent of the diagonal: the larger of those of the finite
 /// element mesh and of the limit surface.
 double SubdivisionFit::measured_mean() {
@@ -267,11 +284,11 @@ double SubdivisionFit::measured_mean() {
   const Clock::time_point begin = Clock::now();
   VolumeMesh mesh = level_.mesh;
   mesh.positions = level_.nodes.apply(unknowns_);
-  const TriangleMesh boundary = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
-  const TriangleMesh limit{level_.limit_samples.apply(unknowns_), level_.sample_triangles};
+  std::vector<TriangleMesh> surfaces = {refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))};
+  if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
   double mean = 0;
-  for (const TriangleMesh* surface : {&boundary, &limit})
-    mean = std::max(mean, surface_distance(*surface, ClosestPoint(*surface), target_mesh_, target_tree_).mean());
+  for (const TriangleMesh& surface : surfaces)
+    mean = std::max(mean, surface_distance(surface, ClosestPoint(surface), target_mesh_, target_tree_).mean());
   mean_ = 100 * mean;
   if (!result_.report.stages.empty()) result_.report.stages.back().mean_distance_percent = *mean_;
   seconds_["distance"] += seconds_since(begin);
