@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMaxSampleRefinements = 3;
 /// How far the finest level's samples lie from the limit surface (0) towards the mesh (1).
-constexpr double kMeshShare = 0.35;
+constexpr double kMeshShare = 0.3;
 
 /// The boundary of a hex mesh as samples: its own vertices, without the limit.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
