@@ -217,7 +217,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->group(group);
   verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
-                  "(0.025 where none is given) and falls by more than the cells' distortion rises")
+                  "(0.015 where none is given) and falls by more than the cells' distortion rises")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()

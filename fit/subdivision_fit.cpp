@@ -8,6 +8,8 @@
 #include "fit/fit_level.h"
 #include "fit/fit_problem.h"
 #include "fit/fit_schedule.h"
+#include "fit/quality.h"
+#include "fit/self_intersection.h"
 #include "fit/surface_distance.h"
 #include "fit/surface_energy.h"
 #include "fit/target_surface.h"
@@ -31,6 +33,8 @@ namespace subvol {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+constexpr int kMaxUnfoldings = 5;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -97,6 +101,9 @@ class SubdivisionFit {
   bool lower_lambda();
   TriangleMesh limit_triangles();
   double measured_mean();
+  VolumeMesh current_mesh() const;
+  double mean_scaled_jacobian() const;
+  bool self_intersects() const;
   bool meets_tolerance();
   void store_result();
   void next_control();
@@ -138,7 +145,12 @@ SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& tem
   control_.positions = normalisation_.to_unit(control_.positions);
   if (options.crease_angle_degrees) {
     control_.tags = merge_tags(control_.tags, features_by_angle(control_, *options.crease_angle_degrees));
-    control_.tags = unfolding_tags(control_, audit(control_));
+    // A crease added at one corner can leave a wide span at another.
+    for (int round = 0; round < kMaxUnfoldings; ++round) {
+      const SubdivisionAudit found = audit(control_);
+      if (found.folding_edges.empty()) break;
+      control_.tags = unfolding_tags(control_, found);
+    }
   }
   cage_ = control_;
   unknowns_ = control_.positions;
@@ -282,8 +294,7 @@ TriangleMesh SubdivisionFit::limit_triangles() {
 double SubdivisionFit::measured_mean() {
   if (mean_) return *mean_;
   const Clock::time_point begin = Clock::now();
-  VolumeMesh mesh = level_.mesh;
-  mesh.positions = level_.nodes.apply(unknowns_);
+  const VolumeMesh mesh = current_mesh();
   std::vector<TriangleMesh> surfaces = {refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))};
   if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
   double mean = 0;
@@ -295,12 +306,26 @@ double SubdivisionFit::measured_mean() {
   return *mean_;
 }
 
+VolumeMesh SubdivisionFit::current_mesh() const {
+  VolumeMesh mesh = level_.mesh;
+  mesh.positions = level_.nodes.apply(unknowns_);
+  return mesh;
+}
+
+double SubdivisionFit::mean_scaled_jacobian() const { return measure_quality(current_mesh()).mean_scaled_jacobian; }
+
+bool SubdivisionFit::self_intersects() const {
+  const VolumeMesh mesh = current_mesh();
+  return !self_intersections(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))).empty();
+}
+
 bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
 /// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
+/// A stage that makes the boundary intersect itself, or without a tolerance costs too much of the shape, is undone.
 bool SubdivisionFit::lower_lambda() {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
@@ -308,13 +333,23 @@ bool SubdivisionFit::lower_lambda() {
     const auto& iterations = result_.report.stages.back().iterations;
     return iterations.empty() ? 0 : iterations.back().volume_energy;
   };
-  double mean = measured_mean(), volume = distortion();
+  double mean = measured_mean(), volume = distortion(), shape = mean_scaled_jacobian();
+  const bool embedded = !self_intersects();
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
+    const std::vector<Vec3> before = unknowns_;
     if (!run_stage(stage, stage_name(stage))) return false;
     const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
+    const double loss = shape - mean_scaled_jacobian();
+    if ((embedded && self_intersects()) || (!options_.tolerance_percent && loss > kMostShapeLoss)) {
+      unknowns_ = before;
+      mean_ = mean;
+      result_.report.stages.back().kept = false;
+      break;
+    }
     mean = measured_mean();
     volume = distortion();
+    shape -= loss;
     if (gain < (options_.tolerance_percent ? kLeastGain : std::max(kLeastGain, cost))) break;
   }
   return true;
