@@ -8,14 +8,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace subvol {
 
 namespace {
 
 constexpr int kMaxSampleRefinements = 3;
-/// How far the finest level's samples lie from the limit surface (0) towards the mesh (1).
-constexpr double kMeshShare = 0.3;
+/// How far the finest level's samples lie from the limit surface (0) towards the mesh (1), and up to which mean gap
+/// between the two (in the mesh's unit; the fit's is the target's diagonal). A coarser mesh cannot follow the target
+/// anyway, and would only draw the limit surface away from it.
+constexpr double kMeshShare = 0.3, kMostGap = 5e-4;
 
 /// The boundary of a hex mesh as samples: its own vertices, without the limit.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
@@ -81,20 +84,30 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     sample_plain_boundary(level.mesh, level.nodes, level);
     return level;
   }
-  level.nodes = compose(limit_map(level.mesh), fine_from_unknowns);
+  const SparseMap limit = limit_map(level.mesh);
+  level.nodes = compose(limit, fine_from_unknowns);
   std::size_t boundary_faces = MeshTopology(level.mesh).boundary_faces().size();
   int refinements = 0;
   while (boundary_faces < min_samples && refinements < kMaxSampleRefinements) {
     boundary_faces *= 4;
     ++refinements;
   }
-  if (finest) refinements = 1;
-  const BoundaryRefinement boundary = refine_boundary(level.mesh, refinements);
-  level.samples = compose(boundary.positions, fine_from_unknowns);
+  BoundaryRefinement boundary;
+  std::optional<SparseMap> towards_mesh;
   if (finest) {
+    boundary = refine_boundary(level.mesh, 1);
     const SparseMap bilinear = bilinear_refinement(boundary, level.mesh.num_vertices());
-    level.samples = blend(level.samples, compose(bilinear, level.nodes), kMeshShare);
+    const std::vector<Vec3> fine = level.refine.apply(control.positions);
+    const std::vector<Vec3> on_limit = boundary.positions.apply(fine), on_mesh = bilinear.apply(limit.apply(fine));
+    double gap = 0;
+    for (std::size_t i = 0; i < on_limit.size(); ++i) gap += (on_limit[i] - on_mesh[i]).norm();
+    // A tolerance is meant for both.
+    if (options.tolerance_percent || gap <= kMostGap * static_cast<double>(on_limit.size()))
+      towards_mesh = compose(bilinear, level.nodes);
   }
+  if (!towards_mesh) boundary = refine_boundary(level.mesh, finest ? std::max(refinements, 1) : refinements);
+  level.samples = compose(boundary.positions, fine_from_unknowns);
+  if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, kMeshShare);
   for (const auto& q : boundary.quads) {
     level.sample_triangles.push_back({q[0], q[1], q[2]});
     level.sample_triangles.push_back({q[0], q[2], q[3]});

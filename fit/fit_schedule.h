@@ -21,8 +21,8 @@ inline constexpr double kDefaultAccuracyPercent = 0.015;
 inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;
 /// Lowering lambda ends when a stage takes less than this share off the mean distance.
 inline constexpr double kLeastGain = 0.01;
-/// Without a tolerance, a halving of lambda that costs more of the mean scaled Jacobian is undone.
-inline constexpr double kMostShapeLoss = 0.005;
+/// Without a tolerance, halvings of lambda may cost so much of the mean scaled Jacobian in all.
+inline constexpr double kMostShapeLoss = 0.0075;
 /// The target is sampled at least about so many times.
 inline constexpr std::size_t kLeastTargetSamples = 20000;
 /// L-BFGS steps allowed for each Newton step of a stage.

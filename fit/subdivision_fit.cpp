@@ -103,7 +103,7 @@ class SubdivisionFit {
   double measured_mean();
   VolumeMesh current_mesh() const;
   double mean_scaled_jacobian() const;
-  bool self_intersects() const;
+  std::size_t intersecting_pairs() const;
   bool meets_tolerance();
   void store_result();
   void next_control();
@@ -314,9 +314,9 @@ VolumeMesh SubdivisionFit::current_mesh() const {
 
 double SubdivisionFit::mean_scaled_jacobian() const { return measure_quality(current_mesh()).mean_scaled_jacobian; }
 
-bool SubdivisionFit::self_intersects() const {
+std::size_t SubdivisionFit::intersecting_pairs() const {
   const VolumeMesh mesh = current_mesh();
-  return !self_intersections(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))).empty();
+  return self_intersections(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))).pairs.size();
 }
 
 bool SubdivisionFit::meets_tolerance() {
@@ -325,7 +325,7 @@ bool SubdivisionFit::meets_tolerance() {
 
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
 /// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
-/// A stage that makes the boundary intersect itself, or without a tolerance costs too much of the shape, is undone.
+/// A stage that makes the boundary intersect itself more, or without a tolerance has cost too much of the shape in all, is undone.
 bool SubdivisionFit::lower_lambda() {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
@@ -333,15 +333,17 @@ bool SubdivisionFit::lower_lambda() {
     const auto& iterations = result_.report.stages.back().iterations;
     return iterations.empty() ? 0 : iterations.back().volume_energy;
   };
-  double mean = measured_mean(), volume = distortion(), shape = mean_scaled_jacobian();
-  const bool embedded = !self_intersects();
+  double mean = measured_mean(), volume = distortion();
+  const double shape = mean_scaled_jacobian();
+  std::size_t pairs = intersecting_pairs();
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
     const std::vector<Vec3> before = unknowns_;
     if (!run_stage(stage, stage_name(stage))) return false;
     const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
     const double loss = shape - mean_scaled_jacobian();
-    if ((embedded && self_intersects()) || (!options_.tolerance_percent && loss > kMostShapeLoss)) {
+    const std::size_t pairs_now = intersecting_pairs();
+    if (pairs_now > pairs || (!options_.tolerance_percent && loss > kMostShapeLoss)) {
       unknowns_ = before;
       mean_ = mean;
       result_.report.stages.back().kept = false;
@@ -349,7 +351,7 @@ bool SubdivisionFit::lower_lambda() {
     }
     mean = measured_mean();
     volume = distortion();
-    shape -= loss;
+    pairs = pairs_now;
     if (gain < (options_.tolerance_percent ? kLeastGain : std::max(kLeastGain, cost))) break;
   }
   return true;
