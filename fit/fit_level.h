@@ -18,7 +18,8 @@ namespace subvol {
 /// S refines (`subdivide`), P moves boundary vertices to their limit positions (`limit_map`; the identity for
 /// FittedSurface::mesh). N goes further refinements down on the boundary alone, to as many points of the limit surface
 /// as the target's detail asks for. On the finest level, where the mesh itself is a result as well, N lies
-/// between the limit surface and the mesh's bilinear quads, which leaves either about half of the gap between the two.
+/// between the limit surface and the mesh's bilinear quads, which shares the gap between the two; but on
+/// the limit surface alone where that gap is too wide for the mesh to follow the target, unless a tolerance is asked for.
 struct FitLevel {
   VolumeMesh mesh;               ///< the finite element mesh: hexes
   SparseMap refine;              ///< S alone: control vertices to the vertices of the next control mesh

@@ -37,7 +37,7 @@ struct StageRecord {
   std::size_t unknowns = 0, cells = 0;
   std::vector<IterationRecord> iterations;
   std::string stop;                ///< which test ended it, with its figure
-  bool kept = true;                ///< false: undone, because a cell could not be certified
+  bool kept = true;                ///< false: undone (the boundary came to intersect itself more, or shapes suffered)
   double seconds = 0;
   double mean_distance_percent = -1;  ///< after the stage, per cent of the diagonal; negative: not measured
 };

@@ -56,9 +56,9 @@ struct FitResult {
 /// Fits a subdivision volume recursively (paper: section 4.3).
 ///
 /// target   triangles in any state that encloses a volume; the unit of length is the target's.
-/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices.
-/// returns  the best state reached; every cell of `mesh` has positive Bernstein coefficients of its Jacobian unless
-///          report.stop_reason is `stalled`.
+/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target is.
+/// returns  the best state reached; every cell of `mesh` is certified (`certificate.h`) unless report.stop_reason is
+///          `stalled`, or the template has cells that are not: no step makes a certified cell lose its certificate.
 /// InputError: options out of range, an empty target, a template that cannot be subdivided or that has inverted cells.
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options);
 
