@@ -6,6 +6,8 @@ namespace {
 
 Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
 
+}  // namespace
+
 Json quality_json(const QualityReport& quality) {
   Json worst = Json::array();
   for (const auto& cell : quality.worst_cells) {
@@ -21,6 +23,8 @@ Json quality_json(const QualityReport& quality) {
           {"worst_cells", std::move(worst)},
           {"histogram", quality.histogram}};
 }
+
+namespace {
 
 Json topology_json(const MeshCheck& check) {
   return {{"components", check.num_components},

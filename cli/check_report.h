@@ -11,6 +11,9 @@ namespace subvol::cli {
 /// A check as it stands in reports: defects, topology, quality, certificate, self-intersections, distance.
 Json check_json(const MeshCheck& check);
 
+/// Shape of the cells, and what is proved of them.
+Json quality_json(const QualityReport& quality);
+
 /// What in a mesh's boundary works against good cells under subdivision.
 Json audit_json(const SubdivisionAudit& found);
 

@@ -25,9 +25,26 @@ TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::str
 }
 
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
-  if (!is_volume_file(path)) return read_polygon_mesh(path, &warnings);
-  const VolumeMesh mesh = load_volume(path, warnings);
-  return boundary_surface(mesh, MeshTopology(mesh));
+  return load_tagged_polygons(path, warnings).polygons;
+}
+
+TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (!is_volume_file(path)) return {read_polygon_mesh(path, &warnings), {}};
+  return tagged_polygons(load_volume(path, warnings));
+}
+
+TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
+  std::vector<Index> volume_vertex;
+  TaggedPolygons boundary{boundary_surface(mesh, MeshTopology(mesh), &volume_vertex), {}};
+  // volume_vertex ascends, so the order of tags is kept.
+  const auto number = [&](Index v) {
+    return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
+  };
+  for (const CreaseEdge& crease : mesh.tags.creases)
+    boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
+  for (const CornerVertex& corner : mesh.tags.corners)
+    boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
+  return boundary;
 }
 
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check) {
@@ -39,6 +56,13 @@ Json describe(const std::string& path, const TriangleMesh& mesh) {
           {"vertices", mesh.positions.size()},
           {"triangles", mesh.triangles.size()},
           {"bounding_box_diagonal", bounding_box_diagonal(mesh)}};
+}
+
+Json describe(const std::string& path, const PolygonMesh& mesh) {
+  return {{"path", path},
+          {"vertices", mesh.positions.size()},
+          {"faces", mesh.num_faces()},
+          {"bounding_box_diagonal", bounding_box_diagonal(triangulate(mesh))}};
 }
 
 Json describe(const std::string& path, const VolumeMesh& mesh) {

@@ -18,11 +18,22 @@ bool is_volume_file(const std::filesystem::path& path);
 TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
+/// A surface of polygons with tags by its own vertex numbers.
+struct TaggedPolygons {
+  PolygonMesh polygons;
+  FeatureTags tags;
+};
+/// The boundary of a volume mesh.
+TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
+/// `load_polygons` with the tags of a volume mesh; those of a surface file are none.
+TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
+
 /// A volume mesh that is sound but for inverted cells and unused vertices (or, unchecked, just readable).
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true);
 
 /// What stands under "input" in a report.
 Json describe(const std::string& path, const TriangleMesh& mesh);
+Json describe(const std::string& path, const PolygonMesh& mesh);
 Json describe(const std::string& path, const VolumeMesh& mesh);
 
 }  // namespace subvol::cli

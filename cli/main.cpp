@@ -14,6 +14,7 @@ namespace {
 
 constexpr const char* kFooter = R"(Examples:
   subvol fit bone.off --template bone.mesh -o bone.glb -o cage:bone_cage.mesh --report bone.json
+  subvol shell bone.off --thickness 2% --layers 2 --side both -o bone_shell.vtu -o bone_shell.glb
   subvol check bone_fine.mesh --target bone.off
   subvol convert cage.mesh -o cage.usda
 
@@ -38,7 +39,7 @@ void require_known_verb(const CLI::App& app, int argc, char** argv) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Fits subdivision volumes: hexahedral meshes whose boundary reproduces a surface.", "subvol"};
+  CLI::App app{"Fits volume meshes to surfaces: subdivision volumes and shells.", "subvol"};
   app.footer(kFooter);
   app.set_version_flag("--version", std::string("subvol ") + version());
   app.require_subcommand(1);
@@ -50,6 +51,7 @@ int run(int argc, char** argv) {
 
   Action action;
   add_fit_command(app, action);
+  add_shell_command(app, action);
   add_subdivide_command(app, action);
   add_check_command(app, action);
   add_convert_command(app, action);

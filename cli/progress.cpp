@@ -27,6 +27,10 @@ Kind kind_of(const std::string& name, bool quiet) {
 
 double share_done(const FitProgress& progress) { return std::clamp(progress.fraction, 0.0, 1.0); }
 
+std::string level_text(const FitProgress& progress) {
+  return progress.level > 0 ? "level " + std::to_string(progress.level) + "  " : "";
+}
+
 }  // namespace
 
 ProgressTeller::ProgressTeller(const std::string& name, bool quiet)
@@ -56,8 +60,8 @@ void ProgressTeller::draw_bar(const FitProgress& progress) {
   const int filled = static_cast<int>(share_done(progress) * kBarWidth);
   const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
                           std::string(static_cast<std::size_t>(kBarWidth - filled), '.');
-  std::fprintf(stderr, "\r\033[K[%s] %3.0f%%  level %d  %.40s  step %d", bar.c_str(), 100 * share_done(progress),
-               progress.level, progress.stage, progress.iteration);
+  std::fprintf(stderr, "\r\033[K[%s] %3.0f%%  %s%.40s  step %d", bar.c_str(), 100 * share_done(progress),
+               level_text(progress).c_str(), progress.stage, progress.iteration);
   std::fflush(stderr);
 }
 
@@ -68,9 +72,9 @@ void ProgressTeller::write_line(const FitProgress& progress) {
   last_ = now;
   last_stage_ = progress.stage;
   last_level_ = progress.level;
-  std::fprintf(stderr, "%3.0f%%  %6.1f s  level %d  %s  step %d  energy %.4g\n", 100 * share_done(progress),
-               std::chrono::duration<double>(now - start_).count(), progress.level, progress.stage, progress.iteration,
-               progress.energy);
+  std::fprintf(stderr, "%3.0f%%  %6.1f s  %s%s  step %d  energy %.4g\n", 100 * share_done(progress),
+               std::chrono::duration<double>(now - start_).count(), level_text(progress).c_str(), progress.stage,
+               progress.iteration, progress.energy);
 }
 
 void ProgressTeller::write_json(const FitProgress& progress) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/subdivision_fit.h"
+#include "fit/fit_report.h"
 
 #include <chrono>
 #include <string>
 
 namespace subvol::cli {
 
-/// Tells on a terminal, in a log, or to a script how far a fit is.
+/// Tells on a terminal, in a log, or to a script how far a long run is.
 class ProgressTeller {
  public:
   enum class Kind { bar, plain, json, none };

@@ -2,56 +2,22 @@
 #include "cli/writing.h"
 
 #include "cli/exit_status.h"
+#include "cli/loading.h"
 #include "export/export.h"
 #include "export/gltf_writer.h"
 #include "export/obj_writer.h"
 #include "export/usd_writer.h"
 #include "export/volume_writer.h"
 #include "fit/quality.h"
-#include "subvol/boundary.h"
 #include "subvol/mesh_io.h"
-#include "subvol/mesh_topology.h"
-
-#include <algorithm>
 
 namespace subvol::cli {
 namespace {
-
-struct Boundary {
-  PolygonMesh polygons;
-  FeatureTags tags;  ///< by the polygons' vertex numbers
-};
-
-Boundary boundary_with_tags(const VolumeMesh& mesh) {
-  std::vector<Index> volume_vertex;
-  Boundary boundary{boundary_surface(mesh, MeshTopology(mesh), &volume_vertex), {}};
-  // volume_vertex ascends, so the order of tags is kept.
-  const auto number = [&](Index v) {
-    return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
-  };
-  for (const CreaseEdge& crease : mesh.tags.creases) {
-    boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
-  }
-  for (const CornerVertex& corner : mesh.tags.corners) {
-    boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
-  }
-  return boundary;
-}
 
 SceneValue scene_value(const Json& value) {
   if (value.is_boolean()) return value.get<bool>();
   if (value.is_number()) return value.get<double>();
   return value.get<std::string>();
-}
-
-SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options) {
-  SurfaceSceneOptions scene{.name = output.path.stem().string(),
-                            .max_chord_percent = options.chord_percent,
-                            .metres_per_unit = options.metres_per_unit,
-                            .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
-                            .source = options.source.filename().string()};
-  for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
-  return scene;
 }
 
 void write_cells(const Output& output, const VolumeMesh& mesh) {
@@ -69,9 +35,19 @@ void write_polygons(const Output& output, const PolygonMesh& surface, const Feat
   write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
 }
 
-bool is_scene(const Output& output) { return output.extension == ".glb" || output.extension == ".gltf"; }
-
 }  // namespace
+
+SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options) {
+  SurfaceSceneOptions scene{.name = output.path.stem().string(),
+                            .max_chord_percent = options.chord_percent,
+                            .metres_per_unit = options.metres_per_unit,
+                            .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
+                            .source = options.source.filename().string()};
+  for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
+  return scene;
+}
+
+bool is_scene(const Output& output) { return output.extension == ".glb" || output.extension == ".gltf"; }
 
 void add_writing_options(CLI::App& verb, WritingOptions& options) {
   const auto group = "Surfaces for DCC tools";
@@ -106,7 +82,7 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
   if (output.is_volume()) return write_cells(output, mesh);
   if (is_scene(output)) return write_gltf(output.path, boundary_scene(mesh, scene_options(output, options)));
-  const Boundary boundary = boundary_with_tags(mesh);
+  const TaggedPolygons boundary = tagged_polygons(mesh);
   write_polygons(output, boundary.polygons, boundary.tags, options);
 }
 

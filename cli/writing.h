@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/outputs.h"
+#include "export/export.h"
 #include "export/tessellate.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
@@ -29,9 +30,13 @@ void add_writing_options(CLI::App& verb, WritingOptions& options);
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
                   const WritingOptions& options);
 bool needs_limit(const Output& output);
+bool is_scene(const Output& output);
 
 /// Writes one mesh as it stands: its cells, or the flat faces of its boundary (.usda: as a subdivision cage).
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);
+
+/// What a scene written to this output says of itself.
+SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options);
 
 /// Writes polygons as they stand. UsageError: a format that holds cells.
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options);

@@ -7,7 +7,7 @@ set(SUBVOL_CONFIG_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/subvol")
 install(TARGETS subvol EXPORT subvol-targets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
   LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-foreach(folder subvol fit export)
+foreach(folder subvol fit shell export)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/${folder}/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/subvol/${folder}"
     FILES_MATCHING PATTERN "*.h")
 endforeach()

@@ -46,6 +46,31 @@ ScenePrimitive wire_primitive(const std::vector<Vec3>& positions, const Segments
   return wire;
 }
 
+/// Triangles over shaded vertices.
+ScenePrimitive shaded_primitive(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
+  // Cut by shaded vertices, so that the triangles name those.
+  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices};
+  ScenePrimitive primitive;
+  primitive.positions = shaded.positions;
+  primitive.normals = shaded.normals;
+  for (const auto& triangle : triangulate(split).triangles)
+    primitive.indices.insert(primitive.indices.end(), triangle.begin(), triangle.end());
+  return primitive;
+}
+
+/// The edges of polygons, once each, by shaded vertices.
+Segments edges_of(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
+  Segments edges;
+  std::set<std::pair<Index, Index>> drawn;
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+    for (std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1], k = begin; k < end; ++k) {
+      const std::size_t next = k + 1 < end ? k + 1 : begin;
+      if (drawn.insert(std::minmax(mesh.face_vertices[k], mesh.face_vertices[next])).second)
+        edges.push_back({shaded.corner_vertices[k], shaded.corner_vertices[next]});
+    }
+  return edges;
+}
+
 void color_by_quality(ScenePrimitive& surface, std::vector<double> vertex_quality) {
   surface.colors.reserve(vertex_quality.size());
   for (const double quality : vertex_quality) surface.colors.push_back(quality_color(quality));
@@ -149,28 +174,56 @@ Scene polygon_scene(const PolygonMesh& mesh, std::span<const double> face_qualit
   const ShadedPolygons shaded = shade_polygons(mesh, options.crease_angle_degrees);
   if (!face_quality.empty() && face_quality.size() != mesh.num_faces())
     throw InputError("face_quality: expected one value per face");
-  // Cut by shaded vertices, so that the triangles name those.
-  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices};
-  ScenePrimitive primitive;
-  primitive.positions = shaded.positions;
-  primitive.normals = shaded.normals;
-  for (const auto& triangle : triangulate(split).triangles)
-    primitive.indices.insert(primitive.indices.end(), triangle.begin(), triangle.end());
-  Segments wires;
-  std::set<std::pair<Index, Index>> drawn;
+  ScenePrimitive primitive = shaded_primitive(mesh, shaded);
   std::vector<double> quality(shaded.positions.size(), 1);
-  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
-    for (std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1], k = begin; k < end; ++k) {
-      const std::size_t next = k + 1 < end ? k + 1 : begin;
-      if (drawn.insert(std::minmax(mesh.face_vertices[k], mesh.face_vertices[next])).second)
-        wires.push_back({shaded.corner_vertices[k], shaded.corner_vertices[next]});
-      if (!face_quality.empty()) {
+  if (!face_quality.empty()) {
+    for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+      for (std::size_t k = mesh.face_offsets[f]; k < mesh.face_offsets[f + 1]; ++k) {
         double& value = quality[shaded.corner_vertices[k]];
         value = std::min(value, face_quality[f]);
       }
-    }
-  if (!face_quality.empty()) color_by_quality(primitive, std::move(quality));
-  return make_scene(std::move(primitive), wires, options);
+    color_by_quality(primitive, std::move(quality));
+  }
+  return make_scene(std::move(primitive), edges_of(mesh, shaded), options);
+}
+
+Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_map,
+                  const SurfaceSceneOptions& options) {
+  if (sheets.empty()) throw InputError("sheet_scene: expected at least one sheet");
+  Scene scene{.name = options.name,
+              .metres_per_unit = options.metres_per_unit,
+              .up_axis = options.up_axis,
+              .options = options.options};
+  Eigen::AlignedBox3d box;
+  ScenePrimitive wires = wire_primitive({}, {});
+  for (const SceneSheet& sheet : sheets) {
+    const ShadedPolygons shaded = shade_polygons(sheet.mesh, options.crease_angle_degrees);
+    const auto by_shaded = [&](const std::vector<double>& values) {
+      if (values.size() != sheet.mesh.positions.size())
+        throw InputError(sheet.name + ": expected one value per vertex");
+      std::vector<double> result(shaded.positions.size());
+      for (std::size_t k = 0; k < shaded.corner_vertices.size(); ++k)
+        result[shaded.corner_vertices[k]] = values[sheet.mesh.face_vertices[k]];
+      return result;
+    };
+    ScenePrimitive primitive = shaded_primitive(sheet.mesh, shaded);
+    if (sheet.shades.empty())
+      primitive.material_color = kPlainColor;
+    else
+      for (const double shade : by_shaded(sheet.shades)) primitive.colors.push_back(quality_color(shade));
+    if (!sheet.attribute.name.empty())
+      primitive.attributes.push_back({sheet.attribute.name, by_shaded(sheet.attribute.values)});
+    for (const Vec3& p : primitive.positions) box.extend(p);
+    const ScenePrimitive wire = wire_primitive(shaded.positions, edges_of(sheet.mesh, shaded));
+    for (const Index v : wire.indices) wires.indices.push_back(static_cast<Index>(wires.positions.size()) + v);
+    wires.positions.insert(wires.positions.end(), wire.positions.begin(), wire.positions.end());
+    scene.nodes.push_back({sheet.name, std::move(primitive)});
+  }
+  scene.origin = box.center();
+  if (!options.source.empty()) scene.extras.emplace_back("source", options.source);
+  if (!colour_map.empty()) scene.extras.emplace_back("colour_map", colour_map);
+  if (options.wireframe) scene.nodes.push_back({"wireframe", std::move(wires)});
+  return scene;
 }
 
 Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options) {

@@ -48,6 +48,19 @@ double chord_length(const VolumeMesh& cage, const SurfaceSceneOptions& options);
 /// The boundary of a volume mesh as it stands, flat faces, coloured by the quality of the boundary cells.
 Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options = {});
 
+/// A surface that is drawn as a node of its own.
+struct SceneSheet {
+  std::string name;
+  PolygonMesh mesh;
+  SceneAttribute attribute{};     ///< one value per vertex; without a name: none
+  std::vector<double> shades{};   ///< per vertex, coloured as `quality_color` colours 0 .. 1; empty: no colours
+};
+
+/// Several sheets as they stand, flat faces, and one "wireframe" with the edges of all. `colour_map` names what the shades
+/// show. InputError: no sheets, arrays of another length than the vertices.
+Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_map,
+                  const SurfaceSceneOptions& options = {});
+
 /// Polygons as they stand. face_quality: one scaled Jacobian per face, or empty (no colours then).
 Scene polygon_scene(const PolygonMesh& mesh, std::span<const double> face_quality = {},
                     const SurfaceSceneOptions& options = {});

@@ -17,7 +17,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the arrays of a .vtu are written as they lie in memory");
 
-void require_cells(const VolumeMesh& mesh, std::span<const double> cell_minima) {
+void require_cells(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {
   if (mesh.num_cells() == 0) throw InputError("mesh: expected at least one cell");
   if (mesh.cell_offsets.size() != mesh.num_cells() + 1 || mesh.cell_offsets.back() != mesh.cell_vertices.size() ||
       (!mesh.references.empty() && mesh.references.size() != mesh.num_cells()))
@@ -36,6 +36,11 @@ void require_cells(const VolumeMesh& mesh, std::span<const double> cell_minima) 
     throw InputError("cell_minima: expected one value per cell");
   if (!std::all_of(cell_minima.begin(), cell_minima.end(), [](double x) { return std::isfinite(x); }))
     throw InputError("cell_minima: expected finite numbers");
+  for (const VertexField& field : fields) {
+    if (field.values.size() != mesh.num_vertices()) throw InputError(field.name + ": expected one value per vertex");
+    if (!std::all_of(field.values.begin(), field.values.end(), [](double x) { return std::isfinite(x); }))
+      throw InputError(field.name + ": expected finite numbers");
+  }
 }
 
 void append_base64(std::string& text, const std::string& bytes) {
@@ -153,10 +158,22 @@ void append_element_data(std::string& text, const Blocks& blocks, std::span<cons
   text += "$EndElementData\n";
 }
 
+void append_node_data(std::string& text, const VertexField& field) {
+  text += "$NodeData\n1\n\"" + field.name + "\"\n1\n0\n3\n0\n1\n";
+  append_line(text, {field.values.size()});
+  for (std::size_t v = 0; v < field.values.size(); ++v) {
+    append_number(text, v + 1);
+    text += ' ';
+    append_number(text, field.values[v]);
+    text += '\n';
+  }
+  text += "$EndNodeData\n";
+}
+
 }  // namespace
 
-std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima) {
-  require_cells(mesh, cell_minima);
+std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {
+  require_cells(mesh, cell_minima, fields);
   const std::span<const double> coordinates(mesh.positions[0].data(), 3 * mesh.num_vertices());
   const std::vector<std::int64_t> corners(mesh.cell_vertices.begin(), mesh.cell_vertices.end());
   const std::vector<std::int64_t> ends(mesh.cell_offsets.begin() + 1, mesh.cell_offsets.end());
@@ -173,14 +190,19 @@ std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima
   append_data_array<std::int64_t>(text, "Int64", "Name=\"connectivity\"", corners);
   append_data_array<std::int64_t>(text, "Int64", "Name=\"offsets\"", ends);
   append_data_array<std::uint8_t>(text, "UInt8", "Name=\"types\"", types);
-  text += "      </Cells>\n      <CellData>\n";
+  text += "      </Cells>\n";
+  if (!fields.empty()) text += "      <PointData>\n";
+  for (const VertexField& field : fields)
+    append_data_array<double>(text, "Float64", "Name=\"" + field.name + "\"", field.values);
+  if (!fields.empty()) text += "      </PointData>\n";
+  text += "      <CellData>\n";
   if (!references.empty()) append_data_array<std::int32_t>(text, "Int32", "Name=\"reference\"", references);
   if (!cell_minima.empty()) append_data_array(text, "Float64", "Name=\"scaled_jacobian\"", cell_minima);
   return text + "      </CellData>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n";
 }
 
-std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima) {
-  require_cells(mesh, cell_minima);
+std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {
+  require_cells(mesh, cell_minima, fields);
   const Blocks blocks = blocks_of(mesh);
   const std::map<int, int> volumes = volume_numbers(blocks);
   std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
@@ -188,13 +210,15 @@ std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima
   append_nodes(text, mesh);
   append_elements(text, mesh, blocks, volumes);
   if (!cell_minima.empty()) append_element_data(text, blocks, cell_minima);
+  for (const VertexField& field : fields) append_node_data(text, field);
   return text;
 }
 
-void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima) {
+void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima,
+                  std::span<const VertexField> fields) {
   const std::string extension = lower_case_extension(path);
   if (extension != ".vtu" && extension != ".msh") throw InputError(path.string() + ": expected the extension .vtu or .msh");
-  write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima) : msh_text(mesh, cell_minima));
+  write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields) : msh_text(mesh, cell_minima, fields));
 }
 
 }  // namespace subvol

@@ -11,13 +11,6 @@ namespace subvol {
 
 namespace {
 
-Mat3 ideal_matrix(CellKind kind) {
-  Mat3 a = Mat3::Identity();
-  if (kind != CellKind::hex) a.col(1) = Vec3(0.5, std::sqrt(3.0) / 2, 0);
-  if (kind == CellKind::tet) a.col(2) = Vec3(0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3);
-  return a;
-}
-
 /// Canonical gradients of all shape functions at a point.
 std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
   const double u = p[0], v = p[1], w = p[2];
@@ -53,6 +46,13 @@ void triangle_points(int n, std::vector<std::array<double, 3>>& points) {
 
 }  // namespace
 
+Mat3 ideal_matrix(CellKind kind) {
+  Mat3 a = Mat3::Identity();
+  if (kind != CellKind::hex) a.col(1) = Vec3(0.5, std::sqrt(3.0) / 2, 0);
+  if (kind == CellKind::tet) a.col(2) = Vec3(0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3);
+  return a;
+}
+
 Mat3 ideal_inverse(CellKind kind) { return ideal_matrix(kind).inverse(); }
 
 double ideal_volume(CellKind kind) {
@@ -63,8 +63,8 @@ double ideal_volume(CellKind kind) {
 ElementRule make_element_rule(CellKind kind, int points_per_direction) {
   const int n = points_per_direction;
   if (n < 2) throw InputError("make_element_rule: points_per_direction must be at least 2, got " + std::to_string(n));
-  std::vector<Vec3> points;
   ElementRule rule;
+  std::vector<Vec3>& points = rule.points;
   rule.kind = kind;
   if (kind == CellKind::tet) {
     points.push_back(Vec3(0.25, 0.25, 0.25));

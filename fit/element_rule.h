@@ -26,6 +26,7 @@ struct ElementRule {
     std::array<double, 3> gradient;  ///< in ideal coordinates, for h = 1
   };
   CellKind kind;
+  std::vector<Vec3> points;          ///< canonical coordinates
   std::vector<double> weights;
   std::vector<std::size_t> offsets;  ///< weights.size() + 1 entries into `entries`
   std::vector<Entry> entries;
@@ -37,7 +38,8 @@ struct ElementRule {
 /// The rule of a kind. points_per_direction >= 2, else InputError. Nested when n - 1 divides n' - 1.
 ElementRule make_element_rule(CellKind kind, int points_per_direction);
 
-/// A^-1 of the ideal cell of edge length 1 (paper: section 3.2), and that cell's volume.
+/// A of the ideal cell of edge length 1 (paper: section 3.2), its inverse, and that cell's volume.
+Mat3 ideal_matrix(CellKind kind);
 Mat3 ideal_inverse(CellKind kind);
 double ideal_volume(CellKind kind);
 

@@ -10,6 +10,13 @@
 
 namespace subvol {
 
+/// Told at every step; level 0: there are none; `fraction` is an estimate of the share done, in [0, 1].
+struct FitProgress {
+  const char* stage;
+  int level, iteration;
+  double energy, fraction;
+};
+
 /// Why a solve ended. Everything but `input` problems (those throw) is told here, never by an exception.
 enum class StopReason {
   converged,        ///< the last stage met its stop test (and the tolerance, where one was asked for)

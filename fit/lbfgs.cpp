@@ -27,28 +27,29 @@ class Objective {
 
   void assign(std::span<const Vec3> x) {
     problem_.samples.apply(x, samples_);
-    problem_.surface->assign(samples_);
+    if (problem_.surface) problem_.surface->assign(samples_);
   }
 
   Value evaluate(std::span<const Vec3> x, std::span<Vec3> gradient) {
-    problem_.nodes.apply(x, nodes_);
+    problem_.apply_nodes(x, nodes_);
     problem_.samples.apply(x, samples_);
     std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
     std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
     Value value;
     value.volume = problem_.volume.add_gradient(nodes_, problem_.lambda, node_gradient_);
     if (!std::isfinite(value.volume)) return value;
-    value.surface = problem_.surface->value(samples_);
+    if (problem_.surface) value.surface = problem_.surface->value(samples_);
     value.energy = value.surface + problem_.lambda * value.volume;
-    problem_.surface->add_gradient(samples_, sample_gradient_);
     problem_.nodes_transposed.apply(node_gradient_, gradient);
+    if (!problem_.surface) return value;
+    problem_.surface->add_gradient(samples_, sample_gradient_);
     problem_.samples_transposed.apply(sample_gradient_, from_samples_);
     add_scaled(1, from_samples_, gradient);
     return value;
   }
 
   bool certified(std::span<const Vec3> x) {
-    problem_.nodes.apply(x, nodes_);
+    problem_.apply_nodes(x, nodes_);
     return certify(nodes_, *problem_.mesh).all_certified();
   }
 

@@ -23,6 +23,11 @@ FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMes
       surface(std::move(surface_energy)),
       lambda(volume_weight) {}
 
+void FitProblem::apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const {
+  nodes.apply(x, out);
+  if (!fixed_nodes.empty()) add_scaled(1, fixed_nodes, out);
+}
+
 namespace {
 
 /// Adds the 3x3 diagonal blocks of M^T H M: D_j = sum_ik M_ij H_ik M_kj.
@@ -65,7 +70,8 @@ class ReducedHessian {
     if (!inverse_diagonal_.empty()) return;
     inverse_diagonal_.assign(problem.nodes.num_cols, Mat3::Zero());
     add_diagonal_blocks(problem.nodes, problem.nodes_transposed, volume, inverse_diagonal_);
-    add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
+    if (problem.surface)
+      add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
 #pragma omp parallel for schedule(static)
     for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
       // Vertices of no cell have no energy: they stay.
@@ -78,6 +84,7 @@ class ReducedHessian {
     problem_.nodes.apply(in, node_in_);
     volume_.multiply(node_in_, node_out_);
     problem_.nodes_transposed.apply(node_out_, out);
+    if (!problem_.surface) return;
     problem_.samples.apply(in, sample_in_);
     problem_.surface->hessian().multiply(sample_in_, sample_out_);
     problem_.samples_transposed.apply(sample_out_, from_samples_);
@@ -146,7 +153,8 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
   const std::size_t n = x.size();
   BlockSparse hessian = problem.volume.pattern();
-  std::vector<Vec3> y = problem.nodes.apply(x), z = problem.samples.apply(x);
+  std::vector<Vec3> y(problem.nodes.num_rows()), z = problem.samples.apply(x);
+  problem.apply_nodes(x, y);
   std::vector<Vec3> node_gradient(y.size()), sample_gradient(z.size()), gradient(n), from_samples(n), d, dy(y.size()),
       dz(z.size()), y_trial(y.size()), z_trial(z.size());
   std::vector<Mat3> inverse_diagonal;
@@ -155,11 +163,11 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
 
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     IterationRecord record;
-    problem.surface->assign(z);
+    if (problem.surface) problem.surface->assign(z);
     hessian.set_zero();
     std::fill(node_gradient.begin(), node_gradient.end(), Vec3::Zero());
     std::fill(sample_gradient.begin(), sample_gradient.end(), Vec3::Zero());
-    const double surface = problem.surface->value(z);
+    const double surface = problem.surface ? problem.surface->value(z) : 0;
     const double volume = problem.volume.add_hessian(y, problem.lambda, node_gradient, hessian);
     const double energy = surface + problem.lambda * volume;
     if (!std::isfinite(energy)) {
@@ -167,10 +175,12 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       result.explanation = "the start has a cell that is inverted at a quadrature point";
       return result;
     }
-    problem.surface->add_gradient(z, sample_gradient);
     problem.nodes_transposed.apply(node_gradient, gradient);
-    problem.samples_transposed.apply(sample_gradient, from_samples);
-    add_scaled(1, from_samples, gradient);
+    if (problem.surface) {
+      problem.surface->add_gradient(z, sample_gradient);
+      problem.samples_transposed.apply(sample_gradient, from_samples);
+      add_scaled(1, from_samples, gradient);
+    }
 
     // The diagonal changes slowly once the first steps are done.
     if (iteration < 2 || iteration % kPreconditionerLife == 0) inverse_diagonal.clear();
@@ -192,7 +202,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       for (std::size_t i = 0; i < y.size(); ++i) y_trial[i] = y[i] + t * dy[i];
       for (std::size_t i = 0; i < z.size(); ++i) z_trial[i] = z[i] + t * dz[i];
       ++record.evaluations;
-      trial_surface = problem.surface->value(z_trial);
+      trial_surface = problem.surface ? problem.surface->value(z_trial) : 0;
       trial_volume = problem.volume.value(y_trial);
       trial = trial_surface + problem.lambda * trial_volume;
       if (!(trial <= energy + kArmijo * t * slope)) continue;
@@ -208,7 +218,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       return result;
     }
     add_scaled(t, d, x);
-    problem.nodes.apply(x, y);
+    problem.apply_nodes(x, y);
     problem.samples.apply(x, z);
     uncertified = std::move(trial_uncertified);
     record.surface_energy = trial_surface;

@@ -2,7 +2,10 @@
 #include "fit/quality.h"
 
 #include "fit/bernstein.h"
+#include "fit/element_rule.h"
 #include "subvol/error.h"
+
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
@@ -146,14 +149,46 @@ Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n)
   return HexSampler<double>{}.run(x, n);
 }
 
+/// Samples of one cell at the points of a rule, against its reference.
+Sampled<double> sample_cell(std::span<const Vec3> corners, const ElementRule& rule, const CellReference& reference,
+                            Index cell) {
+  const Mat3 ideal = ideal_matrix(rule.kind);
+  Sampled<double> result{1, 0};
+  for (std::size_t q = 0; q < rule.num_points(); ++q) {
+    Mat3 jacobian = Mat3::Zero();
+    for (const ElementRule::Entry& entry : rule.point(q))
+      jacobian += corners[entry.vertex] * Eigen::Map<const Vec3>(entry.gradient.data()).transpose();
+    const Mat3 f = jacobian * ideal * reference(cell, rule.points[q]).inverse();
+    const double lengths = f.col(0).norm() * f.col(1).norm() * f.col(2).norm();
+    const double value = lengths > 0 ? f.determinant() / lengths : 0;
+    result.least = std::min(result.least, value);
+    result.sum += value;
+  }
+  return result;
+}
+
 /// Samples of every cell; a sum that is not a number means that comparisons have lost the least value too.
-std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n) {
+std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const CellReference& reference) {
   std::vector<Sampled<double>> result(mesh.num_cells());
   const auto keep = [&](std::size_t c, double least, double sum) {
     const bool finite = std::isfinite(sum);
     result[c] = {finite ? std::clamp(least, -1.0, 1.0) : -1,
                  finite ? sum : -static_cast<double>(num_samples(mesh.kinds[c], n))};
   };
+  if (reference) {
+    std::array<ElementRule, kNumCellKinds> rules;
+    for (int kind = 0; kind < kNumCellKinds; ++kind) rules[kind] = make_element_rule(static_cast<CellKind>(kind), n);
+#pragma omp parallel for schedule(static)
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+      const auto corners = gather_cell(mesh.positions, mesh, c);
+      const ElementRule& rule = rules[static_cast<std::size_t>(mesh.kinds[c])];
+      const Sampled<double> s =
+          sample_cell({corners.data(), mesh.cell(c).size()}, rule, reference, static_cast<Index>(c));
+      // A tet has one point only.
+      keep(c, s.least, s.sum * static_cast<double>(num_samples(mesh.kinds[c], n)) / rule.num_points());
+    }
+    return result;
+  }
   const auto hexes = [&](std::size_t first) {
     thread_local HexSampler<Lanes> sampler;
     const Sampled<Lanes> s = sampler.run(gather_hexes(mesh.positions, mesh.cell(first).data()), n);
@@ -185,13 +220,13 @@ std::vector<QualityReport::WorstCell> worst_of(const VolumeMesh& mesh, const std
 
 }  // namespace
 
-QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction) {
+QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction, const CellReference& reference) {
   const int n = samples_per_direction;
   if (n < 2)
     throw InputError("quality: samples_per_direction is " + std::to_string(n) + ", expected 2 or more");
   QualityReport report;
   report.num_cells = mesh.num_cells();
-  const std::vector<Sampled<double>> samples = sample_cells(mesh, n);
+  const std::vector<Sampled<double>> samples = sample_cells(mesh, n, reference);
   double sum = 0;
   for (std::size_t c = 0; c < samples.size(); ++c) {
     const double least = samples[c].least;

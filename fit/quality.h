@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/cell_reference.h"
 #include "fit/certificate.h"
 #include "subvol/volume_mesh.h"
 
@@ -32,14 +33,15 @@ struct QualityReport {
 ///
 ///   SJ = det F / (|F e1| |F e2| |F e3|),   F = dx/dxi A^-1
 ///
-/// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2).
+/// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2), or the reference given.
 ///
 /// samples_per_direction  n >= 2: n^3 points of a hex, n^2 (n+1)/2 of a prism, n(n+1)(n+2)/6 of a tet, with corners.
+/// reference  of each cell, or empty: the ideal cells. Cost: ten times that without.
 /// returns   values in [-1, 1]; 1 for ideal cells at any size and orientation, 0 where a column of F vanishes, -1 where
 ///           a coordinate is not finite.
 /// InputError: n < 2. The mesh must have valid vertex numbers. Parallel, same bits for any number of threads.
 /// Cost: about 0.8 us a hex on one core at n = 5.
-QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction = 5);
-
+QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction = 5,
+                              const CellReference& reference = {});
 
 }  // namespace subvol

@@ -25,13 +25,6 @@ enum class Correspondence {
   voronoi   ///< the paper's restricted Voronoi cells (`SurfaceEnergy`)
 };
 
-/// Told at every step; `fraction` is an estimate of the share done, in [0, 1].
-struct FitProgress {
-  const char* stage;
-  int level, iteration;
-  double energy, fraction;
-};
-
 struct FitOptions {
   int levels = 3;                                ///< subdivision level of the finest mesh, 1..6
   std::optional<double> tolerance_percent;       ///< stop once the mean distance is below; per cent of the diagonal, > 0

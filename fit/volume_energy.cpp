@@ -4,6 +4,7 @@
 #include "subvol/error.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include <algorithm>
 #include <atomic>
@@ -48,6 +49,37 @@ inline void jacobians(std::span<const ElementRule::Entry> entries, const double 
 #pragma omp simd
         for (int l = 0; l < kLanes; ++l) sum[l] += entry.gradient[c] * x[entry.vertex][r][l];
       for (int l = 0; l < kLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[l];
+    }
+}
+
+/// m = m b, lane by lane: from the ideal to the reference shape.
+inline void multiply(double (*m)[kLanes], const double (*b)[kLanes]) {
+  for (int r = 0; r < 3; ++r)
+#pragma omp simd
+    for (int l = 0; l < kLanes; ++l) {
+      const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
+      for (int c = 0; c < 3; ++c) m[3 * r + c][l] = m0 * b[c][l] + m1 * b[3 + c][l] + m2 * b[6 + c][l];
+    }
+}
+
+/// m = m b^T: the stress against the ideal shape.
+inline void multiply_transposed(double (*m)[kLanes], const double (*b)[kLanes]) {
+  for (int r = 0; r < 3; ++r)
+#pragma omp simd
+    for (int l = 0; l < kLanes; ++l) {
+      const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
+      for (int c = 0; c < 3; ++c)
+        m[3 * r + c][l] = m0 * b[3 * c][l] + m1 * b[3 * c + 1][l] + m2 * b[3 * c + 2][l];
+    }
+}
+
+/// v = b v: right singular vectors, so that V^T grad N becomes V^T b^T grad N.
+inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
+  for (int c = 0; c < 3; ++c)
+#pragma omp simd
+    for (int l = 0; l < kLanes; ++l) {
+      const double v0 = v[c][l], v1 = v[3 + c][l], v2 = v[6 + c][l];
+      for (int r = 0; r < 3; ++r) v[3 * r + c][l] = b[3 * r][l] * v0 + b[3 * r + 1][l] * v1 + b[3 * r + 2][l] * v2;
     }
 }
 
@@ -120,7 +152,25 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal
     if (!(h > 0) || !std::isfinite(h)) throw InputError("VolumeEnergy: ideal_sizes must be positive and finite");
     inverse_sizes_.push_back(1 / h);
   }
+  find_pattern(mesh);
+  rebuild_groups();
+}
 
+VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction)
+    : num_nodes_(mesh.num_vertices()),
+      kinds_(mesh.kinds),
+      cell_offsets_(mesh.cell_offsets),
+      cell_vertices_(mesh.cell_vertices),
+      inverse_sizes_(mesh.num_cells(), 1.0),
+      weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
+      reference_(std::move(reference)),
+      points_(mesh.num_cells(), points_per_direction),
+      colors_(color_cells(mesh)) {
+  find_pattern(mesh);
+  rebuild_groups();
+}
+
+void VolumeEnergy::find_pattern(const VolumeMesh& mesh) {
   pattern_ = clique_pattern(num_nodes_, cell_offsets_, cell_vertices_);
   pattern_.blocks = {};
   block_offsets_.assign(1, 0);
@@ -130,7 +180,6 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal
       for (Index b : cell) block_slots_.push_back(static_cast<Index>(pattern_.find(a, b)));
     block_offsets_.push_back(block_slots_.size());
   }
-  rebuild_groups();
 }
 
 void VolumeEnergy::densify(std::span<const Index> cells, int points_per_direction) {
@@ -159,7 +208,27 @@ void VolumeEnergy::rebuild_groups() {
       }
       group.color_offsets.push_back(group.batches.size());
     }
+    if (reference_) fill_references(group);
   }
+}
+
+void VolumeEnergy::fill_references(Group& group) const {
+  const std::size_t num_points = group.rule.num_points();
+  const Mat3 ideal = ideal_matrix(group.rule.kind);
+  group.to_reference.resize(group.batches.size() * num_points * 9 * kLanes);
+  std::atomic<Index> bad_cell{kNoIndex};
+#pragma omp parallel for schedule(static)
+  for (std::size_t b = 0; b < group.batches.size(); ++b)
+    for (std::size_t q = 0; q < num_points; ++q)
+      for (int l = 0; l < kLanes; ++l) {
+        const Mat3 reference = reference_(group.batches[b][l], group.rule.points[q]);
+        const Mat3 to_reference = ideal * reference.inverse();
+        if (!(reference.determinant() > 0) || !to_reference.allFinite()) bad_cell = group.batches[b][l];
+        for (int e = 0; e < 9; ++e)
+          group.to_reference[(9 * (b * num_points + q) + e) * kLanes + l] = to_reference(e / 3, e % 3);
+      }
+  if (bad_cell != kNoIndex)
+    throw InputError("VolumeEnergy: the reference of cell " + std::to_string(bad_cell) + " has no positive volume");
 }
 
 void VolumeEnergy::gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes,
@@ -198,6 +267,7 @@ double VolumeEnergy::value(std::span<const Vec3> nodes) const {
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      if (reference_) multiply(hencky.jacobian, group.reference(b, q));
       hencky_energy(hencky);
       for (int l = 0; l < group.active[b]; ++l)
         sum += weights_[group.batches[b][l]] * group.rule.weights[q] * hencky.energy[l];
@@ -218,7 +288,9 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      if (reference_) multiply(hencky.jacobian, group.reference(b, q));
       hencky_gradient(hencky);
+      if (reference_) multiply_transposed(hencky.stress, group.reference(b, q));
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         factor[l] = scale * w * inverse_h[l];
@@ -255,7 +327,12 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      if (reference_) multiply(hencky.jacobian, group.reference(b, q));
       hencky_hessian(hencky);
+      if (reference_) {
+        multiply_transposed(hencky.stress, group.reference(b, q));
+        premultiply(group.reference(b, q), hencky.v);
+      }
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         weight[l] = scale * w;

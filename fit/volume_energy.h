@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/block_sparse.h"
+#include "fit/cell_reference.h"
 #include "fit/element_rule.h"
 #include "fit/hencky.h"
 #include "subvol/volume_mesh.h"
@@ -12,12 +13,13 @@
 
 namespace subvol {
 
-/// Mean distortion of a mesh of linear cells against ideal cells.
+/// Mean distortion of a mesh of linear cells against ideal or given reference cells.
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
 /// e is the Hencky energy (`hencky.h`), J_cq the Jacobian of cell c at quadrature point q against the ideal cell of edge
-/// length h_c (`element_rule.h`). Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
+/// length h_c (`element_rule.h`), or against a reference of its own. Dimensionless, >= 0, +infinity where a determinant
+/// is not positive at a point.
 ///
 /// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
 /// number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
@@ -26,6 +28,9 @@ class VolumeEnergy {
   /// ideal_sizes  one positive edge length per cell, in the mesh's unit, else InputError. Cells weigh equally.
   /// points_per_direction  >= 2; 2: corners only.
   VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal_sizes, int points_per_direction);
+  /// reference  kept and asked again by `densify`. Cells weigh equally, so that small ones keep their shape too.
+  /// InputError: a reference whose determinant is not positive.
+  VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction);
 
   /// Gives these cells a denser rule from now on (those that have it already stay).
   void densify(std::span<const Index> cells, int points_per_direction);
@@ -53,9 +58,16 @@ class VolumeEnergy {
     std::vector<std::array<Index, kLanes>> batches;
     std::vector<int> active;                 ///< real cells of each batch
     std::vector<std::size_t> color_offsets;  ///< batches of each colour
+    /// Ideal to reference shape, A_ideal A^-1, per batch and point, row by row and lane by lane; empty: ideal cells.
+    std::vector<double> to_reference;
+    const double (*reference(std::size_t batch, std::size_t q) const)[kLanes] {
+      return reinterpret_cast<const double(*)[kLanes]>(to_reference.data() + 9 * kLanes * (batch * rule.num_points() + q));
+    }
   };
 
+  void find_pattern(const VolumeMesh& mesh);
   void rebuild_groups();
+  void fill_references(Group& group) const;
   void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
   template <class PerBatch>
   double sum_batches(PerBatch&& per_batch) const;
@@ -65,6 +77,7 @@ class VolumeEnergy {
   std::vector<std::size_t> cell_offsets_;
   std::vector<Index> cell_vertices_;
   std::vector<double> inverse_sizes_, weights_;
+  CellReference reference_;        ///< empty: ideal cells
   std::vector<int> points_;        ///< points per direction of each cell
   std::vector<int> colors_;
   std::vector<Group> groups_;

@@ -13,7 +13,10 @@ std::string name_of(Index v, std::span<const Index> names) {
   return std::to_string(names.empty() ? v : names[static_cast<std::size_t>(v)]);
 }
 
-void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names) {
+/// What a closed surface is here: the boundary of something.
+std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
+
+void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind) {
   // Corners leaving each vertex, as chains: a lookup costs the valence.
   const std::size_t num_corners = surface.corner_vertices.size();
   std::vector<Index> head(num_vertices, kNoIndex), next_leaving(num_corners);
@@ -35,12 +38,15 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
       if (surface.corner_vertices[surface.next(g)] == from) twin = g, ++opposite;
     for (Index g = head[from]; g != kNoIndex; g = next_leaving[g])
       if (surface.corner_vertices[surface.next(g)] == to) ++same;
-    if (same != 1 || opposite != 1)
-      throw InputError("boundary edge " + name_of(from, names) + "-" + name_of(to, names) +
-                       " must lie between two boundary faces of opposite direction; it has " +
+    const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
+    if (same != 1 || (opposite != 1 && !border)) {
+      const std::string edge = prefix(kind) + "edge " + name_of(from, names) + "-" + name_of(to, names);
+      if (same > 1 && same + opposite == 2) throw InputError(edge + ": its two faces run the same way along it");
+      throw InputError(edge + " must lie between two " + prefix(kind) + "faces of opposite direction; it has " +
                        std::to_string(same + opposite));
+    }
     surface.twins[h] = twin;
-    if (h < twin) {
+    if (border || h < twin) {
       surface.corner_edges[h] = static_cast<Index>(surface.edge_corners.size());
       surface.edge_corners.push_back(h);
     } else {
@@ -49,16 +55,19 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
   }
 }
 
-void check_fans(const SurfaceTopology& surface, std::span<const Index> names) {
+void check_fans(const SurfaceTopology& surface, std::span<const Index> names, SurfaceKind kind) {
   std::vector<int> counts(surface.num_vertices(), 0);
   for (Index v : surface.corner_vertices) ++counts[v];
   for (std::size_t v = 0; v < surface.num_vertices(); ++v) {
     const Index start = surface.vertex_corners[v];
     int fan = 0;
-    for (Index h = start; h != kNoIndex && (fan == 0 || h != start); h = surface.rotate(h)) ++fan;
+    Index h = start;
+    for (; h != kNoIndex && (fan == 0 || h != start); h = surface.rotate(h)) ++fan;
+    if (h == kNoIndex)  // an open fan: what lies clockwise of the start
+      for (h = start; (h = surface.twins[h]) != kNoIndex; h = surface.next(h)) ++fan;
     if (fan != counts[v])
-      throw InputError("boundary vertex " + name_of(static_cast<Index>(v), names) +
-                       " must have one fan of boundary faces; it has more");
+      throw InputError(prefix(kind) + "vertex " + name_of(static_cast<Index>(v), names) + " must have one fan of " +
+                       prefix(kind) + "faces; it has more");
   }
 }
 
@@ -70,7 +79,7 @@ float checked_sharpness(double sharpness, const std::string& what) {
 }  // namespace
 
 SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_offsets,
-                              std::vector<Index> face_vertices, std::span<const Index> names) {
+                              std::vector<Index> face_vertices, std::span<const Index> names, SurfaceKind kind) {
   SurfaceTopology surface;
   surface.face_offsets = std::move(face_offsets);
   surface.corner_vertices = std::move(face_vertices);
@@ -78,8 +87,8 @@ SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_
   for (std::size_t f = 0; f < surface.num_faces(); ++f)
     for (Index h = surface.face_offsets[f]; h < surface.face_offsets[f + 1]; ++h)
       surface.corner_faces[h] = static_cast<Index>(f);
-  pair_corners(surface, num_vertices, names);
-  check_fans(surface, names);
+  pair_corners(surface, num_vertices, names, kind);
+  check_fans(surface, names, kind);
   surface.edge_sharpness.assign(surface.num_edges(), 0.0f);
   surface.vertex_sharpness.assign(num_vertices, 0.0f);
   return surface;

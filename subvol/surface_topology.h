@@ -9,7 +9,7 @@
 
 namespace subvol {
 
-/// A closed oriented surface of polygons, by corners: the boundary of a volume mesh with its tags.
+/// An oriented surface of polygons, by corners: the boundary of a volume mesh with its tags, or a surface of its own.
 ///
 /// A *corner* h is one vertex of one face and stands for the directed edge to the next vertex of that face, which sees
 /// the face on its left (normals point outward). Vertices have their own compact numbers.
@@ -19,7 +19,7 @@ namespace subvol {
 ///           v
 ///        h (v) ------> next(h)       twin(h) lies on the other side of the edge and runs back
 ///
-/// Pieces cut out of a surface (`surface_piece`) are the one exception to closed: twins are kNoIndex along their border.
+/// Along the border of an open surface (or of a piece cut out of one, `surface_piece`) twins are kNoIndex.
 struct SurfaceTopology {
   std::vector<Index> face_offsets{0};
   std::vector<Index> corner_vertices, corner_faces, twins, corner_edges;
@@ -46,13 +46,20 @@ struct SurfaceTopology {
   Index rotate(Index h) const { return twins[prev(h)]; }
 };
 
-/// Pairs the corners of closed oriented polygons; all sharpnesses are 0.
+enum class SurfaceKind {
+  closed,      ///< every edge has two faces
+  maybe_open   ///< edges of one face are allowed: the border
+};
+
+/// Pairs the corners of oriented polygons; all sharpnesses are 0.
 ///
 /// face_offsets, face_vertices  polygons on vertices 0 .. num_vertices - 1, each of them used.
-/// InputError: an edge that is not between exactly two faces with opposite directions, or a vertex whose faces form
-/// more than one fan. The message has the numbers `names[v]`, or v where `names` is empty.
+/// InputError: an edge that is not between exactly two faces with opposite directions (or beside one face, where the
+/// surface may be open), or a vertex whose faces form more than one fan. The message has the numbers `names[v]`, or v
+/// where `names` is empty.
 SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_offsets,
-                              std::vector<Index> face_vertices, std::span<const Index> names = {});
+                              std::vector<Index> face_vertices, std::span<const Index> names = {},
+                              SurfaceKind kind = SurfaceKind::closed);
 
 /// The boundary of a volume mesh.
 struct BoundarySurface {

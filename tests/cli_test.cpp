@@ -264,7 +264,7 @@ TEST_CASE("Every verb explains itself", "[cli]") {
   const Workplace place;
   const Run all = place.run("--help");
   CHECK(all.status == 0);
-  for (const std::string verb : {"fit", "subdivide", "check", "convert"}) {
+  for (const std::string verb : {"fit", "shell", "subdivide", "check", "convert"}) {
     CHECK(all.out.find("\n  " + verb) != std::string::npos);
     const Run run = place.run(verb + " --help");
     INFO(run.out);
@@ -359,4 +359,45 @@ TEST_CASE("Bad files are refused by every verb, quickly and without a trace", "[
       }
     }
   }
+}
+
+TEST_CASE("A shell goes from a surface to cells, named sheets and a report that tells the truth", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(
+      "shell target.off --thickness 2% --layers 2 --side both -o shell.mesh -o shell.vtu -o shell.glb --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  CHECK(place.names().size() == 6);
+  const auto report = place.json("report.json");
+  CHECK(report["command"] == "shell");
+  CHECK(report["valid"] == true);
+  CHECK(report["self_intersections"] == 0);
+  const auto mesh = subvol::read_volume_mesh(place / "shell.mesh");
+  CHECK(report["quality"]["certified_cells"] == mesh.num_cells());
+  for (const char* side : {"inside", "outside"}) {
+    CHECK(report["thickness"][side]["asked"]["mean_percent"].get<double>() == Approx(2));
+    CHECK(report["thickness"][side]["achieved"]["mean_percent"].get<double>() == Approx(2).epsilon(0.1));
+  }
+  CHECK(place.run("check shell.mesh").status == 0);
+  CHECK(content_of(place / "shell.vtu").find("Name=\"thickness\"") != std::string::npos);
+  const std::string glb = content_of(place / "shell.glb");
+  for (const char* name : {"\"inner\"", "\"base\"", "\"outer\"", "\"wireframe\"", "_THICKNESS"})
+    CHECK(glb.find(name) != std::string::npos);
+}
+
+TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
+  const Workplace place;
+  CHECK(place.run("shell target.off -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness 2%% -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness -1 -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness nan -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness 1 --layers 0 -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness 1 --side up -o a.mesh").status == 2);
+  place.file("few.txt", "1\n2\n");
+  const Run few = place.run("shell target.off --thickness-file few.txt -o a.mesh");
+  CHECK(few.status == 3);
+  CHECK(few.err.find("got 2") != std::string::npos);
+  place.file("bad.txt", "1\nx\n");
+  CHECK(place.run("shell target.off --thickness-file bad.txt -o a.mesh").err.find("bad.txt:2") != std::string::npos);
+  CHECK_FALSE(place.has("a.mesh"));
 }

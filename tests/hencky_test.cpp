@@ -154,6 +154,43 @@ TEST_CASE("Gradient and Hessian of the volume energy agree with differences for 
     }
 }
 
+TEST_CASE("Against references of their own, cells are undistorted in that shape, and derivatives agree with differences") {
+  std::mt19937 random(12);
+  std::normal_distribution<double> normal;
+  for (CellKind kind : kKinds)
+    for (int n : {2, 3}) {
+      VolumeMesh mesh = single_cell(kind);
+      Mat3 shape;
+      shape << 1.2, 0.3, -0.1, 0.1, 0.8, 0.2, -0.2, 0.1, 0.1;
+      const Mat3 reference = shape * ideal_matrix(kind);
+      const VolumeEnergy energy(mesh, [&](Index, const Vec3&) { return reference; }, n);
+      std::vector<Vec3> x = mesh.positions, d(x.size());
+      for (Vec3& p : x) p = shape * p;
+      CHECK(energy.value(x) < 1e-26);
+      for (Vec3& p : x) p = 1.5 * p + 0.002 * Vec3(normal(random), normal(random), normal(random));
+      for (Vec3& p : d) p = Vec3(normal(random), normal(random), normal(random));
+      const double h = 1e-6;
+      auto moved = [&](double t) {
+        std::vector<Vec3> result = x;
+        for (std::size_t i = 0; i < x.size(); ++i) result[i] += t * d[i];
+        return result;
+      };
+      std::vector<Vec3> g(x.size(), Vec3::Zero()), plus = g, minus = g, product(x.size());
+      BlockSparse hessian = energy.pattern();
+      energy.add_hessian(x, 1, g, hessian);
+      double slope = 0;
+      for (std::size_t i = 0; i < x.size(); ++i) slope += g[i].dot(d[i]);
+      CHECK(slope == Approx((energy.value(moved(h)) - energy.value(moved(-h))) / (2 * h)).epsilon(1e-6));
+      energy.add_gradient(moved(h), 1, plus);
+      energy.add_gradient(moved(-h), 1, minus);
+      hessian.multiply(d, product);
+      for (std::size_t i = 0; i < x.size(); ++i)
+        CHECK((product[i] - (plus[i] - minus[i]) / (2 * h)).norm() < 1e-5 * (1 + product[i].norm()));
+    }
+  const VolumeMesh mesh = single_cell(CellKind::hex);
+  CHECK_THROWS(VolumeEnergy(mesh, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, 2));
+}
+
 TEST_CASE("A step of the size that max_step allows stays feasible, a longer one may not") {
   VolumeMesh mesh = single_cell(CellKind::hex);
   const std::vector<double> sizes = {1.0};

@@ -17,16 +17,17 @@ namespace fs = std::filesystem;
 namespace {
 
 const fs::path kRoot = SUBVOL_SOURCE_DIR;
-const std::vector<std::string> kLayers{"subvol", "fit", "export", "cli", "samples", "bench", "tests"};
+const std::vector<std::string> kLayers{"subvol", "fit", "shell", "export", "cli", "samples", "bench", "tests"};
 
 const std::map<std::string, std::set<std::string>> kMayInclude{
     {"subvol", {"subvol"}},
     {"fit", {"subvol", "fit"}},
+    {"shell", {"subvol", "fit", "shell"}},
     {"export", {"subvol", "export"}},  // and kFitForExport
-    {"cli", {"subvol", "fit", "export", "cli"}},
-    {"samples", {"subvol", "fit", "export", "samples"}},
-    {"bench", {"subvol", "fit", "export", "samples", "bench"}},
-    {"tests", {"subvol", "fit", "export", "cli", "samples", "tests"}},
+    {"cli", {"subvol", "fit", "shell", "export", "cli"}},
+    {"samples", {"subvol", "fit", "shell", "export", "samples"}},
+    {"bench", {"subvol", "fit", "shell", "export", "samples", "bench"}},
+    {"tests", {"subvol", "fit", "shell", "export", "cli", "samples", "tests"}},
 };
 // Results of a fit may be shown, its energies and solver not.
 const std::set<std::string> kFitForExport{"fit/quality.h", "fit/certificate.h"};

@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/check_report.h"
+#include "cli/commands.h"
+#include "cli/exit_status.h"
+#include "cli/interrupt.h"
+#include "cli/loading.h"
+#include "cli/outputs.h"
+#include "cli/progress.h"
+#include "cli/report.h"
+#include "cli/writing.h"
+#include "export/gltf_writer.h"
+#include "export/volume_writer.h"
+#include "fit/surface_distance.h"
+#include "shell/shell.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+#include "subvol/features.h"
+#include "subvol/mesh_io.h"
+#include "subvol/surface_io.h"
+#include "subvol/text_scanner.h"
+#include "subvol/version.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+namespace subvol::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct ShellArguments {
+  RunOptions run;
+  WritingOptions writing;
+  ShellOptions shell;
+  std::string surface, thickness, thickness_file, side = "outward";
+  std::optional<double> crease_angle_degrees;
+  bool straight = false;
+};
+
+/// A length in the mesh's unit, or with % of a diagonal. UsageError: neither.
+double parse_length(const std::string& text, double diagonal) {
+  const bool percent = text.ends_with('%');
+  const std::string number = percent ? text.substr(0, text.size() - 1) : text;
+  const std::string error = number_in(1e-300, 1e300)(std::string(number));
+  if (!error.empty()) throw UsageError("--thickness: must be a positive length, or a percentage as 2%, not " + text);
+  return std::stod(number) * (percent ? diagonal / 100 : 1);
+}
+
+/// What the thicknesses of one side are, in the mesh's unit.
+struct ThicknessFigures {
+  double mean = 0, least = 0, most = 0;
+
+  explicit ThicknessFigures(std::span<const double> thickness) {
+    for (const double t : thickness) mean += t / static_cast<double>(thickness.size());
+    least = *std::min_element(thickness.begin(), thickness.end());
+    most = *std::max_element(thickness.begin(), thickness.end());
+  }
+};
+
+/// One shell from its file to its files.
+class ShellRun {
+ public:
+  ShellRun(const ShellArguments& arguments, const CLI::App& verb) : arguments_(arguments), verb_(verb) {}
+  int run();
+
+ private:
+  void load();
+  void grow();
+  void write();
+  void check();
+  void write_report() const;
+  void summarise() const;
+  int status() const;
+  void timed(const char* part, void (ShellRun::*work)());
+  void warn(std::size_t first = 0) const;
+
+  std::vector<double> thickness_from_file() const;
+  /// Values per strand as values per vertex; those of the surface itself are the larger of both sides.
+  std::vector<double> by_vertex(const std::vector<double>& by_strand) const;
+  void write_output(const Output& output, const WritingOptions& writing) const;
+  Scene scene(const Output& output, const WritingOptions& writing) const;
+  /// Calls visit(name, first strand) for every side that has layers.
+  template <class Visit>
+  void for_each_side(const Visit& visit) const;
+  Json thickness_json() const;
+
+  const ShellArguments& arguments_;
+  const CLI::App& verb_;
+  Clock::time_point start_ = Clock::now();
+  std::vector<Output> outputs_;
+  std::vector<std::string> warnings_;
+  TaggedPolygons surface_;
+  double diagonal_ = 0;
+  ShellResult result_;
+  ShellFailures failures_;
+  Json seconds_ = Json::object();
+};
+
+void ShellRun::timed(const char* part, void (ShellRun::*work)()) {
+  const auto begin = Clock::now();
+  (this->*work)();
+  seconds_[part] = std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+void ShellRun::warn(std::size_t first) const {
+  if (arguments_.run.quiet) return;
+  for (std::size_t i = first; i < warnings_.size(); ++i) std::cerr << "subvol: warning: " << warnings_[i] << '\n';
+}
+
+void ShellRun::load() {
+  surface_ = load_tagged_polygons(arguments_.surface, warnings_);
+  diagonal_ = bounding_box_diagonal(triangulate(surface_.polygons));
+  warn();
+}
+
+std::vector<double> ShellRun::thickness_from_file() const {
+  const std::string text = read_file(arguments_.thickness_file);
+  std::vector<double> thickness;
+  std::size_t line = 1, begin = 0;
+  for (; begin < text.size(); ++line) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    std::string word = text.substr(begin, end - begin);
+    while (!word.empty() && (word.back() == '\r' || word.back() == ' ')) word.pop_back();
+    begin = end + 1;
+    if (word.empty()) continue;
+    if (!number_in(1e-300, 1e300)(word).empty())
+      throw InputError(arguments_.thickness_file + ':' + std::to_string(line) + ": expected a positive thickness, got " +
+                       word);
+    thickness.push_back(std::stod(word));
+  }
+  if (thickness.size() != surface_.polygons.positions.size())
+    throw InputError(arguments_.thickness_file + ": expected one thickness for each of the " +
+                     std::to_string(surface_.polygons.positions.size()) + " vertices of the surface, got " +
+                     std::to_string(thickness.size()));
+  return thickness;
+}
+
+void ShellRun::grow() {
+  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
+  ShellOptions options = arguments_.shell;
+  if (arguments_.thickness_file.empty())
+    options.thickness = parse_length(arguments_.thickness, diagonal_);
+  else
+    options.vertex_thickness = thickness_from_file();
+  options.side = arguments_.side == "both"     ? ShellSide::both
+                 : arguments_.side == "inward" ? ShellSide::inward
+                                               : ShellSide::outward;
+  options.optimize = !arguments_.straight;
+  options.tags = surface_.tags;
+  if (arguments_.crease_angle_degrees)
+    options.tags = merge_tags(options.tags, surface_features(surface_.polygons, *arguments_.crease_angle_degrees));
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  catch_interrupt();
+  result_ = make_shell(surface_.polygons, options);
+  teller.finish();
+  const std::size_t before = warnings_.size();
+  warnings_.insert(warnings_.end(), result_.report.warnings.begin(), result_.report.warnings.end());
+  warn(before);
+}
+
+std::vector<double> ShellRun::by_vertex(const std::vector<double>& by_strand) const {
+  const std::size_t n = result_.layers.num_columns();
+  std::vector<double> values;
+  for (std::size_t i = 0; i < result_.mesh.num_vertices(); ++i) {
+    const Index strand = result_.layers.strand(static_cast<Index>(i));
+    values.push_back(strand == kNoIndex ? std::max(by_strand[i % n], by_strand[n + i % n]) : by_strand[strand]);
+  }
+  return values;
+}
+
+Scene ShellRun::scene(const Output& output, const WritingOptions& writing) const {
+  const ShellLayers& layers = result_.layers;
+  const std::vector<double> achieved = by_vertex(result_.achieved), asked = by_vertex(result_.asked);
+  const PolygonMesh& surface = layers.surface;
+  std::vector<SceneSheet> sheets;
+  const auto add = [&](const char* name, int sheet) {
+    SceneSheet& added = sheets.emplace_back();
+    added.name = name;
+    added.mesh = surface;
+    added.attribute.name = "_THICKNESS";
+    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
+      const Index vertex = layers.vertex(sheet, static_cast<Index>(v));
+      added.mesh.positions[v] = result_.mesh.positions[vertex];
+      added.attribute.values.push_back(achieved[vertex]);
+      added.shades.push_back(achieved[vertex] / asked[vertex]);
+    }
+  };
+  if (layers.inside > 0) add("inner", 0);
+  add("base", layers.inside);
+  if (layers.outside > 0) add("outer", layers.num_sheets() - 1);
+  return sheet_scene(sheets, "viridis over achieved / asked thickness 0..1, above 1 as 1", scene_options(output, writing));
+}
+
+void ShellRun::write_output(const Output& output, const WritingOptions& writing) const {
+  if (is_scene(output) && !output.cage) {
+    write_gltf(output.path, scene(output, writing));
+  } else if (output.extension == ".vtu" || output.extension == ".msh") {
+    const VertexField fields[] = {{"thickness", by_vertex(result_.achieved)},
+                                  {"thickness_asked", by_vertex(result_.asked)},
+                                  {"thickness_limited", by_vertex(result_.limited)}};
+    write_volume(output.path, result_.mesh, result_.quality.cell_minima, fields);
+  } else {
+    cli::write_output(output, result_.mesh, writing);
+  }
+}
+
+void ShellRun::write() {
+  WritingOptions writing = arguments_.writing;
+  writing.source = arguments_.surface;
+  writing.options = options_in_force(verb_);
+  for (const Output& output : outputs_) write_output(output, writing);
+}
+
+// What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
+void ShellRun::check() {
+  failures_ = result_.failures;
+  for (const Output& output : outputs_) {
+    if (output.extension != ".mesh") continue;
+    const VolumeMesh reread = read_volume_mesh(output.path, {.check = false});
+    failures_ = ShellCheck(result_.layers, reread, CheckedSheets::all).failures(reread.positions);
+    break;
+  }
+}
+
+template <class Visit>
+void ShellRun::for_each_side(const Visit& visit) const {
+  if (result_.layers.inside > 0) visit("inside", std::size_t{0});
+  if (result_.layers.outside > 0) visit("outside", result_.layers.num_columns());
+}
+
+Json ShellRun::thickness_json() const {
+  Json json = Json::object();
+  const std::size_t n = result_.layers.num_columns();
+  for_each_side([&](const char* side, std::size_t first) {
+    const auto figures = [&](const std::vector<double>& thickness) {
+      const ThicknessFigures f({thickness.data() + first, n});
+      return Json{{"mean", f.mean},
+                  {"min", f.least},
+                  {"max", f.most},
+                  {"mean_percent", 100 * f.mean / diagonal_},
+                  {"min_percent", 100 * f.least / diagonal_},
+                  {"max_percent", 100 * f.most / diagonal_}};
+    };
+    std::size_t clipped = 0;
+    for (std::size_t v = 0; v < n; ++v) clipped += result_.limited[first + v] < result_.asked[first + v];
+    json[side] = {{"asked", figures(result_.asked)},
+                  {"limited", figures(result_.limited)},
+                  {"achieved", figures(result_.achieved)},
+                  {"limited_vertices", clipped}};
+  });
+  return json;
+}
+
+void ShellRun::write_report() const {
+  const FitReport& report = result_.report;
+  Json seconds = seconds_;
+  seconds.update(seconds_json(report));
+  seconds["total"] = std::chrono::duration<double>(Clock::now() - start_).count();
+  Json json{{"subvol", version()},
+            {"command", "shell"},
+            {"options", options_in_force(verb_)},
+            {"input", {{"surface", describe(arguments_.surface, surface_.polygons)}}},
+            {"stop_reason", to_string(report.stop_reason)},
+            {"explanation", report.explanation},
+            {"converged", report.stop_reason == StopReason::converged},
+            {"stages", stages_json(report)},
+            {"valid", failures_.none()},
+            {"thickness", thickness_json()},
+            {"quality", quality_json(result_.quality)},
+            {"not_certified_cells", failures_.certificate.not_certified},
+            {"self_intersections", failures_.intersecting.size()},
+            {"intersecting_faces", failures_.intersecting},
+            {"mesh", describe("", result_.mesh)},
+            {"warnings", warnings_},
+            {"seconds", std::move(seconds)},
+            {"peak_memory_bytes", peak_memory_bytes()},
+            {"outputs", output_names(arguments_.run)}};
+  cli::write_report(arguments_.run.report, json);
+}
+
+void ShellRun::summarise() const {
+  const FitReport& report = result_.report;
+  std::fprintf(stderr, "%s: %s\n", to_string(report.stop_reason), report.explanation.c_str());
+  std::fprintf(stderr, "cells               %zu in %d layer(s), %zu vertices\n", result_.mesh.num_cells(),
+               result_.layers.num_sheets() - 1, result_.mesh.num_vertices());
+  for_each_side([&](const char* side, std::size_t first) {
+    const std::size_t n = result_.layers.num_columns();
+    const ThicknessFigures asked({result_.asked.data() + first, n}), found({result_.achieved.data() + first, n});
+    std::fprintf(stderr, "thickness %-9s asked %.6g, achieved mean %.6g (%.1f %%), min %.6g, max %.6g\n", side, asked.mean,
+                 found.mean, 100 * found.mean / asked.mean, found.least, found.most);
+  });
+  std::fprintf(stderr, "scaled Jacobian     min %.4f, mean %.4f against the references\n",
+               result_.quality.min_scaled_jacobian, result_.quality.mean_scaled_jacobian);
+  std::fprintf(stderr, "certified cells     %zu of %zu\n", failures_.certificate.certified, result_.mesh.num_cells());
+  std::fprintf(stderr, "self-intersections  %zu pairs of faces\n", failures_.intersecting.size());
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, failures_.certificate.not_certified.size()); ++i)
+    std::fprintf(stderr, "  cell %d is not certified\n", static_cast<int>(failures_.certificate.not_certified[i]));
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, failures_.intersecting.size()); ++i)
+    std::fprintf(stderr, "  faces %d and %d meet\n", static_cast<int>(failures_.intersecting[i][0]),
+                 static_cast<int>(failures_.intersecting[i][1]));
+  std::fprintf(stderr, "%s\n", failures_.none() ? "valid" : "NOT VALID");
+  for (const auto& name : output_names(arguments_.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+}
+
+int ShellRun::status() const {
+  if (result_.report.stop_reason == StopReason::cancelled) return kInterrupted;
+  if (!failures_.none()) return kFailed;
+  return result_.report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+}
+
+int ShellRun::run() {
+  if (arguments_.run.outputs.empty() && arguments_.run.report.empty())
+    throw UsageError("shell: nothing to write; give -o FILE or --report FILE");
+  if (arguments_.thickness.empty() == arguments_.thickness_file.empty())
+    throw UsageError("shell: give either --thickness or --thickness-file");
+  if (!arguments_.thickness.empty()) parse_length(arguments_.thickness, 1);
+  outputs_ = checked_outputs(arguments_.run, true);
+  apply_threads(arguments_.run);
+  timed("read", &ShellRun::load);
+  timed("grow", &ShellRun::grow);
+  timed("write", &ShellRun::write);
+  timed("check", &ShellRun::check);
+  if (!arguments_.run.report.empty()) write_report();
+  if (!arguments_.run.quiet) summarise();
+  return status();
+}
+
+void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
+  ShellOptions& shell = arguments.shell;
+  verb.add_option("--thickness", arguments.thickness,
+                  "Thickness of each side, in the mesh's unit or as 2% of the bounding box's diagonal")
+      ->type_name("T");
+  verb.add_option("--thickness-file", arguments.thickness_file,
+                  "Thickness of each vertex instead: one number a line, in the mesh's unit")
+      ->type_name("FILE");
+  verb.add_option("--layers", shell.layers, "Layers on each side")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N")
+      ->capture_default_str();
+  verb.add_option("--growth", shell.growth, "Thickness of a layer against that of the one nearer the surface")
+      ->check(number_in(0.01, 100.0))
+      ->type_name("FACTOR")
+      ->capture_default_str();
+  verb.add_option("--side", arguments.side, "Where the faces' normals point, or against them")
+      ->check(CLI::IsMember({"outward", "inward", "both"}))
+      ->type_name("outward|inward|both")
+      ->capture_default_str();
+  verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimisation");
+  verb.add_option("--crease-angle", arguments.crease_angle_degrees,
+                  "Edges of the surface sharper than this become creases (default: only those the file tags)")
+      ->check(number_in(0.0, 180.0))
+      ->type_name("DEGREES");
+  verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
+      ->check(CLI::Range(1, 1'000'000))
+      ->type_name("N");
+  verb.add_option("--time-limit", shell.time_limit_seconds, "Stop after this time with the best result so far")
+      ->check(number_in(1e-3, 1e9))
+      ->type_name("SECONDS");
+}
+
+}  // namespace
+
+void add_shell_command(CLI::App& app, Action& action) {
+  CLI::App* verb = app.add_subcommand("shell", "Grow layers of prisms or hexes on a surface");
+  const auto arguments = std::make_shared<ShellArguments>();
+  verb->add_option("SURFACE", arguments->surface,
+                   "Triangles and quads: " + surface_formats() + "; or a volume mesh, for its boundary")
+      ->required()
+      ->type_name("FILE");
+  add_shell_options(*verb, *arguments);
+  add_output_options(*verb, arguments->run,
+                     "The layers, or their sheets, by extension: " + output_formats() +
+                         "; cage:FILE for the boundary as a control cage; may be given several times");
+  add_writing_options(*verb, arguments->writing);
+  add_long_run_options(*verb, arguments->run);
+  verb->footer(R"(Example:
+  subvol shell bone.off --thickness 2% --layers 3 --side both -o bone_shell.vtu -o bone_shell.glb
+
+Where there is no room the shell gets thinner; the report and the files tell where. What is written is checked:
+every cell certified, no sheet meeting another; otherwise exit status 1.
+Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return ShellRun(*arguments, *verb).run(); }; });
+}
+
+}  // namespace subvol::cli

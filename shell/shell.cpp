@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shell/shell.h"
+
+#include "fit/fit_problem.h"
+#include "fit/self_intersection.h"
+#include "shell/thickness.h"
+#include "shell/visible_normals.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace subvol {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// At most this many entities are named in a message.
+constexpr std::size_t kMaxNamed = 10;
+constexpr int kMaxRounds = 12;
+constexpr int kDefaultIterations = 60;
+
+std::string list_of(const std::vector<Index>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(numbers.size(), kMaxNamed); ++i)
+    text += (i ? ", " : "") + std::to_string(numbers[i]);
+  if (numbers.size() > kMaxNamed) text += ", ... (" + std::to_string(numbers.size()) + " in all)";
+  return text;
+}
+
+void check_options(const PolygonMesh& surface, const ShellOptions& options) {
+  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
+  if (options.layers < 1) throw InputError("shell: layers must be at least 1, got " + std::to_string(options.layers));
+  if (!positive(options.growth)) throw InputError("shell: growth must be positive");
+  if (options.vertex_thickness.empty()) {
+    if (!positive(options.thickness)) throw InputError("shell: thickness must be positive");
+    return;
+  }
+  if (options.vertex_thickness.size() != surface.positions.size())
+    throw InputError("shell: expected one thickness per vertex (" + std::to_string(surface.positions.size()) + "), got " +
+                     std::to_string(options.vertex_thickness.size()));
+  for (std::size_t v = 0; v < options.vertex_thickness.size(); ++v)
+    if (!positive(options.vertex_thickness[v]))
+      throw InputError("shell: the thickness at vertex " + std::to_string(v) + " must be positive");
+}
+
+/// Moves a surface into a box of diagonal 1 around the origin, and results back.
+struct Normalization {
+  Vec3 centre;
+  double scale;  ///< of the caller's unit
+
+  explicit Normalization(const PolygonMesh& surface) {
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : surface.positions) box.extend(p);
+    centre = box.center();
+    scale = box.diagonal().norm();
+    if (!(scale > 0) || !std::isfinite(scale)) throw InputError("shell: the surface has no finite extent");
+  }
+  PolygonMesh normalized(PolygonMesh surface) const {
+    for (Vec3& p : surface.positions) p = (p - centre) / scale;
+    return surface;
+  }
+};
+
+/// One shell from its surface, in normalised coordinates.
+class ShellMaker {
+ public:
+  ShellMaker(const PolygonMesh& surface, const ShellOptions& options)
+      : options_(options),
+        normalization_(surface),
+        layers_(make_layers(normalization_.normalized(surface), options.side == ShellSide::outward ? 0 : options.layers,
+                            options.side == ShellSide::inward ? 0 : options.layers, options.growth)),
+        cells_(stack_cells(layers_)),
+        check_(layers_, cells_, CheckedSheets::outer) {}
+
+  ShellResult run(const PolygonMesh& surface);
+
+ private:
+  void require_no_intersections() const;
+  void find_directions();
+  void find_thickness();
+  void start();
+  void optimize();
+  MinimizerStop solve(int round);
+  void finish(const PolygonMesh& surface, ShellResult& result);
+  /// Tells the caller; false: it is to end.
+  bool tell(const char* stage, int iteration, double energy, double fraction);
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  void timed(const char* part, void (ShellMaker::*work)());
+
+  const ShellOptions& options_;
+  Normalization normalization_;
+  ShellLayers layers_;
+  VolumeMesh cells_;
+  ShellCheck check_;
+  Clock::time_point begin_ = Clock::now();
+  std::vector<Vec3> directions_;
+  std::vector<double> asked_, thickness_;
+  std::vector<Vec3> start_, positions_;
+  FitReport report_;
+  bool ended_ = false;  ///< by the caller or the clock
+};
+
+bool ShellMaker::tell(const char* stage, int iteration, double energy, double fraction) {
+  if (options_.progress && !options_.progress({stage, 0, iteration, energy, fraction})) {
+    ended_ = true;
+    report_.stop_reason = StopReason::cancelled;
+    report_.explanation = "stopped by the caller";
+  } else if (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds) {
+    ended_ = true;
+    report_.stop_reason = StopReason::time_limit;
+    report_.explanation = "the time limit is reached";
+  }
+  return !ended_;
+}
+
+void ShellMaker::timed(const char* part, void (ShellMaker::*work)()) {
+  const double before = seconds();
+  (this->*work)();
+  report_.seconds.emplace_back(part, seconds() - before);
+}
+
+void ShellMaker::require_no_intersections() const {
+  const int base[] = {layers_.inside};
+  PolygonMesh polygons = sheet_polygons(layers_, base);
+  polygons.face_offsets.resize(layers_.surface.num_faces() + 1);  // no walls
+  polygons.face_vertices.resize(polygons.face_offsets.back());
+  polygons.positions = cells_.positions;
+  std::vector<Index> polygon;
+  const SelfIntersections found = self_intersections(checked_triangles(polygons, polygon));
+  std::vector<Index> faces;
+  for (const auto& [t, s] : found.pairs) faces.insert(faces.end(), {polygon[t], polygon[s]});
+  for (const Index t : found.degenerate) faces.push_back(polygon[t]);
+  std::sort(faces.begin(), faces.end());
+  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  if (!faces.empty())
+    throw InputError("shell: the surface meets itself, or has no area, at faces " + list_of(faces));
+}
+
+void ShellMaker::find_directions() {
+  require_no_intersections();
+  VisibleNormals visible = visible_normals(layers_.surface);
+  if (!visible.hidden.empty())
+    throw InputError("shell: no direction sees all faces around from their front at vertices " + list_of(visible.hidden));
+  directions_ = std::move(visible.directions);
+}
+
+void ShellMaker::find_thickness() {
+  const std::size_t n = layers_.num_columns();
+  asked_.assign(layers_.num_strands(), 0);
+  for (std::size_t v = 0; v < n; ++v) {
+    const double t = options_.vertex_thickness.empty() ? options_.thickness : options_.vertex_thickness[v];
+    if (layers_.inside > 0) asked_[v] = t / normalization_.scale;
+    if (layers_.outside > 0) asked_[n + v] = t / normalization_.scale;
+  }
+  thickness_ = limited_thickness(layers_, directions_, asked_);
+}
+
+void ShellMaker::start() {
+  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_);
+  start_ = advance(layers_, check_, thin, straight_columns(layers_, directions_, thickness_));
+  positions_ = start_;
+}
+
+MinimizerStop ShellMaker::solve(int round) {
+  // The surface's own vertices stay: they are no unknowns.
+  SparseMap nodes;
+  std::vector<Vec3> unknowns, fixed(positions_.size(), Vec3::Zero());
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    if (layers_.strand(static_cast<Index>(i)) == kNoIndex) {
+      fixed[i] = positions_[i];
+    } else {
+      nodes.columns.push_back(static_cast<Index>(unknowns.size()));
+      nodes.values.push_back(1);
+      unknowns.push_back(positions_[i]);
+    }
+    nodes.offsets.push_back(nodes.columns.size());
+  }
+  nodes.num_cols = unknowns.size();
+  SparseMap samples;
+  samples.num_cols = unknowns.size();
+  FitProblem problem(nodes, samples, cells_, VolumeEnergy(cells_, shell_reference(layers_, thickness_), 2), nullptr, 1);
+  problem.fixed_nodes = std::move(fixed);
+
+  StageRecord& stage = report_.stages.emplace_back();
+  stage.name = "solve " + std::to_string(round + 1);
+  stage.lambda = 1;
+  stage.unknowns = unknowns.size();
+  stage.cells = cells_.num_cells();
+  const double before = seconds();
+  int iteration = 0;
+  MinimizerOptions minimizer{.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultIterations};
+  minimizer.progress = [&](const IterationRecord& record) {
+    ++iteration;
+    const double in_round = static_cast<double>(iteration) / minimizer.max_iterations;
+    return tell(stage.name.c_str(), iteration, record.volume_energy,
+                1 - std::pow(0.5, round) * (1 - 0.5 * in_round));
+  };
+  MinimizerResult found = minimize_newton(problem, unknowns, minimizer);
+  stage.iterations = std::move(found.iterations);
+  stage.stop = std::move(found.explanation);
+  stage.seconds = seconds() - before;
+  problem.apply_nodes(unknowns, positions_);
+  return found.stop;
+}
+
+void ShellMaker::optimize() {
+  constexpr double kShrink = 0.7;
+  bool apart = false;
+  for (int round = 0; round < kMaxRounds && !apart && !ended_; ++round) {
+    const MinimizerStop stop = solve(round);
+    if (stop == MinimizerStop::cancelled) break;
+    const ShellFailures failures = check_.failures(positions_);
+    apart = failures.none();
+    if (apart && report_.explanation.empty()) {
+      report_.explanation = report_.stages.back().stop;
+      if (stop == MinimizerStop::iteration_limit) report_.stop_reason = StopReason::iteration_limit;
+      if (stop == MinimizerStop::no_step) report_.stop_reason = StopReason::stalled;
+    }
+    if (apart) break;
+    for (const Index strand : check_.strands(failures)) thickness_[strand] *= kShrink;
+    limit_slope(layers_, thickness_);
+  }
+  if (apart) return;
+  std::vector<double> shares;
+  positions_ = advance(layers_, check_, start_, positions_, &shares);
+  const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; });
+  if (held > 0)
+    report_.warnings.push_back(std::to_string(held) + " columns were held back: there sheets still met after the last solve");
+  if (!ended_) report_.explanation = "sheets still met after " + std::to_string(kMaxRounds) + " solves and were parted";
+}
+
+ShellResult ShellMaker::run(const PolygonMesh& surface) {
+  timed("directions", &ShellMaker::find_directions);
+  timed("thickness", &ShellMaker::find_thickness);
+  timed("start", &ShellMaker::start);
+  if (options_.optimize && tell("start", 0, 0, 0)) timed("solve", &ShellMaker::optimize);
+  if (!options_.optimize) report_.explanation = "straight columns, no solve";
+  ShellResult result;
+  finish(surface, result);
+  return result;
+}
+
+void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
+  const double before = seconds();
+  const double scale = normalization_.scale;
+  result.layers = std::move(layers_);
+  result.layers.surface = surface;
+  result.mesh = std::move(cells_);
+  const ShellLayers& layers = result.layers;
+  for (std::size_t i = 0; i < positions_.size(); ++i)
+    result.mesh.positions[i] = layers.strand(static_cast<Index>(i)) == kNoIndex
+                                   ? surface.positions[i % layers.num_columns()]
+                                   : Vec3(normalization_.centre + scale * positions_[i]);
+  result.asked = std::move(asked_);
+  result.limited = std::move(thickness_);
+  for (double& t : result.asked) t *= scale;
+  for (double& t : result.limited) t *= scale;
+  result.achieved.assign(layers.num_strands(), 0);
+  for (const int sheet : {0, layers.num_sheets() - 1})
+    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
+      const Index vertex = layers.vertex(sheet, static_cast<Index>(v)), strand = layers.strand(vertex);
+      if (strand != kNoIndex) result.achieved[strand] = (result.mesh.positions[vertex] - surface.positions[v]).norm();
+    }
+  result.mesh.tags = shell_tags(layers, options_.tags);
+  result.quality = measure_quality(result.mesh, 5, shell_reference(layers, result.limited));
+  result.failures = ShellCheck(layers, result.mesh, CheckedSheets::all).failures(result.mesh.positions);
+  report_.seconds.emplace_back("check", seconds() - before);
+  result.report = std::move(report_);
+}
+
+}  // namespace
+
+ShellResult make_shell(const PolygonMesh& surface, const ShellOptions& options) {
+  check_options(surface, options);
+  return ShellMaker(surface, options).run(surface);
+}
+
+}  // namespace subvol

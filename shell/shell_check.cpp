@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shell/shell_check.h"
+
+#include "fit/boundary_triangles.h"
+#include "fit/self_intersection.h"
+#include "subvol/boundary.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace subvol {
+namespace {
+
+std::vector<int> sheets_to_check(const ShellLayers& layers, CheckedSheets which) {
+  if (which == CheckedSheets::outer) return {0, layers.num_sheets() - 1};
+  std::vector<int> sheets(layers.num_sheets());
+  std::iota(sheets.begin(), sheets.end(), 0);
+  return sheets;
+}
+
+void sort_unique(std::vector<Index>& list) {
+  std::sort(list.begin(), list.end());
+  list.erase(std::unique(list.begin(), list.end()), list.end());
+}
+
+/// Lowers the shares around strands that were held back, so that neighbours differ by a quarter at most.
+void grade(const ShellLayers& layers, std::vector<double>& shares) {
+  constexpr double kStep = 0.25;
+  const SurfaceTopology& topology = layers.topology;
+  const std::size_t num_columns = layers.num_columns();
+  for (int sweep = 0; sweep < static_cast<int>(1 / kStep); ++sweep)
+    for (const Index h : topology.edge_corners) {
+      const Index a = topology.corner_vertices[h], b = topology.corner_vertices[topology.next(h)];
+      for (const std::size_t side : {std::size_t{0}, num_columns}) {
+        double &s = shares[side + a], &t = shares[side + b];
+        s = std::min(s, t + kStep);
+        t = std::min(t, s + kStep);
+      }
+    }
+}
+
+}  // namespace
+
+TriangleMesh checked_triangles(const PolygonMesh& polygons, std::vector<Index>& polygon_of_triangle) {
+  if (polygons.face_vertices.size() != 3 * polygons.num_faces()) return refined_triangles(polygons, &polygon_of_triangle);
+  return triangulate(polygons, &polygon_of_triangle);
+}
+
+ShellCheck::ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets)
+    : layers_(layers), cells_(cells), polygons_(sheet_polygons(layers, sheets_to_check(layers, sheets))) {}
+
+ShellFailures ShellCheck::failures(std::span<const Vec3> positions) const {
+  ShellFailures result;
+  result.certificate = certify(positions, cells_);
+  PolygonMesh polygons = polygons_;
+  polygons.positions.assign(positions.begin(), positions.end());
+  std::vector<Index> polygon;
+  const SelfIntersections found = self_intersections(checked_triangles(polygons, polygon));
+  for (const auto& [t, s] : found.pairs) result.intersecting.push_back({polygon[t], polygon[s]});
+  for (const Index t : found.degenerate) result.intersecting.push_back({polygon[t], polygon[t]});
+  auto& pairs = result.intersecting;
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return result;
+}
+
+std::vector<Index> ShellCheck::strands(const ShellFailures& failures) const {
+  std::vector<Index> result;
+  const auto add = [&](std::span<const Index> vertices) {
+    for (const Index v : vertices)
+      if (const Index strand = layers_.strand(v); strand != kNoIndex) result.push_back(strand);
+  };
+  for (const Index c : failures.certificate.not_certified) add(cells_.cell(c));
+  for (const auto& pair : failures.intersecting)
+    for (const Index f : pair)
+      add({polygons_.face_vertices.data() + polygons_.face_offsets[f],
+           polygons_.face_offsets[f + 1] - polygons_.face_offsets[f]});
+  sort_unique(result);
+  return result;
+}
+
+std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
+                          std::span<const Vec3> wanted, std::vector<double>* shares_out) {
+  constexpr double kShrink = 0.7, kLeast = 0.05;
+  std::vector<double> shares(layers.num_strands(), 1.0);
+  std::vector<Vec3> positions(wanted.begin(), wanted.end());
+  for (;;) {
+    const ShellFailures failures = check.failures(positions);
+    if (failures.none()) break;
+    bool moved = false;
+    for (const Index strand : check.strands(failures)) {
+      double& share = shares[strand];
+      moved = moved || share > 0;
+      share = kShrink * share < kLeast ? 0 : kShrink * share;
+    }
+    if (!moved) break;  // the safe state was not valid
+    grade(layers, shares);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const Index strand = layers.strand(static_cast<Index>(i));
+      if (strand != kNoIndex) positions[i] = safe[i] + shares[strand] * (wanted[i] - safe[i]);
+    }
+  }
+  if (shares_out) *shares_out = std::move(shares);
+  return positions;
+}
+
+}  // namespace subvol

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/certificate.h"
+#include "shell/shell_layers.h"
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// What keeps a shell from being one.
+struct ShellFailures {
+  CertificateSummary certificate;
+  /// Faces that meet improperly, numbers in `ShellCheck::polygons()`, smaller first, ascending. A face without area makes
+  /// a pair with itself.
+  std::vector<std::array<Index, 2>> intersecting;
+  bool none() const { return certificate.all_certified() && intersecting.empty(); }
+};
+
+/// Which sheets are looked at for intersections. With all cells certified the two outer ones decide for all: a map that
+/// is injective on the boundary of what it maps, and near every point, is so everywhere.
+enum class CheckedSheets { outer, all };
+
+/// Tells whether a shell is valid: every cell certified, and no face of a sheet or of a wall along the border meeting another.
+///
+/// Faces are triangles where the surface has no quads and no border. Otherwise each face stands for the triangles of
+/// `refined_triangles`, the same on all sheets.
+class ShellCheck {
+ public:
+  /// layers, cells  must outlive the check.
+  ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets);
+
+  /// positions  one per vertex of the cells. Exact but for what quads mean; same answer for any number of threads.
+  ShellFailures failures(std::span<const Vec3> positions) const;
+
+  /// Strands of the cells and faces concerned, ascending.
+  std::vector<Index> strands(const ShellFailures& failures) const;
+
+  const PolygonMesh& polygons() const { return polygons_; }
+
+ private:
+  const ShellLayers& layers_;
+  const VolumeMesh& cells_;
+  PolygonMesh polygons_;
+};
+
+/// The triangles that stand for polygons in checks. polygon_of_triangle: written.
+TriangleMesh checked_triangles(const PolygonMesh& polygons, std::vector<Index>& polygon_of_triangle);
+
+/// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the wanted
+/// one, less where cells or faces fail.
+///
+/// safe  valid by `check`, so that this ends: a failing cell or face always has a strand that can go back farther.
+/// shares  if given: how far each strand got, 0 .. 1.
+std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
+                          std::span<const Vec3> wanted, std::vector<double>* shares = nullptr);
+
+}  // namespace subvol

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shell/shell_layers.h"
+
+#include "shell/visible_normals.h"
+#include "subvol/error.h"
+#include "subvol/features.h"
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <set>
+#include <utility>
+
+namespace subvol {
+namespace {
+
+std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {
+  return {surface.face_vertices.data() + surface.face_offsets[f], surface.face_offsets[f + 1] - surface.face_offsets[f]};
+}
+
+void require_faces(const PolygonMesh& surface) {
+  if (surface.num_faces() == 0) throw InputError("shell: the surface has no faces");
+  for (std::size_t f = 0; f < surface.num_faces(); ++f) {
+    const auto face = face_of(surface, f);
+    if (face.size() != 3 && face.size() != 4)
+      throw InputError("shell: face " + std::to_string(f) + " has " + std::to_string(face.size()) +
+                       " corners; only triangles and quads can be extruded");
+    Vec3 area = Vec3::Zero();
+    for (std::size_t k = 0; k < face.size(); ++k) area += corner_normal(surface, f, k);
+    if (!(area.norm() > 1e-12)) throw InputError("shell: face " + std::to_string(f) + " has no area");
+  }
+}
+
+/// The cell of a face between two sheets.
+void add_cell(VolumeMesh& mesh, const ShellLayers& layers, std::span<const Index> face, int layer) {
+  std::array<Index, kMaxCellVertices> corners;
+  for (std::size_t k = 0; k < face.size(); ++k) {
+    corners[k] = layers.vertex(layer, face[k]);
+    corners[face.size() + k] = layers.vertex(layer + 1, face[k]);
+  }
+  mesh.add_cell(face.size() == 3 ? CellKind::prism : CellKind::hex, {corners.data(), 2 * face.size()});
+}
+
+}  // namespace
+
+std::vector<double> layer_shares(int num_layers, double growth) {
+  if (num_layers < 0) throw InputError("layer_shares: num_layers must not be negative");
+  if (!(growth > 0) || !std::isfinite(growth)) throw InputError("layer_shares: growth must be positive");
+  std::vector<double> shares{0};
+  for (int k = 0; k < num_layers; ++k) shares.push_back(shares.back() + std::pow(growth, k));
+  for (double& share : shares) share /= num_layers > 0 ? shares.back() : 1;
+  return shares;
+}
+
+ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth) {
+  require_faces(surface);
+  ShellLayers layers;
+  layers.topology = build_surface(surface.positions.size(), {surface.face_offsets.begin(), surface.face_offsets.end()},
+                                  surface.face_vertices, {}, SurfaceKind::maybe_open);
+  layers.surface = std::move(surface);
+  layers.inside = inside;
+  layers.outside = outside;
+  layers.inside_shares = layer_shares(inside, growth);
+  layers.outside_shares = layer_shares(outside, growth);
+  return layers;
+}
+
+VolumeMesh stack_cells(const ShellLayers& layers) {
+  VolumeMesh mesh;
+  for (int sheet = 0; sheet < layers.num_sheets(); ++sheet)
+    mesh.positions.insert(mesh.positions.end(), layers.surface.positions.begin(), layers.surface.positions.end());
+  for (int layer = 0; layer + 1 < layers.num_sheets(); ++layer)
+    for (std::size_t f = 0; f < layers.surface.num_faces(); ++f) {
+      add_cell(mesh, layers, face_of(layers.surface, f), layer);
+      mesh.references.push_back(layer + 1);
+    }
+  return mesh;
+}
+
+FeatureTags surface_features(const PolygonMesh& surface, double angle_degrees) {
+  // One flat layer: its first sheet is the surface, and walls without area are flat.
+  const ShellLayers layers = make_layers(surface, 0, 1, 1);
+  FeatureTags tags = features_by_angle(stack_cells(layers), angle_degrees);
+  const auto num_columns = static_cast<Index>(layers.num_columns());
+  std::erase_if(tags.creases, [&](const CreaseEdge& c) { return std::max(c.v0, c.v1) >= num_columns; });
+  std::erase_if(tags.corners, [&](const CornerVertex& c) { return c.vertex >= num_columns; });
+  return tags;
+}
+
+FeatureTags shell_tags(const ShellLayers& layers, const FeatureTags& tags) {
+  const SurfaceTopology& topology = layers.topology;
+  FeatureTags border;
+  std::set<std::pair<Index, Index>> edges;
+  for (const Index h : topology.edge_corners) {
+    const Index a = topology.corner_vertices[h], b = topology.corner_vertices[topology.next(h)];
+    edges.insert(std::minmax(a, b));
+    if (topology.twins[h] == kNoIndex) border.creases.push_back({std::min(a, b), std::max(a, b)});
+  }
+  for (const CreaseEdge& crease : tags.creases)
+    if (!edges.count({crease.v0, crease.v1}))
+      throw InputError("shell: crease " + std::to_string(crease.v0) + "-" + std::to_string(crease.v1) +
+                       " is no edge of the surface");
+  for (const CornerVertex& corner : tags.corners)
+    if (corner.vertex < 0 || static_cast<std::size_t>(corner.vertex) >= layers.num_columns())
+      throw InputError("shell: corner " + std::to_string(corner.vertex) + " is no vertex of the surface");
+  const FeatureTags all = merge_tags(tags, border);
+  FeatureTags result;
+  for (const int sheet : {0, layers.num_sheets() - 1}) {
+    for (const CreaseEdge& c : all.creases)
+      result.creases.push_back({layers.vertex(sheet, c.v0), layers.vertex(sheet, c.v1), c.sharpness});
+    for (const CornerVertex& c : all.corners) result.corners.push_back({layers.vertex(sheet, c.vertex), c.sharpness});
+  }
+  return result;
+}
+
+std::vector<Vec3> straight_columns(const ShellLayers& layers, std::span<const Vec3> directions,
+                                   std::span<const double> thickness) {
+  std::vector<Vec3> positions;
+  positions.reserve(layers.num_sheets() * layers.num_columns());
+  for (int sheet = 0; sheet < layers.num_sheets(); ++sheet)
+    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
+      const Index strand = layers.strand(layers.vertex(sheet, static_cast<Index>(v)));
+      const double height = strand == kNoIndex ? 0 : layers.height(sheet) * thickness[strand];
+      positions.push_back(layers.surface.positions[v] + height * directions[v]);
+    }
+  return positions;
+}
+
+CellReference shell_reference(const ShellLayers& layers, std::vector<double> thickness) {
+  return [&layers, thickness = std::move(thickness)](Index cell, const Vec3& point) {
+    const std::size_t num_faces = layers.surface.num_faces();
+    const int layer = static_cast<int>(cell / num_faces);
+    const auto face = face_of(layers.surface, cell % num_faces);
+    const double* side = thickness.data() + (layer < layers.inside ? 0 : layers.num_columns());
+    const double share = layers.height(layer + 1) - layers.height(layer), u = point[0], v = point[1];
+    const auto x = [&](int k) -> const Vec3& { return layers.surface.positions[face[k]]; };
+    const auto t = [&](int k) { return side[face[k]]; };
+    Mat3 reference;
+    double height;
+    if (face.size() == 3) {
+      reference.col(0) = x(1) - x(0);
+      reference.col(1) = x(2) - x(0);
+      height = (1 - u - v) * t(0) + u * t(1) + v * t(2);
+    } else {
+      reference.col(0) = (1 - v) * (x(1) - x(0)) + v * (x(2) - x(3));
+      reference.col(1) = (1 - u) * (x(3) - x(0)) + u * (x(2) - x(1));
+      height = (1 - v) * ((1 - u) * t(0) + u * t(1)) + v * ((1 - u) * t(3) + u * t(2));
+    }
+    reference.col(2) = share * height * reference.col(0).cross(reference.col(1)).normalized();
+    return reference;
+  };
+}
+
+PolygonMesh sheet_polygons(const ShellLayers& layers, std::span<const int> sheets) {
+  PolygonMesh polygons;
+  const auto end_face = [&] { polygons.face_offsets.push_back(polygons.face_vertices.size()); };
+  for (const int sheet : sheets)
+    for (std::size_t f = 0; f < layers.surface.num_faces(); ++f) {
+      for (const Index v : face_of(layers.surface, f)) polygons.face_vertices.push_back(layers.vertex(sheet, v));
+      end_face();
+    }
+  const SurfaceTopology& topology = layers.topology;
+  for (std::size_t h = 0; h < topology.twins.size(); ++h) {
+    if (topology.twins[h] != kNoIndex) continue;
+    const Index from = topology.corner_vertices[h], to = topology.corner_vertices[topology.next(static_cast<Index>(h))];
+    for (int layer = 0; layer + 1 < layers.num_sheets(); ++layer) {
+      for (const Index v : {layers.vertex(layer, from), layers.vertex(layer, to), layers.vertex(layer + 1, to),
+                            layers.vertex(layer + 1, from)})
+        polygons.face_vertices.push_back(v);
+      end_face();
+    }
+  }
+  return polygons;
+}
+
+}  // namespace subvol

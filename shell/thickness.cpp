@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shell/thickness.h"
+
+#include "shell/ray_gap.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+
+#include <algorithm>
+#include <functional>
+#include <queue>
+#include <string>
+
+namespace subvol {
+namespace {
+
+/// Calls visit(a, b, length) for every edge of the surface.
+template <class Visit>
+void for_each_edge(const ShellLayers& layers, const Visit& visit) {
+  const SurfaceTopology& topology = layers.topology;
+  for (const Index h : topology.edge_corners) {
+    const Index a = topology.corner_vertices[h], b = topology.corner_vertices[topology.next(h)];
+    visit(a, b, (layers.surface.positions[a] - layers.surface.positions[b]).norm());
+  }
+}
+
+struct Neighbor {
+  Index vertex;
+  double length;
+};
+
+/// Neighbours of every vertex along edges.
+struct Neighbors {
+  std::vector<std::size_t> offsets;
+  std::vector<Neighbor> list;
+
+  explicit Neighbors(const ShellLayers& layers) : offsets(layers.num_columns() + 1, 0) {
+    for_each_edge(layers, [&](Index a, Index b, double) { ++offsets[a + 1], ++offsets[b + 1]; });
+    for (std::size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    list.resize(offsets.back());
+    std::vector<std::size_t> next(offsets.begin(), offsets.end() - 1);
+    for_each_edge(layers, [&](Index a, Index b, double length) {
+      list[next[a]++] = {b, length};
+      list[next[b]++] = {a, length};
+    });
+  }
+};
+
+/// As Dijkstra's: from the thinnest vertex outward.
+void limit_slope(const Neighbors& neighbors, std::span<double> thickness) {
+  constexpr double kSlope = 0.5;
+  using Entry = std::pair<double, Index>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  const auto spread = [&](double t, Index v) {
+    for (std::size_t i = neighbors.offsets[v]; i < neighbors.offsets[v + 1]; ++i) {
+      const auto& [w, length] = neighbors.list[i];
+      const double most = t + kSlope * length;
+      if (thickness[w] <= most) continue;
+      thickness[w] = most;
+      queue.push({most, w});
+    }
+  };
+  for (std::size_t v = 0; v < thickness.size(); ++v) spread(thickness[v], static_cast<Index>(v));
+  while (!queue.empty()) {
+    const auto [t, v] = queue.top();
+    queue.pop();
+    if (t == thickness[v]) spread(t, v);
+  }
+}
+
+}  // namespace
+
+void limit_slope(const ShellLayers& layers, std::span<double> thickness) {
+  const Neighbors neighbors(layers);
+  const std::size_t n = layers.num_columns();
+  if (layers.inside > 0) limit_slope(neighbors, thickness.subspan(0, n));
+  if (layers.outside > 0) limit_slope(neighbors, thickness.subspan(n, n));
+}
+
+std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const Vec3> directions,
+                                      std::span<const double> asked) {
+  constexpr double kShare = 0.45, kLeast = 1e-4;
+  std::vector<double> thickness(asked.begin(), asked.end());
+  const TriangleMesh surface = triangulate(layers.surface);
+  const auto limit = [&](std::size_t first, double sign) {
+    std::vector<Vec3> along(directions.begin(), directions.end());
+    for (Vec3& d : along) d *= sign;
+    const std::vector<double> gaps = ray_gaps(surface, along);
+    for (std::size_t v = 0; v < gaps.size(); ++v) {
+      double& t = thickness[first + v];
+      t = std::max(std::min(t, kShare * gaps[v]), kLeast * t);
+    }
+  };
+  if (layers.inside > 0) limit(0, -1);
+  if (layers.outside > 0) limit(layers.num_columns(), 1);
+  limit_slope(layers, thickness);
+  return thickness;
+}
+
+std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
+                                 std::span<const double> thickness) {
+  constexpr double kShareOfEdge = 0.02;
+  constexpr int kMaxHalvings = 30;
+  const std::size_t n = layers.num_columns();
+  std::vector<double> thin(thickness.begin(), thickness.end());
+  for_each_edge(layers, [&](Index a, Index b, double length) {
+    for (const Index v : {a, b})
+      for (const std::size_t side : {std::size_t{0}, n}) thin[side + v] = std::min(thin[side + v], kShareOfEdge * length);
+  });
+  for (int halving = 0;; ++halving) {
+    std::vector<Vec3> positions = straight_columns(layers, directions, thin);
+    const ShellFailures failures = check.failures(positions);
+    if (failures.none()) return positions;
+    const std::vector<Index> strands = check.strands(failures);
+    if (halving == kMaxHalvings || strands.empty()) {
+      std::string text = "shell: not even a very thin layer fits at vertices";
+      for (std::size_t i = 0; i < std::min<std::size_t>(strands.size(), 10); ++i)
+        text += (i ? ", " : " ") + std::to_string(strands[i] % n);
+      throw InputError(text);
+    }
+    for (const Index strand : strands) thin[strand] *= 0.5;
+  }
+}
+
+}  // namespace subvol

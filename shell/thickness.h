@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "shell/shell_check.h"
+#include "shell/shell_layers.h"
+
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Thickness per strand that leaves room for what stands opposite, smoothly:
+///
+///   t <= asked,   t <= 0.45 gap,   t(v) <= t(w) + 1/2 |v - w| along every edge
+///
+/// gap  from a surface vertex along its direction (or against it, inside) to another part of the surface (`ray_gaps`).
+/// directions  one per column. asked: per strand. Never below a ten-thousandth of what is asked.
+std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const Vec3> directions,
+                                      std::span<const double> asked);
+
+/// Lowers thicknesses until they differ by half the length of an edge between its ends at most. Cost: n log n.
+void limit_slope(const ShellLayers& layers, std::span<double> thickness);
+
+/// Straight columns so thin that they are valid: the state from which a shell grows.
+///
+/// thickness  per strand: none gets thicker. InputError, naming vertices, where nothing thin enough is found.
+std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
+                                 std::span<const double> thickness);
+
+}  // namespace subvol

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shell/visible_normals.h"
+
+#include "subvol/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+namespace subvol {
+namespace {
+
+constexpr double kLeastVisibility = 1e-6;
+
+/// A cap of the unit sphere: all points p with axis . p >= cosine.
+struct Cap {
+  Vec3 axis;
+  double cosine;
+  bool holds(const Vec3& p) const { return axis.dot(p) >= cosine - 1e-12; }
+};
+
+Cap cap_of(const Vec3& p, const Vec3& q) {
+  const Vec3 axis = (p + q).normalized();
+  return {axis, axis.dot(p)};
+}
+
+Cap cap_of(const Vec3& p, const Vec3& q, const Vec3& r) {
+  Vec3 axis = (q - p).cross(r - p).normalized();
+  if (axis.dot(p) < 0) axis = -axis;
+  return {axis, axis.dot(p)};
+}
+
+/// The smallest cap, as Welzl finds the smallest circle: a point outside lies on the border of the next larger one.
+Cap smallest_cap(std::span<const Vec3> points) {
+  Cap cap{points[0], 1};
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if (cap.holds(points[i])) continue;
+    cap = {points[i], 1};
+    for (std::size_t j = 0; j < i; ++j) {
+      if (cap.holds(points[j])) continue;
+      cap = cap_of(points[i], points[j]);
+      for (std::size_t k = 0; k < j; ++k)
+        if (!cap.holds(points[k])) cap = cap_of(points[i], points[j], points[k]);
+    }
+  }
+  return cap;
+}
+
+}  // namespace
+
+std::optional<Vec3> most_visible_direction(std::span<const Vec3> normals) {
+  if (normals.empty()) throw InputError("most_visible_direction: expected at least one normal");
+  const Cap cap = smallest_cap(normals);
+  const bool seen = std::all_of(normals.begin(), normals.end(),
+                                [&](const Vec3& normal) { return cap.axis.dot(normal) > kLeastVisibility; });
+  return seen ? std::optional<Vec3>(cap.axis) : std::nullopt;
+}
+
+Vec3 corner_normal(const PolygonMesh& surface, std::size_t face, std::size_t corner) {
+  const std::size_t begin = surface.face_offsets[face], size = surface.face_offsets[face + 1] - begin;
+  const auto at = [&](std::size_t k) { return surface.positions[surface.face_vertices[begin + k % size]]; };
+  const Vec3 next = (at(corner + 1) - at(corner)).normalized(), previous = (at(corner + size - 1) - at(corner)).normalized();
+  return next.cross(previous).normalized();
+}
+
+VisibleNormals visible_normals(const PolygonMesh& surface) {
+  const std::size_t num_vertices = surface.positions.size();
+  std::vector<Vec3> normals(surface.face_vertices.size());
+  std::vector<std::vector<std::size_t>> corners(num_vertices);
+  std::vector<std::size_t> face_of_corner(normals.size());
+  for (std::size_t f = 0; f < surface.num_faces(); ++f)
+    for (std::size_t h = surface.face_offsets[f]; h < surface.face_offsets[f + 1]; ++h) {
+      normals[h] = corner_normal(surface, f, h - surface.face_offsets[f]);
+      face_of_corner[h] = f;
+      corners[surface.face_vertices[h]].push_back(h);
+    }
+  VisibleNormals result;
+  result.directions.assign(num_vertices, Vec3::Zero());
+#pragma omp parallel
+  {
+    std::vector<Vec3> own, all;
+#pragma omp for schedule(static)
+    for (std::size_t v = 0; v < num_vertices; ++v) {
+      own.clear(), all.clear();
+      for (const std::size_t h : corners[v]) {
+        const std::size_t f = face_of_corner[h], begin = surface.face_offsets[f], end = surface.face_offsets[f + 1];
+        own.push_back(normals[h]);
+        if (end - begin == 3)
+          all.push_back(normals[h]);
+        else
+          all.insert(all.end(), normals.begin() + begin, normals.begin() + end);
+      }
+      if (std::any_of(own.begin(), own.end(), [](const Vec3& n) { return !(n.squaredNorm() > 0.5); })) continue;
+      std::optional<Vec3> direction = most_visible_direction(all);
+      if (!direction) direction = most_visible_direction(own);
+      if (direction) result.directions[v] = *direction;
+    }
+  }
+  for (std::size_t v = 0; v < num_vertices; ++v)
+    if (result.directions[v].isZero(0)) result.hidden.push_back(static_cast<Index>(v));
+  return result;
+}
+
+}  // namespace subvol
