@@ -11,6 +11,7 @@
 #include "export/gltf_writer.h"
 #include "export/volume_writer.h"
 #include "fit/surface_distance.h"
+#include "fit/target_surface.h"
 #include "shell/shell.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -19,6 +20,8 @@
 #include "subvol/surface_io.h"
 #include "subvol/text_scanner.h"
 #include "subvol/version.h"
+
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <chrono>
@@ -37,6 +40,7 @@ struct ShellArguments {
   WritingOptions writing;
   ShellOptions shell;
   std::string surface, thickness, thickness_file, side = "outward";
+  int order = 1;
   std::optional<double> crease_angle_degrees;
   bool straight = false;
 };
@@ -48,6 +52,17 @@ double parse_length(const std::string& text, double diagonal) {
   const std::string error = number_in(1e-300, 1e300)(std::string(number));
   if (!error.empty()) throw UsageError("--thickness: must be a positive length, or a percentage as 2%, not " + text);
   return std::stod(number) * (percent ? diagonal / 100 : 1);
+}
+
+/// Whether a surface is closed and encloses a negative volume.
+bool faces_point_inward(const TriangleMesh& surface) {
+  const TargetSurface target(surface);
+  if (target.volume_source() != VolumeSource::signed_sum) return false;
+  double volume = 0;
+  for (const auto& [a, b, c] : surface.triangles)
+    volume += (surface.positions[a] - target.centre())
+                  .dot((surface.positions[b] - target.centre()).cross(surface.positions[c] - target.centre()));
+  return volume < 0;
 }
 
 /// What the thicknesses of one side are, in the mesh's unit.
@@ -113,7 +128,10 @@ void ShellRun::warn(std::size_t first) const {
 
 void ShellRun::load() {
   surface_ = load_tagged_polygons(arguments_.surface, warnings_);
-  diagonal_ = bounding_box_diagonal(triangulate(surface_.polygons));
+  const TriangleMesh triangles = triangulate(surface_.polygons);
+  diagonal_ = bounding_box_diagonal(triangles);
+  if (faces_point_inward(triangles))
+    warnings_.push_back(arguments_.surface + ": the faces of this closed surface point inward, so outward is its inside");
   warn();
 }
 
@@ -158,7 +176,11 @@ void ShellRun::grow() {
     return !interrupted();
   };
   catch_interrupt();
-  result_ = make_shell(surface_.polygons, options);
+  try {
+    result_ = make_shell(surface_.polygons, options);
+  } catch (const InputError& error) {
+    throw InputError(arguments_.surface + ": " + error.what());
+  }
   teller.finish();
   const std::size_t before = warnings_.size();
   warnings_.insert(warnings_.end(), result_.report.warnings.begin(), result_.report.warnings.end());
@@ -178,16 +200,14 @@ std::vector<double> ShellRun::by_vertex(const std::vector<double>& by_strand) co
 Scene ShellRun::scene(const Output& output, const WritingOptions& writing) const {
   const ShellLayers& layers = result_.layers;
   const std::vector<double> achieved = by_vertex(result_.achieved), asked = by_vertex(result_.asked);
-  const PolygonMesh& surface = layers.surface;
   std::vector<SceneSheet> sheets;
   const auto add = [&](const char* name, int sheet) {
     SceneSheet& added = sheets.emplace_back();
     added.name = name;
-    added.mesh = surface;
+    added.mesh = sheet_surface(layers, result_.mesh, sheet);
     added.attribute.name = "_THICKNESS";
     for (std::size_t v = 0; v < layers.num_columns(); ++v) {
       const Index vertex = layers.vertex(sheet, static_cast<Index>(v));
-      added.mesh.positions[v] = result_.mesh.positions[vertex];
       added.attribute.values.push_back(achieved[vertex]);
       added.shades.push_back(achieved[vertex] / asked[vertex]);
     }
@@ -204,7 +224,8 @@ void ShellRun::write_output(const Output& output, const WritingOptions& writing)
   } else if (output.extension == ".vtu" || output.extension == ".msh") {
     const VertexField fields[] = {{"thickness", by_vertex(result_.achieved)},
                                   {"thickness_asked", by_vertex(result_.asked)},
-                                  {"thickness_limited", by_vertex(result_.limited)}};
+                                  {"thickness_limited", by_vertex(result_.limited)},
+                                  {"clearance", by_vertex(result_.clearance)}};
     write_volume(output.path, result_.mesh, result_.quality.cell_minima, fields);
   } else {
     cli::write_output(output, result_.mesh, writing);
@@ -253,6 +274,7 @@ Json ShellRun::thickness_json() const {
     json[side] = {{"asked", figures(result_.asked)},
                   {"limited", figures(result_.limited)},
                   {"achieved", figures(result_.achieved)},
+                  {"clearance", figures(result_.clearance)},
                   {"limited_vertices", clipped}};
   });
   return json;
@@ -273,6 +295,7 @@ void ShellRun::write_report() const {
             {"stages", stages_json(report)},
             {"valid", failures_.none()},
             {"thickness", thickness_json()},
+            {"surface_distance_max_percent", 100 * result_.surface_distance_max / diagonal_},
             {"quality", quality_json(result_.quality)},
             {"not_certified_cells", failures_.certificate.not_certified},
             {"self_intersections", failures_.intersecting.size()},
@@ -321,6 +344,7 @@ int ShellRun::run() {
   if (arguments_.thickness.empty() == arguments_.thickness_file.empty())
     throw UsageError("shell: give either --thickness or --thickness-file");
   if (!arguments_.thickness.empty()) parse_length(arguments_.thickness, 1);
+  if (arguments_.order > 1) throw UsageError("--order: curved shells are not offered yet; the cells are of order 1");
   outputs_ = checked_outputs(arguments_.run, true);
   apply_threads(arguments_.run);
   timed("read", &ShellRun::load);
@@ -352,11 +376,17 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->check(CLI::IsMember({"outward", "inward", "both"}))
       ->type_name("outward|inward|both")
       ->capture_default_str();
+  verb.add_flag("--free-surface", shell.free_surface,
+                "Let the surface's vertices slide along it for the cells' sake; its border and creases stay");
   verb.add_flag("--straight", arguments.straight, "Straight columns only: no optimisation");
   verb.add_option("--crease-angle", arguments.crease_angle_degrees,
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
+  verb.add_option("--order", arguments.order, "Order of the cells; only 1 so far")
+      ->check(CLI::Range(1, 12))
+      ->type_name("P")
+      ->capture_default_str();
   verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");
@@ -377,7 +407,7 @@ void add_shell_command(CLI::App& app, Action& action) {
   add_shell_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "The layers, or their sheets, by extension: " + output_formats() +
-                         "; cage:FILE for the boundary as a control cage; may be given several times");
+                         "; cage:FILE for the layers as a control mesh with creases; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   verb->footer(R"(Example:

@@ -15,21 +15,24 @@ namespace subvol {
 
 /// The function that a stage minimises over its unknowns x (control vertices, in the target's unit):
 ///
-///   E(x) = E_S(N x) + lambda E_W(M x + y0)                                     Paper: Eqs. 1, 10
+///   E(x) = E_S(N x + z0) + lambda E_W(M x + y0)                                Paper: Eqs. 1, 10
 ///
 /// M takes the unknowns to the nodes of the finite element mesh, N to the samples of its boundary; gradients and
 /// Hessians come back through the transposes. E_S is taken with the correspondences of the last `SurfaceTerm::assign`.
-/// Nodes that are to stay have no entries in M and their positions in y0.
+/// Nodes that are to stay have no entries in M and their positions in y0; samples likewise.
 struct FitProblem {
   FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
              std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight);
 
   /// out = M x + y0.
   void apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const;
+  /// out = N x + z0.
+  void apply_samples(std::span<const Vec3> x, std::span<Vec3> out) const;
 
   SparseMap nodes, nodes_transposed;      ///< M, M^T
   std::vector<Vec3> fixed_nodes;          ///< y0, one per node; empty: none is fixed
   SparseMap samples, samples_transposed;  ///< N, N^T
+  std::vector<Vec3> fixed_samples;        ///< z0, one per sample; empty: none is fixed
   const VolumeMesh* mesh;                 ///< cells of the finite element mesh (for the certificate)
   VolumeEnergy volume;
   std::unique_ptr<SurfaceTerm> surface;   ///< null: none, N then has no rows

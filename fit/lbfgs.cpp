@@ -26,13 +26,13 @@ class Objective {
         node_gradient_(nodes_.size()), sample_gradient_(samples_.size()), from_samples_(problem.nodes.num_cols) {}
 
   void assign(std::span<const Vec3> x) {
-    problem_.samples.apply(x, samples_);
+    problem_.apply_samples(x, samples_);
     if (problem_.surface) problem_.surface->assign(samples_);
   }
 
   Value evaluate(std::span<const Vec3> x, std::span<Vec3> gradient) {
     problem_.apply_nodes(x, nodes_);
-    problem_.samples.apply(x, samples_);
+    problem_.apply_samples(x, samples_);
     std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
     std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
     Value value;

@@ -28,6 +28,11 @@ void FitProblem::apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const
   if (!fixed_nodes.empty()) add_scaled(1, fixed_nodes, out);
 }
 
+void FitProblem::apply_samples(std::span<const Vec3> x, std::span<Vec3> out) const {
+  samples.apply(x, out);
+  if (!fixed_samples.empty()) add_scaled(1, fixed_samples, out);
+}
+
 namespace {
 
 /// Adds the 3x3 diagonal blocks of M^T H M: D_j = sum_ik M_ij H_ik M_kj.
@@ -153,8 +158,9 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
   const std::size_t n = x.size();
   BlockSparse hessian = problem.volume.pattern();
-  std::vector<Vec3> y(problem.nodes.num_rows()), z = problem.samples.apply(x);
+  std::vector<Vec3> y(problem.nodes.num_rows()), z(problem.samples.num_rows());
   problem.apply_nodes(x, y);
+  problem.apply_samples(x, z);
   std::vector<Vec3> node_gradient(y.size()), sample_gradient(z.size()), gradient(n), from_samples(n), d, dy(y.size()),
       dz(z.size()), y_trial(y.size()), z_trial(z.size());
   std::vector<Mat3> inverse_diagonal;
@@ -219,7 +225,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     }
     add_scaled(t, d, x);
     problem.apply_nodes(x, y);
-    problem.samples.apply(x, z);
+    problem.apply_samples(x, z);
     uncertified = std::move(trial_uncertified);
     record.surface_energy = trial_surface;
     record.volume_energy = trial_volume;

@@ -166,6 +166,42 @@ Sample bracket_sample() {
   return {"bracket", boundary_triangles(fine), cells};
 }
 
+PolygonMesh bowl_surface(int n) {
+  // A cube's surface without its upper side, blown up to a ball.
+  PolygonMesh mesh;
+  std::map<Lattice, Index> numbers;
+  const auto vertex = [&](const Lattice& at) {
+    const auto [entry, added] = numbers.try_emplace(at, static_cast<Index>(mesh.positions.size()));
+    if (added) {
+      // Tangents space the quads of a side evenly over the ball.
+      const auto coordinate = [&](int i) { return std::tan((2.0 * i / n - 1) * kTau / 8); };
+      const Vec3 p = Vec3(coordinate(at[0]), coordinate(at[1]), coordinate(at[2])).normalized();
+      const double ripple = 1 + 0.06 * (1 + p.z()) * std::cos(8 * std::atan2(p.y(), p.x()));
+      mesh.positions.emplace_back(ripple * p.x(), ripple * p.y(), 0.8 * p.z());
+    }
+    return entry->second;
+  };
+  for (int side = 0; side < 6; ++side) {
+    const int axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    if (side == 5) continue;
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        std::array<Index, 4> quad{};
+        for (int k = 0; k < 4; ++k) {
+          Lattice at{};
+          at[axis] = side % 2 * n;
+          at[u] = i + (k == 1 || k == 2);
+          at[v] = j + k / 2;
+          quad[k] = vertex(at);
+        }
+        if (side % 2 == 0) std::swap(quad[1], quad[3]);
+        mesh.face_vertices.insert(mesh.face_vertices.end(), quad.begin(), quad.end());
+        mesh.face_offsets.push_back(mesh.face_vertices.size());
+      }
+  }
+  return mesh;
+}
+
 std::vector<Sample> all_samples() { return {torus_sample(), ball_sample(), bracket_sample()}; }
 
 std::string off_text(const TriangleMesh& mesh) {

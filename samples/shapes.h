@@ -28,6 +28,9 @@ Sample bracket_sample();
 /// All of the above.
 std::vector<Sample> all_samples();
 
+/// A rippled bowl to grow shells on: 5 n^2 quads, open at the top, outward.
+PolygonMesh bowl_surface(int n = 12);
+
 /// A triangle mesh as the text of an .off file.
 std::string off_text(const TriangleMesh& mesh);
 

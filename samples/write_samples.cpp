@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes every sample as NAME_target.off and NAME_template.mesh.
+// Writes every sample as NAME_target.off and NAME_template.mesh, and bowl.obj to grow shells on.
 
+#include "export/obj_writer.h"
 #include "samples/shapes.h"
 #include "subvol/atomic_file.h"
 #include "subvol/mesh_io.h"
@@ -20,6 +21,7 @@ int main(int argc, char** argv) try {
     subvol::write_file_atomically(folder / (sample.name + "_target.off"), subvol::samples::off_text(sample.target));
     subvol::write_volume_mesh(folder / (sample.name + "_template.mesh"), sample.template_mesh);
   }
+  subvol::write_obj(folder / "bowl.obj", subvol::samples::bowl_surface());
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "subvol_samples: %s\n", error.what());

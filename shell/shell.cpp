@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/shell.h"
 
+#include "fit/closest_point.h"
+#include "fit/closest_point_energy.h"
 #include "fit/fit_problem.h"
 #include "fit/self_intersection.h"
 #include "shell/thickness.h"
@@ -13,6 +15,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
+#include <optional>
 
 namespace subvol {
 namespace {
@@ -75,7 +79,7 @@ class ShellMaker {
         layers_(make_layers(normalization_.normalized(surface), options.side == ShellSide::outward ? 0 : options.layers,
                             options.side == ShellSide::inward ? 0 : options.layers, options.growth)),
         cells_(stack_cells(layers_)),
-        check_(layers_, cells_, CheckedSheets::outer) {}
+        check_(layers_, cells_, CheckedSheets::outer, options.free_surface) {}
 
   ShellResult run(const PolygonMesh& surface);
 
@@ -85,6 +89,8 @@ class ShellMaker {
   void find_thickness();
   void start();
   void optimize();
+  std::vector<char> fixed_vertices() const;
+  FitProblem make_problem(std::vector<Vec3>& unknowns) const;
   MinimizerStop solve(int round);
   void finish(const PolygonMesh& surface, ShellResult& result);
   /// Tells the caller; false: it is to end.
@@ -101,6 +107,7 @@ class ShellMaker {
   std::vector<Vec3> directions_;
   std::vector<double> asked_, thickness_;
   std::vector<Vec3> start_, positions_;
+  std::optional<TargetSurface> target_;  ///< the surface as it was, where its vertices are free
   FitReport report_;
   bool ended_ = false;  ///< by the caller or the clock
 };
@@ -138,14 +145,14 @@ void ShellMaker::require_no_intersections() const {
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
   if (!faces.empty())
-    throw InputError("shell: the surface meets itself, or has no area, at faces " + list_of(faces));
+    throw InputError("the surface meets itself, or has no area, at faces " + list_of(faces));
 }
 
 void ShellMaker::find_directions() {
   require_no_intersections();
   VisibleNormals visible = visible_normals(layers_.surface);
   if (!visible.hidden.empty())
-    throw InputError("shell: no direction sees all faces around from their front at vertices " + list_of(visible.hidden));
+    throw InputError("no direction sees all faces around from their front at vertices " + list_of(visible.hidden));
   directions_ = std::move(visible.directions);
 }
 
@@ -166,12 +173,28 @@ void ShellMaker::start() {
   positions_ = start_;
 }
 
-MinimizerStop ShellMaker::solve(int round) {
-  // The surface's own vertices stay: they are no unknowns.
+/// Vertices that are no unknowns.
+std::vector<char> ShellMaker::fixed_vertices() const {
+  std::vector<char> fixed(positions_.size(), 0);
+  const SurfaceTopology& topology = layers_.topology;
+  const auto fix = [&](Index v) { fixed[layers_.vertex(layers_.inside, v)] = 1; };
+  if (!options_.free_surface)
+    for (std::size_t v = 0; v < layers_.num_columns(); ++v) fix(static_cast<Index>(v));
+  for (std::size_t h = 0; h < topology.twins.size(); ++h)
+    if (topology.twins[h] == kNoIndex)
+      fix(topology.corner_vertices[h]), fix(topology.corner_vertices[topology.next(static_cast<Index>(h))]);
+  for (const CreaseEdge& crease : options_.tags.creases) fix(crease.v0), fix(crease.v1);
+  for (const CornerVertex& corner : options_.tags.corners) fix(corner.vertex);
+  return fixed;
+}
+
+/// The energy with the surface's vertices fixed, or drawn to where the surface was.
+FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
+  const std::vector<char> is_fixed = fixed_vertices();
   SparseMap nodes;
-  std::vector<Vec3> unknowns, fixed(positions_.size(), Vec3::Zero());
+  std::vector<Vec3> fixed(positions_.size(), Vec3::Zero());
   for (std::size_t i = 0; i < positions_.size(); ++i) {
-    if (layers_.strand(static_cast<Index>(i)) == kNoIndex) {
+    if (is_fixed[i]) {
       fixed[i] = positions_[i];
     } else {
       nodes.columns.push_back(static_cast<Index>(unknowns.size()));
@@ -181,14 +204,35 @@ MinimizerStop ShellMaker::solve(int round) {
     nodes.offsets.push_back(nodes.columns.size());
   }
   nodes.num_cols = unknowns.size();
-  SparseMap samples;
-  samples.num_cols = unknowns.size();
-  FitProblem problem(nodes, samples, cells_, VolumeEnergy(cells_, shell_reference(layers_, thickness_), 2), nullptr, 1);
+  std::vector<Index> sampled;
+  std::vector<Vec3> fixed_samples;
+  std::unique_ptr<SurfaceTerm> surface;
+  double lambda = 1;
+  if (options_.free_surface) {
+    constexpr double kTangentialWeight = 1e-3, kLambda = 0.01;
+    for (std::size_t v = 0; v < layers_.num_columns(); ++v) {
+      sampled.push_back(layers_.vertex(layers_.inside, static_cast<Index>(v)));
+      fixed_samples.push_back(fixed[sampled.back()]);
+    }
+    surface = std::make_unique<ClosestPointEnergy>(*target_, triangulate(layers_.surface).triangles, sampled.size(),
+                                                   kTangentialWeight, 3);
+    const double share = *std::max_element(thickness_.begin(), thickness_.end()) / target_->length();
+    lambda = kLambda * share * share;
+  }
+  SparseMap samples = select_rows(nodes, sampled);
+  FitProblem problem(std::move(nodes), std::move(samples), cells_,
+                     VolumeEnergy(cells_, shell_reference(layers_, thickness_), 2), std::move(surface), lambda);
   problem.fixed_nodes = std::move(fixed);
+  problem.fixed_samples = std::move(fixed_samples);
+  return problem;
+}
 
+MinimizerStop ShellMaker::solve(int round) {
+  std::vector<Vec3> unknowns;
+  FitProblem problem = make_problem(unknowns);
   StageRecord& stage = report_.stages.emplace_back();
   stage.name = "solve " + std::to_string(round + 1);
-  stage.lambda = 1;
+  stage.lambda = problem.lambda;
   stage.unknowns = unknowns.size();
   stage.cells = cells_.num_cells();
   const double before = seconds();
@@ -197,7 +241,7 @@ MinimizerStop ShellMaker::solve(int round) {
   minimizer.progress = [&](const IterationRecord& record) {
     ++iteration;
     const double in_round = static_cast<double>(iteration) / minimizer.max_iterations;
-    return tell(stage.name.c_str(), iteration, record.volume_energy,
+    return tell(stage.name.c_str(), iteration, record.surface_energy + problem.lambda * record.volume_energy,
                 1 - std::pow(0.5, round) * (1 - 0.5 * in_round));
   };
   MinimizerResult found = minimize_newton(problem, unknowns, minimizer);
@@ -238,11 +282,37 @@ ShellResult ShellMaker::run(const PolygonMesh& surface) {
   timed("directions", &ShellMaker::find_directions);
   timed("thickness", &ShellMaker::find_thickness);
   timed("start", &ShellMaker::start);
+  if (options_.free_surface) target_.emplace(triangulate(layers_.surface));
   if (options_.optimize && tell("start", 0, 0, 0)) timed("solve", &ShellMaker::optimize);
   if (!options_.optimize) report_.explanation = "straight columns, no solve";
   ShellResult result;
   finish(surface, result);
   return result;
+}
+
+void measure_thickness(ShellResult& result) {
+  const ShellLayers& layers = result.layers;
+  const std::vector<Vec3>& positions = result.mesh.positions;
+  const ClosestPoint tree(triangulate(layers.surface));
+  result.achieved.assign(layers.num_strands(), 0);
+  result.clearance.assign(layers.num_strands(), 0);
+  std::vector<ClosestPoint::Hit> hits(layers.num_columns());
+  const auto find_closest = [&](int sheet) {
+    tree.closest({positions.data() + layers.vertex(sheet, 0), layers.num_columns()}, hits);
+  };
+  for (const int sheet : {0, layers.num_sheets() - 1}) {
+    if (sheet == layers.inside) continue;
+    find_closest(sheet);
+    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
+      const Index vertex = layers.vertex(sheet, static_cast<Index>(v)), strand = layers.strand(vertex);
+      const Index foot = layers.vertex(layers.inside, static_cast<Index>(v));
+      result.achieved[strand] = (positions[vertex] - positions[foot]).norm();
+      result.clearance[strand] = hits[v].distance;
+    }
+  }
+  find_closest(layers.inside);
+  for (const ClosestPoint::Hit& hit : hits)
+    result.surface_distance_max = std::max(result.surface_distance_max, hit.distance);
 }
 
 void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
@@ -253,19 +323,14 @@ void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   result.mesh = std::move(cells_);
   const ShellLayers& layers = result.layers;
   for (std::size_t i = 0; i < positions_.size(); ++i)
-    result.mesh.positions[i] = layers.strand(static_cast<Index>(i)) == kNoIndex
+    result.mesh.positions[i] = !options_.free_surface && layers.strand(static_cast<Index>(i)) == kNoIndex
                                    ? surface.positions[i % layers.num_columns()]
                                    : Vec3(normalization_.centre + scale * positions_[i]);
   result.asked = std::move(asked_);
   result.limited = std::move(thickness_);
   for (double& t : result.asked) t *= scale;
   for (double& t : result.limited) t *= scale;
-  result.achieved.assign(layers.num_strands(), 0);
-  for (const int sheet : {0, layers.num_sheets() - 1})
-    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
-      const Index vertex = layers.vertex(sheet, static_cast<Index>(v)), strand = layers.strand(vertex);
-      if (strand != kNoIndex) result.achieved[strand] = (result.mesh.positions[vertex] - surface.positions[v]).norm();
-    }
+  measure_thickness(result);
   result.mesh.tags = shell_tags(layers, options_.tags);
   result.quality = measure_quality(result.mesh, 5, shell_reference(layers, result.limited));
   result.failures = ShellCheck(layers, result.mesh, CheckedSheets::all).failures(result.mesh.positions);

@@ -20,6 +20,8 @@ struct ShellOptions {
   int layers = 1;                        ///< on each side, >= 1
   double growth = 1;                     ///< thickness of a layer against that of the one nearer the surface, > 0
   bool optimize = true;                  ///< false: straight columns, no solve
+  /// Lets the surface's own vertices slide along it where that serves the cells; those of its border and tags stay.
+  bool free_surface = false;
   FeatureTags tags;                      ///< of the surface; repeated on the outer sheets
   int max_iterations = 0;                ///< per solve; 0: the default
   double time_limit_seconds = 0;         ///< 0: none
@@ -34,6 +36,8 @@ struct ShellResult {
   std::vector<double> asked;
   std::vector<double> limited;     ///< what there is room for: what the cells' references have
   std::vector<double> achieved;    ///< distance of a column's end from its surface vertex
+  std::vector<double> clearance;   ///< distance of a column's end from the whole surface given
+  double surface_distance_max = 0; ///< of the surface's vertices, where they were free, from where it was
   QualityReport quality;           ///< against `shell_reference(layers, limited)`
   ShellFailures failures;          ///< of all sheets; faces as in `sheet_polygons` of all sheets
   FitReport report;
@@ -47,7 +51,8 @@ struct ShellResult {
 ///   E(x) = mean over cells and their corners of e(F),  F = dx/du A^-1
 ///
 /// is minimised, e being Hencky's energy (`hencky.h`) and A the polygon a cell stands on, as thick as its layer
-/// (`shell_reference`); the surface's own vertices stay. Energies of single cells do not keep sheets apart: where faces
+/// (`shell_reference`); the surface's own vertices stay, or, where they are free, are drawn to it by `ClosestPointEnergy`
+/// (on real surfaces they leave it by a tenth of the thickness at most, `surface_distance_max`). Energies of single cells do not keep sheets apart: where faces
 /// meet afterwards the thickness asked for is lowered, with a bounded slope, and the solve repeated; what still meets in the
 /// end goes back towards the straight columns.
 ///

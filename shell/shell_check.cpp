@@ -46,8 +46,11 @@ TriangleMesh checked_triangles(const PolygonMesh& polygons, std::vector<Index>& 
   return triangulate(polygons, &polygon_of_triangle);
 }
 
-ShellCheck::ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets)
-    : layers_(layers), cells_(cells), polygons_(sheet_polygons(layers, sheets_to_check(layers, sheets))) {}
+ShellCheck::ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets, bool surface_moves)
+    : layers_(layers),
+      cells_(cells),
+      polygons_(sheet_polygons(layers, sheets_to_check(layers, sheets))),
+      surface_moves_(surface_moves) {}
 
 ShellFailures ShellCheck::failures(std::span<const Vec3> positions) const {
   ShellFailures result;
@@ -67,8 +70,13 @@ ShellFailures ShellCheck::failures(std::span<const Vec3> positions) const {
 std::vector<Index> ShellCheck::strands(const ShellFailures& failures) const {
   std::vector<Index> result;
   const auto add = [&](std::span<const Index> vertices) {
-    for (const Index v : vertices)
-      if (const Index strand = layers_.strand(v); strand != kNoIndex) result.push_back(strand);
+    for (const Index v : vertices) {
+      const Index strand = layers_.strand(v), column = static_cast<Index>(v % layers_.num_columns());
+      if (strand != kNoIndex)
+        result.push_back(strand);
+      else if (surface_moves_)
+        result.insert(result.end(), {column, static_cast<Index>(column + layers_.num_columns())});
+    }
   };
   for (const Index c : failures.certificate.not_certified) add(cells_.cell(c));
   for (const auto& pair : failures.intersecting)
@@ -95,9 +103,11 @@ std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, st
     }
     if (!moved) break;  // the safe state was not valid
     grade(layers, shares);
+    const std::size_t n = layers.num_columns();
     for (std::size_t i = 0; i < positions.size(); ++i) {
       const Index strand = layers.strand(static_cast<Index>(i));
-      if (strand != kNoIndex) positions[i] = safe[i] + shares[strand] * (wanted[i] - safe[i]);
+      const double share = strand != kNoIndex ? shares[strand] : std::min(shares[i % n], shares[n + i % n]);
+      positions[i] = safe[i] + share * (wanted[i] - safe[i]);
     }
   }
   if (shares_out) *shares_out = std::move(shares);

@@ -31,7 +31,8 @@ enum class CheckedSheets { outer, all };
 class ShellCheck {
  public:
   /// layers, cells  must outlive the check.
-  ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets);
+  /// surface_moves  whether faces of the surface itself concern the strands that stand on them.
+  ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets, bool surface_moves = false);
 
   /// positions  one per vertex of the cells. Exact but for what quads mean; same answer for any number of threads.
   ShellFailures failures(std::span<const Vec3> positions) const;
@@ -45,13 +46,14 @@ class ShellCheck {
   const ShellLayers& layers_;
   const VolumeMesh& cells_;
   PolygonMesh polygons_;
+  bool surface_moves_;
 };
 
 /// The triangles that stand for polygons in checks. polygon_of_triangle: written.
 TriangleMesh checked_triangles(const PolygonMesh& polygons, std::vector<Index>& polygon_of_triangle);
 
 /// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the wanted
-/// one, less where cells or faces fail.
+/// one, less where cells or faces fail; a vertex of the surface goes the least share of its strands.
 ///
 /// safe  valid by `check`, so that this ends: a failing cell or face always has a strand that can go back farther.
 /// shares  if given: how far each strand got, 0 .. 1.

@@ -19,15 +19,15 @@ std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {
 }
 
 void require_faces(const PolygonMesh& surface) {
-  if (surface.num_faces() == 0) throw InputError("shell: the surface has no faces");
+  if (surface.num_faces() == 0) throw InputError("the surface has no faces");
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
     const auto face = face_of(surface, f);
     if (face.size() != 3 && face.size() != 4)
-      throw InputError("shell: face " + std::to_string(f) + " has " + std::to_string(face.size()) +
+      throw InputError("face " + std::to_string(f) + " has " + std::to_string(face.size()) +
                        " corners; only triangles and quads can be extruded");
     Vec3 area = Vec3::Zero();
     for (std::size_t k = 0; k < face.size(); ++k) area += corner_normal(surface, f, k);
-    if (!(area.norm() > 1e-12)) throw InputError("shell: face " + std::to_string(f) + " has no area");
+    if (!(area.norm() > 1e-12)) throw InputError("face " + std::to_string(f) + " has no area");
   }
 }
 
@@ -149,6 +149,13 @@ CellReference shell_reference(const ShellLayers& layers, std::vector<double> thi
     reference.col(2) = share * height * reference.col(0).cross(reference.col(1)).normalized();
     return reference;
   };
+}
+
+PolygonMesh sheet_surface(const ShellLayers& layers, const VolumeMesh& cells, int sheet) {
+  PolygonMesh surface = layers.surface;
+  for (std::size_t v = 0; v < layers.num_columns(); ++v)
+    surface.positions[v] = cells.positions[layers.vertex(sheet, static_cast<Index>(v))];
+  return surface;
 }
 
 PolygonMesh sheet_polygons(const ShellLayers& layers, std::span<const int> sheets) {

@@ -85,6 +85,9 @@ std::vector<Vec3> straight_columns(const ShellLayers& layers, std::span<const Ve
 /// sheet k. The layers must outlive the result. thickness: per strand, > 0 where there are layers.
 CellReference shell_reference(const ShellLayers& layers, std::vector<double> thickness);
 
+/// One sheet of the cells as a surface like the one they stand on.
+PolygonMesh sheet_surface(const ShellLayers& layers, const VolumeMesh& cells, int sheet);
+
 /// Polygons of the given sheets and of the walls along the surface's border, over the shell's vertices.
 /// Sheet by sheet in the surface's order, then the walls, layer by layer for each border edge. Positions are left empty.
 PolygonMesh sheet_polygons(const ShellLayers& layers, std::span<const int> sheets);

@@ -112,7 +112,7 @@ std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& ch
     if (failures.none()) return positions;
     const std::vector<Index> strands = check.strands(failures);
     if (halving == kMaxHalvings || strands.empty()) {
-      std::string text = "shell: not even a very thin layer fits at vertices";
+      std::string text = "not even a very thin layer fits at vertices";
       for (std::size_t i = 0; i < std::min<std::size_t>(strands.size(), 10); ++i)
         text += (i ? ", " : " ") + std::to_string(strands[i] % n);
       throw InputError(text);

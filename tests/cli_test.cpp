@@ -393,6 +393,7 @@ TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
   CHECK(place.run("shell target.off --thickness nan -o a.mesh").status == 2);
   CHECK(place.run("shell target.off --thickness 1 --layers 0 -o a.mesh").status == 2);
   CHECK(place.run("shell target.off --thickness 1 --side up -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness 1 --order 2 -o a.mesh").err.find("not offered yet") != std::string::npos);
   place.file("few.txt", "1\n2\n");
   const Run few = place.run("shell target.off --thickness-file few.txt -o a.mesh");
   CHECK(few.status == 3);

@@ -286,6 +286,29 @@ TEST_CASE("A shell that is advanced into itself stops short of it", "[shell]") {
   for (std::size_t v = 0; v < layers.num_columns(); ++v) CHECK(shares[v] < 1);
 }
 
+TEST_CASE("A free surface slides where that helps the cells, and stays near where it was", "[shell]") {
+  RandomPoints random(9);
+  TriangleMesh ball = cube_surface(8, true);
+  for (Vec3& p : ball.positions) p = (p + random.point(0.04)).normalized();
+  const PolygonMesh surface = polygons(ball);
+  const ShellResult fixed = make_shell(surface, {.thickness = 0.2, .layers = 2});
+  const ShellResult free = make_shell(surface, {.thickness = 0.2, .layers = 2, .free_surface = true});
+  check_valid(fixed);
+  CHECK(fixed.surface_distance_max < 1e-15);
+  CHECK(free.failures.none());
+  CHECK(check_mesh(free.mesh).valid());
+  CHECK(free.surface_distance_max > 0);
+  CHECK(free.surface_distance_max < 0.02);
+  CHECK(free.quality.mean_scaled_jacobian > fixed.quality.mean_scaled_jacobian);
+
+  // The border of an open surface stays, and so do its tags.
+  const PolygonMesh patch = grid(8, 8, Faces::quads, [](double i, double j) { return Vec3(i / 4, j / 4, i * i / 60); });
+  const ShellResult open = make_shell(patch, {.thickness = 0.3, .free_surface = true, .tags = {{{30, 31}}, {}}});
+  CHECK(open.failures.none());
+  for (const Index v : {0, 1, 8, 9, 30, 31, 80}) CHECK((open.mesh.positions[v] - patch.positions[v]).norm() < 1e-14);
+  CHECK((open.mesh.positions[40] - patch.positions[40]).norm() > 1e-6);
+}
+
 TEST_CASE("Creases and corners are kept on both outer sheets, and borders become creases", "[shell]") {
   const PolygonMesh patch = plane(Faces::quads);
   const FeatureTags tags{{{8, 9, 2.5}}, {{9}}};
