@@ -74,8 +74,8 @@ int main() {
     for (int n : {2, 3}) {
       if (kind == CellKind::tet && n > 2) continue;
       const VolumeMesh mesh = shaken(kind, 24);
-      const std::vector<double> sizes(mesh.num_cells(), 1.0);
-      const VolumeEnergy energy(mesh, sizes, n);
+      const std::vector<Vec3> lengths(mesh.num_cells(), Vec3::Ones());
+      const VolumeEnergy energy(mesh, lengths, n);
       const ElementRule rule = make_element_rule(kind, n);
       const double points = static_cast<double>(mesh.num_cells() * rule.num_points());
       std::vector<Vec3> gradient(mesh.num_vertices(), Vec3::Zero());

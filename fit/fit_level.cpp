@@ -4,8 +4,6 @@
 #include "subvol/limit_surface.h"
 #include "subvol/mesh_topology.h"
 
-#include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -115,49 +113,26 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   return level;
 }
 
-double cell_volume(const VolumeMesh& mesh, std::size_t c) {
-  const CellTopology& topology = cell_topology(mesh.kinds[c]);
-  const auto cell = mesh.cell(c);
-  const Vec3 origin = mesh.positions[cell[0]];
-  double volume = 0;
-  for (int f = 0; f < topology.num_faces; ++f) {
-    const int n = topology.face_sizes[f];
-    Vec3 center = Vec3::Zero();
-    for (int i = 0; i < n; ++i) center += mesh.positions[cell[topology.faces[f][i]]] - origin;
-    center /= n;
-    for (int i = 0; i < n; ++i) {
-      const Vec3 a = mesh.positions[cell[topology.faces[f][i]]] - origin;
-      const Vec3 b = mesh.positions[cell[topology.faces[f][(i + 1) % n]]] - origin;
-      volume += center.dot(a.cross(b)) / 6;
-    }
-  }
-  return volume;
-}
-
-std::vector<double> child_sizes(const VolumeMesh& template_mesh, double volume, double blend) {
-  std::vector<double> sizes;
-  for (std::size_t c = 0; c < template_mesh.num_cells(); ++c) {
-    const int children = cell_topology(template_mesh.kinds[c]).num_vertices;
-    const double own = std::cbrt(std::max(cell_volume(template_mesh, c), 0.0) / children);
-    sizes.insert(sizes.end(), children, own);
-  }
-  const double common = std::cbrt(volume / static_cast<double>(sizes.size()));
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, bool own) {
+  constexpr int kEdges[3][4][2] = {
+      {{0, 1}, {3, 2}, {4, 5}, {7, 6}}, {{0, 3}, {1, 2}, {4, 7}, {5, 6}}, {{0, 4}, {1, 5}, {2, 6}, {3, 7}}};
+  constexpr double kLeastShare = 1e-3;
+  const double common = std::cbrt(volume / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1)));
+  std::vector<Vec3> boxes(mesh.num_cells(), Vec3::Constant(common));
+  if (!own) return boxes;
   double total = 0;
-  for (double& h : sizes) {
-    // A cell of no volume asks for no size of its own.
-    h = std::pow(common, 1 - blend) * std::pow(std::max(h, 1e-3 * common), blend);
-    total += h * h * h;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const auto cell = mesh.cell(c);
+    for (int i = 0; i < 3; ++i) {
+      double sum = 0;
+      for (const auto& edge : kEdges[i]) sum += (nodes[cell[edge[1]]] - nodes[cell[edge[0]]]).norm();
+      boxes[c][i] = std::max(sum / 4, kLeastShare * common);
+    }
+    total += boxes[c].prod();
   }
   const double scale = std::cbrt(volume / total);
-  for (double& h : sizes) h *= scale;
-  return sizes;
-}
-
-std::vector<double> refined_sizes(std::span<const double> sizes) {
-  std::vector<double> result;
-  result.reserve(8 * sizes.size());
-  for (double h : sizes) result.insert(result.end(), 8, h / 2);
-  return result;
+  for (Vec3& h : boxes) h *= scale;
+  return boxes;
 }
 
 }  // namespace subvol

@@ -38,16 +38,16 @@ struct FitLevel {
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);
 
-/// Ideal edge length of each of the template's cells' children, between common (blend 0) and the cell's own (blend 1):
+/// Edge lengths of the ideal box of each hex.
 ///
-///   h_c = common^(1 - blend) * own_c^blend,  rescaled so that the children's volumes h_c^3 sum up to `volume`
+///   own:  h_ci = mean length of the cell's four edges along its direction i, all rescaled so that
+///         sum_c h_c0 h_c1 h_c2 = volume
+///   else: (volume / number of cells)^(1/3) three times
 ///
-/// One entry per child cell of the first refinement; later levels halve (`refined_sizes`).
-std::vector<double> child_sizes(const VolumeMesh& template_mesh, double volume, double blend);
-/// Eight children of half the size for each entry.
-std::vector<double> refined_sizes(std::span<const double> sizes);
-
-/// Volume of one cell (its quads bilinear), in the mesh's unit cubed; negative when turned inside out.
-double cell_volume(const VolumeMesh& mesh, std::size_t cell);
+/// A box of the cell's own proportions has the cell pay for shear and for change, not for being long or flat.
+///
+/// mesh    hexes only; nodes  its vertices' positions; lengths below a thousandth of the common size are raised to it.
+/// volume  > 0, in the cube of the nodes' unit.
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, bool own);
 
 }  // namespace subvol

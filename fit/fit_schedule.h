@@ -3,7 +3,6 @@
 
 #include "fit/subdivision_fit.h"
 
-#include <span>
 #include <vector>
 
 namespace subvol {
@@ -33,7 +32,7 @@ inline constexpr int kLbfgsSteps = 30;
 /// A stiff start (lambda > 0.05) shrinks and rounds the template and loses features that never come back, so it is kept
 /// for templates that are really far.
 struct FitSchedule {
-  double size_blend = 0;  ///< ideal sizes: 0 common, 1 each template cell's own (see `child_sizes`)
+  bool own_boxes = false;  ///< whether level 1 takes the template cells' own boxes for ideal, not cubes (`ideal_boxes`)
   int levels = 0;
   std::vector<Stage> first, middle, last;  ///< of level 1, of the levels between, of the finest level
   Stage continuation;
@@ -47,11 +46,7 @@ struct FitSchedule {
   double fraction(int number) const;
 };
 
-/// distance     mean distance of template and target by the target's length V/A.
-/// size_spread  standard deviation of the logarithm of the template cells' own sizes (`child_sizes` with blend 1).
-FitSchedule make_schedule(const FitOptions& options, double distance, double size_spread);
-
-/// Standard deviation of the logarithms of positive numbers; 0 for none.
-double logarithmic_spread(std::span<const double> sizes);
+/// distance  mean distance of template and target by the target's length V/A.
+FitSchedule make_schedule(const FitOptions& options, double distance);
 
 }  // namespace subvol

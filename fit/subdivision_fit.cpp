@@ -121,7 +121,7 @@ class SubdivisionFit {
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
-  std::vector<double> sizes_;      ///< ideal sizes of the current level's cells
+  std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
   FitSchedule schedule_;
   int number_ = 0;                 ///< of the level of the finite element mesh
   FitLevel level_;
@@ -166,8 +166,7 @@ void SubdivisionFit::look_over_template() {
   const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), target_mesh_, target_tree_);
   report.initial_distance_mean_percent = 100 * distance.mean();
   report.initial_distance_max_percent = 100 * distance.max();
-  schedule_ = make_schedule(options_, distance.mean() / target_.length(),
-                            logarithmic_spread(child_sizes(control_, target_.volume(), 1)));
+  schedule_ = make_schedule(options_, distance.mean() / target_.length());
   if (target_.volume_source() != VolumeSource::signed_sum)
     report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
 }
@@ -184,7 +183,8 @@ void SubdivisionFit::prepare_level() {
   level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size() / 2, finest());
   limit_check_.reset();
   sample_target(level_.samples.num_rows());
-  sizes_ = number_ == 1 ? child_sizes(control_, target_.volume(), schedule_.size_blend) : refined_sizes(sizes_);
+  ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.volume(),
+                             number_ > 1 || schedule_.own_boxes);
   seconds_["levels"] += seconds_since(begin);
 }
 
@@ -213,7 +213,7 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   record.cells = level_.mesh.num_cells();
 
   FitProblem problem(level_.nodes, level_.samples, level_.mesh,
-                     VolumeEnergy(level_.mesh, sizes_, schedule_.quadrature_points(number_)),
+                     VolumeEnergy(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_)),
                      surface_term(stage), stage.lambda);
   MinimizerOptions options;
   options.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;

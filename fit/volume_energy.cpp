@@ -39,16 +39,16 @@ std::vector<int> color_cells(const VolumeMesh& mesh) {
   return colors;
 }
 
-/// J_q of all lanes: J = sum_a x_a g_a^T / h.
-inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes], const double* inverse_h,
-                      double (*jacobian)[kLanes]) {
+/// J_q of all lanes: J = sum_a x_a g_a^T diag(1/h).
+inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes],
+                      const double (*inverse_h)[kLanes], double (*jacobian)[kLanes]) {
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) {
       double sum[kLanes] = {};
       for (const ElementRule::Entry& entry : entries)
 #pragma omp simd
         for (int l = 0; l < kLanes; ++l) sum[l] += entry.gradient[c] * x[entry.vertex][r][l];
-      for (int l = 0; l < kLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[l];
+      for (int l = 0; l < kLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[c][l];
     }
 }
 
@@ -83,18 +83,19 @@ inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
     }
 }
 
-/// Adds K_ab = U Z_ab U^T for the active vertices of one point, a <= b: with w_a = V^T grad N_a / h,
+/// Adds K_ab = U Z_ab U^T for the active vertices of one point, a <= b: with w_a = V^T diag(1/h) grad N_a,
 ///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi.
-void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch, const double* inverse_h,
-                       const double* weight, double (*k)[9][kLanes]) {
+void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
+                       const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
   constexpr int kPairs = kMaxCellVertices;
   alignas(64) double w[kPairs][3][kLanes];
   for (std::size_t a = 0; a < entries.size(); ++a)
     for (int i = 0; i < 3; ++i)
 #pragma omp simd
       for (int l = 0; l < kLanes; ++l)
-        w[a][i][l] = inverse_h[l] * (batch.v[i][l] * entries[a].gradient[0] + batch.v[3 + i][l] * entries[a].gradient[1] +
-                                     batch.v[6 + i][l] * entries[a].gradient[2]);
+        w[a][i][l] = batch.v[i][l] * inverse_h[0][l] * entries[a].gradient[0] +
+                     batch.v[3 + i][l] * inverse_h[1][l] * entries[a].gradient[1] +
+                     batch.v[6 + i][l] * inverse_h[2][l] * entries[a].gradient[2];
   for (std::size_t a = 0; a < entries.size(); ++a)
     for (std::size_t b = a; b < entries.size(); ++b) {
       double (*block)[kLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
@@ -124,19 +125,20 @@ void add_point_hessian(std::span<const ElementRule::Entry> entries, const Hencky
 
 /// Adds the stresses of one point to the gradients of its active vertices.
 inline void add_point_gradient(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
-                               const double* factor, double (*g)[3][kLanes]) {
+                               const double (*factor)[kLanes], double (*g)[3][kLanes]) {
   for (const ElementRule::Entry& entry : entries)
     for (int r = 0; r < 3; ++r)
 #pragma omp simd
       for (int l = 0; l < kLanes; ++l)
         g[entry.vertex][r][l] +=
-            factor[l] * (batch.stress[3 * r][l] * entry.gradient[0] + batch.stress[3 * r + 1][l] * entry.gradient[1] +
-                         batch.stress[3 * r + 2][l] * entry.gradient[2]);
+            factor[0][l] * batch.stress[3 * r][l] * entry.gradient[0] +
+            factor[1][l] * batch.stress[3 * r + 1][l] * entry.gradient[1] +
+            factor[2][l] * batch.stress[3 * r + 2][l] * entry.gradient[2];
 }
 
 }  // namespace
 
-VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal_sizes, int points_per_direction)
+VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction)
     : num_nodes_(mesh.num_vertices()),
       kinds_(mesh.kinds),
       cell_offsets_(mesh.cell_offsets),
@@ -144,13 +146,13 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal
       weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
       points_(mesh.num_cells(), points_per_direction),
       colors_(color_cells(mesh)) {
-  if (ideal_sizes.size() != mesh.num_cells())
-    throw InputError("VolumeEnergy: ideal_sizes must hold one length per cell (" + std::to_string(mesh.num_cells()) +
-                     "), got " + std::to_string(ideal_sizes.size()));
-  inverse_sizes_.reserve(ideal_sizes.size());
-  for (double h : ideal_sizes) {
-    if (!(h > 0) || !std::isfinite(h)) throw InputError("VolumeEnergy: ideal_sizes must be positive and finite");
-    inverse_sizes_.push_back(1 / h);
+  if (ideal_lengths.size() != mesh.num_cells())
+    throw InputError("VolumeEnergy: ideal_lengths must hold one entry per cell (" + std::to_string(mesh.num_cells()) +
+                     "), got " + std::to_string(ideal_lengths.size()));
+  inverse_lengths_.reserve(ideal_lengths.size());
+  for (const Vec3& h : ideal_lengths) {
+    if (!(h.minCoeff() > 0) || !h.allFinite()) throw InputError("VolumeEnergy: ideal_lengths must be positive and finite");
+    inverse_lengths_.push_back(h.cwiseInverse());
   }
   find_pattern(mesh);
   rebuild_groups();
@@ -161,7 +163,7 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int 
       kinds_(mesh.kinds),
       cell_offsets_(mesh.cell_offsets),
       cell_vertices_(mesh.cell_vertices),
-      inverse_sizes_(mesh.num_cells(), 1.0),
+      inverse_lengths_(mesh.num_cells(), Vec3::Ones()),
       weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
       reference_(std::move(reference)),
       points_(mesh.num_cells(), points_per_direction),
@@ -260,10 +262,11 @@ double VolumeEnergy::sum_batches(PerBatch&& per_batch) const {
 
 double VolumeEnergy::value(std::span<const Vec3> nodes) const {
   return sum_batches([&](const Group& group, std::size_t b) {
-    alignas(64) double x[kMaxCellVertices][3][kLanes], inverse_h[kLanes];
+    alignas(64) double x[kMaxCellVertices][3][kLanes], inverse_h[3][kLanes];
     HenckyBatch hencky;
     gather(group, b, nodes, x);
-    for (int l = 0; l < kLanes; ++l) inverse_h[l] = inverse_sizes_[group.batches[b][l]];
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = inverse_lengths_[group.batches[b][l]][c];
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
@@ -280,11 +283,12 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
   // Feasibility is known only at the end: gather into a copy, so that an infeasible state adds nothing.
   std::vector<Vec3> local(num_nodes_, Vec3::Zero());
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
-    alignas(64) double x[kMaxCellVertices][3][kLanes], g[kMaxCellVertices][3][kLanes] = {}, inverse_h[kLanes],
-        factor[kLanes];
+    alignas(64) double x[kMaxCellVertices][3][kLanes], g[kMaxCellVertices][3][kLanes] = {}, inverse_h[3][kLanes],
+        factor[3][kLanes];
     HenckyBatch hencky;
     gather(group, b, nodes, x);
-    for (int l = 0; l < kLanes; ++l) inverse_h[l] = inverse_sizes_[group.batches[b][l]];
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = inverse_lengths_[group.batches[b][l]][c];
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
@@ -293,7 +297,7 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
       if (reference_) multiply_transposed(hencky.stress, group.reference(b, q));
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
-        factor[l] = scale * w * inverse_h[l];
+        for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * inverse_h[c][l];
         if (l < group.active[b]) sum += w * hencky.energy[l];
       }
       add_point_gradient(group.rule.point(q), hencky, factor, g);
@@ -316,14 +320,15 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
                                  BlockSparse& hessian) const {
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
     constexpr int n_max = kMaxCellVertices;
-    alignas(64) double x[n_max][3][kLanes], g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], inverse_h[kLanes],
-        factor[kLanes], weight[kLanes];
+    alignas(64) double x[n_max][3][kLanes], g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], inverse_h[3][kLanes],
+        factor[3][kLanes], weight[kLanes];
     HenckyBatch hencky;
     gather(group, b, nodes, x);
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int a = 0; a < n; ++a)
       for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
-    for (int l = 0; l < kLanes; ++l) inverse_h[l] = inverse_sizes_[group.batches[b][l]];
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = inverse_lengths_[group.batches[b][l]][c];
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
@@ -336,7 +341,7 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         weight[l] = scale * w;
-        factor[l] = scale * w * inverse_h[l];
+        for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * inverse_h[c][l];
         if (l < group.active[b]) sum += w * hencky.energy[l];
       }
       add_point_gradient(group.rule.point(q), hencky, factor, g);
@@ -370,9 +375,9 @@ double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3>
   for (int n = 0; n <= kMaxSteps; ++n) step[n] = limit * std::pow(kShrink, n);
   std::atomic<int> steps{0};  // step[steps] is safe for every point seen so far
   sum_batches([&](const Group& group, std::size_t b) {
-    alignas(64) double x[kMaxCellVertices][3][kLanes], d[kMaxCellVertices][3][kLanes], ones[kLanes];
+    alignas(64) double x[kMaxCellVertices][3][kLanes], d[kMaxCellVertices][3][kLanes], ones[3][kLanes];
     double jx[9][kLanes], jd[9][kLanes];
-    std::fill_n(ones, kLanes, 1.0);
+    std::fill_n(&ones[0][0], 3 * kLanes, 1.0);
     gather(group, b, nodes, x);
     gather(group, b, direction, d);
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {

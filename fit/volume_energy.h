@@ -17,17 +17,17 @@ namespace subvol {
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
-/// e is the Hencky energy (`hencky.h`), J_cq the Jacobian of cell c at quadrature point q against the ideal cell of edge
-/// length h_c (`element_rule.h`), or against a reference of its own. Dimensionless, >= 0, +infinity where a determinant
-/// is not positive at a point.
+/// e is the Hencky energy (`hencky.h`), J_cq the Jacobian of cell c at quadrature point q against its ideal cell: that of
+/// edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a hex's is the box of edges h_c), or a
+/// reference of its own. Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
 ///
 /// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
 /// number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
 class VolumeEnergy {
  public:
-  /// ideal_sizes  one positive edge length per cell, in the mesh's unit, else InputError. Cells weigh equally.
+  /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError. Cells weigh equally.
   /// points_per_direction  >= 2; 2: corners only.
-  VolumeEnergy(const VolumeMesh& mesh, std::span<const double> ideal_sizes, int points_per_direction);
+  VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction);
   /// reference  kept and asked again by `densify`. Cells weigh equally, so that small ones keep their shape too.
   /// InputError: a reference whose determinant is not positive.
   VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction);
@@ -76,7 +76,8 @@ class VolumeEnergy {
   std::vector<CellKind> kinds_;
   std::vector<std::size_t> cell_offsets_;
   std::vector<Index> cell_vertices_;
-  std::vector<double> inverse_sizes_, weights_;
+  std::vector<Vec3> inverse_lengths_;
+  std::vector<double> weights_;
   CellReference reference_;        ///< empty: ideal cells
   std::vector<int> points_;        ///< points per direction of each cell
   std::vector<int> colors_;

@@ -112,8 +112,8 @@ TEST_CASE("Element rules integrate constants and reproduce affine maps for every
 TEST_CASE("The volume energy of an ideal cell is zero and that of a scaled one is known") {
   for (CellKind kind : kKinds) {
     VolumeMesh mesh = single_cell(kind);
-    const std::vector<double> sizes = {1.0};
-    const VolumeEnergy energy(mesh, sizes, 3);
+    const std::vector<Vec3> lengths = {Vec3::Ones()};
+    const VolumeEnergy energy(mesh, lengths, 3);
     CHECK(energy.value(mesh.positions) < 1e-28);
     for (Vec3& p : mesh.positions) p *= 2;
     CHECK(energy.value(mesh.positions) == Approx(1.5 * std::log(2) * std::log(2)).epsilon(1e-13));
@@ -122,14 +122,21 @@ TEST_CASE("The volume energy of an ideal cell is zero and that of a scaled one i
   }
 }
 
+TEST_CASE("A box costs nothing where a box of its lengths is ideal") {
+  VolumeMesh mesh = single_cell(CellKind::hex);
+  const std::vector<Vec3> lengths = {Vec3(3, 0.2, 1)};
+  for (Vec3& p : mesh.positions) p = p.cwiseProduct(lengths[0]);
+  CHECK(VolumeEnergy(mesh, lengths, 3).value(mesh.positions) < 1e-28);
+}
+
 TEST_CASE("Gradient and Hessian of the volume energy agree with differences for every kind") {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   for (CellKind kind : kKinds)
     for (int n : {2, 3}) {
       VolumeMesh mesh = single_cell(kind);
-      const std::vector<double> sizes = {1.0};
-      const VolumeEnergy energy(mesh, sizes, n);
+      const std::vector<Vec3> lengths = {Vec3(1.1, 0.9, 1.05)};
+      const VolumeEnergy energy(mesh, lengths, n);
       std::vector<Vec3> x = mesh.positions, d(x.size());
       for (Vec3& p : x) p = 1.5 * p + 0.03 * Vec3(normal(random), normal(random), normal(random));
       for (Vec3& p : d) p = Vec3(normal(random), normal(random), normal(random));
@@ -193,8 +200,8 @@ TEST_CASE("Against references of their own, cells are undistorted in that shape,
 
 TEST_CASE("A step of the size that max_step allows stays feasible, a longer one may not") {
   VolumeMesh mesh = single_cell(CellKind::hex);
-  const std::vector<double> sizes = {1.0};
-  const VolumeEnergy energy(mesh, sizes, 2);
+  const std::vector<Vec3> lengths = {Vec3::Ones()};
+  const VolumeEnergy energy(mesh, lengths, 2);
   std::vector<Vec3> d(mesh.positions.size(), Vec3::Zero());
   d[6] = Vec3(-2, -2, -2);
   const double t = energy.max_step(mesh.positions, d);
@@ -209,7 +216,7 @@ TEST_CASE("A step of the size that max_step allows stays feasible, a longer one 
 TEST_CASE("Element rules and volume energies refuse what they cannot use") {
   const VolumeMesh mesh = single_cell(CellKind::hex);
   CHECK_THROWS(make_element_rule(CellKind::hex, 1));
-  CHECK_THROWS(VolumeEnergy(mesh, std::vector<double>{}, 2));
-  CHECK_THROWS(VolumeEnergy(mesh, std::vector<double>{-1.0}, 2));
-  CHECK_THROWS(VolumeEnergy(mesh, std::vector<double>{std::nan("")}, 2));
+  CHECK_THROWS(VolumeEnergy(mesh, std::vector<Vec3>{}, 2));
+  CHECK_THROWS(VolumeEnergy(mesh, std::vector<Vec3>{Vec3(1, -1, 1)}, 2));
+  CHECK_THROWS(VolumeEnergy(mesh, std::vector<Vec3>{Vec3(1, 1, std::nan(""))}, 2));
 }

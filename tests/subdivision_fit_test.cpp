@@ -211,17 +211,20 @@ TEST_CASE("A fit refuses options out of range, empty targets and unusable templa
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, inverted, {}), InputError);
 }
 
-TEST_CASE("Ideal sizes fill the volume asked for at any blend") {
-  const VolumeMesh mesh = mixed_cells();
-  for (double blend : {0.0, 0.5, 1.0}) {
-    const std::vector<double> sizes = child_sizes(mesh, 3.0, blend);
+TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proportions") {
+  const SubdivisionLevel level = subdivide(mixed_cells());
+  const std::vector<Vec3> nodes = level.linear_split.apply(mixed_cells().positions);
+  for (bool own : {false, true}) {
     double total = 0;
-    for (double h : sizes) total += h * h * h;
+    for (const Vec3& h : ideal_boxes(level.fine, nodes, 3.0, own)) total += h.prod();
     CHECK(total == Approx(3).epsilon(1e-12));
-    double refined = 0;
-    for (double h : refined_sizes(sizes)) refined += h * h * h;
-    CHECK(refined == Approx(3).epsilon(1e-12));
   }
+  const VolumeMesh cube = lattice(1, 1, 1);
+  std::vector<Vec3> stretched = cube.positions;
+  for (Vec3& p : stretched) p = p.cwiseProduct(Vec3(4, 1, 2));
+  CHECK((ideal_boxes(cube, stretched, 1.0, true)[0] - Vec3(2, 0.5, 1)).norm() < 1e-14);
+  CHECK((ideal_boxes(cube, stretched, 1.0, false)[0] - Vec3::Ones()).norm() < 1e-14);
+  CHECK(ideal_boxes(cube, std::vector<Vec3>(8, Vec3::Zero()), 1.0, true)[0].allFinite());
 }
 
 TEST_CASE("Real cases fit with certified cells", "[data]") {
