@@ -113,20 +113,20 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   return level;
 }
 
-std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, bool own) {
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
+                              double own_share) {
   constexpr int kEdges[3][4][2] = {
       {{0, 1}, {3, 2}, {4, 5}, {7, 6}}, {{0, 3}, {1, 2}, {4, 7}, {5, 6}}, {{0, 4}, {1, 5}, {2, 6}, {3, 7}}};
   constexpr double kLeastShare = 1e-3;
   const double common = std::cbrt(volume / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1)));
-  std::vector<Vec3> boxes(mesh.num_cells(), Vec3::Constant(common));
-  if (!own) return boxes;
+  std::vector<Vec3> boxes(mesh.num_cells());
   double total = 0;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const auto cell = mesh.cell(c);
     for (int i = 0; i < 3; ++i) {
       double sum = 0;
       for (const auto& edge : kEdges[i]) sum += (nodes[cell[edge[1]]] - nodes[cell[edge[0]]]).norm();
-      boxes[c][i] = std::max(sum / 4, kLeastShare * common);
+      boxes[c][i] = common * std::pow(std::max(sum / (4 * common), kLeastShare), own_share);
     }
     total += boxes[c].prod();
   }

@@ -38,16 +38,15 @@ struct FitLevel {
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);
 
-/// Edge lengths of the ideal box of each hex.
+/// Edge lengths of the ideal box of each hex, between a cube of common size (own_share 0) and the cell's own (1):
 ///
-///   own:  h_ci = mean length of the cell's four edges along its direction i, all rescaled so that
-///         sum_c h_c0 h_c1 h_c2 = volume
-///   else: (volume / number of cells)^(1/3) three times
+///   h_ci = common^(1 - own_share) own_ci^own_share,  all rescaled so that sum_c h_c0 h_c1 h_c2 = volume
 ///
-/// A box of the cell's own proportions has the cell pay for shear and for change, not for being long or flat.
+/// own_ci is the mean length of the cell's four edges along its direction i. A box of the cell's own proportions has the
+/// cell pay for shear and for change, not for being long or flat.
 ///
 /// mesh    hexes only; nodes  its vertices' positions; lengths below a thousandth of the common size are raised to it.
 /// volume  > 0, in the cube of the nodes' unit.
-std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, bool own);
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, double own_share);
 
 }  // namespace subvol

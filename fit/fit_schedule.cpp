@@ -29,7 +29,7 @@ double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - 
 FitSchedule make_schedule(const FitOptions& options, double distance) {
   FitSchedule schedule;
   schedule.levels = options.levels;
-  schedule.own_boxes = distance < kCloseDistance;
+  schedule.own_box_shares = distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
   const double coarse = std::max(kCoarseLambda, options.lambda_close);
   schedule.first = {{coarse, kFarTangentialWeight, 20, kCoarseDecrease}, {coarse, kCloseTangentialWeight, 20, kCoarseDecrease}};
   schedule.middle = {{coarse, kCloseTangentialWeight, 20, kCoarseDecrease}};

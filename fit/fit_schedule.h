@@ -32,7 +32,9 @@ inline constexpr int kLbfgsSteps = 30;
 /// A stiff start (lambda > 0.05) shrinks and rounds the template and loses features that never come back, so it is kept
 /// for templates that are really far.
 struct FitSchedule {
-  bool own_boxes = false;  ///< whether level 1 takes the template cells' own boxes for ideal, not cubes (`ideal_boxes`)
+  /// How much level 1 takes the template cells' own boxes for ideal (`ideal_boxes`); each further entry is another try,
+  /// for templates that cannot be refined without inverting a cell with those before.
+  std::vector<double> own_box_shares;
   int levels = 0;
   std::vector<Stage> first, middle, last;  ///< of level 1, of the levels between, of the finest level
   Stage continuation;

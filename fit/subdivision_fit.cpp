@@ -93,6 +93,8 @@ class SubdivisionFit {
 
  private:
   void look_over_template();
+  void begin(double own_box_share);
+  bool run_levels();
   void prepare_level();
   bool start_level();
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
@@ -116,11 +118,13 @@ class SubdivisionFit {
   TriangleMesh target_mesh_;
   ClosestPoint target_tree_;
   TargetSurface target_;           ///< sampled for the current level
+  VolumeMesh template_;            ///< normalised, with its creases
   VolumeMesh control_;             ///< the control mesh (its last refinement, for cage-only fits)
   VolumeMesh cage_;                ///< the mesh whose vertices are the unknowns
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
+  double own_box_share_ = 0;       ///< of the current try
   std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
   FitSchedule schedule_;
   int number_ = 0;                 ///< of the level of the finite element mesh
@@ -139,30 +143,26 @@ SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& tem
       target_mesh_(normalised(target, normalisation_)),
       target_tree_(target_mesh_),
       target_(target_mesh_),
-      control_(template_mesh) {
+      template_(template_mesh) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
-  control_.positions = normalisation_.to_unit(control_.positions);
+  template_.positions = normalisation_.to_unit(template_.positions);
   if (options.crease_angle_degrees) {
-    control_.tags = merge_tags(control_.tags, features_by_angle(control_, *options.crease_angle_degrees));
+    template_.tags = merge_tags(template_.tags, features_by_angle(template_, *options.crease_angle_degrees));
     // A crease added at one corner can leave a wide span at another.
     for (int round = 0; round < kMaxUnfoldings; ++round) {
-      const SubdivisionAudit found = audit(control_);
+      const SubdivisionAudit found = audit(template_);
       if (found.folding_edges.empty()) break;
-      control_.tags = unfolding_tags(control_, found);
+      template_.tags = unfolding_tags(template_, found);
     }
   }
-  cage_ = control_;
-  unknowns_ = control_.positions;
-  from_unknowns_ = identity_map(unknowns_.size());
-  previous_nodes_ = from_unknowns_;
 }
 
 /// What the report says of the input, and what the schedule makes of it.
 void SubdivisionFit::look_over_template() {
   FitReport& report = result_.report;
-  report.warnings = audit(control_).warnings;
-  const TriangleMesh boundary = refined_triangles(boundary_surface(control_, MeshTopology(control_)));
+  report.warnings = audit(template_).warnings;
+  const TriangleMesh boundary = refined_triangles(boundary_surface(template_, MeshTopology(template_)));
   const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), target_mesh_, target_tree_);
   report.initial_distance_mean_percent = 100 * distance.mean();
   report.initial_distance_max_percent = 100 * distance.max();
@@ -184,7 +184,7 @@ void SubdivisionFit::prepare_level() {
   limit_check_.reset();
   sample_target(level_.samples.num_rows());
   ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.volume(),
-                             number_ > 1 || schedule_.own_boxes);
+                             number_ == 1 ? own_box_share_ : 1);
   seconds_["levels"] += seconds_since(begin);
 }
 
@@ -388,9 +388,16 @@ void SubdivisionFit::next_control() {
   previous_nodes_ = options_.surface == FittedSurface::limit ? limit_map(control_) : from_unknowns_;
 }
 
-FitResult SubdivisionFit::run() {
-  FitReport& report = result_.report;
-  look_over_template();
+/// Unknowns are the template's vertices.
+void SubdivisionFit::begin(double own_box_share) {
+  own_box_share_ = own_box_share;
+  control_ = cage_ = template_;
+  unknowns_ = control_.positions;
+  from_unknowns_ = previous_nodes_ = identity_map(unknowns_.size());
+}
+
+/// One try at all levels, with one choice of ideal cells. False where it ended early.
+bool SubdivisionFit::run_levels() {
   bool going = true;
   for (number_ = 1; going; ++number_) {
     prepare_level();
@@ -399,7 +406,28 @@ FitResult SubdivisionFit::run() {
     if (finest() || (going && meets_tolerance())) break;
     if (going) next_control();
   }
-  if (going) {
+  return going;
+}
+
+FitResult SubdivisionFit::run() {
+  look_over_template();
+  bool done = false;
+  std::optional<FitResult> best;  // of the tries that stalled: the one that got to the finest mesh
+  for (double share : schedule_.own_box_shares) {
+    begin(share);
+    done = run_levels();
+    if (done || result_.report.stop_reason != StopReason::stalled) {
+      best.reset();
+      break;
+    }
+    if (!best || result_.mesh.num_cells() > best->mesh.num_cells()) best = result_;
+  }
+  if (best) {
+    best->report.stages = std::move(result_.report.stages);
+    result_ = std::move(*best);
+  }
+  FitReport& report = result_.report;
+  if (done) {
     const double mean = measured_mean();
     const bool missed = options_.tolerance_percent && mean > *options_.tolerance_percent;
     report.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/boundary_triangles.h"
 #include "fit/element_rule.h"
-#include "fit/fit_level.h"
+#include "fit/enclosed_volume.h"
 #include "fit/mesh_check.h"
 #include "shell/ray_gap.h"
 #include "shell/shell.h"
 #include "shell/thickness.h"
 #include "shell/visible_normals.h"
+#include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/surface_io.h"
 #include "tests/data.h"
@@ -66,9 +67,8 @@ PolygonMesh plane(Faces faces) {
 }
 
 double volume(const VolumeMesh& mesh) {
-  double sum = 0;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) sum += cell_volume(mesh, c);
-  return sum;
+  const TriangleMesh boundary = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
+  return signed_volume(boundary.positions, boundary.triangles);
 }
 
 /// Least det J on a dense grid of points, relative to nothing: only its sign counts.

@@ -214,7 +214,7 @@ TEST_CASE("A fit refuses options out of range, empty targets and unusable templa
 TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proportions") {
   const SubdivisionLevel level = subdivide(mixed_cells());
   const std::vector<Vec3> nodes = level.linear_split.apply(mixed_cells().positions);
-  for (bool own : {false, true}) {
+  for (double own : {0.0, 0.5, 1.0}) {
     double total = 0;
     for (const Vec3& h : ideal_boxes(level.fine, nodes, 3.0, own)) total += h.prod();
     CHECK(total == Approx(3).epsilon(1e-12));
@@ -222,9 +222,9 @@ TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proport
   const VolumeMesh cube = lattice(1, 1, 1);
   std::vector<Vec3> stretched = cube.positions;
   for (Vec3& p : stretched) p = p.cwiseProduct(Vec3(4, 1, 2));
-  CHECK((ideal_boxes(cube, stretched, 1.0, true)[0] - Vec3(2, 0.5, 1)).norm() < 1e-14);
-  CHECK((ideal_boxes(cube, stretched, 1.0, false)[0] - Vec3::Ones()).norm() < 1e-14);
-  CHECK(ideal_boxes(cube, std::vector<Vec3>(8, Vec3::Zero()), 1.0, true)[0].allFinite());
+  CHECK((ideal_boxes(cube, stretched, 1.0, 1)[0] - Vec3(2, 0.5, 1)).norm() < 1e-14);
+  CHECK((ideal_boxes(cube, stretched, 1.0, 0)[0] - Vec3::Ones()).norm() < 1e-14);
+  CHECK(ideal_boxes(cube, std::vector<Vec3>(8, Vec3::Zero()), 1.0, 1)[0].allFinite());
 }
 
 TEST_CASE("Real cases fit with certified cells", "[data]") {
