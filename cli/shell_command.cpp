@@ -7,9 +7,8 @@
 #include "cli/outputs.h"
 #include "cli/progress.h"
 #include "cli/report.h"
+#include "cli/shell_output.h"
 #include "cli/writing.h"
-#include "export/gltf_writer.h"
-#include "export/volume_writer.h"
 #include "fit/surface_distance.h"
 #include "fit/target_surface.h"
 #include "shell/shell.h"
@@ -17,6 +16,7 @@
 #include "subvol/error.h"
 #include "subvol/features.h"
 #include "subvol/mesh_io.h"
+#include "subvol/subdivision.h"
 #include "subvol/surface_io.h"
 #include "subvol/text_scanner.h"
 #include "subvol/version.h"
@@ -65,17 +65,6 @@ bool faces_point_inward(const TriangleMesh& surface) {
   return volume < 0;
 }
 
-/// What the thicknesses of one side are, in the mesh's unit.
-struct ThicknessFigures {
-  double mean = 0, least = 0, most = 0;
-
-  explicit ThicknessFigures(std::span<const double> thickness) {
-    for (const double t : thickness) mean += t / static_cast<double>(thickness.size());
-    least = *std::min_element(thickness.begin(), thickness.end());
-    most = *std::max_element(thickness.begin(), thickness.end());
-  }
-};
-
 /// One shell from its file to its files.
 class ShellRun {
  public:
@@ -87,6 +76,7 @@ class ShellRun {
   void grow();
   void write();
   void check();
+  void check_subdivided();
   void write_report() const;
   void summarise() const;
   int status() const;
@@ -94,15 +84,6 @@ class ShellRun {
   void warn(std::size_t first = 0) const;
 
   std::vector<double> thickness_from_file() const;
-  /// Values per strand as values per vertex; those of the surface itself are the larger of both sides.
-  std::vector<double> by_vertex(const std::vector<double>& by_strand) const;
-  void write_output(const Output& output, const WritingOptions& writing) const;
-  Scene scene(const Output& output, const WritingOptions& writing) const;
-  /// Calls visit(name, first strand) for every side that has layers.
-  template <class Visit>
-  void for_each_side(const Visit& visit) const;
-  Json thickness_json() const;
-
   const ShellArguments& arguments_;
   const CLI::App& verb_;
   Clock::time_point start_ = Clock::now();
@@ -112,6 +93,7 @@ class ShellRun {
   double diagonal_ = 0;
   ShellResult result_;
   ShellFailures failures_;
+  std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
   Json seconds_ = Json::object();
 };
 
@@ -187,56 +169,11 @@ void ShellRun::grow() {
   warn(before);
 }
 
-std::vector<double> ShellRun::by_vertex(const std::vector<double>& by_strand) const {
-  const std::size_t n = result_.layers.num_columns();
-  std::vector<double> values;
-  for (std::size_t i = 0; i < result_.mesh.num_vertices(); ++i) {
-    const Index strand = result_.layers.strand(static_cast<Index>(i));
-    values.push_back(strand == kNoIndex ? std::max(by_strand[i % n], by_strand[n + i % n]) : by_strand[strand]);
-  }
-  return values;
-}
-
-Scene ShellRun::scene(const Output& output, const WritingOptions& writing) const {
-  const ShellLayers& layers = result_.layers;
-  const std::vector<double> achieved = by_vertex(result_.achieved), asked = by_vertex(result_.asked);
-  std::vector<SceneSheet> sheets;
-  const auto add = [&](const char* name, int sheet) {
-    SceneSheet& added = sheets.emplace_back();
-    added.name = name;
-    added.mesh = sheet_surface(layers, result_.mesh, sheet);
-    added.attribute.name = "_THICKNESS";
-    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
-      const Index vertex = layers.vertex(sheet, static_cast<Index>(v));
-      added.attribute.values.push_back(achieved[vertex]);
-      added.shades.push_back(achieved[vertex] / asked[vertex]);
-    }
-  };
-  if (layers.inside > 0) add("inner", 0);
-  add("base", layers.inside);
-  if (layers.outside > 0) add("outer", layers.num_sheets() - 1);
-  return sheet_scene(sheets, "viridis over achieved / asked thickness 0..1, above 1 as 1", scene_options(output, writing));
-}
-
-void ShellRun::write_output(const Output& output, const WritingOptions& writing) const {
-  if (is_scene(output) && !output.cage) {
-    write_gltf(output.path, scene(output, writing));
-  } else if (output.extension == ".vtu" || output.extension == ".msh") {
-    const VertexField fields[] = {{"thickness", by_vertex(result_.achieved)},
-                                  {"thickness_asked", by_vertex(result_.asked)},
-                                  {"thickness_limited", by_vertex(result_.limited)},
-                                  {"clearance", by_vertex(result_.clearance)}};
-    write_volume(output.path, result_.mesh, result_.quality.cell_minima, fields);
-  } else {
-    cli::write_output(output, result_.mesh, writing);
-  }
-}
-
 void ShellRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.surface;
   writing.options = options_in_force(verb_);
-  for (const Output& output : outputs_) write_output(output, writing);
+  for (const Output& output : outputs_) write_shell(output, result_, writing);
 }
 
 // What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
@@ -250,34 +187,15 @@ void ShellRun::check() {
   }
 }
 
-template <class Visit>
-void ShellRun::for_each_side(const Visit& visit) const {
-  if (result_.layers.inside > 0) visit("inside", std::size_t{0});
-  if (result_.layers.outside > 0) visit("outside", result_.layers.num_columns());
-}
-
-Json ShellRun::thickness_json() const {
-  Json json = Json::object();
-  const std::size_t n = result_.layers.num_columns();
-  for_each_side([&](const char* side, std::size_t first) {
-    const auto figures = [&](const std::vector<double>& thickness) {
-      const ThicknessFigures f({thickness.data() + first, n});
-      return Json{{"mean", f.mean},
-                  {"min", f.least},
-                  {"max", f.most},
-                  {"mean_percent", 100 * f.mean / diagonal_},
-                  {"min_percent", 100 * f.least / diagonal_},
-                  {"max_percent", 100 * f.most / diagonal_}};
-    };
-    std::size_t clipped = 0;
-    for (std::size_t v = 0; v < n; ++v) clipped += result_.limited[first + v] < result_.asked[first + v];
-    json[side] = {{"asked", figures(result_.asked)},
-                  {"limited", figures(result_.limited)},
-                  {"achieved", figures(result_.achieved)},
-                  {"clearance", figures(result_.clearance)},
-                  {"limited_vertices", clipped}};
-  });
-  return json;
+// Who asks for a control mesh will subdivide it: valid cells may turn inverted then.
+void ShellRun::check_subdivided() {
+  if (std::none_of(outputs_.begin(), outputs_.end(), [](const Output& output) { return output.cage; })) return;
+  subdivided_ = certify(subdivide(result_.mesh, BoundaryRule::catmull_clark).fine);
+  if (subdivided_->all_certified()) return;
+  warnings_.push_back(std::to_string(subdivided_->not_certified.size()) + " of " +
+                      std::to_string(subdivided_->certified + subdivided_->not_certified.size()) +
+                      " cells are not certified once the control mesh is subdivided");
+  warn(warnings_.size() - 1);
 }
 
 void ShellRun::write_report() const {
@@ -294,7 +212,7 @@ void ShellRun::write_report() const {
             {"converged", report.stop_reason == StopReason::converged},
             {"stages", stages_json(report)},
             {"valid", failures_.none()},
-            {"thickness", thickness_json()},
+            {"thickness", thickness_json(result_, diagonal_)},
             {"surface_distance_max_percent", 100 * result_.surface_distance_max / diagonal_},
             {"quality", quality_json(result_.quality)},
             {"not_certified_cells", failures_.certificate.not_certified},
@@ -305,6 +223,9 @@ void ShellRun::write_report() const {
             {"seconds", std::move(seconds)},
             {"peak_memory_bytes", peak_memory_bytes()},
             {"outputs", output_names(arguments_.run)}};
+  if (subdivided_)
+    json["subdivided_once"] = {{"certified_cells", subdivided_->certified},
+                               {"not_certified_cells", subdivided_->not_certified.size()}};
   cli::write_report(arguments_.run.report, json);
 }
 
@@ -313,12 +234,7 @@ void ShellRun::summarise() const {
   std::fprintf(stderr, "%s: %s\n", to_string(report.stop_reason), report.explanation.c_str());
   std::fprintf(stderr, "cells               %zu in %d layer(s), %zu vertices\n", result_.mesh.num_cells(),
                result_.layers.num_sheets() - 1, result_.mesh.num_vertices());
-  for_each_side([&](const char* side, std::size_t first) {
-    const std::size_t n = result_.layers.num_columns();
-    const ThicknessFigures asked({result_.asked.data() + first, n}), found({result_.achieved.data() + first, n});
-    std::fprintf(stderr, "thickness %-9s asked %.6g, achieved mean %.6g (%.1f %%), min %.6g, max %.6g\n", side, asked.mean,
-                 found.mean, 100 * found.mean / asked.mean, found.least, found.most);
-  });
+  std::cerr << thickness_text(result_);
   std::fprintf(stderr, "scaled Jacobian     min %.4f, mean %.4f against the references\n",
                result_.quality.min_scaled_jacobian, result_.quality.mean_scaled_jacobian);
   std::fprintf(stderr, "certified cells     %zu of %zu\n", failures_.certificate.certified, result_.mesh.num_cells());
@@ -351,6 +267,7 @@ int ShellRun::run() {
   timed("grow", &ShellRun::grow);
   timed("write", &ShellRun::write);
   timed("check", &ShellRun::check);
+  timed("subdivide", &ShellRun::check_subdivided);
   if (!arguments_.run.report.empty()) write_report();
   if (!arguments_.run.quiet) summarise();
   return status();

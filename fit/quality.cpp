@@ -149,18 +149,34 @@ Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n)
   return HexSampler<double>{}.run(x, n);
 }
 
-/// Samples of one cell at the points of a rule, against its reference.
-Sampled<double> sample_cell(std::span<const Vec3> corners, const ElementRule& rule, const CellReference& reference,
+/// The points of a rule with the gradients of the shape functions by canonical coordinates; unused rows are 0.
+struct SamplePoints {
+  using Gradients = Eigen::Matrix<double, kMaxCellVertices, 3>;
+  std::vector<Vec3> points;
+  std::vector<Gradients> gradients;
+
+  SamplePoints(CellKind kind, int n) {
+    const ElementRule rule = make_element_rule(kind, n);
+    points = rule.points;
+    gradients.assign(points.size(), Gradients::Zero());
+    const Mat3 ideal = ideal_matrix(kind);
+    for (std::size_t q = 0; q < points.size(); ++q)
+      for (const ElementRule::Entry& entry : rule.point(q))
+        gradients[q].row(entry.vertex) = Eigen::Map<const Vec3>(entry.gradient.data()).transpose() * ideal;
+  }
+};
+
+/// Samples of one cell against its reference.
+Sampled<double> sample_cell(std::span<const Vec3> corners, const SamplePoints& at, const CellReference& reference,
                             Index cell) {
-  const Mat3 ideal = ideal_matrix(rule.kind);
+  Eigen::Matrix<double, 3, kMaxCellVertices> x = Eigen::Matrix<double, 3, kMaxCellVertices>::Zero();
+  for (std::size_t v = 0; v < corners.size(); ++v) x.col(static_cast<Index>(v)) = corners[v] - corners[0];
   Sampled<double> result{1, 0};
-  for (std::size_t q = 0; q < rule.num_points(); ++q) {
-    Mat3 jacobian = Mat3::Zero();
-    for (const ElementRule::Entry& entry : rule.point(q))
-      jacobian += corners[entry.vertex] * Eigen::Map<const Vec3>(entry.gradient.data()).transpose();
-    const Mat3 f = jacobian * ideal * reference(cell, rule.points[q]).inverse();
-    const double lengths = f.col(0).norm() * f.col(1).norm() * f.col(2).norm();
-    const double value = lengths > 0 ? f.determinant() / lengths : 0;
+  for (std::size_t q = 0; q < at.points.size(); ++q) {
+    const Mat3 jacobian = x * at.gradients[q];
+    const Mat3 f = jacobian * reference(cell, at.points[q]).inverse();
+    const double squared = f.col(0).squaredNorm() * f.col(1).squaredNorm() * f.col(2).squaredNorm();
+    const double value = squared > 0 ? f.determinant() / std::sqrt(squared) : 0;
     result.least = std::min(result.least, value);
     result.sum += value;
   }
@@ -176,16 +192,14 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
                  finite ? sum : -static_cast<double>(num_samples(mesh.kinds[c], n))};
   };
   if (reference) {
-    std::array<ElementRule, kNumCellKinds> rules;
-    for (int kind = 0; kind < kNumCellKinds; ++kind) rules[kind] = make_element_rule(static_cast<CellKind>(kind), n);
+    const SamplePoints points[] = {{CellKind::tet, n}, {CellKind::prism, n}, {CellKind::hex, n}};
 #pragma omp parallel for schedule(static)
     for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
       const auto corners = gather_cell(mesh.positions, mesh, c);
-      const ElementRule& rule = rules[static_cast<std::size_t>(mesh.kinds[c])];
-      const Sampled<double> s =
-          sample_cell({corners.data(), mesh.cell(c).size()}, rule, reference, static_cast<Index>(c));
+      const SamplePoints& at = points[static_cast<std::size_t>(mesh.kinds[c])];
+      const Sampled<double> s = sample_cell({corners.data(), mesh.cell(c).size()}, at, reference, static_cast<Index>(c));
       // A tet has one point only.
-      keep(c, s.least, s.sum * static_cast<double>(num_samples(mesh.kinds[c], n)) / rule.num_points());
+      keep(c, s.least, s.sum * static_cast<double>(num_samples(mesh.kinds[c], n)) / static_cast<double>(at.points.size()));
     }
     return result;
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/shell.h"
 
-#include "fit/closest_point.h"
 #include "fit/closest_point_energy.h"
 #include "fit/fit_problem.h"
 #include "fit/self_intersection.h"
@@ -290,31 +289,6 @@ ShellResult ShellMaker::run(const PolygonMesh& surface) {
   return result;
 }
 
-void measure_thickness(ShellResult& result) {
-  const ShellLayers& layers = result.layers;
-  const std::vector<Vec3>& positions = result.mesh.positions;
-  const ClosestPoint tree(triangulate(layers.surface));
-  result.achieved.assign(layers.num_strands(), 0);
-  result.clearance.assign(layers.num_strands(), 0);
-  std::vector<ClosestPoint::Hit> hits(layers.num_columns());
-  const auto find_closest = [&](int sheet) {
-    tree.closest({positions.data() + layers.vertex(sheet, 0), layers.num_columns()}, hits);
-  };
-  for (const int sheet : {0, layers.num_sheets() - 1}) {
-    if (sheet == layers.inside) continue;
-    find_closest(sheet);
-    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
-      const Index vertex = layers.vertex(sheet, static_cast<Index>(v)), strand = layers.strand(vertex);
-      const Index foot = layers.vertex(layers.inside, static_cast<Index>(v));
-      result.achieved[strand] = (positions[vertex] - positions[foot]).norm();
-      result.clearance[strand] = hits[v].distance;
-    }
-  }
-  find_closest(layers.inside);
-  for (const ClosestPoint::Hit& hit : hits)
-    result.surface_distance_max = std::max(result.surface_distance_max, hit.distance);
-}
-
 void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   const double before = seconds();
   const double scale = normalization_.scale;
@@ -330,7 +304,10 @@ void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   result.limited = std::move(thickness_);
   for (double& t : result.asked) t *= scale;
   for (double& t : result.limited) t *= scale;
-  measure_thickness(result);
+  MeasuredThickness measured = measure_thickness(layers, result.mesh.positions);
+  result.achieved = std::move(measured.achieved);
+  result.clearance = std::move(measured.clearance);
+  result.surface_distance_max = measured.surface_distance_max;
   result.mesh.tags = shell_tags(layers, options_.tags);
   result.quality = measure_quality(result.mesh, 5, shell_reference(layers, result.limited));
   result.failures = ShellCheck(layers, result.mesh, CheckedSheets::all).failures(result.mesh.positions);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/thickness.h"
 
+#include "fit/closest_point.h"
 #include "shell/ray_gap.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -94,6 +95,28 @@ std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const
   if (layers.outside > 0) limit(layers.num_columns(), 1);
   limit_slope(layers, thickness);
   return thickness;
+}
+
+MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const Vec3> positions) {
+  const ClosestPoint tree(triangulate(layers.surface));
+  const std::size_t n = layers.num_columns();
+  MeasuredThickness measured{std::vector<double>(layers.num_strands(), 0.0),
+                             std::vector<double>(layers.num_strands(), 0.0)};
+  std::vector<ClosestPoint::Hit> hits(n);
+  for (const int sheet : {0, layers.inside, layers.num_sheets() - 1}) {
+    tree.closest(positions.subspan(layers.vertex(sheet, 0), n), hits);
+    for (std::size_t v = 0; v < n; ++v) {
+      const Index vertex = layers.vertex(sheet, static_cast<Index>(v)), strand = layers.strand(vertex);
+      if (strand == kNoIndex) {
+        measured.surface_distance_max = std::max(measured.surface_distance_max, hits[v].distance);
+      } else {
+        const Index foot = layers.vertex(layers.inside, static_cast<Index>(v));
+        measured.achieved[strand] = (positions[vertex] - positions[foot]).norm();
+        measured.clearance[strand] = hits[v].distance;
+      }
+    }
+  }
+  return measured;
 }
 
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,

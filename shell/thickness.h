@@ -27,4 +27,14 @@ void limit_slope(const ShellLayers& layers, std::span<double> thickness);
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
                                  std::span<const double> thickness);
 
+/// What the thickness of a shell came to, in the surface's unit.
+struct MeasuredThickness {
+  std::vector<double> achieved;    ///< per strand: length of its column on that side, straight from end to end
+  std::vector<double> clearance;   ///< per strand: distance of its end from the surface of `layers`
+  double surface_distance_max = 0; ///< of the vertices of the sheet that is the surface, from that of `layers`
+};
+
+/// positions  one per vertex of the shell. Strands of a side without layers get 0. Quads are cut by `triangulate`.
+MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const Vec3> positions);
+
 }  // namespace subvol

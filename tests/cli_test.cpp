@@ -385,6 +385,17 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
     CHECK(glb.find(name) != std::string::npos);
 }
 
+TEST_CASE("A shell is a control mesh that can be subdivided", "[cli]") {
+  const Workplace place;
+  const Run run = place.run("shell target.off --thickness 3% --crease-angle 60 -o cage:cage.mesh --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report["subdivided_once"]["not_certified_cells"] == 0);
+  CHECK(place.run("subdivide cage.mesh --levels 1 -o fine.mesh").status == 0);
+  CHECK(place.run("check fine.mesh").status == 0);
+}
+
 TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
   const Workplace place;
   CHECK(place.run("shell target.off -o a.mesh").status == 2);

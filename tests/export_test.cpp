@@ -140,3 +140,26 @@ TEST_CASE("options out of range are refused") {
   const VolumeMesh stranger = lattice(3, 1, 1);
   CHECK_THROWS_AS(surface_scene(cage, &stranger, {}), InputError);
 }
+
+TEST_CASE("a scene of sheets has a node for each with its attribute and colours, and one wireframe") {
+  const PolygonMesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {0, 4}, {0, 1, 2, 3}};
+  PolygonMesh above = square;
+  for (Vec3& p : above.positions) p.z() = 1;
+  const std::vector<SceneSheet> sheets{{.name = "lower", .mesh = square},
+                                       {.name = "upper", .mesh = above, .attribute = {"_HEIGHT", {1, 2, 3, 4}},
+                                        .shades = {0, 0.3, 0.6, 1}}};
+  const Scene scene = sheet_scene(sheets, "a map");
+  REQUIRE(scene.nodes.size() == 3);
+  CHECK(scene.nodes[0].name == "lower");
+  CHECK(scene.nodes[0].primitive.colors.empty());
+  CHECK(scene.nodes[1].name == "upper");
+  CHECK(scene.nodes[1].primitive.colors.size() == 4);
+  CHECK(scene.nodes[1].primitive.attributes[0].values == std::vector<double>{1, 2, 3, 4});
+  CHECK(scene.nodes[2].name == "wireframe");
+  CHECK(scene.nodes[2].primitive.indices.size() == 16);
+  CHECK(has_extra(scene, "colour_map"));
+  CHECK(scene.origin == Vec3(0.5, 0.5, 0.5));
+  CHECK_NOTHROW(gltf_bytes(scene, GltfContainer::glb));
+  CHECK_THROWS_AS(sheet_scene({}, ""), InputError);
+  CHECK_THROWS_AS(sheet_scene(std::vector<SceneSheet>{{.name = "x", .mesh = square, .shades = {1}}}, ""), InputError);
+}

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/element_rule.h"
 #include "fit/quality.h"
 #include "subvol/error.h"
 
@@ -149,4 +150,24 @@ TEST_CASE("quality is defined for odd input and refuses too few samples", "[qual
   CHECK(report.min_scaled_jacobian == -1);
   CHECK(report.inverted_cells == 1);
   CHECK(report.certificate.certified == 0);
+}
+
+TEST_CASE("against a reference of their own cells have quality 1 in that shape, and against the ideal one the usual", "[quality]") {
+  Mat3 shape;
+  shape << 1.2, 0.3, -0.1, 0.1, 0.8, 0.2, -0.2, 0.1, 0.1;
+  for (VolumeMesh mesh : {box(1, 1, 1), ideal_prism(1), ideal_tet()}) {
+    const Mat3 ideal = ideal_matrix(mesh.kinds[0]);
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> shift(-0.1, 0.1);
+    VolumeMesh shaken = mesh;
+    for (Vec3& p : shaken.positions) p += Vec3(shift(random), shift(random), shift(random));
+    const QualityReport usual = measure_quality(shaken);
+    const QualityReport same = measure_quality(shaken, 5, [&](Index, const Vec3&) { return Mat3(3 * ideal); });
+    CHECK(same.min_scaled_jacobian == Approx(usual.min_scaled_jacobian).epsilon(1e-12));
+    CHECK(same.mean_scaled_jacobian == Approx(usual.mean_scaled_jacobian).epsilon(1e-12));
+    for (Vec3& p : mesh.positions) p = shape * p;
+    const QualityReport own = measure_quality(mesh, 5, [&](Index, const Vec3&) { return Mat3(shape * ideal); });
+    CHECK(own.min_scaled_jacobian == Approx(1).epsilon(1e-12));
+    CHECK(measure_quality(mesh).min_scaled_jacobian < 0.9);
+  }
 }

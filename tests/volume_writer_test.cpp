@@ -123,3 +123,15 @@ TEST_CASE("meshes that cannot be written as volumes are refused") {
   refused([nan](VolumeMesh&, std::vector<double>& q) { q[0] = nan; });
   CHECK_THROWS_AS(write_volume("mesh.vtk", marked_cells()), InputError);
 }
+
+TEST_CASE("fields stand at the vertices of a .vtu and a .msh") {
+  const VolumeMesh mesh = marked_cells();
+  VertexField field{"thickness", {}};
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) field.values.push_back(0.1 * static_cast<double>(v));
+  const std::vector<VertexField> fields{field};
+  CHECK(data_array<double>(vtu_text(mesh, {}, fields), "thickness") == field.values);
+  CHECK(msh_text(mesh, {}, fields).find("$NodeData\n1\n\"thickness\"\n") != std::string::npos);
+  CHECK_THROWS_AS(vtu_text(mesh, {}, std::vector<VertexField>{{"short", {1}}}), InputError);
+  field.values[0] = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(msh_text(mesh, {}, std::vector<VertexField>{field}), InputError);
+}
