@@ -6,26 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <vector>
 
 namespace subvol {
 
 namespace {
-
-/// Equal positions get equal numbers.
-std::vector<Index> merged_numbers(std::span<const Vec3> positions) {
-  std::vector<Index> order(positions.size()), number(positions.size());
-  std::iota(order.begin(), order.end(), 0);
-  const auto less = [&](Index a, Index b) {
-    return std::lexicographical_compare(positions[a].begin(), positions[a].end(), positions[b].begin(),
-                                        positions[b].end());
-  };
-  std::sort(order.begin(), order.end(), less);
-  for (std::size_t k = 0; k < order.size(); ++k)
-    number[order[k]] = k > 0 && !less(order[k - 1], order[k]) ? number[order[k - 1]] : order[k];
-  return number;
-}
 
 /// Cells of a grid around the surface, with an empty layer on all sides.
 class Grid {
@@ -90,34 +75,6 @@ double signed_volume(std::span<const Vec3> positions, std::span<const std::array
   for (const auto& t : triangles)
     sum += (positions[t[0]] - origin).dot((positions[t[1]] - origin).cross(positions[t[2]] - origin));
   return std::abs(sum) / 6;
-}
-
-double closed_share(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
-  if (triangles.empty()) return 0;
-  const std::vector<Index> number = merged_numbers(positions);
-  struct HalfEdge {
-    Index low, high;
-    bool forward;
-    auto operator<=>(const HalfEdge&) const = default;
-  };
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * triangles.size());
-  for (const auto& t : triangles)
-    for (int k = 0; k < 3; ++k) {
-      const Index a = number[t[k]], b = number[t[(k + 1) % 3]];
-      edges.push_back({std::min(a, b), std::max(a, b), a < b});
-    }
-  std::sort(edges.begin(), edges.end());
-  std::size_t matched = 0;
-  for (std::size_t first = 0, last; first < edges.size(); first = last) {
-    std::size_t num_forward = 0;
-    for (last = first;
-         last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high; ++last)
-      num_forward += edges[last].forward;
-    // Surfaces may touch along an edge: as many one way as the other is fine.
-    matched += 2 * std::min(num_forward, last - first - num_forward);
-  }
-  return static_cast<double>(matched) / static_cast<double>(edges.size());
 }
 
 double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,

@@ -12,10 +12,6 @@ namespace subvol {
 /// oriented surface; meaningless for others.
 double signed_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
 
-/// Share of the triangles' half-edges that pair up with an opposite half-edge, in [0, 1]. Positions decide, not
-/// numbers, so a soup of a closed, oriented surface has 1.
-double closed_share(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
-
 /// Volume of the grid cells that cannot be reached from outside without crossing the surface, and half of those that it
 /// passes through.
 ///

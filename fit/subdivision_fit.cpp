@@ -10,6 +10,7 @@
 #include "fit/fit_schedule.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
+#include "fit/soup_topology.h"
 #include "fit/surface_distance.h"
 #include "fit/surface_energy.h"
 #include "fit/target_surface.h"
@@ -167,6 +168,12 @@ void SubdivisionFit::look_over_template() {
   report.initial_distance_mean_percent = 100 * distance.mean();
   report.initial_distance_max_percent = 100 * distance.max();
   schedule_ = make_schedule(options_, distance.mean() / target_.length());
+  const SoupTopology wanted = soup_topology(target_mesh_.positions, target_mesh_.triangles);
+  const long euler_number = soup_topology(boundary.positions, boundary.triangles).euler_number;
+  if (wanted.closed_share == 1 && wanted.euler_number != euler_number)
+    report.warnings.push_back(format("Euler numbers differ (target %ld, template's boundary %ld): their handles or "
+                                     "components do, and the fit cannot change those",
+                                     wanted.euler_number, euler_number));
   if (target_.volume_source() != VolumeSource::signed_sum)
     report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
 }

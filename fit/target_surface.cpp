@@ -2,6 +2,7 @@
 #include "fit/target_surface.h"
 
 #include "fit/enclosed_volume.h"
+#include "fit/soup_topology.h"
 #include "subvol/error.h"
 
 #include <Eigen/Geometry>
@@ -27,7 +28,7 @@ double find_volume(std::span<const Vec3> positions, std::span<const std::array<I
                    VolumeSource& source) {
   const double bound = isoperimetric_bound(area);
   source = VolumeSource::signed_sum;
-  if (closed_share(positions, triangles) >= kClosedEnough) {
+  if (soup_topology(positions, triangles).closed_share >= kClosedEnough) {
     const double volume = signed_volume(positions, triangles);
     if (volume > kFlatness * bound) return volume;
   }

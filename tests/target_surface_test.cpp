@@ -2,6 +2,8 @@
 #include "fit/target_surface.h"
 
 #include "fit/enclosed_volume.h"
+#include "fit/soup_topology.h"
+#include "samples/shapes.h"
 #include "subvol/error.h"
 #include "tests/surface_fixtures.h"
 
@@ -74,13 +76,21 @@ TEST_CASE("the flood's volume converges to the enclosed one") {
   }
 }
 
-TEST_CASE("closed_share counts half-edges without a partner") {
-  const TriangleMesh mesh = cube_surface(2, false);
-  CHECK(closed_share(mesh.positions, mesh.triangles) == 1);
-  auto open = mesh.triangles;
-  open.pop_back();
-  const double num_edges = 3.0 * static_cast<double>(open.size());
-  CHECK(closed_share(mesh.positions, open) == Approx((num_edges - 3) / num_edges));
+TEST_CASE("the topology of a soup counts half-edges without a partner, and handles") {
+  const auto of = [](const TriangleMesh& mesh) { return soup_topology(mesh.positions, mesh.triangles); };
+  TriangleMesh mesh = cube_surface(2, false);
+  CHECK(of(mesh).closed_share == 1);
+  CHECK(of(mesh).euler_number == 2);
+  TriangleMesh soup = soup_of(mesh);
+  soup.triangles.push_back({0, 0, 1});
+  CHECK(of(soup).closed_share == 1);
+  CHECK(of(soup).euler_number == 2);
+  mesh.triangles.pop_back();
+  const double num_half_edges = 3.0 * static_cast<double>(mesh.triangles.size());
+  CHECK(of(mesh).closed_share == Approx((num_half_edges - 3) / num_half_edges));
+  CHECK(of(mesh).euler_number == 1);
+  CHECK(of(samples::torus_sample().target).euler_number == 0);
+  CHECK(of(TriangleMesh{}).euler_number == 0);
 }
 
 TEST_CASE("triangles without area are dropped, positions of no triangle are ignored") {
