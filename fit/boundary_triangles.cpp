@@ -75,4 +75,29 @@ TriangleMesh refined_triangles(const PolygonMesh& polygons, std::vector<Index>* 
   return result;
 }
 
+TriangleMesh fan_triangles(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle) {
+  TriangleMesh result;
+  result.positions = polygons.positions;
+  result.triangles.reserve(polygons.face_vertices.size());
+  if (polygon_of_triangle) polygon_of_triangle->clear();
+  for (std::size_t f = 0; f < polygons.num_faces(); ++f) {
+    const std::size_t begin = polygons.face_offsets[f], size = polygons.face_offsets[f + 1] - begin;
+    if (size < 3) continue;
+    const auto corner = [&](std::size_t k) { return polygons.face_vertices[begin + k % size]; };
+    const std::size_t before = result.triangles.size();
+    if (size == 3) {
+      result.triangles.push_back({corner(0), corner(1), corner(2)});
+    } else {
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t k = 0; k < size; ++k) sum += polygons.positions[corner(k)];
+      const auto centre = static_cast<Index>(result.positions.size());
+      result.positions.push_back(sum / static_cast<double>(size));
+      for (std::size_t k = 0; k < size; ++k) result.triangles.push_back({corner(k), corner(k + 1), centre});
+    }
+    if (polygon_of_triangle)
+      polygon_of_triangle->insert(polygon_of_triangle->end(), result.triangles.size() - before, static_cast<Index>(f));
+  }
+  return result;
+}
+
 }  // namespace subvol

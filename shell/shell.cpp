@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/shell.h"
 
+#include "fit/boundary_triangles.h"
 #include "fit/closest_point_energy.h"
 #include "fit/fit_problem.h"
 #include "fit/self_intersection.h"
@@ -112,6 +113,7 @@ class ShellMaker {
 };
 
 bool ShellMaker::tell(const char* stage, int iteration, double energy, double fraction) {
+  if (ended_) return false;
   if (options_.progress && !options_.progress({stage, 0, iteration, energy, fraction})) {
     ended_ = true;
     report_.stop_reason = StopReason::cancelled;
@@ -137,7 +139,7 @@ void ShellMaker::require_no_intersections() const {
   polygons.face_vertices.resize(polygons.face_offsets.back());
   polygons.positions = cells_.positions;
   std::vector<Index> polygon;
-  const SelfIntersections found = self_intersections(checked_triangles(polygons, polygon));
+  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon));
   std::vector<Index> faces;
   for (const auto& [t, s] : found.pairs) faces.insert(faces.end(), {polygon[t], polygon[s]});
   for (const Index t : found.degenerate) faces.push_back(polygon[t]);
@@ -241,7 +243,7 @@ MinimizerStop ShellMaker::solve(int round) {
     ++iteration;
     const double in_round = static_cast<double>(iteration) / minimizer.max_iterations;
     return tell(stage.name.c_str(), iteration, record.surface_energy + problem.lambda * record.volume_energy,
-                1 - std::pow(0.5, round) * (1 - 0.5 * in_round));
+                0.95 - 0.85 * std::pow(0.5, round) * (1 - 0.5 * in_round));
   };
   MinimizerResult found = minimize_newton(problem, unknowns, minimizer);
   stage.iterations = std::move(found.iterations);
@@ -278,12 +280,17 @@ void ShellMaker::optimize() {
 }
 
 ShellResult ShellMaker::run(const PolygonMesh& surface) {
+  cells_.tags = shell_tags(layers_, options_.tags);
+  tell("directions", 0, 0, 0);
   timed("directions", &ShellMaker::find_directions);
+  tell("thickness", 0, 0, 0.02);
   timed("thickness", &ShellMaker::find_thickness);
+  tell("start", 0, 0, 0.04);
   timed("start", &ShellMaker::start);
   if (options_.free_surface) target_.emplace(triangulate(layers_.surface));
-  if (options_.optimize && tell("start", 0, 0, 0)) timed("solve", &ShellMaker::optimize);
+  if (options_.optimize && !ended_) timed("solve", &ShellMaker::optimize);
   if (!options_.optimize) report_.explanation = "straight columns, no solve";
+  if (!ended_) tell("check", 0, 0, 0.95);
   ShellResult result;
   finish(surface, result);
   return result;
@@ -308,7 +315,6 @@ void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   result.achieved = std::move(measured.achieved);
   result.clearance = std::move(measured.clearance);
   result.surface_distance_max = measured.surface_distance_max;
-  result.mesh.tags = shell_tags(layers, options_.tags);
   result.quality = measure_quality(result.mesh, 5, shell_reference(layers, result.limited));
   result.failures = ShellCheck(layers, result.mesh, CheckedSheets::all).failures(result.mesh.positions);
   report_.seconds.emplace_back("check", seconds() - before);

@@ -3,7 +3,6 @@
 
 #include "fit/boundary_triangles.h"
 #include "fit/self_intersection.h"
-#include "subvol/boundary.h"
 
 #include <algorithm>
 #include <numeric>
@@ -41,11 +40,6 @@ void grade(const ShellLayers& layers, std::vector<double>& shares) {
 
 }  // namespace
 
-TriangleMesh checked_triangles(const PolygonMesh& polygons, std::vector<Index>& polygon_of_triangle) {
-  if (polygons.face_vertices.size() != 3 * polygons.num_faces()) return refined_triangles(polygons, &polygon_of_triangle);
-  return triangulate(polygons, &polygon_of_triangle);
-}
-
 ShellCheck::ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets, bool surface_moves)
     : layers_(layers),
       cells_(cells),
@@ -58,7 +52,7 @@ ShellFailures ShellCheck::failures(std::span<const Vec3> positions) const {
   PolygonMesh polygons = polygons_;
   polygons.positions.assign(positions.begin(), positions.end());
   std::vector<Index> polygon;
-  const SelfIntersections found = self_intersections(checked_triangles(polygons, polygon));
+  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon));
   for (const auto& [t, s] : found.pairs) result.intersecting.push_back({polygon[t], polygon[s]});
   for (const Index t : found.degenerate) result.intersecting.push_back({polygon[t], polygon[t]});
   auto& pairs = result.intersecting;

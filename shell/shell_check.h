@@ -26,8 +26,7 @@ enum class CheckedSheets { outer, all };
 
 /// Tells whether a shell is valid: every cell certified, and no face of a sheet or of a wall along the border meeting another.
 ///
-/// Faces are triangles where the surface has no quads and no border. Otherwise each face stands for the triangles of
-/// `refined_triangles`, the same on all sheets.
+/// Triangles stand for themselves, quads (walls among them) for their `fan_triangles`, the same on all sheets.
 class ShellCheck {
  public:
   /// layers, cells  must outlive the check.
@@ -48,9 +47,6 @@ class ShellCheck {
   PolygonMesh polygons_;
   bool surface_moves_;
 };
-
-/// The triangles that stand for polygons in checks. polygon_of_triangle: written.
-TriangleMesh checked_triangles(const PolygonMesh& polygons, std::vector<Index>& polygon_of_triangle);
 
 /// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the wanted
 /// one, less where cells or faces fail; a vertex of the surface goes the least share of its strands.

@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -20,8 +21,19 @@ std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {
 
 void require_faces(const PolygonMesh& surface) {
   if (surface.num_faces() == 0) throw InputError("the surface has no faces");
+  std::vector<char> used(surface.positions.size(), 0);
+  for (std::size_t v = 0; v < used.size(); ++v)
+    if (!surface.positions[v].allFinite()) throw InputError("vertex " + std::to_string(v) + " is not finite");
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
     const auto face = face_of(surface, f);
+    for (std::size_t k = 0; k < face.size(); ++k) {
+      if (face[k] < 0 || static_cast<std::size_t>(face[k]) >= used.size())
+        throw InputError("face " + std::to_string(f) + " names vertex " + std::to_string(face[k]) + " of " +
+                         std::to_string(used.size()));
+      if (std::find(face.begin(), face.begin() + k, face[k]) != face.begin() + k)
+        throw InputError("face " + std::to_string(f) + " names vertex " + std::to_string(face[k]) + " twice");
+      used[face[k]] = 1;
+    }
     if (face.size() != 3 && face.size() != 4)
       throw InputError("face " + std::to_string(f) + " has " + std::to_string(face.size()) +
                        " corners; only triangles and quads can be extruded");
@@ -29,6 +41,9 @@ void require_faces(const PolygonMesh& surface) {
     for (std::size_t k = 0; k < face.size(); ++k) area += corner_normal(surface, f, k);
     if (!(area.norm() > 1e-12)) throw InputError("face " + std::to_string(f) + " has no area");
   }
+  const auto unused = std::find(used.begin(), used.end(), 0);
+  if (unused != used.end())
+    throw InputError("vertex " + std::to_string(unused - used.begin()) + " belongs to no face");
 }
 
 /// The cell of a face between two sheets.

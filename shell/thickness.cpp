@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <functional>
 #include <queue>
+#include <set>
 #include <string>
 
 namespace subvol {
@@ -135,9 +136,13 @@ std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& ch
     if (failures.none()) return positions;
     const std::vector<Index> strands = check.strands(failures);
     if (halving == kMaxHalvings || strands.empty()) {
+      std::set<Index> columns;
+      for (const Index strand : strands) columns.insert(static_cast<Index>(strand % n));
       std::string text = "not even a very thin layer fits at vertices";
-      for (std::size_t i = 0; i < std::min<std::size_t>(strands.size(), 10); ++i)
-        text += (i ? ", " : " ") + std::to_string(strands[i] % n);
+      std::size_t named = 0;
+      for (auto it = columns.begin(); it != columns.end() && named < 10; ++it, ++named)
+        text += (named ? ", " : " ") + std::to_string(*it);
+      if (columns.size() > named) text += ", ... (" + std::to_string(columns.size()) + " in all)";
       throw InputError(text);
     }
     for (const Index strand : strands) thin[strand] *= 0.5;

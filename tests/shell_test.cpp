@@ -355,6 +355,7 @@ TEST_CASE("A shell can be stopped at any step and is valid all the same", "[shel
                                         }});
   CHECK(shell.report.stop_reason == StopReason::cancelled);
   CHECK(calls == 3);
+  CHECK(shell.report.stages.empty());
   check_valid(shell);
 }
 
@@ -370,6 +371,19 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
   PolygonMesh pentagon{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0.5, 1.5, 0}, {0, 1, 0}}, {0}, {}};
   add_face(pentagon, {0, 1, 2, 3, 4});
   CHECK_THROWS_WITH(make_shell(pentagon, {.thickness = 1}), Catch::Contains("face 0 has 5 corners"));
+
+  PolygonMesh odd = good;
+  odd.positions.emplace_back(9, 9, 9);
+  CHECK_THROWS_WITH(make_shell(odd, {.thickness = 1}), Catch::Contains("belongs to no face"));
+  odd = good;
+  odd.positions[3].x() = std::nan("");
+  CHECK_THROWS_AS(make_shell(odd, {.thickness = 1}), InputError);
+  odd = good;
+  odd.face_vertices[4] = 1000;
+  CHECK_THROWS_WITH(make_shell(odd, {.thickness = 1}), Catch::Contains("names vertex 1000"));
+  odd = good;
+  odd.face_vertices[1] = odd.face_vertices[0];
+  CHECK_THROWS_WITH(make_shell(odd, {.thickness = 1}), Catch::Contains("twice"));
 
   PolygonMesh three{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}}, {0}, {}};
   add_face(three, {0, 1, 2});
