@@ -276,7 +276,9 @@ void ShellMaker::optimize() {
   const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; });
   if (held > 0)
     report_.warnings.push_back(std::to_string(held) + " columns were held back: there sheets still met after the last solve");
-  if (!ended_) report_.explanation = "sheets still met after " + std::to_string(kMaxRounds) + " solves and were parted";
+  if (ended_) return;
+  report_.stop_reason = StopReason::iteration_limit;
+  report_.explanation = "sheets still met after " + std::to_string(kMaxRounds) + " solves and were parted";
 }
 
 ShellResult ShellMaker::run(const PolygonMesh& surface) {
@@ -290,7 +292,6 @@ ShellResult ShellMaker::run(const PolygonMesh& surface) {
   if (options_.free_surface) target_.emplace(triangulate(layers_.surface));
   if (options_.optimize && !ended_) timed("solve", &ShellMaker::optimize);
   if (!options_.optimize) report_.explanation = "straight columns, no solve";
-  if (!ended_) tell("check", 0, 0, 0.95);
   ShellResult result;
   finish(surface, result);
   return result;

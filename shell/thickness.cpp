@@ -2,6 +2,7 @@
 #include "shell/thickness.h"
 
 #include "fit/closest_point.h"
+#include "fit/surface_distance.h"
 #include "shell/ray_gap.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -83,12 +84,14 @@ std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const
   constexpr double kShare = 0.45, kLeast = 1e-4;
   std::vector<double> thickness(asked.begin(), asked.end());
   const TriangleMesh surface = triangulate(layers.surface);
+  const double diagonal = bounding_box_diagonal(surface);
   const auto limit = [&](std::size_t first, double sign) {
     std::vector<Vec3> along(directions.begin(), directions.end());
     for (Vec3& d : along) d *= sign;
     const std::vector<double> gaps = ray_gaps(surface, along);
     for (std::size_t v = 0; v < gaps.size(); ++v) {
       double& t = thickness[first + v];
+      t = std::min(t, diagonal);
       t = std::max(std::min(t, kShare * gaps[v]), kLeast * t);
     }
   };

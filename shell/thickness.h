@@ -11,8 +11,9 @@ namespace subvol {
 
 /// Thickness per strand that leaves room for what stands opposite, smoothly:
 ///
-///   t <= asked,   t <= 0.45 gap,   t(v) <= t(w) + 1/2 |v - w| along every edge
+///   t <= asked,   t <= diagonal,   t <= 0.45 gap,   t(v) <= t(w) + 1/2 |v - w| along every edge
 ///
+/// diagonal  of the surface's bounding box.
 /// gap  from a surface vertex along its direction (or against it, inside) to another part of the surface (`ray_gaps`).
 /// directions  one per column. asked: per strand. Never below a ten-thousandth of what is asked.
 std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const Vec3> directions,
