@@ -39,7 +39,7 @@ struct ShellArguments {
   RunOptions run;
   WritingOptions writing;
   ShellOptions shell;
-  std::string surface, thickness, thickness_file, side = "outward";
+  std::string surface, thickness, thickness_file, thickness_attribute, side = "outward";
   int order = 1;
   std::optional<double> crease_angle_degrees;
   bool straight = false;
@@ -72,6 +72,7 @@ class ShellRun {
   int run();
 
  private:
+  void require_one_per_vertex(const std::string& file, const std::vector<double>& thickness) const;
   void load();
   void grow();
   void write();
@@ -84,6 +85,7 @@ class ShellRun {
   void warn(std::size_t first = 0) const;
 
   std::vector<double> thickness_from_file() const;
+  std::vector<double> thickness_from_attribute() const;
   const ShellArguments& arguments_;
   const CLI::App& verb_;
   Clock::time_point start_ = Clock::now();
@@ -132,20 +134,30 @@ std::vector<double> ShellRun::thickness_from_file() const {
                        word);
     thickness.push_back(std::stod(word));
   }
+  require_one_per_vertex(arguments_.thickness_file, thickness);
+  return thickness;
+}
+
+std::vector<double> ShellRun::thickness_from_attribute() const {
+  std::vector<double> thickness = read_vertex_attribute(arguments_.surface, arguments_.thickness_attribute);
+  require_one_per_vertex(arguments_.surface, thickness);
+  return thickness;
+}
+
+void ShellRun::require_one_per_vertex(const std::string& file, const std::vector<double>& thickness) const {
   if (thickness.size() != surface_.polygons.positions.size())
-    throw InputError(arguments_.thickness_file + ": expected one thickness for each of the " +
+    throw InputError(file + ": expected one thickness for each of the " +
                      std::to_string(surface_.polygons.positions.size()) + " vertices of the surface, got " +
                      std::to_string(thickness.size()));
-  return thickness;
 }
 
 void ShellRun::grow() {
   ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
   ShellOptions options = arguments_.shell;
-  if (arguments_.thickness_file.empty())
+  if (!arguments_.thickness.empty())
     options.thickness = parse_length(arguments_.thickness, diagonal_);
   else
-    options.vertex_thickness = thickness_from_file();
+    options.vertex_thickness = arguments_.thickness_file.empty() ? thickness_from_attribute() : thickness_from_file();
   options.side = arguments_.side == "both"     ? ShellSide::both
                  : arguments_.side == "inward" ? ShellSide::inward
                                                : ShellSide::outward;
@@ -216,7 +228,7 @@ void ShellRun::write_report() const {
             {"surface_distance_max_percent", 100 * result_.surface_distance_max / diagonal_},
             {"quality", quality_json(result_.quality)},
             {"not_certified_cells", failures_.certificate.not_certified},
-            {"self_intersections", failures_.intersecting.size()},
+            {"boundary_self_intersections", failures_.intersecting.size()},
             {"intersecting_faces", failures_.intersecting},
             {"mesh", describe("", result_.mesh)},
             {"warnings", warnings_},
@@ -257,8 +269,8 @@ int ShellRun::status() const {
 int ShellRun::run() {
   if (arguments_.run.outputs.empty() && arguments_.run.report.empty())
     throw UsageError("shell: nothing to write; give -o FILE or --report FILE");
-  if (arguments_.thickness.empty() == arguments_.thickness_file.empty())
-    throw UsageError("shell: give either --thickness or --thickness-file");
+  if (arguments_.thickness.empty() + arguments_.thickness_file.empty() + arguments_.thickness_attribute.empty() != 2)
+    throw UsageError("shell: give one of --thickness, --thickness-file and --thickness-attribute");
   if (!arguments_.thickness.empty()) parse_length(arguments_.thickness, 1);
   if (arguments_.order > 1) throw UsageError("--order: curved shells are not offered yet; the cells are of order 1");
   outputs_ = checked_outputs(arguments_.run, true);
@@ -281,6 +293,9 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
   verb.add_option("--thickness-file", arguments.thickness_file,
                   "Thickness of each vertex instead: one number a line, in the mesh's unit")
       ->type_name("FILE");
+  verb.add_option("--thickness-attribute", arguments.thickness_attribute,
+                  "Thickness of each vertex instead: a vertex property of SURFACE, a .ply")
+      ->type_name("NAME");
   verb.add_option("--layers", shell.layers, "Layers on each side")
       ->check(CLI::Range(1, 1000))
       ->type_name("N")

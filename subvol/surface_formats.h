@@ -7,6 +7,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace subvol {
 
@@ -15,5 +16,7 @@ PolygonMesh parse_off(const std::string& name, std::string_view bytes);
 PolygonMesh parse_obj(const std::string& name, std::string_view bytes);
 PolygonMesh parse_stl(const std::string& name, std::string_view bytes);
 PolygonMesh parse_ply(const std::string& name, std::string_view bytes);
+/// One value of a vertex property per vertex; InputError where there is no such property.
+std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute);
 
 }  // namespace subvol

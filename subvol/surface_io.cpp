@@ -178,6 +178,12 @@ TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* 
   return mesh;
 }
 
+std::vector<double> read_vertex_attribute(const fs::path& path, const std::string& attribute) {
+  if (lower_case(path.extension().string()) != ".ply")
+    throw InputError(path.string() + ": only .ply files have vertex properties");
+  return parse_ply_attribute(path.string(), read_file(path), attribute);
+}
+
 std::string surface_formats() {
   std::string text;
   for (const Format& format : kFormats)

@@ -31,6 +31,11 @@ PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std
 /// triangles with the same three positions.
 TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
+/// Values of a vertex property of a .ply, one per vertex in the file's order.
+///
+/// InputError: another extension; no such property; a file that `read_polygon_mesh` refuses; a value that is not finite.
+std::vector<double> read_vertex_attribute(const std::filesystem::path& path, const std::string& attribute);
+
 /// Extensions the readers accept, as text for help and messages.
 std::string surface_formats();
 

@@ -23,7 +23,7 @@ constexpr NamedType kPlyTypes[] = {
     {"float64", kFloat64}};
 
 struct Property {
-  enum class Use { none, x, y, z, corners };
+  enum class Use { none, x, y, z, corners, attribute };
   Use use = Use::none;
   bool is_list = false;
   ValueType count_type = kUInt8, type = kFloat32;
@@ -46,8 +46,9 @@ struct Element {
 
 class PlyParser {
  public:
-  PlyParser(const std::string& name, std::string_view bytes)
-      : name_(name), size_(bytes.size()), scan_(name, bytes, TextScanner::Comments::none) {}
+  /// attribute  vertex property whose values are kept as well; empty: none.
+  PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "")
+      : name_(name), size_(bytes.size()), scan_(name, bytes, TextScanner::Comments::none), attribute_(std::move(attribute)) {}
 
   PolygonMesh parse() {
     read_header();
@@ -58,6 +59,9 @@ class PlyParser {
                          std::to_string(mesh_.positions.size()));
     return std::move(mesh_);
   }
+
+  /// What `parse` found of the attribute, one value per vertex that has it.
+  std::vector<double> take_attribute() { return std::move(values_); }
 
  private:
   /// Where the text is lines, the line tells the place; in binary data, the byte.
@@ -126,11 +130,12 @@ class PlyParser {
     scan_.fail("unknown property type " + in_quotes(word));
   }
 
-  static Property::Use use_of(std::string_view element, std::string_view name, bool is_list) {
+  Property::Use use_of(std::string_view element, std::string_view name, bool is_list) const {
     if (element == "vertex" && !is_list) {
       if (name == "x") return Property::Use::x;
       if (name == "y") return Property::Use::y;
       if (name == "z") return Property::Use::z;
+      if (!attribute_.empty() && name == attribute_) return Property::Use::attribute;
     }
     const bool corners = name == "vertex_indices" || name == "vertex_index";
     return element == "face" && is_list && corners ? Property::Use::corners : Property::Use::none;
@@ -166,8 +171,10 @@ class PlyParser {
       }
     } else if (property.use == Use::none) {
       skip_value(property.type);
+    } else if (property.use == Use::attribute) {
+      values_.push_back(read_number(property.type, "a value of " + attribute_));
     } else {
-      mesh_.positions.back()[static_cast<int>(property.use) - static_cast<int>(Use::x)] = read_coordinate(property.type);
+      mesh_.positions.back()[static_cast<int>(property.use) - static_cast<int>(Use::x)] = read_number(property.type, "a coordinate");
     }
   }
 
@@ -183,10 +190,10 @@ class PlyParser {
     return value;
   }
 
-  double read_coordinate(ValueType type) {
-    if (text_) return scan_.number("a coordinate");
+  double read_number(ValueType type, const std::string& what) {
+    if (text_) return scan_.number(what.c_str());
     const double value = read_binary(type);
-    if (!std::isfinite(value)) fail("a coordinate is not finite");
+    if (!std::isfinite(value)) fail(what + " is not finite");
     return value;
   }
 
@@ -207,10 +214,20 @@ class PlyParser {
   std::endian order_ = std::endian::little;
   std::vector<Element> elements_;
   PolygonMesh mesh_;
+  std::string attribute_;
+  std::vector<double> values_;
 };
 
 }  // namespace
 
 PolygonMesh parse_ply(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).parse(); }
+
+std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute) {
+  PlyParser parser(name, bytes, attribute);
+  const std::size_t num_vertices = parser.parse().positions.size();
+  std::vector<double> values = parser.take_attribute();
+  if (values.size() != num_vertices) throw InputError(name + ": the vertices have no property " + in_quotes(attribute));
+  return values;
+}
 
 }  // namespace subvol

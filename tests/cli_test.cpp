@@ -371,7 +371,7 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
   const auto report = place.json("report.json");
   CHECK(report["command"] == "shell");
   CHECK(report["valid"] == true);
-  CHECK(report["self_intersections"] == 0);
+  CHECK(report["boundary_self_intersections"] == 0);
   const auto mesh = subvol::read_volume_mesh(place / "shell.mesh");
   CHECK(report["quality"]["certified_cells"] == mesh.num_cells());
   for (const char* side : {"inside", "outside"}) {
@@ -383,6 +383,26 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
   const std::string glb = content_of(place / "shell.glb");
   for (const char* name : {"\"inner\"", "\"base\"", "\"outer\"", "\"wireframe\"", "_THICKNESS"})
     CHECK(glb.find(name) != std::string::npos);
+}
+
+TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property of the surface", "[cli]") {
+  const Workplace place;
+  const std::string faces = "3 0 1 2\n3 0 3 1\n3 1 3 2\n3 2 3 0\n";
+  place.file("tet.ply",
+             "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
+             "property float wall\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
+             "0 0 0 0.1\n0 1 0 0.1\n1 0 0 0.1\n0 0 1 0.2\n" + faces);
+  place.file("wall.txt", "0.1\n0.1\n\n0.1\r\n0.2\n");
+  REQUIRE(place.run("shell tet.ply --thickness-attribute wall -o a.mesh --report a.json").status == 0);
+  REQUIRE(place.run("shell tet.ply --thickness-file wall.txt -o b.mesh --report b.json").status == 0);
+  for (const char* report : {"a.json", "b.json"}) {
+    const auto asked = place.json(report)["thickness"]["outside"]["asked"];
+    CHECK(asked["min"].get<double>() == Approx(0.1));
+    CHECK(asked["max"].get<double>() == Approx(0.2));
+  }
+  CHECK(place.run("shell tet.ply --thickness-attribute roof -o c.mesh").err.find("roof") != std::string::npos);
+  CHECK(place.run("shell target.off --thickness-attribute wall -o c.mesh").status == 3);
+  CHECK(place.run("shell tet.ply --thickness-attribute wall --thickness 1 -o c.mesh").status == 2);
 }
 
 TEST_CASE("A shell is a control mesh that can be subdivided", "[cli]") {
