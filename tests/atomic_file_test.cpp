@@ -60,7 +60,7 @@ TEST_CASE("what cannot be written is an IoError that names the path and leaves n
 
 TEST_CASE("a full device is an IoError and a device can be written to") {
   if (!fs::exists("/dev/full")) {
-    WARN("no /dev/full here: skipped");
+    WARN("SKIPPED: no /dev/full here");
     return;
   }
   CHECK_THROWS_AS(write_file_atomically("/dev/full", "x"), IoError);

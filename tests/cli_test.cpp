@@ -326,7 +326,7 @@ TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
 TEST_CASE("Bad files are refused by every verb, quickly and without a trace", "[cli][data]") {
   const auto data = subvol::test::data_dir();
   if (!data) {
-    WARN("skipped: no folder of real inputs");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   const Workplace place;

@@ -163,7 +163,7 @@ TEST_CASE("refined triangles of a tet are four to a face", "[boundary_triangles]
 TEST_CASE("checks of published templates agree with what is known of them", "[mesh_check][data]") {
   const auto folder = test::data_dir();
   if (!folder) {
-    WARN("no SUBVOL_DATA: skipped");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   struct Known {

@@ -210,7 +210,7 @@ TEST_CASE("a mesh that could not be read back is not written") {
 TEST_CASE("the real templates load and are sound but for the inverted cells they are known for") {
   const auto data = data_dir();
   if (!data) {
-    WARN("no real data here: skipped");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   std::size_t num_read = 0;
@@ -232,7 +232,7 @@ TEST_CASE("the real templates load and are sound but for the inverted cells they
 TEST_CASE("every bad volume mesh of the collection gets the outcome it asks for") {
   const auto data = data_dir();
   if (!data) {
-    WARN("no real data here: skipped");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   std::istringstream lines(content_of(*data / "bad" / "EXPECT.txt"));

@@ -426,7 +426,7 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
 TEST_CASE("Real surfaces get valid shells on every side", "[shell][data]") {
   const auto data = data_dir();
   if (!data) {
-    WARN("no data folder: skipped");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   for (const char* name : {"sphere/surface.off", "bumpy_cube/surface.off", "cubespikes_quads/surface.obj",

@@ -230,7 +230,7 @@ TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proport
 TEST_CASE("Real cases fit with certified cells", "[data]") {
   const auto data = data_dir();
   if (!data) {
-    WARN("skipped: no folder with real data");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   for (const char* name : {"doubletorus17", "mixed_fandisk"}) {

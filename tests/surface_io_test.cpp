@@ -260,7 +260,7 @@ TEST_CASE("an unknown surface extension is refused with the known ones") {
 TEST_CASE("every bad surface of the collection gets the outcome it asks for, and the real ones load") {
   const auto data = data_dir();
   if (!data) {
-    WARN("no real data here: skipped");
+    WARN("SKIPPED: no folder with real data");
     return;
   }
   std::istringstream lines(content_of(*data / "bad" / "EXPECT.txt"));
