@@ -115,7 +115,8 @@ void ShellRun::load() {
   const TriangleMesh triangles = triangulate(surface_.polygons);
   diagonal_ = bounding_box_diagonal(triangles);
   if (faces_point_inward(triangles))
-    warnings_.push_back(arguments_.surface + ": the faces of this closed surface point inward, so outward is its inside");
+    warnings_.push_back(arguments_.surface +
+                        ": the faces of this closed surface point inward, so outward is its inside");
   warn();
 }
 
@@ -130,8 +131,8 @@ std::vector<double> ShellRun::thickness_from_file() const {
     begin = end + 1;
     if (word.empty()) continue;
     if (!number_in(1e-300, 1e300)(word).empty())
-      throw InputError(arguments_.thickness_file + ':' + std::to_string(line) + ": expected a positive thickness, got " +
-                       word);
+      throw InputError(arguments_.thickness_file + ':' + std::to_string(line) +
+                       ": expected a positive thickness, got " + word);
     thickness.push_back(std::stod(word));
   }
   require_one_per_vertex(arguments_.thickness_file, thickness);
@@ -348,7 +349,9 @@ void add_shell_command(CLI::App& app, Action& action) {
 Where there is no room the shell gets thinner; the report and the files tell where. What is written is checked:
 every cell certified, no sheet meeting another; otherwise exit status 1.
 Ctrl-C once ends with the best result so far (exit status 130), twice ends the program.)");
-  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return ShellRun(*arguments, *verb).run(); }; });
+  verb->callback([arguments, verb, &action] {
+    action = [arguments, verb] { return ShellRun(*arguments, *verb).run(); };
+  });
 }
 
 }  // namespace subvol::cli

@@ -107,8 +107,8 @@ std::string thickness_text(const ShellResult& shell) {
   for_each_side(shell.layers, [&](const char* side, std::size_t first) {
     const ThicknessFigures asked({shell.asked.data() + first, n}), found({shell.achieved.data() + first, n});
     char line[200];
-    std::snprintf(line, sizeof line, "thickness %-9s asked %.6g, achieved mean %.6g (%.1f %%), min %.6g, max %.6g\n", side,
-                  asked.mean, found.mean, 100 * found.mean / asked.mean, found.least, found.most);
+    std::snprintf(line, sizeof line, "thickness %-9s asked %.6g, achieved mean %.6g (%.1f %%), min %.6g, max %.6g\n",
+                  side, asked.mean, found.mean, 100 * found.mean / asked.mean, found.least, found.most);
     text += line;
   });
   return text;

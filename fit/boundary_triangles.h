@@ -18,8 +18,8 @@ namespace subvol {
 /// returns              points [corners][edges, by first appearance][centres], orientation kept.
 TriangleMesh refined_triangles(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle = nullptr);
 
-/// The same surface with as few triangles as describe it: triangles stay as they are, a quad, or a larger polygon, becomes
-/// the fan of its centre over its border. Points [corners][centres].
+/// The same surface with as few triangles as describe it: triangles stay as they are, a quad, or a larger polygon,
+/// becomes the fan of its centre over its border. Points [corners][centres].
 TriangleMesh fan_triangles(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle = nullptr);
 
 }  // namespace subvol

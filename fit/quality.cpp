@@ -197,9 +197,11 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
     for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
       const auto corners = gather_cell(mesh.positions, mesh, c);
       const SamplePoints& at = points[static_cast<std::size_t>(mesh.kinds[c])];
-      const Sampled<double> s = sample_cell({corners.data(), mesh.cell(c).size()}, at, reference, static_cast<Index>(c));
+      const Sampled<double> s =
+          sample_cell({corners.data(), mesh.cell(c).size()}, at, reference, static_cast<Index>(c));
       // A tet has one point only.
-      keep(c, s.least, s.sum * static_cast<double>(num_samples(mesh.kinds[c], n)) / static_cast<double>(at.points.size()));
+      const double repeats = static_cast<double>(num_samples(mesh.kinds[c], n)) / static_cast<double>(at.points.size());
+      keep(c, s.least, repeats * s.sum);
     }
     return result;
   }

@@ -45,8 +45,8 @@ void check_options(const PolygonMesh& surface, const ShellOptions& options) {
     return;
   }
   if (options.vertex_thickness.size() != surface.positions.size())
-    throw InputError("shell: expected one thickness per vertex (" + std::to_string(surface.positions.size()) + "), got " +
-                     std::to_string(options.vertex_thickness.size()));
+    throw InputError("shell: expected one thickness per vertex (" + std::to_string(surface.positions.size()) +
+                     "), got " + std::to_string(options.vertex_thickness.size()));
   for (std::size_t v = 0; v < options.vertex_thickness.size(); ++v)
     if (!positive(options.vertex_thickness[v]))
       throw InputError("shell: the thickness at vertex " + std::to_string(v) + " must be positive");
@@ -238,7 +238,8 @@ MinimizerStop ShellMaker::solve(int round) {
   stage.cells = cells_.num_cells();
   const double before = seconds();
   int iteration = 0;
-  MinimizerOptions minimizer{.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultIterations};
+  MinimizerOptions minimizer;
+  minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultIterations;
   minimizer.progress = [&](const IterationRecord& record) {
     ++iteration;
     const double in_round = static_cast<double>(iteration) / minimizer.max_iterations;
@@ -275,7 +276,8 @@ void ShellMaker::optimize() {
   positions_ = advance(layers_, check_, start_, positions_, &shares);
   const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; });
   if (held > 0)
-    report_.warnings.push_back(std::to_string(held) + " columns were held back: there sheets still met after the last solve");
+    report_.warnings.push_back(std::to_string(held) +
+                               " columns were held back: there sheets still met after the last solve");
   if (ended_) return;
   report_.stop_reason = StopReason::iteration_limit;
   report_.explanation = "sheets still met after " + std::to_string(kMaxRounds) + " solves and were parted";

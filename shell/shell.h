@@ -28,8 +28,8 @@ struct ShellOptions {
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
 };
 
-/// A shell and what is true of it. Thicknesses are per strand (`shell_layers.h`), in the surface's unit; those of a side
-/// without layers are 0.
+/// A shell and what is true of it. Thicknesses are per strand (`shell_layers.h`), in the surface's unit; those of a
+/// side without layers are 0.
 struct ShellResult {
   ShellLayers layers;
   VolumeMesh mesh;                 ///< layer by layer; references number the layers from the innermost, from 1
@@ -51,16 +51,16 @@ struct ShellResult {
 ///   E(x) = mean over cells and their corners of e(F),  F = dx/du A^-1
 ///
 /// is minimised, e being Hencky's energy (`hencky.h`) and A the polygon a cell stands on, as thick as its layer
-/// (`shell_reference`); the surface's own vertices stay, or, where they are free, are drawn to it by `ClosestPointEnergy`
-/// (on real surfaces they leave it by a tenth of the thickness at most, `surface_distance_max`). Energies of single cells do not keep sheets apart: where faces
-/// meet afterwards the thickness asked for is lowered, with a bounded slope, and the solve repeated; what still meets in the
-/// end goes back towards the straight columns.
+/// (`shell_reference`); the surface's own vertices stay, or, where they are free, are drawn to it by
+/// `ClosestPointEnergy` (on real surfaces they leave it by a tenth of the thickness at most, `surface_distance_max`).
+/// Energies of single cells do not keep sheets apart: where faces meet afterwards the thickness asked for is lowered,
+/// with a bounded slope, and the solve repeated; what still meets in the end goes back towards the straight columns.
 ///
-/// returns  a shell whose cells are certified and whose sheets do not meet, for every surface that is not refused, but for
-///          rounding when the caller's coordinates are much larger than the surface; `failures` has the last word.
-/// InputError: options out of range; what `make_layers` refuses; a surface that meets itself; vertices from which not all
-/// faces around are seen from their front, or on which not even a very thin layer fits. Messages name the first of them.
-/// Same bits for any number of threads.
+/// returns  a shell whose cells are certified and whose sheets do not meet, for every surface that is not refused, but
+///          for rounding when the caller's coordinates are much larger than the surface; `failures` has the last word.
+/// InputError: options out of range; what `make_layers` refuses; a surface that meets itself; vertices from which not
+/// all faces around are seen from their front, or on which not even a very thin layer fits. Messages name the first of
+/// them. Same bits for any number of threads.
 ShellResult make_shell(const PolygonMesh& surface, const ShellOptions& options);
 
 }  // namespace subvol

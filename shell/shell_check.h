@@ -14,8 +14,8 @@ namespace subvol {
 /// What keeps a shell from being one.
 struct ShellFailures {
   CertificateSummary certificate;
-  /// Faces that meet improperly, numbers in `ShellCheck::polygons()`, smaller first, ascending. A face without area makes
-  /// a pair with itself.
+  /// Faces that meet improperly, numbers in `ShellCheck::polygons()`, smaller first, ascending. A face without area
+  /// makes a pair with itself.
   std::vector<std::array<Index, 2>> intersecting;
   bool none() const { return certificate.all_certified() && intersecting.empty(); }
 };
@@ -24,7 +24,8 @@ struct ShellFailures {
 /// is injective on the boundary of what it maps, and near every point, is so everywhere.
 enum class CheckedSheets { outer, all };
 
-/// Tells whether a shell is valid: every cell certified, and no face of a sheet or of a wall along the border meeting another.
+/// Tells whether a shell is valid: every cell certified, and no face of a sheet or of a wall along the border meeting
+/// another.
 ///
 /// Triangles stand for themselves, quads (walls among them) for their `fan_triangles`, the same on all sheets.
 class ShellCheck {
@@ -48,8 +49,8 @@ class ShellCheck {
   bool surface_moves_;
 };
 
-/// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the wanted
-/// one, less where cells or faces fail; a vertex of the surface goes the least share of its strands.
+/// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the
+/// wanted one, less where cells or faces fail; a vertex of the surface goes the least share of its strands.
 ///
 /// safe  valid by `check`, so that this ends: a failing cell or face always has a strand that can go back farther.
 /// shares  if given: how far each strand got, 0 .. 1.

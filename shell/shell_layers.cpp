@@ -16,7 +16,8 @@ namespace subvol {
 namespace {
 
 std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {
-  return {surface.face_vertices.data() + surface.face_offsets[f], surface.face_offsets[f + 1] - surface.face_offsets[f]};
+  const std::size_t begin = surface.face_offsets[f];
+  return {surface.face_vertices.data() + begin, surface.face_offsets[f + 1] - begin};
 }
 
 void require_faces(const PolygonMesh& surface) {

@@ -15,8 +15,9 @@ namespace subvol {
 
 /// How the layers of a shell are numbered.
 ///
-/// A *column* is a surface vertex with its copies, a *strand* the part of a column on one side of the surface, a *sheet* a
-/// copy of the whole surface. Sheets are numbered from the innermost outward; sheet `inside` is the surface itself.
+/// A *column* is a surface vertex with its copies, a *strand* the part of a column on one side of the surface, a
+/// *sheet* a copy of the whole surface. Sheets are numbered from the innermost outward; sheet `inside` is the surface
+/// itself.
 ///
 ///        sheet 3  ---o-----o---   outermost        inside = 1, outside = 2
 ///                    | cell|                       vertex = sheet * num_columns + surface vertex
@@ -58,8 +59,9 @@ std::vector<double> layer_shares(int num_layers, double growth);
 
 /// Pairs the surface's edges and checks what a shell needs of it.
 ///
-/// InputError: no faces; vertices out of range, not finite, named twice by a face or by none; a face of more than four corners; an edge of more than two faces, or of two that run the same way
-/// along it; a vertex whose faces form more than one fan; a face without area.
+/// InputError: no faces; vertices out of range, not finite, named twice by a face or by none; a face of more than four
+/// corners; an edge of more than two faces, or of two that run the same way along it; a vertex whose faces form more
+/// than one fan; a face without area.
 ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth);
 
 /// The cells with all sheets in the place of the surface. References number the layers from the innermost, from 1.
@@ -72,7 +74,8 @@ FeatureTags surface_features(const PolygonMesh& surface, double angle_degrees);
 /// tags  creases along edges of the surface and corners at its vertices, else InputError.
 FeatureTags shell_tags(const ShellLayers& layers, const FeatureTags& tags);
 
-/// Positions of straight columns: surface vertex plus height of the sheet times thickness of its side along `directions`.
+/// Positions of straight columns: surface vertex plus height of the sheet times thickness of its side along
+/// `directions`.
 /// thickness  per strand, in the surface's unit. Returns one position per vertex.
 std::vector<Vec3> straight_columns(const ShellLayers& layers, std::span<const Vec3> directions,
                                    std::span<const double> thickness);
@@ -89,7 +92,8 @@ CellReference shell_reference(const ShellLayers& layers, std::vector<double> thi
 PolygonMesh sheet_surface(const ShellLayers& layers, const VolumeMesh& cells, int sheet);
 
 /// Polygons of the given sheets and of the walls along the surface's border, over the shell's vertices.
-/// Sheet by sheet in the surface's order, then the walls, layer by layer for each border edge. Positions are left empty.
+/// Sheet by sheet in the surface's order, then the walls, layer by layer for each border edge. Positions are left
+/// empty.
 PolygonMesh sheet_polygons(const ShellLayers& layers, std::span<const int> sheets);
 
 }  // namespace subvol

@@ -131,7 +131,7 @@ std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& ch
   std::vector<double> thin(thickness.begin(), thickness.end());
   for_each_edge(layers, [&](Index a, Index b, double length) {
     for (const Index v : {a, b})
-      for (const std::size_t side : {std::size_t{0}, n}) thin[side + v] = std::min(thin[side + v], kShareOfEdge * length);
+      for (double* t : {&thin[v], &thin[n + v]}) *t = std::min(*t, kShareOfEdge * length);
   });
   for (int halving = 0;; ++halving) {
     std::vector<Vec3> positions = straight_columns(layers, directions, thin);

@@ -59,7 +59,8 @@ std::optional<Vec3> most_visible_direction(std::span<const Vec3> normals) {
 Vec3 corner_normal(const PolygonMesh& surface, std::size_t face, std::size_t corner) {
   const std::size_t begin = surface.face_offsets[face], size = surface.face_offsets[face + 1] - begin;
   const auto at = [&](std::size_t k) { return surface.positions[surface.face_vertices[begin + k % size]]; };
-  const Vec3 next = (at(corner + 1) - at(corner)).normalized(), previous = (at(corner + size - 1) - at(corner)).normalized();
+  const Vec3 next = (at(corner + 1) - at(corner)).normalized();
+  const Vec3 previous = (at(corner + size - 1) - at(corner)).normalized();
   return next.cross(previous).normalized();
 }
 

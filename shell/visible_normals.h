@@ -26,9 +26,10 @@ struct VisibleNormals {
 
 /// For every vertex of a surface the `most_visible_direction` of the faces around it.
 ///
-/// A triangle counts with its normal. A quad counts with the normals at its four corners, so that a thin extrusion of the
-/// bilinear patch is nowhere inverted; where these leave no direction, with the one at the vertex only.
-/// surface  triangles and quads, each vertex used. Degenerate: a corner without angle has no normal; its vertex is hidden.
+/// A triangle counts with its normal. A quad counts with the normals at its four corners, so that a thin extrusion of
+/// the bilinear patch is nowhere inverted; where these leave no direction, with the one at the vertex only.
+/// surface  triangles and quads, each vertex used. Degenerate: a corner without angle has no normal; its vertex is
+/// hidden.
 VisibleNormals visible_normals(const PolygonMesh& surface);
 
 /// Normal of a polygon at one of its corners, from the two edges there; 0 where they span nothing.

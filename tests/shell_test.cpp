@@ -77,7 +77,8 @@ double least_determinant(const VolumeMesh& mesh, std::size_t cell, const Element
   for (std::size_t q = 0; q < rule.num_points(); ++q) {
     Mat3 jacobian = Mat3::Zero();
     for (const ElementRule::Entry& entry : rule.point(q))
-      jacobian += mesh.positions[mesh.cell(cell)[entry.vertex]] * Eigen::Map<const Vec3>(entry.gradient.data()).transpose();
+      jacobian +=
+          mesh.positions[mesh.cell(cell)[entry.vertex]] * Eigen::Map<const Vec3>(entry.gradient.data()).transpose();
     least = std::min(least, jacobian.determinant());
   }
   return least;
@@ -169,8 +170,8 @@ TEST_CASE("A sphere's shell is as thick as its energy says, and has that volume"
   // One layer: half of the corners are stretched twice by (R + h)/R, so E(h) = ln^2(h/d)/2 + ln^2((R + h)/R)/2.
   const double d = 0.2;
   for (const double sign : {1.0, -1.0}) {
-    const double h =
-        zero_of([&](double t) { return std::log(t / d) / t + sign * std::log(1 + sign * t) / (1 + sign * t); }, 0.1, 0.3);
+    const auto slope = [&](double t) { return std::log(t / d) / t + sign * std::log(1 + sign * t) / (1 + sign * t); };
+    const double h = zero_of(slope, 0.1, 0.3);
     const ShellResult shell = make_shell(polygons(cube_surface(16, true)),
                                          {.thickness = d, .side = sign > 0 ? ShellSide::outward : ShellSide::inward});
     check_valid(shell);
@@ -206,7 +207,8 @@ TEST_CASE("Scaling, moving and turning the surface does the same to its shell", 
 }
 
 TEST_CASE("Walls that face each other share the room between them", "[shell]") {
-  // A slot of width 1, outward being into the slot: twice 0.8 does not fit. And an L, whose sides bend towards each other.
+  // A slot of width 1, outward being into the slot: twice 0.8 does not fit. And an L, whose sides bend towards each
+  // other.
   const auto profile = [](const std::vector<Vec3>& corners, int cuts) {
     std::vector<Vec3> points;
     for (std::size_t k = 0; k + 1 < corners.size(); ++k)
