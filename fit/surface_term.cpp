@@ -44,11 +44,37 @@ SurfaceTerm::SurfaceTerm(std::vector<std::array<Index, 3>> sample_triangles, std
 void SurfaceTerm::begin_assign(std::span<const Vec3> samples) {
   if (samples.size() != num_samples()) throw InputError("SurfaceTerm::assign: samples must be num_samples positions");
   assigned_.assign(samples.begin(), samples.end());
+  if (creases_) creases_->assign(samples);
   triangle_areas_.resize(triangles_.size());
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     const Vec3& a = samples[triangles_[t][0]];
     triangle_areas_[t] = 0.5 * (samples[triangles_[t][1]] - a).cross(samples[triangles_[t][2]] - a).norm();
+  }
+}
+
+void SurfaceTerm::add_creases(CreaseEnergy creases) {
+  for (const CreaseSegment& segment : creases.segments()) {
+    const auto [a, b] = segment.ends;
+    const bool known = static_cast<std::size_t>(std::max(a, b)) < num_samples();
+    if (!known || hessian_.find(a, b) == hessian_.num_entries())
+      throw InputError("SurfaceTerm::add_creases: a segment must be an edge of a sample triangle");
+  }
+  creases_ = std::move(creases);
+}
+
+void SurfaceTerm::add_crease_links(std::size_t sample, Row& row) const {
+  const auto i = static_cast<Index>(sample);
+  for (Index number : creases_->links_at(sample)) {
+    const CreaseEnergy::Link& link = creases_->link(number);
+    const std::array<double, 2> shares = {1 - link.at, link.at};
+    const double own = link.ends[0] == i ? shares[0] : shares[1];
+    const Vec3 d = shares[0] * assigned_[link.ends[0]] + shares[1] * assigned_[link.ends[1]] - link.point;
+    const double weight = own * link.weight;
+    row.surface_to_target += weight * d.dot(link.metric * d);
+    row.gradient += 2 * weight * link.metric * d;
+    for (int k = 0; k < 2; ++k)
+      row.blocks[hessian_.find(i, link.ends[k]) - hessian_.offsets[i]] += 2 * weight * shares[k] * link.metric;
   }
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include "fit/block_sparse.h"
+#include "fit/crease_energy.h"
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,6 +23,9 @@ class SurfaceTerm {
   /// Takes the samples' positions (num_samples, finite, else InputError), finds what corresponds to them, freezes it.
   /// Must come before the functions below.
   virtual void assign(std::span<const Vec3> samples) = 0;
+
+  /// Adds creases whose segments are edges of sample triangles (else InputError); to be called before `assign`.
+  void add_creases(CreaseEnergy creases);
 
   /// E(z) with what is frozen. Taken relative to the assigned samples, so differences of close-by values are good.
   double value(std::span<const Vec3> z) const;
@@ -68,6 +73,7 @@ class SurfaceTerm {
   void assemble(double scale, const AddRow& add_row);
 
  private:
+  void add_crease_links(std::size_t sample, Row& row) const;
   /// Row i of H (z - assigned samples).
   Vec3 hessian_times_step(std::span<const Vec3> z, std::size_t i) const;
 
@@ -78,6 +84,7 @@ class SurfaceTerm {
   std::vector<Vec3> assigned_, gradient_;
   BlockSparse hessian_;
   double target_to_surface_ = 0, surface_to_target_ = 0;
+  std::optional<CreaseEnergy> creases_;
 };
 
 /// Sum of f(i) over [0, n) in slices of fixed size: the same bits for any number of threads.
@@ -109,6 +116,7 @@ void SurfaceTerm::assemble(double scale, const AddRow& add_row) {
       row.diagonal = hessian_.find(static_cast<Index>(i), static_cast<Index>(i)) - begin;
       row.position = assigned_[i];
       add_row(i, row);
+      if (creases_) add_crease_links(i, row);
       to_surface[i] = row.target_to_surface;
       to_target[i] = row.surface_to_target;
       gradient_[i] = scale * row.gradient;

@@ -152,6 +152,24 @@ std::array<Index, 4> face_entries(const SurfaceTopology& surface, Index f, std::
   return entries;
 }
 
+/// The 2^levels descendants of every crease. Those of edge e are e 2^levels and on, as `refined_topology` numbers them.
+std::vector<std::array<Index, 2>> refined_creases(const VolumeMesh& mesh, const MeshTopology& topology,
+                                                  std::span<const Index> volume_edges, const SurfaceTopology& refined,
+                                                  int levels) {
+  std::vector<std::array<Index, 2>> creases;
+  if (mesh.tags.creases.empty()) return creases;
+  std::vector<Index> surface_edge(topology.num_edges(), kNoIndex);
+  for (std::size_t e = 0; e < volume_edges.size(); ++e) surface_edge[volume_edges[e]] = static_cast<Index>(e);
+  for (const CreaseEdge& crease : mesh.tags.creases) {
+    const Index first = surface_edge[topology.find_edge(crease.v0, crease.v1)] << levels;
+    for (Index e = first; e < first + (Index{1} << levels); ++e) {
+      const Index h = refined.edge_corners[e];
+      creases.push_back({refined.corner_vertices[h], refined.corner_vertices[refined.next(h)]});
+    }
+  }
+  return creases;
+}
+
 }  // namespace
 
 SparseMap limit_map(const VolumeMesh& mesh) {
@@ -171,7 +189,8 @@ BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with
   if (levels < 0 || levels > kMaxBoundaryLevels)
     throw InputError("refine_boundary: levels must be 0 to " + std::to_string(kMaxBoundaryLevels) + ", got " +
                      std::to_string(levels));
-  BoundarySurface boundary = tagged_boundary(mesh, MeshTopology(mesh));
+  const MeshTopology topology(mesh);
+  BoundarySurface boundary = tagged_boundary(mesh, topology);
   SurfaceTopology surface = std::move(boundary.topology);
   std::vector<Index> columns = boundary.vertices;
   std::size_t num_cols = mesh.num_vertices();
@@ -194,6 +213,7 @@ BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with
   result.positions = to_control(limit_rows(surface, columns, num_cols));
   for (std::size_t f = 0; f < surface.num_faces(); ++f)
     result.quads.push_back(face_entries(surface, static_cast<Index>(f), surface.corner_vertices));
+  result.crease_edges = refined_creases(mesh, topology, boundary.edges, surface, levels);
   if (!with_tangents) return result;
 
   Tangents tangents = tangent_rows(surface, columns, num_cols);

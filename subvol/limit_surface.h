@@ -26,6 +26,8 @@ struct BoundaryRefinement {
   std::vector<std::array<Index, 4>> quads;
   std::vector<Index> face_of_quad;  ///< boundary face each came from: a place in MeshTopology::boundary_faces()
   std::vector<Index> vertices;      ///< volume vertex of each of the first vertices.size() refined vertices
+  /// Refined edges along the mesh's creases, in the order of its tags: 2^levels for each.
+  std::vector<std::array<Index, 2>> crease_edges;
 
   /// Tangents of the limit surface, one row per *normal site*: one site per vertex on smooth parts, one per side where
   /// creases cut the surface. Empty unless asked for.
