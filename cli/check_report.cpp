@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/check_report.h"
 
+#include <sstream>
+
 namespace subvol::cli {
 namespace {
 
@@ -67,6 +69,31 @@ Json audit_json(const SubdivisionAudit& found) {
           {"reflex_creases", found.reflex_creases.size()},
           {"folding_corners", found.folding_corners},
           {"warnings", found.warnings}};
+}
+
+Json creases_json(const CreaseDistance& creases) {
+  return {{"target_curves", creases.num_curves},
+          {"followed_curves", creases.num_followed},
+          {"target_length_percent", creases.target_length_percent},
+          {"followed_share", creases.followed_share()},
+          {"share_within_tenth_percent", creases.within_share()},
+          {"mean_percent", creases.mean_percent()},
+          {"max_percent", creases.max_percent()},
+          {"mean_from_target_percent", creases.mean_from_target_percent},
+          {"mean_to_target_percent", creases.mean_to_target_percent},
+          {"max_from_target_percent", creases.max_from_target_percent},
+          {"max_to_target_percent", creases.max_to_target_percent},
+          {"farthest", point_json(creases.farthest)},
+          {"crease_length_percent", creases.crease_length_percent}};
+}
+
+std::string to_text(const CreaseDistance& creases) {
+  std::ostringstream text;
+  text << "sharp edges         creases follow " << creases.num_followed << " of " << creases.num_curves << " curves ("
+       << 100 * creases.followed_share() << " % of their length): mean " << creases.mean_percent() << " %, max "
+       << creases.max_percent() << " % of the diagonal; " << 100 * creases.within_share() << " % of all within "
+       << kSharpPercent << " %\n";
+  return text.str();
 }
 
 Json distance_json(const SurfaceDistance& distance, double diagonal) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/run_options.h"
+#include "fit/crease_distance.h"
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "subvol/audit.h"
@@ -19,5 +20,9 @@ Json audit_json(const SubdivisionAudit& found);
 
 /// A distance in the mesh's unit and in per cent of a diagonal; `a` is ours, `b` the target.
 Json distance_json(const SurfaceDistance& distance, double diagonal);
+
+/// How well creases meet the target's sharp edges; and the same as one line for people.
+Json creases_json(const CreaseDistance& creases);
+std::string to_text(const CreaseDistance& creases);
 
 }  // namespace subvol::cli

@@ -143,6 +143,7 @@ void FitRun::write_report() const {
   json.update(check_json(mesh_check_));
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
   json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
+  if (report.creases) json["creases"] = creases_json(*report.creases);
   json["cage"] = describe("", result_.cage);
   json["audit"] = audit_json(audit(template_mesh_));
   json["warnings"] = warnings_;
@@ -158,6 +159,7 @@ void FitRun::summarise() const {
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
             << to_text(mesh_check_) << "limit surface to target: mean " << limit_distance_.mean() * percent << " %, max "
             << limit_distance_.max() * percent << " % of the diagonal\n";
+  if (report.creases) std::cerr << to_text(*report.creases);
   for (const auto& name : output_names(arguments_.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
 }
 
@@ -203,7 +205,8 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str();
   verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
   verb.add_option("--crease-angle", fit.crease_angle_degrees,
-                  "Edges of the template's boundary sharper than this become creases (default: only those the file tags)")
+                  "Keep edges of the target sharper than this sharp: edges of the template that follow them become\n"
+                  "creases and are drawn to them (default: creases only where the template's file tags them)")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
 }

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
 namespace subvol {
@@ -37,6 +38,26 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
     level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
   }
   level.samples = select_rows(nodes, rows);
+  for (const CreaseEdge& crease : mesh.tags.creases)
+    level.crease_edges.push_back({sample_of[crease.v0], sample_of[crease.v1]});
+}
+
+/// Both children of a crease end at its middle, which is a vertex of no other crease.
+std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags& control) {
+  std::map<Index, std::array<Index, 2>> ends_of_middle;
+  for (const CreaseEdge& crease : fine.creases) {
+    const auto [at, added] = ends_of_middle.try_emplace(crease.v1, std::array{crease.v0, crease.v0});
+    if (!added) at->second = {std::min(at->second[0], crease.v0), std::max(at->second[1], crease.v0)};
+  }
+  std::vector<Index> parents;
+  for (const CreaseEdge& crease : fine.creases) {
+    const auto& [v0, v1] = ends_of_middle[crease.v1];
+    const auto at = std::lower_bound(
+        control.creases.begin(), control.creases.end(), std::pair(v0, v1),
+        [](const CreaseEdge& c, const std::pair<Index, Index>& ends) { return std::pair(c.v0, c.v1) < ends; });
+    parents.push_back(static_cast<Index>(at - control.creases.begin()));
+  }
+  return parents;
 }
 
 /// Boundary nodes -> vertices of the boundary refined once, by bilinear interpolation in its quads.
@@ -74,6 +95,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   FitLevel level;
   SubdivisionLevel refined = subdivide(control, options.boundary);
   level.mesh = std::move(refined.fine);
+  level.parent_creases = parents_of_creases(level.mesh.tags, control.tags);
   level.safe_nodes = compose(refined.linear_split, previous_nodes);
   level.refine = std::move(refined.matrix);
   const SparseMap fine_from_unknowns = compose(level.refine, from_unknowns);
@@ -106,6 +128,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   if (!towards_mesh) boundary = refine_boundary(level.mesh, finest ? std::max(refinements, 1) : refinements);
   level.samples = compose(boundary.positions, fine_from_unknowns);
   if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, kMeshShare);
+  level.crease_edges = std::move(boundary.crease_edges);
   for (const auto& q : boundary.quads) {
     level.sample_triangles.push_back({q[0], q[1], q[2]});
     level.sample_triangles.push_back({q[0], q[2], q[3]});

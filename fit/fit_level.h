@@ -27,6 +27,9 @@ struct FitLevel {
   SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid whenever that mesh is certified
   SparseMap samples;             ///< N
   std::vector<std::array<Index, 3>> sample_triangles;
+  /// Edges between samples along the mesh's creases, in the order of its tags and equally many for each.
+  std::vector<std::array<Index, 2>> crease_edges;
+  std::vector<Index> parent_creases;  ///< for each crease of the mesh, the place in control.tags.creases it came from
 };
 
 /// Builds the level above a control mesh.

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/crease_distance.h"
 #include "subvol/types.h"
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -55,6 +57,7 @@ struct FitReport {
   std::string explanation;                 ///< one sentence for people
   std::vector<StageRecord> stages;
   double initial_distance_mean_percent = 0, initial_distance_max_percent = 0;
+  std::optional<CreaseDistance> creases;   ///< of the limit surface; where there are sharp edges to follow
   std::vector<std::string> warnings;       ///< audit: what the template's geometry cannot do, topology mismatch, ...
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...
 };

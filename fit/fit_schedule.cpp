@@ -11,6 +11,8 @@ namespace {
 /// Up to which distance a template's own cells tell what the fitted ones should look like (measured on real templates).
 constexpr double kCloseDistance = 0.4;
 constexpr double kCoarseLambda = 0.05;
+/// With creases tied from the start, stiffer cells swell beside them, and folds made then do not go away.
+constexpr double kHeldLambda = 0.01;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
 constexpr double kCoarseDecrease = 1e-3, kFinalDecrease = 3e-4;
 
@@ -26,11 +28,11 @@ Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTang
 
 double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
 
-FitSchedule make_schedule(const FitOptions& options, double distance) {
+FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold) {
   FitSchedule schedule;
   schedule.levels = options.levels;
   schedule.own_box_shares = distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
-  const double coarse = std::max(kCoarseLambda, options.lambda_close);
+  const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
   schedule.first = {{coarse, kFarTangentialWeight, 20, kCoarseDecrease}, {coarse, kCloseTangentialWeight, 20, kCoarseDecrease}};
   schedule.middle = {{coarse, kCloseTangentialWeight, 20, kCoarseDecrease}};
   if (options.lambda_close < coarse) schedule.last = {schedule.final_stage(options.lambda_close)};

@@ -22,6 +22,8 @@ inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare =
 inline constexpr double kLeastGain = 0.01;
 /// Without a tolerance, halvings of lambda may cost so much of the mean scaled Jacobian in all.
 inline constexpr double kMostShapeLoss = 0.0075;
+/// A crease counts as much as a strip of surface so wide, by the target's length V/A.
+inline constexpr double kCreaseWidth = 1;
 /// The target is sampled at least about so many times.
 inline constexpr std::size_t kLeastTargetSamples = 20000;
 /// L-BFGS steps allowed for each Newton step of a stage.
@@ -48,7 +50,8 @@ struct FitSchedule {
   double fraction(int number) const;
 };
 
-/// distance  mean distance of template and target by the target's length V/A.
-FitSchedule make_schedule(const FitOptions& options, double distance);
+/// distance      mean distance of template and target by the target's length V/A.
+/// creases_hold  whether creases are tied to most of the target's sharp edges.
+FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold = false);
 
 }  // namespace subvol

@@ -8,6 +8,7 @@
 #include "fit/fit_level.h"
 #include "fit/fit_problem.h"
 #include "fit/fit_schedule.h"
+#include "fit/followed_creases.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
 #include "fit/soup_topology.h"
@@ -17,7 +18,6 @@
 #include "subvol/audit.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
-#include "subvol/features.h"
 #include "subvol/limit_surface.h"
 #include "subvol/mesh_topology.h"
 
@@ -34,8 +34,6 @@ namespace subvol {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr int kMaxUnfoldings = 5;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -122,6 +120,7 @@ class SubdivisionFit {
   VolumeMesh template_;            ///< normalised, with its creases
   VolumeMesh control_;             ///< the control mesh (its last refinement, for cage-only fits)
   VolumeMesh cage_;                ///< the mesh whose vertices are the unknowns
+  FollowedCreases template_creases_, creases_;  ///< of template_, of level_.mesh
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
@@ -148,15 +147,8 @@ SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& tem
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   template_.positions = normalisation_.to_unit(template_.positions);
-  if (options.crease_angle_degrees) {
-    template_.tags = merge_tags(template_.tags, features_by_angle(template_, *options.crease_angle_degrees));
-    // A crease added at one corner can leave a wide span at another.
-    for (int round = 0; round < kMaxUnfoldings; ++round) {
-      const SubdivisionAudit found = audit(template_);
-      if (found.folding_edges.empty()) break;
-      template_.tags = unfolding_tags(template_, found);
-    }
-  }
+  if (options.crease_angle_degrees || !template_.tags.creases.empty())
+    template_creases_ = FollowedCreases(target_mesh_, options.crease_angle_degrees, template_);
 }
 
 /// What the report says of the input, and what the schedule makes of it.
@@ -167,7 +159,7 @@ void SubdivisionFit::look_over_template() {
   const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), target_mesh_, target_tree_);
   report.initial_distance_mean_percent = 100 * distance.mean();
   report.initial_distance_max_percent = 100 * distance.max();
-  schedule_ = make_schedule(options_, distance.mean() / target_.length());
+  schedule_ = make_schedule(options_, distance.mean() / target_.length(), template_creases_.hold_the_surface());
   const SoupTopology wanted = soup_topology(target_mesh_.positions, target_mesh_.triangles);
   const long euler_number = soup_topology(boundary.positions, boundary.triangles).euler_number;
   if (wanted.closed_share == 1 && wanted.euler_number != euler_number)
@@ -189,6 +181,7 @@ void SubdivisionFit::prepare_level() {
   const Clock::time_point begin = Clock::now();
   level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size() / 2, finest());
   limit_check_.reset();
+  creases_.refine(level_);
   sample_target(level_.samples.num_rows());
   ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.volume(),
                              number_ == 1 ? own_box_share_ : 1);
@@ -201,11 +194,16 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
   const std::size_t num_samples = level_.samples.num_rows();
-  if (options_.correspondence == Correspondence::voronoi)
-    return std::make_unique<SurfaceEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight);
   const int points = level_.sample_triangles.size() > 2 * target_.triangles().size() ? 1 : 3;
-  return std::make_unique<ClosestPointEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight,
-                                              points);
+  std::unique_ptr<SurfaceTerm> term;
+  if (options_.correspondence == Correspondence::voronoi)
+    term = std::make_unique<SurfaceEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight);
+  else
+    term = std::make_unique<ClosestPointEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight,
+                                                points);
+  if (!creases_.curves().empty())
+    term->add_creases(creases_.energy(level_, kCreaseWidth * target_.length(), stage.tangential_weight));
+  return term;
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
@@ -377,6 +375,11 @@ void SubdivisionFit::store_result() {
   result_.mesh.positions = normalisation_.from_unit(level_.nodes.apply(unknowns_));
   result_.cage = cage_;
   result_.cage.positions = normalisation_.from_unit(unknowns_);
+  if (creases_.curves().empty()) return;
+  const TriangleMesh limit = limit_triangles();
+  CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
+  creases.farthest = normalisation_.from_unit({creases.farthest})[0];
+  result_.report.creases = creases;
 }
 
 /// The refined mesh becomes the next control mesh (paper: section 4.3), unless the unknowns stay where they are.
@@ -399,6 +402,7 @@ void SubdivisionFit::next_control() {
 void SubdivisionFit::begin(double own_box_share) {
   own_box_share_ = own_box_share;
   control_ = cage_ = template_;
+  creases_ = template_creases_;
   unknowns_ = control_.positions;
   from_unknowns_ = previous_nodes_ = identity_map(unknowns_.size());
 }

@@ -32,7 +32,10 @@ struct FitOptions {
   BoundaryRule boundary = BoundaryRule::catmull_clark;
   bool cage_only = false;                        ///< unknowns stay on the given template
   double lambda_far = 1.0, lambda_close = 0.005; ///< > 0; close may be lowered further when a tolerance asks for it
-  std::optional<double> crease_angle_degrees;    ///< tags the template's boundary edges sharper than this, (0, 180)
+  /// Edges of the target sharper than this stay sharp where the template has edges that follow them: those become
+  /// creases and are drawn to them. In [0, 180]; empty: only the template's own tags are creases, and are drawn to
+  /// edges above 40 degrees.
+  std::optional<double> crease_angle_degrees;
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own

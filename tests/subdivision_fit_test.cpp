@@ -2,6 +2,7 @@
 #include "fit/boundary_triangles.h"
 #include "fit/certificate.h"
 #include "fit/fit_level.h"
+#include "fit/mesh_check.h"
 #include "fit/subdivision_fit.h"
 #include "fit/surface_distance.h"
 #include "samples/shapes.h"
@@ -187,6 +188,32 @@ TEST_CASE("A time limit ends the fit with a result") {
   CHECK(certify(result.mesh).all_certified());
 }
 
+TEST_CASE("Sharp edges of the target stay sharp, whether an angle or the template's tags tell of them") {
+  samples::Sample sample = samples::bracket_sample();
+  FitOptions options = quick();
+  SECTION("by angle, on a template without tags") {
+    sample.template_mesh.tags = {};
+    options.crease_angle_degrees = 40;
+  }
+  SECTION("by the template's tags") {}
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(result.report.stop_reason == StopReason::converged);
+  CHECK(certify(result.mesh).all_certified());
+  REQUIRE(result.report.creases);
+  CHECK(result.report.creases->followed_share() == 1);
+  CHECK(result.report.creases->within_share() > 0.99);
+  CHECK(result.report.creases->max_percent() < 0.15);
+}
+
+TEST_CASE("A target without sharp edges gets no crease by angle") {
+  const samples::Sample sample = samples::torus_sample();
+  FitOptions options = quick(1);
+  options.crease_angle_degrees = 40;
+  const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  CHECK(result.cage.tags.empty());
+  CHECK_FALSE(result.report.creases);
+}
+
 TEST_CASE("A fit refuses options out of range, empty targets and unusable templates") {
   const samples::Sample sample = samples::ball_sample();
   const auto refused = [&](const FitOptions& options) {
@@ -241,5 +268,29 @@ TEST_CASE("Real cases fit with certified cells", "[data]") {
     CHECK(result.report.stop_reason == StopReason::converged);
     CHECK(certify(result.mesh).all_certified());
     CHECK(mesh_percent(result.mesh, target) < 0.12);
+  }
+}
+
+TEST_CASE("Sharp edges of real cases stay sharp", "[data]") {
+  const auto data = data_dir();
+  if (!data) {
+    WARN("skipped: no folder with real data");
+    return;
+  }
+  // Both gave up corners and edges of thin parts when only the template's angles told of creases.
+  for (const char* name : {"cad_fandisk49", "joint129"}) {
+    CAPTURE(name);
+    const TriangleMesh target = read_triangle_mesh(*data / "fit" / name / "target.off");
+    const VolumeMesh template_mesh = read_volume_mesh(*data / "fit" / name / "template.mesh");
+    FitOptions options = quick();
+    options.crease_angle_degrees = 40;
+    const FitResult result = fit_subdivision_volume(target, template_mesh, options);
+    CHECK(result.report.stop_reason == StopReason::converged);
+    CHECK(check_mesh(result.mesh).valid());
+    REQUIRE(result.report.creases);
+    CHECK(result.report.creases->followed_share() > 0.98);
+    CHECK(result.report.creases->mean_percent() < 0.05);
+    CHECK(result.report.creases->max_percent() < 0.5);
+    CHECK(mesh_percent(result.mesh, target) < 0.1);
   }
 }

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/crease_distance.h"
+#include "fit/crease_energy.h"
+#include "fit/crease_paths.h"
+#include "fit/fit_level.h"
+#include "subvol/limit_surface.h"
+#include "subvol/triangle_mesh.h"
+#include "subvol/volume_mesh.h"
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Edges sharper than this, in degrees, are features where nobody says otherwise.
+inline constexpr double kUsualCreaseAngle = 40;
+
+/// The creases of a fit from level to level, and which feature curve of the target each of them follows.
+class FollowedCreases {
+ public:
+  /// No creases that follow anything.
+  FollowedCreases() = default;
+
+  /// With an angle: tags a template by the target's edges that are sharper, with creases along the paths that follow
+  /// them (`follow_curves`) and what keeps the boundary from folding at their corners (`unfolding_tags`); tags it has
+  /// already stay. Without: finds out which of the template's own creases follow edges sharper than kUsualCreaseAngle.
+  FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees, VolumeMesh& template_mesh);
+
+  const FeatureCurves& curves() const { return curves_; }
+  /// Whether most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
+  bool hold_the_surface() const;
+
+  /// Goes over to the creases of the mesh of a level made from the present ones.
+  void refine(const FitLevel& level);
+
+  /// Draws the samples on a level's creases to their curves.
+  CreaseEnergy energy(const FitLevel& level, double width, double tangential_weight) const;
+  /// limit  refinement of the present level's mesh, at `points`.
+  CreaseDistance distance(const BoundaryRefinement& limit, std::span<const Vec3> points, double diagonal) const;
+
+ private:
+  void tag(VolumeMesh& template_mesh) const;
+  std::vector<CreaseSegment> segments(std::span<const std::array<Index, 2>> edges) const;
+
+  FeatureCurves curves_;
+  std::vector<CreasePath> paths_;
+  std::vector<Index> curve_of_crease_;  ///< in the order of the mesh's tags; kNoIndex for creases that follow nothing
+};
+
+}  // namespace subvol
