@@ -96,7 +96,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   SubdivisionLevel refined = subdivide(control, options.boundary);
   level.mesh = std::move(refined.fine);
   level.parent_creases = parents_of_creases(level.mesh.tags, control.tags);
-  level.safe_nodes = compose(refined.linear_split, previous_nodes);
+  level.safe_nodes = compose(linear_split(control), previous_nodes);
   level.refine = std::move(refined.matrix);
   const SparseMap fine_from_unknowns = compose(level.refine, from_unknowns);
   if (options.surface == FittedSurface::mesh) {

@@ -124,6 +124,12 @@ class Incidence {
   std::vector<std::uint32_t> offsets_, uses_;
 };
 
+template <class Vertices>
+void add_mean(const Vertices& vertices, RowBuilder& row, double weight = 1) {
+  const double share = weight / static_cast<double>(std::size(vertices));
+  for (Index v : vertices) row.add(v, share);
+}
+
 /// Everything the rows of one refinement are read from.
 class Refiner {
  public:
@@ -140,29 +146,6 @@ class Refiner {
         face_cells_(topology_.num_faces(), mesh.num_cells(), [&](std::size_t c) { return topology_.cell_faces(c); }) {}
 
   SparseMap matrix() const {
-    return assemble([&](Index v, RowBuilder& row) { vertex_row(v, row); },
-                    [&](Index e, RowBuilder& row) { edge_row(e, row); },
-                    [&](Index f, RowBuilder& row) { face_row(f, row); });
-  }
-
-  SparseMap linear_split() const {
-    return assemble([](Index v, RowBuilder& row) { row.add(v, 1); },
-                    [&](Index e, RowBuilder& row) { add_mean(topology_.edge(e), row); },
-                    [&](Index f, RowBuilder& row) { add_mean(topology_.face(f), row); });
-  }
-
-  VolumeMesh fine_cells() const;
-  FeatureTags fine_tags() const;
-
- private:
-  static std::vector<Index> inverse(std::span<const Index> list, std::size_t size) {
-    std::vector<Index> numbers(size, kNoIndex);
-    for (std::size_t i = 0; i < list.size(); ++i) numbers[list[i]] = static_cast<Index>(i);
-    return numbers;
-  }
-
-  template <class VertexRow, class EdgeRow, class FaceRow>
-  SparseMap assemble(VertexRow&& vertex_row, EdgeRow&& edge_row, FaceRow&& face_row) const {
     const std::size_t nv = mesh_.num_vertices(), ne = topology_.num_edges(), nf = topology_.num_faces();
     return assemble_rows(nv + ne + nf + mesh_.num_cells(), nv, [&](std::size_t i, RowBuilder& row) {
       if (i < nv)
@@ -176,10 +159,14 @@ class Refiner {
     });
   }
 
-  template <class Vertices>
-  static void add_mean(const Vertices& vertices, RowBuilder& row, double weight = 1) {
-    const double share = weight / static_cast<double>(std::size(vertices));
-    for (Index v : vertices) row.add(v, share);
+  VolumeMesh fine_cells() const;
+  FeatureTags fine_tags() const;
+
+ private:
+  static std::vector<Index> inverse(std::span<const Index> list, std::size_t size) {
+    std::vector<Index> numbers(size, kNoIndex);
+    for (std::size_t i = 0; i < list.size(); ++i) numbers[list[i]] = static_cast<Index>(i);
+    return numbers;
   }
 
   /// Mean of the masks that the cells around an entity have for it.
@@ -305,11 +292,26 @@ SubdivisionLevel subdivide(const VolumeMesh& control, BoundaryRule rule) {
   const Refiner refiner(control, rule);
   SubdivisionLevel level;
   level.matrix = refiner.matrix();
-  level.linear_split = refiner.linear_split();
   level.fine = refiner.fine_cells();
   level.fine.positions = level.matrix.apply(control.positions);
   level.fine.tags = refiner.fine_tags();
   return level;
+}
+
+SparseMap linear_split(const VolumeMesh& control) {
+  require_usable(control);
+  const MeshTopology topology(control);
+  const std::size_t nv = control.num_vertices(), ne = topology.num_edges(), nf = topology.num_faces();
+  return assemble_rows(nv + ne + nf + control.num_cells(), nv, [&](std::size_t i, RowBuilder& row) {
+    if (i < nv)
+      row.add(static_cast<Index>(i), 1);
+    else if (i < nv + ne)
+      add_mean(topology.edge(static_cast<Index>(i - nv)), row);
+    else if (i < nv + ne + nf)
+      add_mean(topology.face(static_cast<Index>(i - nv - ne)), row);
+    else
+      add_mean(control.cell(i - nv - ne - nf), row);
+  });
 }
 
 }  // namespace subvol

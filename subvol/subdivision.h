@@ -24,9 +24,8 @@ enum class BoundaryRule {
 /// crease apart, so that cells around reflex creases do not invert (see crease_sheets.h); this changes no boundary row.
 /// Not guaranteed positive all the same: where the boundary itself folds or flattens cells, see `audit`.
 struct SubdivisionLevel {
-  SparseMap matrix;        ///< S: num fine vertices x num control vertices; rows sum to 1
-  SparseMap linear_split;  ///< the multi-linear split alone: edge, face and cell midpoints; control vertices stay
-  VolumeMesh fine;         ///< the refined mesh: all hexes, positions = S * control positions, tags carried
+  SparseMap matrix;  ///< S: num fine vertices x num control vertices; rows sum to 1
+  VolumeMesh fine;   ///< the refined mesh: all hexes, positions = S * control positions, tags carried
 };
 
 /// Refines once. The mesh must pass `validate` but for `unused_vertex` and `inverted_cell`; else InputError.
@@ -34,5 +33,9 @@ struct SubdivisionLevel {
 /// Unused vertices stay where they are. Tags are halved along: child edges of a crease have its sharpness less 1,
 /// infinite ones stay infinite, those that reach 0 are dropped. Cost: linear, about 0.2 microseconds per fine cell.
 SubdivisionLevel subdivide(const VolumeMesh& control, BoundaryRule rule = BoundaryRule::catmull_clark);
+
+/// The multi-linear split alone, with the same rows and columns as S: edge, face and cell midpoints; control vertices
+/// stay. It keeps valid whatever is valid with multi-linear cells. InputError: as `subdivide`.
+SparseMap linear_split(const VolumeMesh& control);
 
 }  // namespace subvol

@@ -240,7 +240,7 @@ TEST_CASE("A fit refuses options out of range, empty targets and unusable templa
 
 TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proportions") {
   const SubdivisionLevel level = subdivide(mixed_cells());
-  const std::vector<Vec3> nodes = level.linear_split.apply(mixed_cells().positions);
+  const std::vector<Vec3> nodes = linear_split(mixed_cells()).apply(mixed_cells().positions);
   for (double own : {0.0, 0.5, 1.0}) {
     double total = 0;
     for (const Vec3& h : ideal_boxes(level.fine, nodes, 3.0, own)) total += h.prod();
