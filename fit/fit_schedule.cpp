@@ -14,7 +14,6 @@ constexpr double kCoarseLambda = 0.05;
 /// With creases tied from the start, stiffer cells swell beside them, and folds made then do not go away.
 constexpr double kHeldLambda = 0.01;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
-constexpr double kCoarseDecrease = 1e-3, kFinalDecrease = 3e-4;
 
 }  // namespace
 
@@ -24,7 +23,7 @@ std::vector<Stage> FitSchedule::stages(int number) const {
   return result;
 }
 
-Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight, 20, kFinalDecrease}; }
+Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight}; }
 
 double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
 
@@ -33,8 +32,8 @@ FitSchedule make_schedule(const FitOptions& options, double distance, bool creas
   schedule.levels = options.levels;
   schedule.own_box_shares = distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
   const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
-  schedule.first = {{coarse, kFarTangentialWeight, 20, kCoarseDecrease}, {coarse, kCloseTangentialWeight, 20, kCoarseDecrease}};
-  schedule.middle = {{coarse, kCloseTangentialWeight, 20, kCoarseDecrease}};
+  schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
+  schedule.middle = {{coarse, kCloseTangentialWeight}};
   if (options.lambda_close < coarse) schedule.last = {schedule.final_stage(options.lambda_close)};
   schedule.continuation = {coarse, kFarTangentialWeight, 4};
   return schedule;
