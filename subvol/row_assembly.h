@@ -5,8 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <utility>
 #include <vector>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
 
 namespace subvol {
 
@@ -60,6 +65,17 @@ class RowBuilder {
   std::vector<Entry> entries_;
 };
 
+/// Asks the system for large pages behind what a vector has reserved: fresh memory costs most of the time otherwise.
+template <class T>
+void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
+#ifdef MADV_HUGEPAGE
+  constexpr std::uintptr_t kPage = 4096;
+  const auto begin = (reinterpret_cast<std::uintptr_t>(reserved.data()) + kPage - 1) / kPage * kPage;
+  const auto end = reinterpret_cast<std::uintptr_t>(reserved.data() + reserved.capacity()) / kPage * kPage;
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // advice: failure is no harm
+#endif
+}
+
 /// Builds a map row by row, in parallel: fill(i, builder) adds the weights of row i.
 ///
 /// `fill` must depend on i only and not throw. Chunks of rows are independent and joined in order, so the result does
@@ -79,6 +95,8 @@ SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill)
   map.offsets[0] = 0;
   map.columns.reserve(kExpectedRowSize * num_rows);
   map.values.reserve(kExpectedRowSize * num_rows);
+  prefer_large_pages(map.columns);
+  prefer_large_pages(map.values);
 #pragma omp parallel if (num_rows > kChunkRows)
   {
     RowBuilder row(num_cols);
