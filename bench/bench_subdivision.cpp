@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Times of building and applying the subdivision matrix, level by level, and of refining a boundary.
+#include "bench/hex_grid.h"
 #include "subvol/limit_surface.h"
 #include "subvol/mesh_topology.h"
 #include "subvol/subdivision.h"
@@ -13,23 +14,6 @@
 using namespace subvol;
 
 namespace {
-
-/// n^3 hexes of unit side.
-VolumeMesh grid(int n) {
-  VolumeMesh mesh;
-  for (int k = 0; k <= n; ++k)
-    for (int j = 0; j <= n; ++j)
-      for (int i = 0; i <= n; ++i) mesh.positions.emplace_back(i, j, k);
-  const auto id = [n](int i, int j, int k) { return static_cast<Index>(i + (n + 1) * (j + (n + 1) * k)); };
-  for (int k = 0; k < n; ++k)
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        const Index hex[8] = {id(i, j, k),     id(i + 1, j, k),     id(i + 1, j + 1, k),     id(i, j + 1, k),
-                              id(i, j, k + 1), id(i + 1, j, k + 1), id(i + 1, j + 1, k + 1), id(i, j + 1, k + 1)};
-        mesh.add_cell(CellKind::hex, hex);
-      }
-  return mesh;
-}
 
 /// Least seconds of a few runs.
 template <class Run>
@@ -65,7 +49,7 @@ void print_level(const VolumeMesh& control, int level, bool last) {
 /// bench_subdivision [levels = 3]: of a grid of 8^3 hexes.
 int main(int argc, char** argv) {
   const int levels = argc > 1 ? std::atoi(argv[1]) : 3;
-  VolumeMesh mesh = grid(8);
+  VolumeMesh mesh = bench::hex_grid(8);
   const VolumeMesh coarse = mesh;
   std::printf("{\n  \"threads\": %d,\n  \"subdivide\": [\n", omp_get_max_threads());
   for (int level = 1; level <= levels; ++level) {

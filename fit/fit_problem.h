@@ -56,6 +56,9 @@ struct MinimizerResult {
   std::vector<IterationRecord> iterations;
 };
 
+/// Keeps the record of a step and tells the caller; false, with the result's stop set, when they want to end here.
+bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result);
+
 /// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
 /// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`certificate.h`) certified; cells
 /// that stand in the way get a denser quadrature for the steps to come.

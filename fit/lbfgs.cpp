@@ -147,12 +147,7 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
     record.surface_energy = value.surface;
     record.volume_energy = value.volume;
     record.step_length = t;
-    result.iterations.push_back(record);
-    if (options.progress && !options.progress(record)) {
-      result.stop = MinimizerStop::cancelled;
-      result.explanation = "stopped by the caller";
-      return result;
-    }
+    if (!record_step(record, options, result)) return result;
     if ((iteration + 1) % kInnerSteps == 0) {
       if (energy_at_assign - value.energy < options.relative_decrease * value.energy) {
         result.stop = MinimizerStop::converged;

@@ -152,6 +152,14 @@ std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vec
 
 }  // namespace
 
+bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result) {
+  result.iterations.push_back(record);
+  if (!options.progress || options.progress(record)) return true;
+  result.stop = MinimizerStop::cancelled;
+  result.explanation = "stopped by the caller";
+  return false;
+}
+
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
   constexpr double kArmijo = 1e-4;
   constexpr int kMaxHalvings = 30, kDensePoints = 5, kPreconditionerLife = 4;
@@ -230,12 +238,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     record.surface_energy = trial_surface;
     record.volume_energy = trial_volume;
     record.step_length = t;
-    result.iterations.push_back(record);
-    if (options.progress && !options.progress(record)) {
-      result.stop = MinimizerStop::cancelled;
-      result.explanation = "stopped by the caller";
-      return result;
-    }
+    if (!record_step(record, options, result)) return result;
     const double decrease = (energy - trial) / energy;
     small_steps = decrease < options.relative_decrease ? small_steps + 1 : 0;
     if (small_steps == 2) {

@@ -260,16 +260,24 @@ double VolumeEnergy::sum_batches(PerBatch&& per_batch) const {
   return total;
 }
 
+/// Corners and ideal cells of one batch.
+struct VolumeEnergy::BatchState {
+  alignas(64) double x[kMaxCellVertices][3][kLanes], inverse_h[3][kLanes];
+
+  BatchState(const VolumeEnergy& energy, const Group& group, std::size_t batch, std::span<const Vec3> nodes) {
+    energy.gather(group, batch, nodes, x);
+    for (int c = 0; c < 3; ++c)
+      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = energy.inverse_lengths_[group.batches[batch][l]][c];
+  }
+};
+
 double VolumeEnergy::value(std::span<const Vec3> nodes) const {
   return sum_batches([&](const Group& group, std::size_t b) {
-    alignas(64) double x[kMaxCellVertices][3][kLanes], inverse_h[3][kLanes];
+    const BatchState state(*this, group, b, nodes);
     HenckyBatch hencky;
-    gather(group, b, nodes, x);
-    for (int c = 0; c < 3; ++c)
-      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = inverse_lengths_[group.batches[b][l]][c];
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
       if (reference_) multiply(hencky.jacobian, group.reference(b, q));
       hencky_energy(hencky);
       for (int l = 0; l < group.active[b]; ++l)
@@ -283,21 +291,18 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
   // Feasibility is known only at the end: gather into a copy, so that an infeasible state adds nothing.
   std::vector<Vec3> local(num_nodes_, Vec3::Zero());
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
-    alignas(64) double x[kMaxCellVertices][3][kLanes], g[kMaxCellVertices][3][kLanes] = {}, inverse_h[3][kLanes],
-        factor[3][kLanes];
+    const BatchState state(*this, group, b, nodes);
+    alignas(64) double g[kMaxCellVertices][3][kLanes] = {}, factor[3][kLanes];
     HenckyBatch hencky;
-    gather(group, b, nodes, x);
-    for (int c = 0; c < 3; ++c)
-      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = inverse_lengths_[group.batches[b][l]][c];
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
       if (reference_) multiply(hencky.jacobian, group.reference(b, q));
       hencky_gradient(hencky);
       if (reference_) multiply_transposed(hencky.stress, group.reference(b, q));
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
-        for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * inverse_h[c][l];
+        for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
         if (l < group.active[b]) sum += w * hencky.energy[l];
       }
       add_point_gradient(group.rule.point(q), hencky, factor, g);
@@ -320,18 +325,15 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
                                  BlockSparse& hessian) const {
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
     constexpr int n_max = kMaxCellVertices;
-    alignas(64) double x[n_max][3][kLanes], g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], inverse_h[3][kLanes],
-        factor[3][kLanes], weight[kLanes];
+    const BatchState state(*this, group, b, nodes);
+    alignas(64) double g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], factor[3][kLanes], weight[kLanes];
     HenckyBatch hencky;
-    gather(group, b, nodes, x);
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int a = 0; a < n; ++a)
       for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
-    for (int c = 0; c < 3; ++c)
-      for (int l = 0; l < kLanes; ++l) inverse_h[c][l] = inverse_lengths_[group.batches[b][l]][c];
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), x, inverse_h, hencky.jacobian);
+      jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
       if (reference_) multiply(hencky.jacobian, group.reference(b, q));
       hencky_hessian(hencky);
       if (reference_) {
@@ -341,11 +343,11 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         weight[l] = scale * w;
-        for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * inverse_h[c][l];
+        for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
         if (l < group.active[b]) sum += w * hencky.energy[l];
       }
       add_point_gradient(group.rule.point(q), hencky, factor, g);
-      add_point_hessian(group.rule.point(q), hencky, inverse_h, weight, k);
+      add_point_hessian(group.rule.point(q), hencky, state.inverse_h, weight, k);
     }
     for (int l = 0; l < group.active[b]; ++l) {
       const Index cell = group.batches[b][l];

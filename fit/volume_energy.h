@@ -66,6 +66,8 @@ class VolumeEnergy {
   };
 
   void find_pattern(const VolumeMesh& mesh);
+  struct BatchState;
+
   void rebuild_groups();
   void fill_references(Group& group) const;
   void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
