@@ -124,6 +124,7 @@ class SubdivisionFit {
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
+  int try_ = 0;                    ///< tries begun, each with other ideal cells
   double own_box_share_ = 0;       ///< of the current try
   std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
   FitSchedule schedule_;
@@ -207,7 +208,8 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
-bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
+bool SubdivisionFit::run_stage(const Stage& stage, const std::string& stage_name) {
+  const std::string name = try_ == 1 ? stage_name : format("try %d, ", try_) + stage_name;
   const Clock::time_point begin = Clock::now();
   StageRecord record;
   record.name = name;
@@ -400,6 +402,7 @@ void SubdivisionFit::next_control() {
 
 /// Unknowns are the template's vertices.
 void SubdivisionFit::begin(double own_box_share) {
+  ++try_;
   own_box_share_ = own_box_share;
   control_ = cage_ = template_;
   creases_ = template_creases_;
