@@ -8,7 +8,7 @@
 namespace subvol::test {
 
 /// Folder of the real inputs: the environment variable SUBVOL_DATA, or shared/data beside the source folder. Nothing where
-/// neither is there; tests then WARN and return.
+/// neither is there; tests then WARN("SKIPPED: ..."), which ctest counts as skipped, and return.
 inline std::optional<std::filesystem::path> data_dir() {
   const char* variable = std::getenv("SUBVOL_DATA");
   const std::filesystem::path folder =
