@@ -218,7 +218,8 @@ void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std
                   std::span<const VertexField> fields) {
   const std::string extension = lower_case_extension(path);
   if (extension != ".vtu" && extension != ".msh") throw InputError(path.string() + ": expected the extension .vtu or .msh");
-  write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields) : msh_text(mesh, cell_minima, fields));
+  write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields)
+                                                  : msh_text(mesh, cell_minima, fields));
 }
 
 }  // namespace subvol

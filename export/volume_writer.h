@@ -28,8 +28,8 @@ std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima
                      std::span<const VertexField> fields = {});
 
 /// Linear cells as Gmsh 4.1 ASCII: tets (4), hexes (5), prisms (6); one volume per reference, a physical group of that
-/// number where it is positive; `scaled_jacobian` as element data, the fields as node data. Element numbers start at 1, volume by volume, then
-/// kind by kind. Doubles survive. Tags are not carried. Errors as above.
+/// number where it is positive; `scaled_jacobian` as element data, the fields as node data. Element numbers start at 1,
+/// volume by volume, then kind by kind. Doubles survive. Tags are not carried. Errors as above.
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                      std::span<const VertexField> fields = {});
 

@@ -151,7 +151,8 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_l
                      "), got " + std::to_string(ideal_lengths.size()));
   inverse_lengths_.reserve(ideal_lengths.size());
   for (const Vec3& h : ideal_lengths) {
-    if (!(h.minCoeff() > 0) || !h.allFinite()) throw InputError("VolumeEnergy: ideal_lengths must be positive and finite");
+    if (!(h.minCoeff() > 0) || !h.allFinite())
+      throw InputError("VolumeEnergy: ideal_lengths must be positive and finite");
     inverse_lengths_.push_back(h.cwiseInverse());
   }
   find_pattern(mesh);
