@@ -51,6 +51,10 @@ Vec3 closest_on_triangle(const Vec3& p, const std::array<Vec3, 3>& x) {
   return best;
 }
 
+void check_finite(std::span<const Vec3> positions, Index v) {
+  if (!positions[v].allFinite()) throw InputError("closest point: vertex " + std::to_string(v) + " is not finite");
+}
+
 void check(const TriangleMesh& mesh) {
   if (mesh.triangles.empty()) throw InputError("closest point: the surface has no triangles");
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -58,60 +62,89 @@ void check(const TriangleMesh& mesh) {
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
         throw InputError("closest point: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
                          " of " + std::to_string(mesh.positions.size()));
-      if (!mesh.positions[v].allFinite())
-        throw InputError("closest point: vertex " + std::to_string(v) + " is not finite");
+      check_finite(mesh.positions, v);
     }
 }
 
 }  // namespace
 
-/// Halves the triangles at the median of their centres, three times per node.
-struct ClosestPoint::Builder {
-  ClosestPoint& tree;
-  std::vector<Vec3> centres;
-  struct Range {
-    Index begin, end;
-  };
+/// Halves the range until it has kWidth parts or no part is larger than a leaf; split(lower, upper) tells of each cut.
+template <class Split>
+ClosestPoint::Parts ClosestPoint::parts_of(Range range, Split&& split) {
+  Parts parts{{range}};
+  for (int round = 0; round < 3; ++round)
+    for (int i = 0, existing = parts.count; i < existing; ++i) {
+      Range& part = parts.ranges[i];
+      const Index size = part.end - part.begin;
+      if (size <= kWidth) continue;
+      const Range upper{part.begin + size / 2, part.end};
+      part.end = upper.begin;
+      split(part, upper);
+      parts.ranges[parts.count++] = upper;
+    }
+  return parts;
+}
 
-  Range split(Range& range) {
-    const auto first = tree.order_.begin() + range.begin, last = tree.order_.begin() + range.end;
+/// Brings the items into the order of the tree's leaves: every cut is at the median of the longest axis.
+void ClosestPoint::partition(std::vector<Item>& items, Range range) {
+  constexpr Index kLeastTask = 4096;
+  const Parts parts = parts_of(range, [&](Range lower, Range upper) {
+    const auto first = items.begin() + lower.begin, last = items.begin() + upper.end;
     Vec3 low = Vec3::Constant(kInfinity), high = -low;
     for (auto i = first; i != last; ++i) {
-      low = low.cwiseMin(centres[*i]);
-      high = high.cwiseMax(centres[*i]);
+      low = low.cwiseMin(i->centre);
+      high = high.cwiseMax(i->centre);
     }
     int axis;
     (high - low).maxCoeff(&axis);
-    const auto middle = first + (last - first) / 2;
-    std::nth_element(first, middle, last, [&](Index a, Index b) {
-      const double ca = centres[a][axis], cb = centres[b][axis];
-      return ca != cb ? ca < cb : a < b;
+    std::nth_element(first, items.begin() + upper.begin, last, [axis](const Item& a, const Item& b) {
+      return a.centre[axis] != b.centre[axis] ? a.centre[axis] < b.centre[axis] : a.triangle < b.triangle;
     });
-    const Index cut = range.begin + static_cast<Index>(middle - first);
-    const Range upper{cut, range.end};
-    range.end = cut;
-    return upper;
+  });
+  for (int i = 0; i < parts.count; ++i) {
+    const Range part = parts.ranges[i];
+    if (part.end - part.begin <= kWidth) continue;
+#pragma omp task shared(items) firstprivate(part) if (part.end - part.begin > kLeastTask)
+    partition(items, part);
   }
+#pragma omp taskwait
+}
 
-  void set_box(Node& node, int c, Range range) const {
-    Vec3 low = Vec3::Constant(kInfinity), high = -low;
-    for (Index i = range.begin; i < range.end; ++i)
-      for (const Vec3& p : tree.corners_[tree.order_[i]]) {
-        low = low.cwiseMin(p);
-        high = high.cwiseMax(p);
-      }
-    for (int axis = 0; axis < 3; ++axis) {
-      node.low[axis][c] = low[axis];
-      node.high[axis][c] = high[axis];
+/// Adds the node of a range and all below it: the cuts depend on counts alone.
+Index ClosestPoint::add_node(Range range) {
+  const Parts parts = parts_of(range, [](Range, Range) {});
+  const Index number = static_cast<Index>(nodes_.size());
+  nodes_.emplace_back();
+  for (int c = 0; c < kWidth; ++c) {
+    Index child = kNoIndex;
+    const bool is_leaf = c < parts.count && parts.ranges[c].end - parts.ranges[c].begin <= kWidth;
+    if (is_leaf) {
+      child = static_cast<Index>(leaf_ranges_.size());
+      leaf_ranges_.push_back(parts.ranges[c]);
+    } else if (c < parts.count) {
+      child = add_node(parts.ranges[c]);
     }
+    nodes_[number].child[c] = child;
+    nodes_[number].is_leaf[c] = is_leaf;
   }
+  return number;
+}
 
-  Index add_leaf(Range range) {
-    const auto inverse = [](double x) { return x > 0 ? 1 / x : 0; };
-    Leaf leaf;
+/// Leaves and boxes from the triangles' corners.
+void ClosestPoint::fit_boxes() {
+  struct Box {
+    Vec3 low = Vec3::Constant(kInfinity), high = Vec3::Constant(-kInfinity);
+  };
+  const auto inverse = [](double x) { return x > 0 ? 1 / x : 0; };
+  std::vector<Box> of_leaf(leaves_.size()), of_node(nodes_.size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    const Range range = leaf_ranges_[i];
+    Leaf& leaf = leaves_[i];
     for (int lane = 0; lane < kWidth; ++lane) {
-      const Index t = tree.order_[range.begin + (lane < range.end - range.begin ? lane : 0)];
-      const auto& x = tree.corners_[t];
+      const Index t = order_[range.begin + (lane < range.end - range.begin ? lane : 0)];
+      const auto& x = corners_[t];
+      for (const Vec3& p : x) of_leaf[i] = {of_leaf[i].low.cwiseMin(p), of_leaf[i].high.cwiseMax(p)};
       const Vec3 ab = x[1] - x[0], ac = x[2] - x[0];
       const double area = ab.cross(ac).squaredNorm();
       for (int axis = 0; axis < 3; ++axis) {
@@ -125,41 +158,51 @@ struct ClosestPoint::Builder {
       leaf.inverse_area[lane] = is_sliver(area, ab.squaredNorm(), ac.squaredNorm()) ? 0 : 1 / area;
       leaf.triangle[lane] = t;
     }
-    tree.leaves_.push_back(leaf);
-    return static_cast<Index>(tree.leaves_.size() - 1);
   }
-
-  Index build(Range all) {
-    std::array<Range, kWidth> parts{all};
-    int num_parts = 1;
-    for (int round = 0; round < 3; ++round)
-      for (int part = 0, existing = num_parts; part < existing; ++part)
-        if (parts[part].end - parts[part].begin > kWidth) parts[num_parts++] = split(parts[part]);
-    const Index number = static_cast<Index>(tree.nodes_.size());
-    tree.nodes_.emplace_back();
-    Node node;
+  for (std::size_t i = nodes_.size(); i-- > 0;)
     for (int c = 0; c < kWidth; ++c) {
-      const Range part = c < num_parts ? parts[c] : Range{0, 0};
-      set_box(node, c, part);
-      node.is_leaf[c] = part.end - part.begin <= kWidth;
-      node.child[c] = c >= num_parts ? kNoIndex : node.is_leaf[c] ? add_leaf(part) : build(part);
+      const Index child = nodes_[i].child[c];
+      const Box box = child == kNoIndex ? Box{} : nodes_[i].is_leaf[c] ? of_leaf[child] : of_node[child];
+      for (int axis = 0; axis < 3; ++axis) {
+        nodes_[i].low[axis][c] = box.low[axis];
+        nodes_[i].high[axis][c] = box.high[axis];
+      }
+      of_node[i] = {of_node[i].low.cwiseMin(box.low), of_node[i].high.cwiseMax(box.high)};
     }
-    tree.nodes_[number] = node;
-    return number;
-  }
-};
+}
 
-ClosestPoint::ClosestPoint(const TriangleMesh& mesh) {
+ClosestPoint::ClosestPoint(const TriangleMesh& mesh)
+    : triangles_(mesh.triangles), corners_(mesh.triangles.size()), num_vertices_(mesh.positions.size()) {
   check(mesh);
-  const Index count = static_cast<Index>(mesh.triangles.size());
-  Builder builder{*this, {}};
-  for (Index t = 0; t < count; ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    corners_.push_back({mesh.positions[a], mesh.positions[b], mesh.positions[c]});
-    builder.centres.push_back((mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3);
-    order_.push_back(t);
+  const Index count = static_cast<Index>(triangles_.size());
+  std::vector<Item> items(count);
+#pragma omp parallel
+  {
+#pragma omp for schedule(static)
+    for (Index t = 0; t < count; ++t) {
+      const auto& [a, b, c] = triangles_[t];
+      items[t] = {(mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3, t};
+    }
+#pragma omp single
+    partition(items, {0, count});
   }
-  builder.build({0, count});
+  order_.resize(count);
+  for (Index i = 0; i < count; ++i) order_[i] = items[i].triangle;
+  add_node({0, count});
+  leaves_.resize(leaf_ranges_.size());
+  move(mesh.positions);
+}
+
+void ClosestPoint::move(std::span<const Vec3> positions) {
+  if (positions.size() != num_vertices_)
+    throw InputError("closest point: " + std::to_string(positions.size()) + " positions for " +
+                     std::to_string(num_vertices_) + " vertices");
+  for (const auto& triangle : triangles_)
+    for (Index v : triangle) check_finite(positions, v);
+#pragma omp parallel for schedule(static)
+  for (std::size_t t = 0; t < triangles_.size(); ++t)
+    for (int k = 0; k < 3; ++k) corners_[t][k] = positions[triangles_[t][k]];
+  fit_boxes();
 }
 
 /// Squared distances to all triangles of the leaf: to the plane where p is above the inside, else to the closest edge.
@@ -251,10 +294,10 @@ void ClosestPoint::closest(std::span<const Vec3> points, std::span<Hit> hits) co
   const std::size_t num_runs = (points.size() + kRun - 1) / kRun;
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < num_runs; ++run) {
-    Index hint = kNoIndex;
+    Index before = kNoIndex;
     for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, points.size()); ++i) {
-      hits[i] = closest(points[i], hint);
-      hint = hits[i].triangle;
+      hits[i] = closest(points[i], hits[i].triangle == kNoIndex ? before : hits[i].triangle);
+      before = hits[i].triangle;
     }
   }
 }

@@ -14,17 +14,22 @@ namespace subvol {
 ///
 /// A tree of its own because a distance check asks some 10^5 such questions in well under a second: it answers in a
 /// fraction of a microsecond where neighbouring questions follow each other, several times faster than CGAL's.
-/// Immutable, copies the triangles, safe to use from many threads. Soups and degenerate triangles are welcome.
+/// Copies the triangles; queries are safe from many threads at once. Soups and degenerate triangles are welcome.
 class ClosestPoint {
  public:
   struct Hit {
-    Vec3 point;       ///< the closest point
-    Index triangle;   ///< a triangle that holds it
-    double distance;  ///< >= 0
+    Vec3 point;                  ///< the closest point
+    Index triangle = kNoIndex;   ///< a triangle that holds it
+    double distance = 0;         ///< >= 0
   };
 
-  /// InputError: no triangles, a vertex number out of range, a position that is not finite. Cost: n log n, 0.3 us n.
+  /// InputError: no triangles, a vertex number out of range, a position that is not finite. Parallel, the same tree for
+  /// any number of threads. Cost: n log n.
   explicit ClosestPoint(const TriangleMesh& mesh);
+
+  /// Moves the vertices. The tree keeps its shape and fits its boxes anew: several times faster than a new tree, and as
+  /// good as long as neighbours stay neighbours. InputError: another number of vertices, a position that is not finite.
+  void move(std::span<const Vec3> positions);
 
   /// The closest point of the surface to p. Where p is not finite: triangle kNoIndex, distance NaN.
   ///
@@ -32,8 +37,9 @@ class ClosestPoint {
   ///       but that of several triangles at the same distance, up to rounding, the one returned may depend on it.
   Hit closest(const Vec3& p, Index hint = kNoIndex) const;
 
-  /// `closest` for many points, in parallel; neighbours in the span should be neighbours in space. Same bits for any
-  /// number of threads. InputError: sizes differ.
+  /// `closest` for many points, in parallel. Same bits for any number of threads. InputError: sizes differ.
+  ///
+  /// hits  in: their triangles are hints; where those are kNoIndex, the answer for the point before serves.
   void closest(std::span<const Vec3> points, std::span<Hit> hits) const;
 
   std::size_t num_triangles() const { return order_.size(); }
@@ -57,14 +63,33 @@ class ClosestPoint {
     Lanes inverse_area;                        ///< 1 / |ab x ac|^2, 0 for slivers: only their edges count
     std::array<Index, kWidth> triangle;
   };
-  struct Builder;
+  struct Range {
+    Index begin, end;  ///< places in order_
+  };
+  /// Up to kWidth parts of a range, none empty, by repeated halving.
+  struct Parts {
+    std::array<Range, kWidth> ranges;
+    int count = 1;
+  };
+  struct Item {
+    Vec3 centre;
+    Index triangle;
+  };
 
+  template <class Split>
+  static Parts parts_of(Range range, Split&& split);
+  static void partition(std::vector<Item>& items, Range range);
+  Index add_node(Range range);
+  void fit_boxes();
   void visit(const Leaf& leaf, const Vec3& p, Index& best, double& best_squared) const;
 
-  std::vector<Node> nodes_;
+  std::vector<Node> nodes_;  // parents before their children
   std::vector<Leaf> leaves_;
+  std::vector<Range> leaf_ranges_;
+  std::vector<std::array<Index, 3>> triangles_;
   std::vector<std::array<Vec3, 3>> corners_;  // by triangle
   std::vector<Index> order_;
+  std::size_t num_vertices_ = 0;
 };
 
 }  // namespace subvol

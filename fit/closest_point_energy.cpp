@@ -40,20 +40,23 @@ ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<
 }
 
 void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
-  const std::vector<std::array<Index, 3>> corners(triangles().begin(), triangles().end());
-  const ClosestPoint tree(TriangleMesh{{samples.begin(), samples.end()}, corners});
   const std::vector<Vec3>& points = target_->samples();
-  std::vector<ClosestPoint::Hit> hits(points.size());
-  tree.closest(points, hits);
+  if (surface_tree_) {
+    surface_tree_->move(samples);
+  } else {
+    surface_tree_.emplace(TriangleMesh{{samples.begin(), samples.end()}, {triangles().begin(), triangles().end()}});
+    target_hits_.resize(points.size());
+  }
+  surface_tree_->closest(points, target_hits_);
   target_offsets_.assign(triangles().size() + 1, 0);
-  for (const auto& hit : hits) ++target_offsets_[hit.triangle + 1];
+  for (const auto& hit : target_hits_) ++target_offsets_[hit.triangle + 1];
   for (std::size_t t = 0; t < triangles().size(); ++t) target_offsets_[t + 1] += target_offsets_[t];
   std::vector<std::size_t> next(target_offsets_.begin(), target_offsets_.end() - 1);
   target_links_.resize(points.size());
   for (std::size_t j = 0; j < points.size(); ++j) {
-    const Index t = hits[j].triangle;
-    const auto& q = corners[t];
-    target_links_[next[t]++] = {t, barycentric(hits[j].point, samples[q[0]], samples[q[1]], samples[q[2]]), points[j],
+    const Index t = target_hits_[j].triangle;
+    const auto& q = triangles()[t];
+    target_links_[next[t]++] = {t, barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]), points[j],
                                 target_->normals()[target_->sample_triangles()[j]], sample_areas_[j]};
   }
 }
@@ -64,15 +67,17 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       {{kTwoThirds, kSixth, kSixth}, {kSixth, kTwoThirds, kSixth}, {kSixth, kSixth, kTwoThirds}}};
   const int n = points_per_triangle_;
   surface_links_.resize(n * triangles().size());
+  surface_hints_.resize(n * triangles().size(), kNoIndex);
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < triangles().size(); ++t) {
     const auto& q = triangles()[t];
-    Index hint = kNoIndex;
+    Index before = kNoIndex;
     for (int k = 0; k < n; ++k) {
       const std::array<double, 3> l = n == 1 ? std::array<double, 3>{kThird, kThird, kThird} : kThree[k];
       const Vec3 x = l[0] * samples[q[0]] + l[1] * samples[q[1]] + l[2] * samples[q[2]];
-      const ClosestPoint::Hit hit = target_tree_.closest(x, hint);
-      hint = hit.triangle;
+      Index& hint = surface_hints_[n * t + k];
+      const ClosestPoint::Hit hit = target_tree_.closest(x, hint == kNoIndex ? before : hint);
+      hint = before = hit.triangle;
       surface_links_[n * t + k] = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
                                    triangle_area(t) / n};
     }

@@ -5,6 +5,8 @@
 #include "fit/surface_term.h"
 #include "fit/target_surface.h"
 
+#include <optional>
+
 namespace subvol {
 
 /// The surface energy of Eq. 9 with exact closest points in place of Voronoi cells.
@@ -24,7 +26,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
   ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                      std::size_t num_samples, double tangential_weight, int points_per_triangle);
 
-  /// Cost: one closest-point query per target sample and per quadrature point, and a tree over S~.
+  /// Cost: one closest-point query per target sample and per quadrature point. The answers of the call before are where
+  /// the search starts, and the tree over S~ moves along.
   void assign(std::span<const Vec3> samples) override;
 
  private:
@@ -42,12 +45,15 @@ class ClosestPointEnergy final : public SurfaceTerm {
 
   const TargetSurface* target_;
   ClosestPoint target_tree_;
+  std::optional<ClosestPoint> surface_tree_;       ///< of S~
+  std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
   double tau_, scale_;
   int points_per_triangle_;
   std::vector<double> sample_areas_;         ///< a_j
   std::vector<Link> target_links_;           ///< by sample triangle
   std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
   std::vector<Link> surface_links_;          ///< points_per_triangle_ for each sample triangle
+  std::vector<Index> surface_hints_;         ///< target triangles of t(x_q)
 };
 
 }  // namespace subvol

@@ -18,7 +18,8 @@ constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
 }  // namespace
 
 std::vector<Stage> FitSchedule::stages(int number) const {
-  std::vector<Stage> result = number == 1 ? first : middle;
+  if (number > 1) return number == levels ? last : middle;
+  std::vector<Stage> result = first;
   if (number == levels) result.insert(result.end(), last.begin(), last.end());
   return result;
 }
@@ -34,7 +35,7 @@ FitSchedule make_schedule(const FitOptions& options, double distance, bool creas
   const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
   schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
   schedule.middle = {{coarse, kCloseTangentialWeight}};
-  if (options.lambda_close < coarse) schedule.last = {schedule.final_stage(options.lambda_close)};
+  schedule.last = {schedule.final_stage(options.lambda_close)};
   schedule.continuation = {coarse, kFarTangentialWeight, 4};
   return schedule;
 }

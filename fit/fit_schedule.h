@@ -38,7 +38,7 @@ struct FitSchedule {
   /// for templates that cannot be refined without inverting a cell with those before.
   std::vector<double> own_box_shares;
   int levels = 0;
-  std::vector<Stage> first, middle, last;  ///< of level 1, of the levels between, of the finest level
+  std::vector<Stage> first, middle, last;  ///< of level 1, of the levels between, of the finest
   Stage continuation;
 
   std::vector<Stage> stages(int number) const;

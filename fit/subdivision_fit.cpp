@@ -306,7 +306,8 @@ double SubdivisionFit::measured_mean() {
   if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
   double mean = 0;
   for (const TriangleMesh& surface : surfaces)
-    mean = std::max(mean, surface_distance(surface, ClosestPoint(surface), target_mesh_, target_tree_).mean());
+    mean = std::max(mean, surface_distance(surface, ClosestPoint(surface), target_mesh_, target_tree_,
+                                           {.extremes = false}).mean());
   mean_ = 100 * mean;
   if (!result_.report.stages.empty()) result_.report.stages.back().mean_distance_percent = *mean_;
   seconds_["distance"] += seconds_since(begin);

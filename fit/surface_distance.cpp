@@ -90,11 +90,13 @@ class Sampler {
   int any_ = 0;
 };
 
-OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const ClosestPoint& to, int num_samples) {
+OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const ClosestPoint& to,
+                   const SurfaceDistanceOptions& options) {
   std::vector<double> areas(order.size());
   double total = 0;
   for (std::size_t place = 0; place < order.size(); ++place) total += areas[place] = area_of(from, order[place]);
-  const std::vector<std::uint8_t> uses = first_uses(from, order);
+  const std::vector<std::uint8_t> uses =
+      options.extremes ? first_uses(from, order) : std::vector<std::uint8_t>(order.size(), 0);
   constexpr std::size_t kRun = 32;  // sums and hints stay inside a run, whatever thread takes it
   std::vector<OneSided> runs((order.size() + kRun - 1) / kRun);
 #pragma omp parallel for schedule(dynamic)
@@ -102,7 +104,7 @@ OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const
     Sampler sampler(from, to);
     for (std::size_t place = run * kRun; place < std::min((run + 1) * kRun, order.size()); ++place) {
       const double share = total > 0 ? areas[place] / total : 0;
-      const int m = std::max(1, static_cast<int>(std::lround(std::sqrt(num_samples * share))));
+      const int m = std::max(1, static_cast<int>(std::lround(std::sqrt(options.num_samples * share))));
       sampler.add_triangle(order[place], areas[place], m, uses[place]);
     }
     runs[run] = sampler.result;
@@ -123,8 +125,8 @@ SurfaceDistance surface_distance(const TriangleMesh& a, const ClosestPoint& tree
   if (options.num_samples < 1)
     throw InputError("surface distance: num_samples is " + std::to_string(options.num_samples) +
                      ", expected 1 or more");
-  const OneSided forth = one_sided(a, tree_a.order(), tree_b, options.num_samples);
-  const OneSided back = one_sided(b, tree_b.order(), tree_a, options.num_samples);
+  const OneSided forth = one_sided(a, tree_a.order(), tree_b, options);
+  const OneSided back = one_sided(b, tree_b.order(), tree_a, options);
   return {forth.mean, back.mean, forth.max, back.max};
 }
 

@@ -9,6 +9,7 @@ namespace subvol {
 
 struct SurfaceDistanceOptions {
   int num_samples = 50000;  ///< about so many points carry each mean, spread by area; >= 1
+  bool extremes = true;     ///< vertices and edge midpoints are looked at as well, for the maxima
 };
 
 /// Distances between two surfaces, both ways, in the mesh's unit.

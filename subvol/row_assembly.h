@@ -23,46 +23,50 @@ class RowBuilder {
   void add(Index column, double weight) {
     Index& slot = slots_[column];
     if (slot == kNoIndex) {
-      slot = static_cast<Index>(entries_.size());
-      entries_.push_back({column, weight});
+      slot = static_cast<Index>(keys_.size());
+      keys_.push_back(static_cast<std::uint64_t>(column) << 32 | static_cast<std::uint64_t>(slot));
+      weights_.push_back(weight);
     } else {
-      entries_[slot].weight += weight;
+      weights_[slot] += weight;
     }
   }
 
   /// Appends the row, sorted by column, and empties the builder.
   void flush(std::vector<Index>& columns, std::vector<double>& values) {
-    sort_entries();
-    for (const Entry& entry : entries_) {
-      columns.push_back(entry.column);
-      values.push_back(entry.weight);
-      slots_[entry.column] = kNoIndex;
+    sort_keys();
+    const std::size_t first = columns.size(), size = keys_.size();
+    columns.resize(first + size);
+    values.resize(first + size);
+    for (std::size_t i = 0; i < size; ++i) {
+      const Index column = static_cast<Index>(keys_[i] >> 32);
+      columns[first + i] = column;
+      values[first + i] = weights_[static_cast<std::uint32_t>(keys_[i])];
+      slots_[column] = kNoIndex;
     }
-    entries_.clear();
+    keys_.clear();
+    weights_.clear();
   }
 
  private:
-  struct Entry {
-    Index column;
-    double weight;
-  };
-
-  void sort_entries() {
+  void sort_keys() {
     constexpr std::size_t kInsertionLimit = 32;  // rows of regular meshes have at most 27 entries
-    if (entries_.size() > kInsertionLimit) {
-      std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.column < b.column; });
+    const std::size_t size = keys_.size();
+    if (size > kInsertionLimit) {
+      std::sort(keys_.begin(), keys_.end());
       return;
     }
-    for (std::size_t i = 1; i < entries_.size(); ++i) {
-      const Entry entry = entries_[i];
+    std::uint64_t* keys = keys_.data();
+    for (std::size_t i = 1; i < size; ++i) {
+      const std::uint64_t key = keys[i];
       std::size_t j = i;
-      for (; j > 0 && entries_[j - 1].column > entry.column; --j) entries_[j] = entries_[j - 1];
-      entries_[j] = entry;
+      for (; j > 0 && keys[j - 1] > key; --j) keys[j] = keys[j - 1];
+      keys[j] = key;
     }
   }
 
-  std::vector<Index> slots_;  // place of each column in entries_, or kNoIndex
-  std::vector<Entry> entries_;
+  std::vector<Index> slots_;         // place of each column in weights_, or kNoIndex
+  std::vector<std::uint64_t> keys_;  // column, then slot
+  std::vector<double> weights_;
 };
 
 /// Asks the system for large pages behind what a vector has reserved: fresh memory costs most of the time otherwise.
