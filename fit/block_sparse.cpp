@@ -74,4 +74,27 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
   return result;
 }
 
+void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
+                         std::span<Mat3> diagonal) {
+#pragma omp parallel
+  {
+    std::vector<double> weight(map.num_rows(), 0.0);  // column j of M, scattered
+#pragma omp for schedule(dynamic, 64)
+    for (std::size_t j = 0; j < map.num_cols; ++j) {
+      const auto rows = map_transposed.row_columns(j);
+      const auto values = map_transposed.row_values(j);
+      for (std::size_t a = 0; a < rows.size(); ++a) weight[rows[a]] = values[a];
+      double sum[9] = {};
+      for (std::size_t a = 0; a < rows.size(); ++a)
+        for (std::size_t k = hessian.offsets[rows[a]]; k < hessian.offsets[rows[a] + 1]; ++k) {
+          const double w = values[a] * weight[hessian.columns[k]];
+          if (w == 0) continue;
+          for (int e = 0; e < 9; ++e) sum[e] += w * hessian.blocks[9 * k + e];
+        }
+      for (int e = 0; e < 9; ++e) diagonal[j](e / 3, e % 3) += sum[e];
+      for (Index i : rows) weight[i] = 0;
+    }
+  }
+}
+
 }  // namespace subvol

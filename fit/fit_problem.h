@@ -3,7 +3,7 @@
 
 #include "fit/fit_report.h"
 #include "fit/surface_term.h"
-#include "fit/volume_energy.h"
+#include "fit/volume_term.h"
 #include "subvol/sparse_map.h"
 
 #include <functional>
@@ -21,7 +21,7 @@ namespace subvol {
 /// Hessians come back through the transposes. E_S is taken with the correspondences of the last `SurfaceTerm::assign`.
 /// Nodes that are to stay have no entries in M and their positions in y0; samples likewise.
 struct FitProblem {
-  FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
+  FitProblem(SparseMap node_map, SparseMap sample_map, std::unique_ptr<VolumeTerm> volume_energy,
              std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight);
 
   /// out = M x + y0.
@@ -33,8 +33,7 @@ struct FitProblem {
   std::vector<Vec3> fixed_nodes;          ///< y0, one per node; empty: none is fixed
   SparseMap samples, samples_transposed;  ///< N, N^T
   std::vector<Vec3> fixed_samples;        ///< z0, one per sample; empty: none is fixed
-  const VolumeMesh* mesh;                 ///< cells of the finite element mesh (for the certificate)
-  VolumeEnergy volume;
+  std::unique_ptr<VolumeTerm> volume;
   std::unique_ptr<SurfaceTerm> surface;   ///< null: none, N then has no rows
   double lambda;                          ///< > 0
 };
@@ -60,7 +59,7 @@ struct MinimizerResult {
 bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result);
 
 /// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
-/// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`certificate.h`) certified; cells
+/// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`VolumeTerm`) certified; cells
 /// that stand in the way get a denser quadrature for the steps to come.
 ///
 /// x  feasible start (finite E), else `no_step`; receives the result.

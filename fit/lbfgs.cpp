@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate.h"
 #include "fit/fit_problem.h"
 #include "fit/vector_math.h"
 
@@ -36,7 +35,7 @@ class Objective {
     std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
     std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
     Value value;
-    value.volume = problem_.volume.add_gradient(nodes_, problem_.lambda, node_gradient_);
+    value.volume = problem_.volume->add_gradient(nodes_, problem_.lambda, node_gradient_);
     if (!std::isfinite(value.volume)) return value;
     if (problem_.surface) value.surface = problem_.surface->value(samples_);
     value.energy = value.surface + problem_.lambda * value.volume;
@@ -50,7 +49,7 @@ class Objective {
 
   bool certified(std::span<const Vec3> x) {
     problem_.apply_nodes(x, nodes_);
-    return certify(nodes_, *problem_.mesh).all_certified();
+    return problem_.volume->uncertified(nodes_).empty();
   }
 
  private:

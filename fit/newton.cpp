@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate.h"
 #include "fit/fit_problem.h"
 #include "fit/vector_math.h"
 
@@ -12,13 +11,12 @@
 
 namespace subvol {
 
-FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, const VolumeMesh& elements, VolumeEnergy volume_energy,
+FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, std::unique_ptr<VolumeTerm> volume_energy,
                        std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight)
     : nodes(std::move(node_map)),
       nodes_transposed(transposed(nodes)),
       samples(std::move(sample_map)),
       samples_transposed(transposed(samples)),
-      mesh(&elements),
       volume(std::move(volume_energy)),
       surface(std::move(surface_energy)),
       lambda(volume_weight) {}
@@ -35,37 +33,12 @@ void FitProblem::apply_samples(std::span<const Vec3> x, std::span<Vec3> out) con
 
 namespace {
 
-/// Adds the 3x3 diagonal blocks of M^T H M: D_j = sum_ik M_ij H_ik M_kj.
-void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
-                         std::vector<Mat3>& diagonal) {
-#pragma omp parallel
-  {
-    std::vector<double> weight(map.num_rows(), 0.0);  // column j of M, scattered
-#pragma omp for schedule(dynamic, 64)
-    for (std::size_t j = 0; j < map.num_cols; ++j) {
-      const auto rows = map_transposed.row_columns(j);
-      const auto values = map_transposed.row_values(j);
-      for (std::size_t a = 0; a < rows.size(); ++a) weight[rows[a]] = values[a];
-      double sum[9] = {};
-      for (std::size_t a = 0; a < rows.size(); ++a)
-        for (std::size_t k = hessian.offsets[rows[a]]; k < hessian.offsets[rows[a] + 1]; ++k) {
-          const double w = values[a] * weight[hessian.columns[k]];
-          if (w == 0) continue;
-          for (int e = 0; e < 9; ++e) sum[e] += w * hessian.blocks[9 * k + e];
-        }
-      for (int e = 0; e < 9; ++e) diagonal[j](e / 3, e % 3) += sum[e];
-      for (Index i : rows) weight[i] = 0;
-    }
-  }
-}
-
 /// The pulled-back Hessian M^T H_W M + N^T H_S N with its block-Jacobi preconditioner.
 class ReducedHessian {
  public:
   /// inverse_diagonal  of an earlier Hessian of the same problem, to be used again; empty: computed.
-  ReducedHessian(const FitProblem& problem, const BlockSparse& volume, std::vector<Mat3>& inverse_diagonal)
+  ReducedHessian(const FitProblem& problem, std::vector<Mat3>& inverse_diagonal)
       : problem_(problem),
-        volume_(volume),
         inverse_diagonal_(inverse_diagonal),
         node_in_(problem.nodes.num_rows()),
         node_out_(problem.nodes.num_rows()),
@@ -74,7 +47,7 @@ class ReducedHessian {
         from_samples_(problem.nodes.num_cols) {
     if (!inverse_diagonal_.empty()) return;
     inverse_diagonal_.assign(problem.nodes.num_cols, Mat3::Zero());
-    add_diagonal_blocks(problem.nodes, problem.nodes_transposed, volume, inverse_diagonal_);
+    problem.volume->add_diagonal_blocks(problem.nodes, problem.nodes_transposed, inverse_diagonal_);
     if (problem.surface)
       add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
 #pragma omp parallel for schedule(static)
@@ -87,7 +60,7 @@ class ReducedHessian {
 
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) {
     problem_.nodes.apply(in, node_in_);
-    volume_.multiply(node_in_, node_out_);
+    problem_.volume->multiply(node_in_, node_out_);
     problem_.nodes_transposed.apply(node_out_, out);
     if (!problem_.surface) return;
     problem_.samples.apply(in, sample_in_);
@@ -103,7 +76,6 @@ class ReducedHessian {
 
  private:
   const FitProblem& problem_;
-  const BlockSparse& volume_;
   std::vector<Mat3>& inverse_diagonal_;
   std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
 };
@@ -162,27 +134,25 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
   constexpr double kArmijo = 1e-4;
-  constexpr int kMaxHalvings = 30, kDensePoints = 5, kPreconditionerLife = 4;
+  constexpr int kMaxHalvings = 30, kPreconditionerLife = 4;
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
   const std::size_t n = x.size();
-  BlockSparse hessian = problem.volume.pattern();
   std::vector<Vec3> y(problem.nodes.num_rows()), z(problem.samples.num_rows());
   problem.apply_nodes(x, y);
   problem.apply_samples(x, z);
   std::vector<Vec3> node_gradient(y.size()), sample_gradient(z.size()), gradient(n), from_samples(n), d, dy(y.size()),
       dz(z.size()), y_trial(y.size()), z_trial(z.size());
   std::vector<Mat3> inverse_diagonal;
-  std::vector<Index> uncertified = certify(y, *problem.mesh).not_certified;
+  std::vector<Index> uncertified = problem.volume->uncertified(y);
   int small_steps = 0;
 
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     IterationRecord record;
     if (problem.surface) problem.surface->assign(z);
-    hessian.set_zero();
     std::fill(node_gradient.begin(), node_gradient.end(), Vec3::Zero());
     std::fill(sample_gradient.begin(), sample_gradient.end(), Vec3::Zero());
     const double surface = problem.surface ? problem.surface->value(z) : 0;
-    const double volume = problem.volume.add_hessian(y, problem.lambda, node_gradient, hessian);
+    const double volume = problem.volume->linearize(y, problem.lambda, node_gradient);
     const double energy = surface + problem.lambda * volume;
     if (!std::isfinite(energy)) {
       result.stop = MinimizerStop::no_step;
@@ -198,7 +168,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
 
     // The diagonal changes slowly once the first steps are done.
     if (iteration < 2 || iteration % kPreconditionerLife == 0) inverse_diagonal.clear();
-    ReducedHessian reduced(problem, hessian, inverse_diagonal);
+    ReducedHessian reduced(problem, inverse_diagonal);
     record.linear_iterations = conjugate_gradients(reduced, gradient, options, d);
     const double slope = dot(gradient, d);
     if (!(slope < 0)) {
@@ -209,7 +179,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     problem.nodes.apply(d, dy);
     problem.samples.apply(d, dz);
 
-    double t = problem.volume.max_step(y, dy), trial = 0, trial_surface = 0, trial_volume = 0;
+    double t = problem.volume->max_step(y, dy), trial = 0, trial_surface = 0, trial_volume = 0;
     std::vector<Index> blocking, trial_uncertified;
     bool accepted = false;
     for (int halving = 0; halving < kMaxHalvings && !accepted; ++halving, t *= accepted ? 1 : 0.5) {
@@ -217,15 +187,15 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       for (std::size_t i = 0; i < z.size(); ++i) z_trial[i] = z[i] + t * dz[i];
       ++record.evaluations;
       trial_surface = problem.surface ? problem.surface->value(z_trial) : 0;
-      trial_volume = problem.volume.value(y_trial);
+      trial_volume = problem.volume->value(y_trial);
       trial = trial_surface + problem.lambda * trial_volume;
       if (!(trial <= energy + kArmijo * t * slope)) continue;
-      trial_uncertified = certify(y_trial, *problem.mesh).not_certified;
+      trial_uncertified = problem.volume->uncertified(y_trial);
       const std::vector<Index> failed = newly_failed(uncertified, trial_uncertified);
       accepted = failed.empty();
       blocking.insert(blocking.end(), failed.begin(), failed.end());
     }
-    if (!blocking.empty()) problem.volume.densify(blocking, kDensePoints);
+    if (!blocking.empty()) problem.volume->densify(blocking);
     if (!accepted) {
       result.stop = MinimizerStop::no_step;
       result.explanation = "no step along the search direction decreases the energy";

@@ -15,6 +15,7 @@
 #include "fit/surface_distance.h"
 #include "fit/surface_energy.h"
 #include "fit/target_surface.h"
+#include "fit/volume_energy.h"
 #include "subvol/audit.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -219,8 +220,8 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& stage_name
   record.unknowns = unknowns_.size();
   record.cells = level_.mesh.num_cells();
 
-  FitProblem problem(level_.nodes, level_.samples, level_.mesh,
-                     VolumeEnergy(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_)),
+  FitProblem problem(level_.nodes, level_.samples,
+                     std::make_unique<VolumeEnergy>(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_)),
                      surface_term(stage), stage.lambda);
   MinimizerOptions options;
   options.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;

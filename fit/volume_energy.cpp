@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/volume_energy.h"
 
+#include "fit/certificate.h"
 #include "subvol/error.h"
 
 #include <Eigen/Geometry>
@@ -53,7 +54,7 @@ inline void jacobians(std::span<const ElementRule::Entry> entries, const double 
 }
 
 /// m = m b, lane by lane: from the ideal to the reference shape.
-inline void multiply(double (*m)[kLanes], const double (*b)[kLanes]) {
+inline void multiply_lanes(double (*m)[kLanes], const double (*b)[kLanes]) {
   for (int r = 0; r < 3; ++r)
 #pragma omp simd
     for (int l = 0; l < kLanes; ++l) {
@@ -63,7 +64,7 @@ inline void multiply(double (*m)[kLanes], const double (*b)[kLanes]) {
 }
 
 /// m = m b^T: the stress against the ideal shape.
-inline void multiply_transposed(double (*m)[kLanes], const double (*b)[kLanes]) {
+inline void multiply_lanes_transposed(double (*m)[kLanes], const double (*b)[kLanes]) {
   for (int r = 0; r < 3; ++r)
 #pragma omp simd
     for (int l = 0; l < kLanes; ++l) {
@@ -139,10 +140,8 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
 }  // namespace
 
 VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction)
-    : num_nodes_(mesh.num_vertices()),
-      kinds_(mesh.kinds),
-      cell_offsets_(mesh.cell_offsets),
-      cell_vertices_(mesh.cell_vertices),
+    : mesh_(&mesh),
+      num_nodes_(mesh.num_vertices()),
       weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
       points_(mesh.num_cells(), points_per_direction),
       colors_(color_cells(mesh)) {
@@ -155,26 +154,25 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_l
       throw InputError("VolumeEnergy: ideal_lengths must be positive and finite");
     inverse_lengths_.push_back(h.cwiseInverse());
   }
-  find_pattern(mesh);
+  find_pattern();
   rebuild_groups();
 }
 
 VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction)
-    : num_nodes_(mesh.num_vertices()),
-      kinds_(mesh.kinds),
-      cell_offsets_(mesh.cell_offsets),
-      cell_vertices_(mesh.cell_vertices),
+    : mesh_(&mesh),
+      num_nodes_(mesh.num_vertices()),
       inverse_lengths_(mesh.num_cells(), Vec3::Ones()),
       weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
       reference_(std::move(reference)),
       points_(mesh.num_cells(), points_per_direction),
       colors_(color_cells(mesh)) {
-  find_pattern(mesh);
+  find_pattern();
   rebuild_groups();
 }
 
-void VolumeEnergy::find_pattern(const VolumeMesh& mesh) {
-  pattern_ = clique_pattern(num_nodes_, cell_offsets_, cell_vertices_);
+void VolumeEnergy::find_pattern() {
+  const VolumeMesh& mesh = *mesh_;
+  pattern_ = clique_pattern(num_nodes_, mesh.cell_offsets, mesh.cell_vertices);
   pattern_.blocks = {};
   block_offsets_.assign(1, 0);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
@@ -185,16 +183,17 @@ void VolumeEnergy::find_pattern(const VolumeMesh& mesh) {
   }
 }
 
-void VolumeEnergy::densify(std::span<const Index> cells, int points_per_direction) {
-  for (Index c : cells) points_[c] = std::max(points_[c], points_per_direction);
+void VolumeEnergy::densify(std::span<const Index> cells) {
+  constexpr int kDensePoints = 5;
+  for (Index c : cells) points_[c] = std::max(points_[c], kDensePoints);
   rebuild_groups();
 }
 
 void VolumeEnergy::rebuild_groups() {
   // Cells by (kind, points, colour), each list in ascending order.
   std::map<std::pair<int, int>, std::vector<std::vector<Index>>> lists;
-  for (std::size_t c = 0; c < kinds_.size(); ++c) {
-    auto& by_color = lists[{static_cast<int>(kinds_[c]), points_[c]}];
+  for (std::size_t c = 0; c < mesh_->num_cells(); ++c) {
+    auto& by_color = lists[{static_cast<int>(mesh_->kinds[c]), points_[c]}];
     if (by_color.size() <= static_cast<std::size_t>(colors_[c])) by_color.resize(colors_[c] + 1);
     by_color[colors_[c]].push_back(static_cast<Index>(c));
   }
@@ -238,7 +237,7 @@ void VolumeEnergy::gather(const Group& group, std::size_t batch, std::span<const
                           double (*x)[3][kLanes]) const {
   const int n = cell_topology(group.rule.kind).num_vertices;
   for (int l = 0; l < kLanes; ++l) {
-    const Index* corners = cell_vertices_.data() + cell_offsets_[group.batches[batch][l]];
+    const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[group.batches[batch][l]];
     for (int a = 0; a < n; ++a)
       for (int r = 0; r < 3; ++r) x[a][r][l] = nodes[corners[a]][r];
   }
@@ -279,7 +278,7 @@ double VolumeEnergy::value(std::span<const Vec3> nodes) const {
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
-      if (reference_) multiply(hencky.jacobian, group.reference(b, q));
+      if (reference_) multiply_lanes(hencky.jacobian, group.reference(b, q));
       hencky_energy(hencky);
       for (int l = 0; l < group.active[b]; ++l)
         sum += weights_[group.batches[b][l]] * group.rule.weights[q] * hencky.energy[l];
@@ -298,9 +297,9 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
-      if (reference_) multiply(hencky.jacobian, group.reference(b, q));
+      if (reference_) multiply_lanes(hencky.jacobian, group.reference(b, q));
       hencky_gradient(hencky);
-      if (reference_) multiply_transposed(hencky.stress, group.reference(b, q));
+      if (reference_) multiply_lanes_transposed(hencky.stress, group.reference(b, q));
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
@@ -310,7 +309,7 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
     }
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int l = 0; l < group.active[b]; ++l) {
-      const Index* corners = cell_vertices_.data() + cell_offsets_[group.batches[b][l]];
+      const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[group.batches[b][l]];
       for (int a = 0; a < n; ++a) local[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
     }
     return sum;
@@ -335,10 +334,10 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
-      if (reference_) multiply(hencky.jacobian, group.reference(b, q));
+      if (reference_) multiply_lanes(hencky.jacobian, group.reference(b, q));
       hencky_hessian(hencky);
       if (reference_) {
-        multiply_transposed(hencky.stress, group.reference(b, q));
+        multiply_lanes_transposed(hencky.stress, group.reference(b, q));
         premultiply(group.reference(b, q), hencky.v);
       }
       for (int l = 0; l < kLanes; ++l) {
@@ -352,7 +351,7 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
     }
     for (int l = 0; l < group.active[b]; ++l) {
       const Index cell = group.batches[b][l];
-      const Index* corners = cell_vertices_.data() + cell_offsets_[cell];
+      const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[cell];
       const Index* slots = block_slots_.data() + block_offsets_[cell];
       for (int a = 0; a < n; ++a) {
         gradient[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
@@ -369,6 +368,23 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
     return sum;
   });
   return energy;
+}
+
+double VolumeEnergy::linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
+  if (hessian_.blocks.empty()) hessian_ = pattern();
+  hessian_.set_zero();
+  return add_hessian(nodes, scale, gradient, hessian_);
+}
+
+void VolumeEnergy::multiply(std::span<const Vec3> in, std::span<Vec3> out) const { hessian_.multiply(in, out); }
+
+void VolumeEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
+                                       std::span<Mat3> diagonal) const {
+  subvol::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
+}
+
+std::vector<Index> VolumeEnergy::uncertified(std::span<const Vec3> nodes) const {
+  return certify(nodes, *mesh_).not_certified;
 }
 
 double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {

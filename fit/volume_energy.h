@@ -5,6 +5,7 @@
 #include "fit/cell_reference.h"
 #include "fit/element_rule.h"
 #include "fit/hencky.h"
+#include "fit/volume_term.h"
 #include "subvol/volume_mesh.h"
 
 #include <array>
@@ -23,8 +24,9 @@ namespace subvol {
 ///
 /// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
 /// number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
-class VolumeEnergy {
+class VolumeEnergy final : public VolumeTerm {
  public:
+  /// mesh  must outlive the energy; its positions are not read.
   /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError. Cells weigh equally.
   /// points_per_direction  >= 2; 2: corners only.
   VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction);
@@ -32,21 +34,20 @@ class VolumeEnergy {
   /// InputError: a reference whose determinant is not positive.
   VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction);
 
-  /// Gives these cells a denser rule from now on (those that have it already stay).
-  void densify(std::span<const Index> cells, int points_per_direction);
+  double value(std::span<const Vec3> nodes) const override;
+  double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
+  double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override;
+  void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
+                           std::span<Mat3> diagonal) const override;
+  double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
+  std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
+  void densify(std::span<const Index> cells) override;
 
-  double value(std::span<const Vec3> nodes) const;
-
-  /// Adds scale * dE/dx to `gradient`; returns the value. Infeasible: nothing is added.
-  double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const;
-
-  /// The same, and adds scale times the positive definite Hessian (clamped, see `hencky.h`) to `hessian`, a matrix of
-  /// this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both arguments are spoilt).
+  /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `hencky.h`) to
+  /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both
+  /// arguments are spoilt).
   double add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;
-
-  /// The largest t in (0, limit] of a geometric sequence so that every determinant keeps at least a tenth of its value
-  /// on the way from x to x + t d. The nodes must be feasible.
-  double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const;
 
   /// Zero matrix with one block per pair of nodes that share a cell.
   BlockSparse pattern() const;
@@ -65,8 +66,9 @@ class VolumeEnergy {
     }
   };
 
-  void find_pattern(const VolumeMesh& mesh);
   struct BatchState;
+
+  void find_pattern();
 
   void rebuild_groups();
   void fill_references(Group& group) const;
@@ -74,17 +76,15 @@ class VolumeEnergy {
   template <class PerBatch>
   double sum_batches(PerBatch&& per_batch) const;
 
+  const VolumeMesh* mesh_;
   std::size_t num_nodes_;
-  std::vector<CellKind> kinds_;
-  std::vector<std::size_t> cell_offsets_;
-  std::vector<Index> cell_vertices_;
   std::vector<Vec3> inverse_lengths_;
   std::vector<double> weights_;
   CellReference reference_;        ///< empty: ideal cells
   std::vector<int> points_;        ///< points per direction of each cell
   std::vector<int> colors_;
   std::vector<Group> groups_;
-  BlockSparse pattern_;
+  BlockSparse pattern_, hessian_;
   std::vector<std::size_t> block_offsets_;  ///< of each cell in block_slots_
   std::vector<Index> block_slots_;          ///< block number of (a, b), a-major, in the pattern
 };

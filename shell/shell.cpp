@@ -5,6 +5,7 @@
 #include "fit/closest_point_energy.h"
 #include "fit/fit_problem.h"
 #include "fit/self_intersection.h"
+#include "fit/volume_energy.h"
 #include "shell/thickness.h"
 #include "shell/visible_normals.h"
 #include "subvol/boundary.h"
@@ -221,8 +222,9 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
     lambda = kLambda * share * share;
   }
   SparseMap samples = select_rows(nodes, sampled);
-  FitProblem problem(std::move(nodes), std::move(samples), cells_,
-                     VolumeEnergy(cells_, shell_reference(layers_, thickness_), 2), std::move(surface), lambda);
+  FitProblem problem(std::move(nodes), std::move(samples),
+                     std::make_unique<VolumeEnergy>(cells_, shell_reference(layers_, thickness_), 2), std::move(surface),
+                     lambda);
   problem.fixed_nodes = std::move(fixed);
   problem.fixed_samples = std::move(fixed_samples);
   return problem;
