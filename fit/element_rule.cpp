@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/element_rule.h"
 
+#include "fit/quadrature.h"
 #include "subvol/error.h"
 
 #include <Eigen/LU>
@@ -31,19 +32,6 @@ std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
           Vec3(v * w, u * w, u * v),    Vec3(-v * w, a * w, a * v)};
 }
 
-double trapezoidal_weight(int i, int n) { return (i == 0 || i == n - 1 ? 0.5 : 1.0) / (n - 1); }
-
-/// Points of the triangle's regular split, with the share of its triangles around each.
-void triangle_points(int n, std::vector<std::array<double, 3>>& points) {
-  const double small = 1.0 / ((n - 1) * (n - 1) * 3.0);
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i + j < n; ++i) {
-      const int zeros = (i == 0) + (j == 0) + (i + j == n - 1);
-      const int triangles = zeros == 0 ? 6 : zeros == 1 ? 3 : 1;
-      points.push_back({double(i) / (n - 1), double(j) / (n - 1), small * triangles});
-    }
-}
-
 }  // namespace
 
 Mat3 ideal_matrix(CellKind kind) {
@@ -63,31 +51,16 @@ double ideal_volume(CellKind kind) {
 ElementRule make_element_rule(CellKind kind, int points_per_direction) {
   const int n = points_per_direction;
   if (n < 2) throw InputError("make_element_rule: points_per_direction must be at least 2, got " + std::to_string(n));
+  // The Jacobian of a linear tet is constant.
+  Quadrature quadrature = kind == CellKind::tet ? Quadrature{{Vec3(0.25, 0.25, 0.25)}, {1}}
+                                                : make_quadrature(kind, QuadratureRule::trapezoidal, n);
   ElementRule rule;
-  std::vector<Vec3>& points = rule.points;
   rule.kind = kind;
-  if (kind == CellKind::tet) {
-    points.push_back(Vec3(0.25, 0.25, 0.25));
-    rule.weights.push_back(1);
-  } else if (kind == CellKind::prism) {
-    std::vector<std::array<double, 3>> triangle;
-    triangle_points(n, triangle);
-    for (int k = 0; k < n; ++k)
-      for (const auto& t : triangle) {
-        points.push_back(Vec3(t[0], t[1], double(k) / (n - 1)));
-        rule.weights.push_back(t[2] * trapezoidal_weight(k, n));
-      }
-  } else {
-    for (int k = 0; k < n; ++k)
-      for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i) {
-          points.push_back(Vec3(i, j, k) / (n - 1));
-          rule.weights.push_back(trapezoidal_weight(i, n) * trapezoidal_weight(j, n) * trapezoidal_weight(k, n));
-        }
-  }
+  rule.points = std::move(quadrature.points);
+  rule.weights = std::move(quadrature.weights);
   const Mat3 to_ideal = ideal_inverse(kind).transpose();
   rule.offsets.push_back(0);
-  for (const Vec3& p : points) {
+  for (const Vec3& p : rule.points) {
     const std::vector<Vec3> gradients = canonical_gradients(kind, p);
     for (std::size_t a = 0; a < gradients.size(); ++a) {
       if (gradients[a].squaredNorm() == 0) continue;

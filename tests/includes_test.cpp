@@ -30,7 +30,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
     {"tests", {"subvol", "fit", "shell", "export", "cli", "samples", "tests"}},
 };
 // Results of a fit may be shown, its energies and solver not.
-const std::set<std::string> kFitForExport{"fit/quality.h", "fit/certificate.h"};
+const std::set<std::string> kFitForExport{"fit/quality.h", "fit/certificate.h", "fit/element_space.h",
+                                          "fit/high_order_mesh.h"};
 
 struct Source {
   std::string path, layer;

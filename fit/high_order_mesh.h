@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/element_space.h"
+#include "subvol/sparse_map.h"
+
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// A volume mesh of curved cells: a space and one coefficient per node, vertices' positions and modes' displacements.
+struct HighOrderMesh {
+  ElementSpace space;
+  std::vector<Vec3> coefficients;
+
+  /// InputError: other than one coefficient per node.
+  HighOrderMesh(ElementSpace space, std::vector<Vec3> coefficients);
+  /// The straight-sided mesh in a space of any orders: modes are zero. `mesh` has the space's vertices, else InputError.
+  HighOrderMesh(ElementSpace space, const VolumeMesh& mesh);
+
+  /// x(u), and dx/du (columns are derivatives by u, v, w), at a point of a cell in canonical coordinates.
+  /// Slow: makes its tables anew; for many points use `point_map` or ShapeFunctions.
+  Vec3 position(std::size_t c, const Vec3& point) const;
+  Mat3 jacobian(std::size_t c, const Vec3& point) const;
+
+  /// The same mesh in a space of other orders: the same shape where no order falls, else without the modes that are gone.
+  HighOrderMesh with_orders(const EntityOrders& orders) const;
+};
+
+/// A point of a cell, in canonical coordinates.
+struct CellPoint {
+  Index cell;
+  Vec3 point;
+};
+
+/// Nodes -> positions at points, one row per point. Weights within rounding of zero (1e-15) are left out.
+///
+/// InputError: a cell out of range, a point that is not finite or further than 1e-9 outside its cell. Parallel.
+SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points);
+
+}  // namespace subvol
