@@ -58,7 +58,7 @@ std::vector<LocalMode> all_modes(CellKind kind, int order) {
 
 }  // namespace
 
-TEST_CASE("Modes of a line have their closed forms, vanish at the ends and have their parity", "[basis]") {
+TEST_CASE("modes of a line have their closed forms, vanish at the ends and have their parity", "[basis]") {
   for (const Basis basis : kBothBases) {
     INFO(to_string(basis));
     for (const double x : {0.0, 1.0})
@@ -83,7 +83,7 @@ TEST_CASE("Modes of a line have their closed forms, vanish at the ends and have 
   CHECK(legendre.derivatives[2] == Approx(std::sqrt(3.0) * (1 - 2 * x)));
 }
 
-TEST_CASE("Derivatives of line modes are orthonormal", "[basis]") {
+TEST_CASE("derivatives of line modes are orthonormal", "[basis]") {
   const LineRule rule = gauss_rule(40);
   for (const Basis basis : kBothBases)
     for (int i = 1; i < kMaxOrder; ++i)
@@ -97,7 +97,7 @@ TEST_CASE("Derivatives of line modes are orthonormal", "[basis]") {
       }
 }
 
-TEST_CASE("Derivatives of line modes and kernels are differences in the limit", "[basis]") {
+TEST_CASE("derivatives of line modes and kernels are differences in the limit", "[basis]") {
   for (const Basis basis : kBothBases)
     for (const double x : {0.001, 0.02, 0.1, 0.2, 0.37, 0.499, 0.501, 0.8, 0.999}) {
       const Line line = line_at(basis, x), above = line_at(basis, x + kStep), below = line_at(basis, x - kStep);
@@ -115,7 +115,7 @@ TEST_CASE("Derivatives of line modes and kernels are differences in the limit", 
     }
 }
 
-TEST_CASE("Kernels are smooth up to the ends", "[basis]") {
+TEST_CASE("kernels are smooth up to the ends", "[basis]") {
   for (const Basis basis : kBothBases) {
     const Line end = kernels_at(basis, 0), near = kernels_at(basis, 1e-13), slope = line_at(basis, 0);
     for (int i = 0; i + 1 < kMaxOrder; ++i) {
@@ -126,7 +126,7 @@ TEST_CASE("Kernels are smooth up to the ends", "[basis]") {
   }
 }
 
-TEST_CASE("Vertex functions are linear and sum to one; modes vanish at vertices and on what they do not belong to",
+TEST_CASE("vertex functions are linear and sum to one; modes vanish at vertices and on what they do not belong to",
           "[basis]") {
   PointSource source(3);
   for (const Basis basis : kBothBases)
@@ -165,7 +165,7 @@ TEST_CASE("Vertex functions are linear and sum to one; modes vanish at vertices 
     }
 }
 
-TEST_CASE("Gradients of shape functions are differences in the limit", "[basis]") {
+TEST_CASE("gradients of shape functions are differences in the limit", "[basis]") {
   PointSource source(11);
   for (const Basis basis : kBothBases)
     for (const CellKind kind : kAllKinds) {

@@ -107,7 +107,7 @@ VolumeMesh affine_cells() {
 
 }  // namespace
 
-TEST_CASE("Node counts of one cell have their closed forms", "[elements]") {
+TEST_CASE("node counts of one cell have their closed forms", "[elements]") {
   for (int p = 1; p <= kMaxOrder; ++p) {
     CHECK(ElementSpace(single_cell(CellKind::hex), Basis::fourier, p).num_nodes() == (p + 1.0) * (p + 1) * (p + 1));
     CHECK(ElementSpace(single_cell(CellKind::prism), Basis::fourier, p).num_nodes() ==
@@ -118,7 +118,7 @@ TEST_CASE("Node counts of one cell have their closed forms", "[elements]") {
   }
 }
 
-TEST_CASE("A hex of one order lists its functions in tensor order", "[elements]") {
+TEST_CASE("a hex of one order lists its functions in tensor order", "[elements]") {
   for (const int p : {1, 2, 5}) {
     const ElementSpace space(lattice(2, 2, 2), Basis::fourier, p);
     CHECK(space.num_patterns() == 1);
@@ -135,7 +135,7 @@ TEST_CASE("A hex of one order lists its functions in tensor order", "[elements]"
   }
 }
 
-TEST_CASE("Cells of one order and kind share few patterns", "[elements]") {
+TEST_CASE("cells of one order and kind share few patterns", "[elements]") {
   PointSource source(23);
   std::map<CellKind, std::set<std::vector<LocalMode>>> patterns;
   for (int repeat = 0; repeat < 500; ++repeat)
@@ -151,7 +151,7 @@ TEST_CASE("Cells of one order and kind share few patterns", "[elements]") {
   CHECK(patterns[CellKind::tet].size() == 12);
 }
 
-TEST_CASE("Cells of all kinds agree on every edge and face they share, in every orientation", "[elements]") {
+TEST_CASE("cells of all kinds agree on every edge and face they share, in every orientation", "[elements]") {
   constexpr double kTolerance = 1e-12;  // rounding of a thousand functions with coefficients of order one
   PointSource source(29);
   double largest = 0;
@@ -187,7 +187,7 @@ TEST_CASE("Cells of all kinds agree on every edge and face they share, in every 
   CHECK(largest <= kTolerance);
 }
 
-TEST_CASE("Affine maps are reproduced at every order, kind and basis", "[elements]") {
+TEST_CASE("affine maps are reproduced at every order, kind and basis", "[elements]") {
   const Mat3 matrix = (Mat3() << 1, 0.3, -0.2, 0.1, 0.8, 0.4, -0.5, 0.2, 1.3).finished();
   const auto affine = [&](const Vec3& x) -> Vec3 { return matrix * x + Vec3(3, -1, 2); };
   for (const Basis basis : kBothBases)
@@ -207,7 +207,7 @@ TEST_CASE("Affine maps are reproduced at every order, kind and basis", "[element
     }
 }
 
-TEST_CASE("Polynomial maps are reproduced by the legendre basis at every order and kind", "[elements]") {
+TEST_CASE("polynomial maps are reproduced by the legendre basis at every order and kind", "[elements]") {
   PointSource source(31);
   for (int order = 1; order <= kMaxOrder; ++order)
     for (const CellKind kind : kAllKinds) {
@@ -231,7 +231,7 @@ TEST_CASE("Polynomial maps are reproduced by the legendre basis at every order a
   }
 }
 
-TEST_CASE("Raising orders keeps the map, and lowering them again gives the first back", "[elements]") {
+TEST_CASE("raising orders keeps the map, and lowering them again gives the first back", "[elements]") {
   PointSource source(37);
   for (const Basis basis : kBothBases)
     for (int repeat = 0; repeat < 10; ++repeat) {
@@ -255,7 +255,7 @@ TEST_CASE("Raising orders keeps the map, and lowering them again gives the first
     }
 }
 
-TEST_CASE("Jacobians of a mesh are differences of its positions", "[elements]") {
+TEST_CASE("jacobians of a mesh are differences of its positions", "[elements]") {
   PointSource source(41);
   const ElementSpace space(mixed_cells(), Basis::fourier, 6);
   const HighOrderMesh mesh = random_mesh(space, source);
@@ -270,7 +270,7 @@ TEST_CASE("Jacobians of a mesh are differences of its positions", "[elements]") 
   }
 }
 
-TEST_CASE("A map to points gives the positions there", "[elements]") {
+TEST_CASE("a map to points gives the positions there", "[elements]") {
   PointSource source(43);
   for (const Basis basis : kBothBases) {
     const ElementSpace space(mixed_cells(), basis, 5);
@@ -288,7 +288,7 @@ TEST_CASE("A map to points gives the positions there", "[elements]") {
   }
 }
 
-TEST_CASE("A smooth map is met at the rate of the basis", "[elements]") {
+TEST_CASE("a smooth map is met at the rate of the basis", "[elements]") {
   // What the fourier modes leave of a smooth function falls with the third power of the order inside a cell.
   const auto smooth = [](const Vec3& x) -> Vec3 {
     return x + 0.1 * Vec3(std::sin(2 * x[1] + x[2]), std::cos(x[0] * x[2]), std::exp(0.5 * x[0]));
@@ -309,7 +309,7 @@ TEST_CASE("A smooth map is met at the rate of the basis", "[elements]") {
   }
 }
 
-TEST_CASE("What cannot be a space or a mesh of it is refused", "[elements]") {
+TEST_CASE("what cannot be a space or a mesh of it is refused", "[elements]") {
   const VolumeMesh mesh = mixed_cells();
   const MeshTopology topology(mesh);
   CHECK_THROWS_AS(ElementSpace(mesh, Basis::fourier, 0), InputError);

@@ -32,7 +32,7 @@ double mean(const Quadrature& rule, int a, int b, int c) {
 
 }  // namespace
 
-TEST_CASE("Weights are positive, sum to one, and rules are exact up to their degree", "[quadrature]") {
+TEST_CASE("weights are positive, sum to one, and rules are exact up to their degree", "[quadrature]") {
   for (const CellKind kind : kAllKinds)
     for (const QuadratureRule name : {QuadratureRule::trapezoidal, QuadratureRule::gauss_lobatto})
       for (const int n : {2, 3, 4, 7, 12}) {
@@ -50,7 +50,7 @@ TEST_CASE("Weights are positive, sum to one, and rules are exact up to their deg
   CHECK(make_quadrature(CellKind::hex, QuadratureRule::trapezoidal, 4).points.size() == 64);
 }
 
-TEST_CASE("Trapezoidal rules converge with the square of their step on triangle and tet", "[quadrature]") {
+TEST_CASE("trapezoidal rules converge with the square of their step on triangle and tet", "[quadrature]") {
   for (const CellKind kind : {CellKind::prism, CellKind::tet}) {
     const double exact = exact_mean(kind, 2, 0, 0);
     const double coarse = std::abs(mean(make_quadrature(kind, QuadratureRule::trapezoidal, 9), 2, 0, 0) - exact);
@@ -59,7 +59,7 @@ TEST_CASE("Trapezoidal rules converge with the square of their step on triangle 
   }
 }
 
-TEST_CASE("Line rules have their closed forms; counts for orders nest", "[quadrature]") {
+TEST_CASE("line rules have their closed forms; counts for orders nest", "[quadrature]") {
   CHECK(gauss_rule(1).points[0] == Approx(0.5));
   CHECK(gauss_rule(2).points[0] == Approx(0.5 - std::sqrt(3.0) / 6));
   CHECK(gauss_lobatto_rule(3).weights[1] == Approx(2.0 / 3));
@@ -75,7 +75,7 @@ TEST_CASE("Line rules have their closed forms; counts for orders nest", "[quadra
   }
 }
 
-TEST_CASE("Rules of too few points are refused", "[quadrature]") {
+TEST_CASE("rules of too few points are refused", "[quadrature]") {
   CHECK_THROWS_AS(make_quadrature(CellKind::hex, QuadratureRule::trapezoidal, 1), InputError);
   CHECK_THROWS_AS(make_triangle_quadrature(QuadratureRule::trapezoidal, 1), InputError);
   CHECK_THROWS_AS(gauss_rule(0), InputError);
