@@ -24,7 +24,7 @@ inline constexpr int mode_parity(int i) { return i % 2 ? 1 : -1; }
 /// Modes are exactly 0 at both ends, and N(1 - x) is N(x) up to order and signs bit by bit where 1 - x is exact.
 void line_functions(Basis basis, int order, double x, double* values, double* derivatives);
 
-/// What remains of the modes without their zeros: psi_i(x) = phi_i(x) / (x (1 - x)), i = 1 .. order - 1, smooth on [0, 1].
+/// What remains of the modes without their zeros: psi_i(x) = phi_i(x) / (x (1 - x)), i = 1 .. order - 1, smooth.
 ///
 /// For legendre a polynomial of degree i - 1. Computed without a division by small numbers; parity as of phi_i.
 /// values, derivatives: order - 1 entries each.

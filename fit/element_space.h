@@ -29,8 +29,9 @@ struct EntityOrders {
 ///
 ///   x(u) = sum_a sign_a N_a(u) coefficient[node_a]       over a cell's functions N_a                 Paper: Eq. 5
 ///
-/// Vertices come first, with the numbers of the mesh and their positions as coefficients; then the modes of edges, faces
-/// and cells, whose coefficients are displacements. Each mode exists once, in a frame that global vertex numbers fix:
+/// Vertices come first, with the numbers of the mesh and their positions as coefficients; then the modes of edges,
+/// faces and cells, whose coefficients are displacements. Each mode exists once, in a frame that global vertex numbers
+/// fix:
 ///
 ///   edge      from the smaller vertex to the larger
 ///   quad      origin at the smallest vertex, i towards the smaller of its two neighbours, j towards the other
@@ -39,8 +40,9 @@ struct EntityOrders {
 ///
 /// Neighbours of any kind and orientation therefore agree on what they share, up to rounding.
 ///
-/// Cells whose functions are the same have the same *pattern*: its modes, ascending. A hex whose entities all have order
-/// p has one pattern, with all (p + 1)^3 modes in tensor order, i fastest; prisms of one order have at most 9, tets 12.
+/// Cells whose functions are the same have the same *pattern*: its modes, ascending. A hex whose entities all have
+/// order p has one pattern, with all (p + 1)^3 modes in tensor order, i fastest; prisms of one order have at most 9,
+/// tets 12.
 ///
 /// Immutable; copies share what they can. Positions of the mesh are not kept.
 class ElementSpace {

@@ -16,7 +16,7 @@ struct HighOrderMesh {
 
   /// InputError: other than one coefficient per node.
   HighOrderMesh(ElementSpace space, std::vector<Vec3> coefficients);
-  /// The straight-sided mesh in a space of any orders: modes are zero. `mesh` has the space's vertices, else InputError.
+  /// The straight-sided mesh in a space of any orders: modes are zero. InputError: other than the space's vertices.
   HighOrderMesh(ElementSpace space, const VolumeMesh& mesh);
 
   /// x(u), and dx/du (columns are derivatives by u, v, w), at a point of a cell in canonical coordinates.
@@ -24,7 +24,7 @@ struct HighOrderMesh {
   Vec3 position(std::size_t c, const Vec3& point) const;
   Mat3 jacobian(std::size_t c, const Vec3& point) const;
 
-  /// The same mesh in a space of other orders: the same shape where no order falls, else without the modes that are gone.
+  /// The same mesh in a space of other orders: the same shape where no order falls, else without what is gone.
   HighOrderMesh with_orders(const EntityOrders& orders) const;
 };
 

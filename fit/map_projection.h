@@ -7,9 +7,9 @@
 
 namespace subvol {
 
-/// The mesh that follows a given map, entity by entity: vertices are met, then the modes of edges, of faces and of cells
-/// take what is left there, by least squares weighted as the integral (Gauss points in the entity's frame, order + 2 in
-/// each direction).
+/// The mesh that follows a given map, entity by entity: vertices are met, then the modes of edges, of faces and of
+/// cells take what is left there, by least squares weighted as the integral (Gauss points in the entity's frame, order
+/// + 2 in each direction).
 ///
 /// map    (cell, canonical point) -> position, finite (else InputError). Every edge and face is asked about from one of
 ///        its cells.

@@ -75,8 +75,8 @@ Quadrature collapsed_triangle(int n) {
   return rule;
 }
 
-/// Cubes of the grid fall into an upright tet, an octahedron of four times its volume, and a hanging tet, as far as they
-/// lie inside.
+/// Cubes of the grid fall into an upright tet, an octahedron of four times its volume, and a hanging tet, as far as
+/// they lie inside.
 Quadrature regular_tet(int n) {
   const int last = n - 1;
   std::vector<double> sums(n * n * n, 0.0);  // in volumes of a small tet

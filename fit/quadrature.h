@@ -10,8 +10,8 @@ namespace subvol {
 
 /// What a quadrature takes along a line.
 ///
-///   trapezoidal    equal steps, both ends included; exact for linear functions and, with n points, for cosines cos(k pi x)
-///                  up to k = 2n - 3                                            Paper: Eq. 6
+///   trapezoidal    equal steps, both ends included; exact for linear functions and, with n points, for cosines
+///                  cos(k pi x) up to k = 2n - 3                                Paper: Eq. 6
 ///   gauss_lobatto  both ends included; exact up to degree 2n - 3
 enum class QuadratureRule { trapezoidal, gauss_lobatto };
 
@@ -23,10 +23,10 @@ struct Quadrature {
 
 /// n points a direction: u fastest, then v, then w (prism: the triangle's points, then w).
 ///
-/// Triangle and tetrahedron, trapezoidal: the regular grid of n points a side, with the vertex rule on every piece of the
-/// regular split (the octahedra among a tet's pieces have equal weights); exact for linear functions. Gauss-Lobatto has
-/// no such grid: they take Gauss points in collapsed coordinates instead, all inside, exact up to degree 2n - 3 too.
-/// InputError: n < 2. Trapezoidal grids are nested where n - 1 divides n' - 1.
+/// Triangle and tetrahedron, trapezoidal: the regular grid of n points a side, with the vertex rule on every piece of
+/// the regular split (the octahedra among a tet's pieces have equal weights); exact for linear functions. Gauss-Lobatto
+/// has no such grid: they take Gauss points in collapsed coordinates instead, all inside, exact up to degree 2n - 3
+/// too. InputError: n < 2. Trapezoidal grids are nested where n - 1 divides n' - 1.
 Quadrature make_quadrature(CellKind kind, QuadratureRule rule, int n);
 /// The same for the triangle {u + v <= 1}, w = 0.
 Quadrature make_triangle_quadrature(QuadratureRule rule, int n);

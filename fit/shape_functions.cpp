@@ -7,7 +7,7 @@ namespace subvol {
 
 namespace {
 
-/// Gradients of the barycentric coordinates of tet and triangle by (u, v, w): l_0 = 1 - u - v (- w), l_1 = u, l_2 = v, ..
+/// Gradients of the barycentric coordinates of tet and triangle by (u, v, w): l_0 = 1 - u - v (- w), l_1 = u, ..
 Vec3 barycentric_gradient(CellKind kind, int vertex) {
   if (vertex > 0) return Vec3::Unit(vertex - 1);
   return kind == CellKind::tet ? Vec3(-1, -1, -1) : Vec3(-1, -1, 0);

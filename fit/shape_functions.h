@@ -25,9 +25,9 @@ std::span<const Vec3> canonical_vertices(CellKind kind);
 ///   V_c,j  = l_c psi_j(l_c), V_c,0 = l_c                             a factor only where vertex >= 0
 ///
 /// with l the barycentric coordinates and psi the `mode_kernels`. On its own edge, E_ab,i is phi_i(l_b); everywhere, it
-/// changes by phi_i's parity where a and b change places. So edges carry phi_i and quad faces phi_i phi_j on every kind,
-/// and triangle faces E_ab,i V_c,j on both kinds that have them. With legendre, prism functions are polynomials of
-/// degree i + 1, i + j + 1 over the triangle, tet functions of degree i + j + k + 1.
+/// changes by phi_i's parity where a and b change places. So edges carry phi_i and quad faces phi_i phi_j on every
+/// kind, and triangle faces E_ab,i V_c,j on both kinds that have them. With legendre, prism functions are polynomials
+/// of degree i + 1, i + j + 1 over the triangle, tet functions of degree i + j + k + 1.
 struct LocalMode {
   std::int8_t edge = -1;    ///< of a prism or tet, in the kind's order (prism: 0 .. 2); or -1
   std::int8_t vertex = -1;  ///< of a prism (0 .. 2) or tet; or -1
@@ -64,15 +64,15 @@ void for_each_mode(EntityShape shape, int order, const Function& f);
 
 /// The shape function of a local vertex.
 LocalMode vertex_mode(CellKind kind, int vertex);
-/// Modes phi_i of an edge that runs from local vertex a to b, phi_i phi_j of a quad with its origin at a, i running to b
-/// and j to d, and E_ab,i V_c,j of the triangle a b c.
+/// Modes phi_i of an edge that runs from local vertex a to b, phi_i phi_j of a quad with its origin at a, i running to
+/// b and j to d, and E_ab,i V_c,j of the triangle a b c.
 SignedMode edge_mode(CellKind kind, int a, int b, int i);
 SignedMode quad_mode(CellKind kind, int a, int b, int d, int i, int j);
 SignedMode triangle_mode(CellKind kind, int a, int b, int c, int i, int j);
 /// A mode of the cell itself. Hex phi_i phi_j phi_k, prism E_01,i V_2,j phi_k, tet E_01,i V_2,j V_3,k.
 LocalMode cell_mode(CellKind kind, ModeIndex index);
 
-/// Values and gradients of shape functions at points of one kind of cell. Holds its tables: no allocation; one per thread.
+/// Values and gradients of shape functions at points of one kind of cell. Never allocates; one per thread.
 class ShapeFunctions {
  public:
   /// max_order: 1 .. kMaxOrder, at least that of any mode asked for.
