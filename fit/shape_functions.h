@@ -81,7 +81,14 @@ class ShapeFunctions {
   CellKind kind() const { return kind_; }
   /// Prepares a point, in canonical coordinates inside the cell.
   void set_point(const Vec3& point);
-  double value(const LocalMode& mode) const { return evaluate(mode).value; }
+  double value(const LocalMode& mode) const {
+    if (kind_ == CellKind::hex)
+      return axes_[0][mode.i].value * axes_[1][mode.j].value * axes_[2][mode.k].value;
+    double result = mode.edge >= 0 ? edges_[mode.edge][mode.i].value : 1;
+    if (mode.vertex >= 0) result *= vertices_[mode.vertex][mode.j].value;
+    if (kind_ == CellKind::prism) return result * axes_[2][mode.k].value;
+    return mode.k > 0 ? result * vertices_[3][mode.k].value : result;
+  }
   /// Value, and gradient by the canonical coordinates.
   double value(const LocalMode& mode, Vec3& gradient) const {
     const Factor f = evaluate(mode);
