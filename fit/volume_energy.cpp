@@ -2,6 +2,7 @@
 #include "fit/volume_energy.h"
 
 #include "fit/certificate.h"
+#include "fit/step_limit.h"
 #include "subvol/error.h"
 
 #include <Eigen/Geometry>
@@ -388,11 +389,7 @@ std::vector<Index> VolumeEnergy::uncertified(std::span<const Vec3> nodes) const 
 }
 
 double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
-  constexpr double kShrink = 0.8, kKept = 0.1;
-  constexpr int kMaxSteps = 200;
-  std::array<double, kMaxSteps + 1> step;  // a table, so that a step has the same bits for every thread
-  for (int n = 0; n <= kMaxSteps; ++n) step[n] = limit * std::pow(kShrink, n);
-  std::atomic<int> steps{0};  // step[steps] is safe for every point seen so far
+  StepLimit steps(limit);
   sum_batches([&](const Group& group, std::size_t b) {
     alignas(64) double x[kMaxCellVertices][3][kLanes], d[kMaxCellVertices][3][kLanes], ones[3][kLanes];
     double jx[9][kLanes], jd[9][kLanes];
@@ -403,31 +400,17 @@ double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3>
       jacobians(group.rule.point(q), x, ones, jx);
       jacobians(group.rule.point(q), d, ones, jd);
       for (int l = 0; l < kLanes; ++l) {
-        // det(J + t D) = c0 + c1 t + c2 t^2 + c3 t^3; positive on [0, t] if its four Bernstein coefficients there are.
         Mat3 j, e;
         for (int k = 0; k < 9; ++k) {
           j(k / 3, k % 3) = jx[k][l];
           e(k / 3, k % 3) = jd[k][l];
         }
-        const Vec3 j12 = j.col(1).cross(j.col(2)), e12 = e.col(1).cross(e.col(2));
-        const Vec3 mixed = j.col(1).cross(e.col(2)) + e.col(1).cross(j.col(2));
-        const double det = j.col(0).dot(j12);
-        const double c0 = (1 - kKept) * det, c1 = e.col(0).dot(j12) + j.col(0).dot(mixed),
-                     c2 = e.col(0).dot(mixed) + j.col(0).dot(e12), c3 = e.col(0).dot(e12);
-        int n = steps.load(std::memory_order_relaxed);
-        for (; n < kMaxSteps; ++n) {
-          const double t = step[n];
-          const double a1 = c1 * t, a2 = c2 * t * t, a3 = c3 * t * t * t;
-          if (c0 + a1 / 3 > 0 && c0 + 2 * a1 / 3 + a2 / 3 > 0 && c0 + a1 + a2 + a3 > 0) break;
-        }
-        int seen = steps.load(std::memory_order_relaxed);
-        while (seen < n && !steps.compare_exchange_weak(seen, n)) {
-        }
+        steps.admit(j, e);
       }
     }
     return 0.0;
   });
-  return step[steps.load()];
+  return steps.step();
 }
 
 BlockSparse VolumeEnergy::pattern() const {
