@@ -41,7 +41,8 @@ struct IterationRecord {
 /// One minimisation with fixed level, lambda and tangential weight.
 struct StageRecord {
   std::string name;                ///< "level 2, lambda 0.05", "level 1, continuation t=0.5"
-  int level = 0;                   ///< level of the finite element mesh (control level + 1)
+  int level = 0;                   ///< level of the finite element mesh (control level + 1); 0: there are no levels
+  int order = 0;                   ///< of curved elements; 0: cells are linear
   double lambda = 0, tangential_weight = 0;
   std::size_t unknowns = 0, cells = 0;
   std::vector<IterationRecord> iterations;

@@ -4,16 +4,14 @@
 #include "fit/boundary_triangles.h"
 #include "fit/certificate.h"
 #include "fit/closest_point.h"
-#include "fit/closest_point_energy.h"
 #include "fit/fit_level.h"
-#include "fit/fit_problem.h"
 #include "fit/fit_schedule.h"
 #include "fit/followed_creases.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
 #include "fit/soup_topology.h"
+#include "fit/stage_runner.h"
 #include "fit/surface_distance.h"
-#include "fit/surface_energy.h"
 #include "fit/target_surface.h"
 #include "fit/volume_energy.h"
 #include "subvol/audit.h"
@@ -23,7 +21,6 @@
 #include "subvol/mesh_topology.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -34,41 +31,11 @@ namespace subvol {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
 template <class... Values>
 std::string format(const char* form, Values... values) {
   char text[160];
   std::snprintf(text, sizeof text, form, values...);
   return text;
-}
-
-/// Centred coordinates in which the target's box has the diagonal 1: nothing depends on the origin or the unit.
-struct Normalisation {
-  Vec3 centre = Vec3::Zero();
-  double diagonal = 1;
-
-  explicit Normalisation(const TriangleMesh& target) {
-    diagonal = bounding_box_diagonal(target);
-    if (!(diagonal > 0) || !std::isfinite(diagonal))
-      throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");
-    centre = TargetSurface(target).centre();
-  }
-  std::vector<Vec3> to_unit(std::vector<Vec3> points) const {
-    for (Vec3& p : points) p = (p - centre) / diagonal;
-    return points;
-  }
-  std::vector<Vec3> from_unit(std::vector<Vec3> points) const {
-    for (Vec3& p : points) p = centre + diagonal * p;
-    return points;
-  }
-};
-
-TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation) {
-  mesh.positions = normalisation.to_unit(std::move(mesh.positions));
-  return mesh;
 }
 
 void check_options(const FitOptions& options) {
@@ -109,7 +76,6 @@ class SubdivisionFit {
   bool meets_tolerance();
   void store_result();
   void next_control();
-  void sample_target(std::size_t num_samples);
   std::string stage_name(const Stage& stage) const;
   bool finest() const { return number_ == options_.levels; }
 
@@ -136,7 +102,7 @@ class SubdivisionFit {
   std::optional<double> mean_;     ///< percent, of the current state
   FitResult result_;
   std::map<std::string, double> seconds_;
-  Clock::time_point start_ = Clock::now();
+  StageRunner runner_;
 };
 
 SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options)
@@ -145,7 +111,8 @@ SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& tem
       target_mesh_(normalised(target, normalisation_)),
       target_tree_(target_mesh_),
       target_(target_mesh_),
-      template_(template_mesh) {
+      template_(template_mesh),
+      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   template_.positions = normalisation_.to_unit(template_.positions);
@@ -172,22 +139,15 @@ void SubdivisionFit::look_over_template() {
     report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
 }
 
-/// Samples the target about as densely as the fitted surface: sparse sites on large facets would claim points of the
-/// surface that belong to a neighbouring facet.
-void SubdivisionFit::sample_target(std::size_t num_samples) {
-  const double spacing = 1.8 * std::sqrt(target_.area() / static_cast<double>(std::max(num_samples, kLeastTargetSamples)));
-  target_ = TargetSurface(target_mesh_, {.sample_spacing = spacing});
-}
-
 void SubdivisionFit::prepare_level() {
-  const Clock::time_point begin = Clock::now();
+  const double begin = runner_.seconds();
   level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size() / 2, finest());
   limit_check_.reset();
   creases_.refine(level_);
-  sample_target(level_.samples.num_rows());
+  target_ = sampled_target(target_mesh_, target_.area(), level_.samples.num_rows());
   ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.volume(),
                              number_ == 1 ? own_box_share_ : 1);
-  seconds_["levels"] += seconds_since(begin);
+  seconds_["levels"] += runner_.seconds() - begin;
 }
 
 std::string SubdivisionFit::stage_name(const Stage& stage) const {
@@ -195,59 +155,28 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 }
 
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
-  const std::size_t num_samples = level_.samples.num_rows();
-  const int points = level_.sample_triangles.size() > 2 * target_.triangles().size() ? 1 : 3;
-  std::unique_ptr<SurfaceTerm> term;
-  if (options_.correspondence == Correspondence::voronoi)
-    term = std::make_unique<SurfaceEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight);
-  else
-    term = std::make_unique<ClosestPointEnergy>(target_, level_.sample_triangles, num_samples, stage.tangential_weight,
-                                                points);
+  std::unique_ptr<SurfaceTerm> term = make_surface_term(target_, level_.sample_triangles, level_.samples.num_rows(),
+                                                        stage.tangential_weight, options_.correspondence);
   if (!creases_.curves().empty())
     term->add_creases(creases_.energy(level_, kCreaseWidth * target_.length(), stage.tangential_weight));
   return term;
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
-bool SubdivisionFit::run_stage(const Stage& stage, const std::string& stage_name) {
-  const std::string name = try_ == 1 ? stage_name : format("try %d, ", try_) + stage_name;
-  const Clock::time_point begin = Clock::now();
+bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   StageRecord record;
-  record.name = name;
+  record.name = try_ == 1 ? name : format("try %d, ", try_) + name;
   record.level = number_;
-  record.lambda = lambda_ = stage.lambda;
-  record.tangential_weight = stage.tangential_weight;
-  record.unknowns = unknowns_.size();
   record.cells = level_.mesh.num_cells();
-
+  lambda_ = stage.lambda;
   FitProblem problem(level_.nodes, level_.samples,
                      std::make_unique<VolumeEnergy>(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_)),
                      surface_term(stage), stage.lambda);
-  MinimizerOptions options;
-  options.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
-  if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) options.max_iterations *= kLbfgsSteps;
-  options.relative_decrease = stage.relative_decrease;
-  int iteration = 0;
-  bool timed_out = false;
-  options.progress = [&](const IterationRecord& step) {
-    timed_out = options_.time_limit_seconds > 0 && seconds_since(start_) > options_.time_limit_seconds;
-    const double energy = step.surface_energy + stage.lambda * step.volume_energy;
-    const bool going = !options_.progress ||
-                       options_.progress({name.c_str(), number_, ++iteration, energy, schedule_.fraction(number_)});
-    return going && !timed_out;
-  };
-  const MinimizerResult solved = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, unknowns_, options)
-                                                                      : minimize_newton(problem, unknowns_, options);
+  const double begin = runner_.seconds();
+  const bool going = runner_.run(problem, stage, std::move(record), schedule_.fraction(number_), unknowns_, result_.report);
+  seconds_["solve"] += runner_.seconds() - begin;
   mean_.reset();
-  record.iterations = solved.iterations;
-  record.stop = solved.explanation;
-  record.seconds = seconds_since(begin);
-  seconds_["solve"] += record.seconds;
-  result_.report.stages.push_back(std::move(record));
-  if (solved.stop != MinimizerStop::cancelled) return true;
-  result_.report.stop_reason = timed_out ? StopReason::time_limit : StopReason::cancelled;
-  result_.report.explanation = (timed_out ? "time limit reached in " : "cancelled in ") + name;
-  return false;
+  return going;
 }
 
 /// Makes the level's start valid by continuation from the linear split L of the level below:
@@ -301,7 +230,7 @@ TriangleMesh SubdivisionFit::limit_triangles() {
 /// element mesh and of the limit surface.
 double SubdivisionFit::measured_mean() {
   if (mean_) return *mean_;
-  const Clock::time_point begin = Clock::now();
+  const double begin = runner_.seconds();
   const VolumeMesh mesh = current_mesh();
   std::vector<TriangleMesh> surfaces = {refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))};
   if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
@@ -311,7 +240,7 @@ double SubdivisionFit::measured_mean() {
                                            {.extremes = false}).mean());
   mean_ = 100 * mean;
   if (!result_.report.stages.empty()) result_.report.stages.back().mean_distance_percent = *mean_;
-  seconds_["distance"] += seconds_since(begin);
+  seconds_["distance"] += runner_.seconds() - begin;
   return *mean_;
 }
 

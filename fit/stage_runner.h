@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/fit_problem.h"
+#include "fit/fit_schedule.h"
+#include "fit/target_surface.h"
+
+#include <chrono>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace subvol {
+
+/// Centred coordinates in which the target's box has the diagonal 1: nothing depends on the origin or the unit.
+struct Normalisation {
+  Vec3 centre = Vec3::Zero();
+  double diagonal = 1;
+
+  /// InputError: a target without extent, or with coordinates that are not finite.
+  explicit Normalisation(const TriangleMesh& target);
+  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
+  std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
+};
+
+TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation);
+
+/// The target sampled about as densely as the fitted surface: sparse sites on large facets would claim points of the
+/// surface that belong to a neighbouring facet.
+TargetSurface sampled_target(const TriangleMesh& target, double area, std::size_t num_samples);
+
+/// E_S between samples of the fitted surface and a target, which must outlive it.
+std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
+                                               const std::vector<std::array<Index, 3>>& sample_triangles,
+                                               std::size_t num_samples, double tangential_weight,
+                                               Correspondence correspondence);
+
+/// Runs the minimisations of a fit one after the other, with one clock and one report.
+class StageRunner {
+ public:
+  /// What the fit's options say of all stages.
+  struct Options {
+    SolverKind solver = SolverKind::newton;
+    int max_iterations = 0;         ///< 0: the stage's own
+    double time_limit_seconds = 0;  ///< 0: none
+    std::function<bool(const FitProgress&)> progress;
+  };
+
+  explicit StageRunner(Options options) : options_(std::move(options)) {}
+
+  /// Minimises over x and appends the record, whose name, level or order, and cells are set, to the report. `fraction` is
+  /// told to whoever follows the progress. False, with the report's stop reason set, when the fit must end.
+  bool run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction, std::vector<Vec3>& x,
+           FitReport& report) const;
+
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Options options_;
+  Clock::time_point start_ = Clock::now();
+};
+
+}  // namespace subvol
