@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/cell_reference.h"
+#include "fit/element_space.h"
+#include "fit/hencky.h"
+#include "fit/quadrature.h"
+#include "fit/volume_term.h"
+#include "fit/wide.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Mean distortion of a mesh of curved cells against ideal or given reference cells.
+///
+///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
+///
+/// e is the Hencky energy (`hencky.h`), A_cq the derivative of the ideal cell's map: edge length 1, stretched by h_c along
+/// its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
+/// coefficients of edge, face and cell modes. Cells weigh equally.
+///
+/// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for n
+/// modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept as
+/// 27 numbers per point and never assembled. Same bits for any number of threads.
+class HighOrderEnergy final : public VolumeTerm {
+ public:
+  /// space  must outlive the energy.
+  /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError.
+  /// points_per_direction  of each cell; at least 2, else InputError.
+  HighOrderEnergy(const ElementSpace& space, std::span<const Vec3> ideal_lengths,
+                  std::span<const int> points_per_direction, QuadratureRule rule = QuadratureRule::trapezoidal);
+  /// reference  kept and asked again by `densify`. InputError: a reference whose determinant is not positive.
+  HighOrderEnergy(const ElementSpace& space, CellReference reference, std::span<const int> points_per_direction,
+                  QuadratureRule rule = QuadratureRule::trapezoidal);
+  ~HighOrderEnergy() override;
+
+  double value(std::span<const Vec3> nodes) const override;
+  double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
+  double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override;
+  /// Of the diagonal that the mean of the second derivative over every cell's points gives. Every column of the map must
+  /// have at most one entry for it to be that of M^T H M; else what couples several nodes is left out.
+  void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
+                           std::span<Mat3> diagonal) const override;
+  double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
+  /// Number of quadrature points of all cells.
+  std::size_t num_points() const;
+  std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
+  void densify(std::span<const Index> cells) override;
+
+ private:
+  struct Group;
+  class Sweep;
+
+  void rebuild_groups();
+  void fill_references(Group& group) const;
+  void find_incidences();
+  template <class PerBatch>
+  double sum_batches(PerBatch&& per_batch) const;
+  void keep(const Group& group, std::size_t batch, const std::vector<Wide>& coefficients) const;
+  void gather_nodes(double scale, std::span<Vec3> out) const;
+
+  const ElementSpace* space_;
+  QuadratureRule rule_;
+  std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell, where cells have one for all their points
+  CellReference reference_;
+  std::vector<int> points_;
+  std::vector<Group> groups_;
+  /// What every batch adds to its cells' modes, and where each node finds its parts: signed places, by node.
+  mutable std::vector<double> local_;
+  std::vector<std::size_t> incidence_offsets_;
+  std::vector<std::int64_t> incidences_;
+};
+
+}  // namespace subvol
