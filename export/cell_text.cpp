@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/cell_text.h"
+
+#include "export/text_format.h"
+#include "export/vtu_arrays.h"
+#include "subvol/error.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <tuple>
+#include <vector>
+
+namespace subvol {
+namespace {
+
+std::uint8_t vtk_type(CellKind kind) { return kind == CellKind::tet ? 71 : kind == CellKind::hex ? 72 : 73; }
+
+constexpr int kGmshTets[] = {4, 11, 29, 30, 31, 71, 72, 73, 74, 75};
+constexpr int kGmshPrisms[] = {6, 13};
+constexpr int kGmshHexes[] = {5, 12, 92, 93, 94, 95, 96, 97, 98};
+
+std::span<const int> gmsh_types(CellKind kind) {
+  if (kind == CellKind::tet) return kGmshTets;
+  return kind == CellKind::prism ? std::span<const int>(kGmshPrisms) : std::span<const int>(kGmshHexes);
+}
+
+int gmsh_type(CellKind kind, int order) {
+  assert(order >= 1 && order <= max_gmsh_order(kind));
+  return gmsh_types(kind)[static_cast<std::size_t>(order) - 1];
+}
+
+/// Cells in the order of a .msh: by reference, then kind, then order, then number.
+using Blocks = std::map<std::tuple<int, CellKind, int>, std::vector<std::size_t>>;
+
+Blocks blocks_of(const CellView& mesh) {
+  Blocks blocks;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    blocks[{mesh.references.empty() ? 0 : mesh.references[c], mesh.kinds[c], mesh.order(c)}].push_back(c);
+  return blocks;
+}
+
+/// Volume numbers, from 1 in the order of the references.
+std::map<int, int> volume_numbers(const Blocks& blocks) {
+  std::map<int, int> numbers;
+  for (const auto& [key, cells] : blocks) numbers.try_emplace(std::get<0>(key), static_cast<int>(numbers.size()) + 1);
+  return numbers;
+}
+
+void append_line(std::string& text, std::initializer_list<std::size_t> numbers) {
+  const char* separator = "";
+  for (const std::size_t number : numbers) {
+    text += separator;
+    append_number(text, number);
+    separator = " ";
+  }
+  text += '\n';
+}
+
+void append_entities(std::string& text, const CellView& mesh, const std::map<int, int>& volumes) {
+  Vec3 low = mesh.positions[0], high = low;
+  for (const Vec3& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  text += "$Entities\n";
+  append_line(text, {0, 0, 0, volumes.size()});
+  for (const auto& [reference, number] : volumes) {
+    append_number(text, number);
+    text += ' ';
+    append_vector(text, low, " ");
+    text += ' ';
+    append_vector(text, high, " ");
+    text += reference > 0 ? " 1 " + std::to_string(reference) : " 0";
+    text += " 0\n";
+  }
+  text += "$EndEntities\n";
+}
+
+void append_nodes(std::string& text, const CellView& mesh) {
+  const std::size_t n = mesh.positions.size();
+  text += "$Nodes\n";
+  append_line(text, {1, n, 1, n});
+  append_line(text, {3, 1, 0, n});
+  for (std::size_t v = 1; v <= n; ++v) append_line(text, {v});
+  for (const Vec3& position : mesh.positions) {
+    append_vector(text, position, " ");
+    text += '\n';
+  }
+  text += "$EndNodes\n";
+}
+
+void append_elements(std::string& text, const CellView& mesh, const Blocks& blocks,
+                     const std::map<int, int>& volumes) {
+  text += "$Elements\n";
+  append_line(text, {blocks.size(), mesh.num_cells(), 1, mesh.num_cells()});
+  std::size_t number = 0;
+  for (const auto& [key, cells] : blocks) {
+    const auto& [reference, kind, order] = key;
+    append_line(text, {3, static_cast<std::size_t>(volumes.at(reference)),
+                       static_cast<std::size_t>(gmsh_type(kind, order)), cells.size()});
+    for (const std::size_t c : cells) {
+      append_number(text, ++number);
+      for (const Index v : mesh.cell(c)) {
+        text += ' ';
+        append_number(text, v + std::int64_t{1});
+      }
+      text += '\n';
+    }
+  }
+  text += "$EndElements\n";
+}
+
+void append_element_data(std::string& text, const Blocks& blocks, std::span<const double> cell_minima) {
+  text += "$ElementData\n1\n\"scaled_jacobian\"\n1\n0\n3\n0\n1\n";
+  append_line(text, {cell_minima.size()});
+  std::size_t number = 0;
+  for (const auto& [key, cells] : blocks)
+    for (const std::size_t c : cells) {
+      append_number(text, ++number);
+      text += ' ';
+      append_number(text, cell_minima[c]);
+      text += '\n';
+    }
+  text += "$EndElementData\n";
+}
+
+void append_node_data(std::string& text, const VertexField& field) {
+  text += "$NodeData\n1\n\"" + field.name + "\"\n1\n0\n3\n0\n1\n";
+  append_line(text, {field.values.size()});
+  for (std::size_t v = 0; v < field.values.size(); ++v) {
+    append_number(text, v + 1);
+    text += ' ';
+    append_number(text, field.values[v]);
+    text += '\n';
+  }
+  text += "$EndNodeData\n";
+}
+
+}  // namespace
+
+int max_gmsh_order(CellKind kind) { return static_cast<int>(gmsh_types(kind).size()); }
+
+void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells) {
+  if (!cell_minima.empty() && cell_minima.size() != num_cells)
+    throw InputError("cell_minima: expected one value per cell");
+  if (!std::all_of(cell_minima.begin(), cell_minima.end(), [](double x) { return std::isfinite(x); }))
+    throw InputError("cell_minima: expected finite numbers");
+}
+
+std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
+                         const std::string& field_data) {
+  const std::span<const double> coordinates(mesh.positions.data()->data(), 3 * mesh.positions.size());
+  const std::vector<std::int64_t> corners(mesh.nodes.begin(), mesh.nodes.end());
+  const std::vector<std::int64_t> ends(mesh.offsets.begin() + 1, mesh.offsets.end());
+  const std::vector<std::int32_t> references(mesh.references.begin(), mesh.references.end());
+  std::vector<std::uint8_t> types;
+  for (const CellKind kind : mesh.kinds) types.push_back(vtk_type(kind));
+  std::string text =
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"2.2\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+      "  <UnstructuredGrid>\n";
+  if (!field_data.empty()) text += "    <FieldData>\n" + field_data + "    </FieldData>\n";
+  text += "    <Piece NumberOfPoints=\"" + std::to_string(mesh.positions.size()) +
+          "\" NumberOfCells=\"" + std::to_string(mesh.num_cells()) +
+          "\">\n      <Points>\n";
+  append_data_array(text, "Name=\"Points\" NumberOfComponents=\"3\"", coordinates);
+  text += "      </Points>\n      <Cells>\n";
+  append_data_array<std::int64_t>(text, "Name=\"connectivity\"", corners);
+  append_data_array<std::int64_t>(text, "Name=\"offsets\"", ends);
+  append_data_array<std::uint8_t>(text, "Name=\"types\"", types);
+  text += "      </Cells>\n";
+  if (!fields.empty()) text += "      <PointData>\n";
+  for (const VertexField& field : fields)
+    append_data_array<double>(text, "Name=\"" + field.name + "\"", field.values);
+  if (!fields.empty()) text += "      </PointData>\n";
+  text += "      <CellData>\n";
+  const std::vector<std::int32_t> orders(mesh.orders.begin(), mesh.orders.end());
+  if (!orders.empty()) append_data_array<std::int32_t>(text, "Name=\"order\"", orders);
+  if (!references.empty()) append_data_array<std::int32_t>(text, "Name=\"reference\"", references);
+  if (!cell_minima.empty()) append_data_array(text, "Name=\"scaled_jacobian\"", cell_minima);
+  return text + "      </CellData>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n";
+}
+
+std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
+                         std::span<const VertexField> fields) {
+  const Blocks blocks = blocks_of(mesh);
+  const std::map<int, int> volumes = volume_numbers(blocks);
+  std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
+  append_entities(text, mesh, volumes);
+  append_nodes(text, mesh);
+  append_elements(text, mesh, blocks, volumes);
+  if (!cell_minima.empty()) append_element_data(text, blocks, cell_minima);
+  for (const VertexField& field : fields) append_node_data(text, field);
+  return text;
+}
+
+}  // namespace subvol

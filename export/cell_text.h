@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+// The text of .vtu and .msh files, for linear and for Lagrange cells alike.
+
+#include "export/volume_writer.h"
+
+#include <span>
+#include <string>
+
+namespace subvol {
+
+/// Cells with points on regular grids, listed as the file format wants them. The arrays are consistent; see the writers.
+struct CellView {
+  std::span<const Vec3> positions;
+  std::span<const CellKind> kinds;
+  std::span<const int> orders;      ///< one per cell, or empty: all 1
+  std::span<const std::size_t> offsets;
+  std::span<const Index> nodes;
+  std::span<const int> references;  ///< one per cell, or empty: all 0
+
+  std::size_t num_cells() const { return kinds.size(); }
+  int order(std::size_t c) const { return orders.empty() ? 1 : orders[c]; }
+  std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
+};
+
+/// field_data: <DataArray> elements for the file's field data, or empty. Cell data `order` is written where there are any.
+std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
+                         const std::string& field_data = {});
+
+/// Largest order of a kind that Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
+int max_gmsh_order(CellKind kind);
+/// Orders: 1 .. max_gmsh_order (asserted).
+std::string msh_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields);
+
+/// InputError unless there is one finite number per cell, or none at all.
+void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells);
+
+}  // namespace subvol

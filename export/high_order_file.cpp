@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/high_order_file.h"
+
+#include "export/cell_text.h"
+#include "export/lagrange_mesh.h"
+#include "export/text_format.h"
+#include "export/vtu_arrays.h"
+#include "subvol/atomic_file.h"
+#include "subvol/error.h"
+#include "subvol/mesh_io.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <string_view>
+
+namespace subvol {
+namespace {
+
+constexpr std::int64_t kFormatVersion = 1;
+
+// --- Writing --------------------------------------------------------------------------------------------------------
+
+void require_writable(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  const std::size_t num_cells = mesh.space.num_cells();
+  if (num_cells == 0) throw InputError("mesh: expected at least one cell");
+  for (std::size_t i = 0; i < mesh.coefficients.size(); ++i)
+    if (!mesh.coefficients[i].allFinite())
+      throw InputError("mesh: node " + std::to_string(i) + ": expected finite coefficients");
+  require_cell_minima(options.cell_minima, num_cells);
+  if (!options.references.empty() && options.references.size() != num_cells)
+    throw InputError("references: expected one per cell");
+}
+
+CellView view_of(const LagrangeMesh& mesh, std::span<const int> references) {
+  return {mesh.positions, mesh.kinds, mesh.orders, mesh.cell_offsets, mesh.cell_nodes, references};
+}
+
+void append_orders(std::string& text, const char* name, const std::vector<int>& orders) {
+  const std::vector<std::uint8_t> bytes(orders.begin(), orders.end());
+  append_data_array<std::uint8_t>(
+      text, std::string("Name=\"") + name + "\" NumberOfTuples=\"" + std::to_string(bytes.size()) + '"', bytes);
+}
+
+std::string field_data(const HighOrderMesh& mesh) {
+  const ElementSpace& space = mesh.space;
+  const std::int64_t format[] = {kFormatVersion, space.basis() == Basis::legendre,
+                                 static_cast<std::int64_t>(space.num_vertices())};
+  std::string text;
+  append_data_array<std::int64_t>(text, "Name=\"subvol_format\" NumberOfTuples=\"3\"", format);
+  append_orders(text, "subvol_edge_orders", space.orders().edges);
+  append_orders(text, "subvol_face_orders", space.orders().faces);
+  append_orders(text, "subvol_cell_orders", space.orders().cells);
+  append_data_array<double>(text,
+                            "Name=\"subvol_coefficients\" NumberOfComponents=\"3\" NumberOfTuples=\"" +
+                                std::to_string(mesh.coefficients.size()) + '"',
+                            {mesh.coefficients.data()->data(), 3 * mesh.coefficients.size()});
+  return text;
+}
+
+/// Linear cells with the references of the curved ones.
+VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  std::vector<Index> parents;
+  VolumeMesh cells =
+      linear_cells(mesh, options.linear_intervals ? options.linear_intervals : mesh.space.max_order(), &parents);
+  if (!options.references.empty())
+    for (const Index parent : parents) cells.references.push_back(options.references[parent]);
+  return cells;
+}
+
+// --- Reading --------------------------------------------------------------------------------------------------------
+
+/// The data arrays of a .vtu, by name, decoded when they are asked for.
+class VtuArrays {
+ public:
+  VtuArrays(std::string name, std::string_view bytes) : name_(std::move(name)) {
+    const std::size_t begin = bytes.find("<VTKFile");
+    if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
+      fail("expected a whole VTK XML file");
+    const std::string_view header = tag(bytes, begin);
+    for (const auto& [key, expected] : {std::pair{"type", "UnstructuredGrid"}, {"version", "2.2"},
+                                        {"byte_order", "LittleEndian"}, {"header_type", "UInt64"}})
+      if (attribute(header, key) != expected)
+        fail(std::string("expected ") + key + "=\"" + expected + "\", as subvol writes it, found " +
+             in_quotes(attribute(header, key)));
+    if (header.find("compressor") != std::string_view::npos) fail("expected arrays that are not compressed");
+    for (std::size_t at = bytes.find("<DataArray", begin); at != std::string_view::npos;
+         at = bytes.find("<DataArray", at + 1))
+      add(bytes, at);
+  }
+
+  bool has(const std::string& array) const { return arrays_.contains(array); }
+
+  template <class T>
+  std::vector<T> get(const std::string& array) const {
+    const auto found = arrays_.find(array);
+    if (found == arrays_.end()) fail("expected a data array " + array);
+    if (found->second.type != vtu_type<T>())
+      fail(array + ": expected type " + vtu_type<T>() + ", found " + in_quotes(found->second.type));
+    if (found->second.format != "binary") fail(array + ": expected format=\"binary\", as subvol writes it");
+    const std::optional<std::string> bytes = decode_base64(found->second.digits);
+    std::uint64_t size = 0;
+    if (bytes && bytes->size() >= sizeof size) std::memcpy(&size, bytes->data(), sizeof size);
+    if (!bytes || bytes->size() < sizeof size || bytes->size() - sizeof size != size || size % sizeof(T) != 0)
+      fail(array + ": expected base64 of a length and as many bytes");
+    std::vector<T> values(size / sizeof(T));
+    if (size > 0) std::memcpy(values.data(), bytes->data() + sizeof size, size);
+    return values;
+  }
+
+  [[noreturn]] void fail(const std::string& message) const { throw InputError(name_ + ": " + message); }
+
+ private:
+  struct Array {
+    std::string_view type, format, digits;
+  };
+
+  std::string_view tag(std::string_view bytes, std::size_t begin) const {
+    const std::size_t end = bytes.find('>', begin);
+    if (end == std::string_view::npos) fail("the file ends inside a tag");
+    return bytes.substr(begin, end - begin);
+  }
+  static std::string_view attribute(std::string_view tag, const std::string& key) {
+    const std::string opening = ' ' + key + "=\"";
+    const std::size_t begin = tag.find(opening);
+    if (begin == std::string_view::npos) return {};
+    const std::string_view rest = tag.substr(begin + opening.size());
+    return rest.substr(0, rest.find('"'));
+  }
+  void add(std::string_view bytes, std::size_t begin) {
+    const std::string_view opening = tag(bytes, begin);
+    const std::string_view content = bytes.substr(begin + opening.size() + 1);
+    const std::string array(attribute(opening, "Name"));
+    const Array found{attribute(opening, "type"), attribute(opening, "format"), content.substr(0, content.find('<'))};
+    if (!arrays_.try_emplace(array, found).second) fail("expected one data array " + in_quotes(array) + ", found more");
+  }
+
+  std::string name_;
+  std::map<std::string, Array> arrays_;
+};
+
+CellKind kind_of(const VtuArrays& file, std::uint8_t type) {
+  if (type != 71 && type != 72 && type != 73)
+    file.fail("types: expected 71, 72 and 73 (Lagrange cells), found " + std::to_string(type));
+  return type == 71 ? CellKind::tet : type == 72 ? CellKind::hex : CellKind::prism;
+}
+
+/// The corners of the cells; positions are those of the points.
+VolumeMesh read_corners(const VtuArrays& file, std::int64_t num_vertices) {
+  const auto points = file.get<double>("Points");
+  const auto nodes = file.get<std::int64_t>("connectivity"), ends = file.get<std::int64_t>("offsets");
+  const auto types = file.get<std::uint8_t>("types");
+  if (points.size() % 3 != 0 || num_vertices < 0 || num_vertices > static_cast<std::int64_t>(points.size() / 3))
+    file.fail("expected at least as many points as vertices");
+  if (ends.size() != types.size() || types.empty()) file.fail("expected one offset and one type for each cell");
+  VolumeMesh mesh;
+  for (std::int64_t v = 0; v < num_vertices; ++v) mesh.positions.emplace_back(&points[3 * static_cast<std::size_t>(v)]);
+  std::vector<Index> corners;
+  for (std::size_t c = 0; c < types.size(); ++c) {
+    const CellKind kind = kind_of(file, types[c]);
+    const std::int64_t begin = c ? ends[c - 1] : 0, size = cell_topology(kind).num_vertices;
+    if (begin < 0 || ends[c] < begin || ends[c] - begin < size || ends[c] > static_cast<std::int64_t>(nodes.size()))
+      file.fail("offsets: cell " + std::to_string(c) + ": expected at least its corners");
+    corners.clear();
+    for (std::int64_t k = begin; k < begin + size; ++k) {
+      const std::int64_t v = nodes[static_cast<std::size_t>(k)];
+      if (v < 0 || v >= num_vertices)
+        file.fail("connectivity: cell " + std::to_string(c) + ": expected a vertex number below " +
+                  std::to_string(num_vertices) + ", found " + std::to_string(v));
+      corners.push_back(static_cast<Index>(v));
+    }
+    mesh.add_cell(kind, corners);
+  }
+  return mesh;
+}
+
+void require_sound(const VtuArrays& file, const VolumeMesh& mesh) {
+  for (const MeshDefect& defect : validate(mesh))
+    if (defect.kind != MeshDefect::Kind::inverted_cell && defect.kind != MeshDefect::Kind::unused_vertex)
+      file.fail(defect.message + " (" + to_string(defect.kind) + ")");
+}
+
+std::vector<int> read_orders(const VtuArrays& file, const std::string& array) {
+  const auto orders = file.get<std::uint8_t>(array);
+  return {orders.begin(), orders.end()};
+}
+
+std::vector<Vec3> read_coefficients(const VtuArrays& file, const VolumeMesh& mesh) {
+  const auto numbers = file.get<double>("subvol_coefficients");
+  if (numbers.size() % 3 != 0 || numbers.size() / 3 < mesh.num_vertices())
+    file.fail("subvol_coefficients: expected three numbers for every node, vertices first");
+  std::vector<Vec3> coefficients;
+  for (std::size_t i = 0; i < numbers.size(); i += 3) {
+    coefficients.emplace_back(&numbers[i]);
+    if (!coefficients.back().allFinite()) file.fail("subvol_coefficients: expected finite numbers");
+  }
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+    if (coefficients[v] != mesh.positions[v])
+      file.fail("Points: vertex " + std::to_string(v) +
+                " differs from its coefficients: expected the points as subvol wrote them");
+  return coefficients;
+}
+
+Basis read_basis(const VtuArrays& file, const std::vector<std::int64_t>& format) {
+  if (format.size() != 3 || format[0] != kFormatVersion || (format[1] != 0 && format[1] != 1))
+    file.fail("subvol_format: expected version " + std::to_string(kFormatVersion) +
+              ", basis 0 or 1, and the number of vertices");
+  return format[1] ? Basis::legendre : Basis::fourier;
+}
+
+}  // namespace
+
+std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  require_writable(mesh, options);
+  const LagrangeMesh cells = lagrange_mesh(mesh, lagrange_orders(mesh.space, kMaxVtkOrder), NodeOrdering::vtk);
+  return vtu_document(view_of(cells, options.references), options.cell_minima, {}, field_data(mesh));
+}
+
+std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  require_writable(mesh, options);
+  const std::vector<int> orders = lagrange_orders(mesh.space, kMaxOrder);
+  for (std::size_t c = 0; c < orders.size(); ++c) {
+    const CellKind kind = mesh.space.kind(c);
+    if (orders[c] > max_gmsh_order(kind))
+      throw InputError("cell " + std::to_string(c) + " is a " + cell_topology(kind).name + " of order " +
+                       std::to_string(orders[c]) + ", but Gmsh evaluates a " + cell_topology(kind).name +
+                       " up to order " + std::to_string(max_gmsh_order(kind)) +
+                       " only; write a .vtu, or a .mesh of many linear cells");
+  }
+  const LagrangeMesh cells = lagrange_mesh(mesh, orders, NodeOrdering::gmsh);
+  return msh_document(view_of(cells, options.references), options.cell_minima, {});
+}
+
+void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  const std::string extension = lower_case_extension(path);
+  if (extension == ".mesh" || extension == ".vtk") {
+    require_writable(mesh, options);
+    return write_volume_mesh(path, small_cells(mesh, options));
+  }
+  if (extension != ".vtu" && extension != ".msh")
+    throw InputError(path.string() + ": expected the extension .vtu, .msh, .mesh or .vtk");
+  try {
+    write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, options) : msh_text(mesh, options));
+  } catch (const InputError& error) {
+    throw InputError(path.string() + ": " + error.what());
+  }
+}
+
+HighOrderFile read_high_order(const std::filesystem::path& path) {
+  if (lower_case_extension(path) != ".vtu") throw InputError(path.string() + ": expected the extension .vtu");
+  const std::string bytes = read_file(path);
+  const VtuArrays file(path.string(), bytes);
+  if (!file.has("subvol_format"))
+    file.fail("expected a high-order mesh as subvol writes it, with the map of its cells in the field data "
+              "(subvol_format, subvol_coefficients, ..); this file has none");
+  const auto format = file.get<std::int64_t>("subvol_format");
+  const Basis basis = read_basis(file, format);
+  const VolumeMesh mesh = read_corners(file, format[2]);
+  std::vector<Vec3> coefficients = read_coefficients(file, mesh);
+  require_sound(file, mesh);
+  std::vector<int> references;
+  if (file.has("reference")) {
+    const auto numbers = file.get<std::int32_t>("reference");
+    if (numbers.size() != mesh.num_cells()) file.fail("reference: expected one number for each cell");
+    references.assign(numbers.begin(), numbers.end());
+  }
+  try {
+    ElementSpace space(mesh, basis,
+                       EntityOrders{read_orders(file, "subvol_edge_orders"), read_orders(file, "subvol_face_orders"),
+                                    read_orders(file, "subvol_cell_orders")});
+    return {{std::move(space), std::move(coefficients)}, std::move(references)};
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    if (message.starts_with(path.string())) throw;
+    file.fail(message);
+  }
+}
+
+}  // namespace subvol

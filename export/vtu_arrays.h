@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace subvol {
+
+static_assert(std::endian::native == std::endian::little, "the arrays of a .vtu are written as they lie in memory");
+
+/// The words a .vtu has for types of numbers.
+template <class T>
+constexpr const char* vtu_type();
+template <>
+constexpr const char* vtu_type<double>() { return "Float64"; }
+template <>
+constexpr const char* vtu_type<std::int32_t>() { return "Int32"; }
+template <>
+constexpr const char* vtu_type<std::int64_t>() { return "Int64"; }
+template <>
+constexpr const char* vtu_type<std::uint8_t>() { return "UInt8"; }
+
+/// Bytes as text, four digits for three bytes.
+void append_base64(std::string& text, std::string_view bytes);
+/// The bytes again, or nothing where a character or the length is not that of such a text.
+std::optional<std::string> decode_base64(std::string_view digits);
+
+/// A <DataArray> with its length in bytes and its numbers in base64. attributes: the name and what else is to be said.
+template <class T>
+void append_data_array(std::string& text, const std::string& attributes, std::span<const T> values) {
+  const std::uint64_t size = values.size() * sizeof(T);
+  std::string bytes(sizeof size + size, '\0');
+  std::memcpy(bytes.data(), &size, sizeof size);
+  if (size > 0) std::memcpy(bytes.data() + sizeof size, values.data(), size);
+  text += std::string("        <DataArray type=\"") + vtu_type<T>() + "\" " + attributes + " format=\"binary\">";
+  append_base64(text, bytes);
+  text += "</DataArray>\n";
+}
+
+}  // namespace subvol
