@@ -8,9 +8,10 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <compare>
 #include <cstdint>
 #include <map>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 namespace subvol {
@@ -32,20 +33,26 @@ int gmsh_type(CellKind kind, int order) {
   return gmsh_types(kind)[static_cast<std::size_t>(order) - 1];
 }
 
-/// Cells in the order of a .msh: by reference, then kind, then order, then number.
-using Blocks = std::map<std::tuple<int, CellKind, int>, std::vector<std::size_t>>;
+/// A volume of a .msh: cells of one reference and order. Gmsh takes all tets of a volume for tets of one order.
+struct Volume {
+  int reference, order;
+  auto operator<=>(const Volume&) const = default;
+};
+
+/// Cells in the order of a .msh: by volume, then kind, then number.
+using Blocks = std::map<std::pair<Volume, CellKind>, std::vector<std::size_t>>;
 
 Blocks blocks_of(const CellView& mesh) {
   Blocks blocks;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    blocks[{mesh.references.empty() ? 0 : mesh.references[c], mesh.kinds[c], mesh.order(c)}].push_back(c);
+    blocks[{{mesh.references.empty() ? 0 : mesh.references[c], mesh.order(c)}, mesh.kinds[c]}].push_back(c);
   return blocks;
 }
 
 /// Volume numbers, from 1 in the order of the references.
-std::map<int, int> volume_numbers(const Blocks& blocks) {
-  std::map<int, int> numbers;
-  for (const auto& [key, cells] : blocks) numbers.try_emplace(std::get<0>(key), static_cast<int>(numbers.size()) + 1);
+std::map<Volume, int> volume_numbers(const Blocks& blocks) {
+  std::map<Volume, int> numbers;
+  for (const auto& [key, cells] : blocks) numbers.try_emplace(key.first, static_cast<int>(numbers.size()) + 1);
   return numbers;
 }
 
@@ -59,18 +66,18 @@ void append_line(std::string& text, std::initializer_list<std::size_t> numbers) 
   text += '\n';
 }
 
-void append_entities(std::string& text, const CellView& mesh, const std::map<int, int>& volumes) {
+void append_entities(std::string& text, const CellView& mesh, const std::map<Volume, int>& volumes) {
   Vec3 low = mesh.positions[0], high = low;
   for (const Vec3& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
   text += "$Entities\n";
   append_line(text, {0, 0, 0, volumes.size()});
-  for (const auto& [reference, number] : volumes) {
+  for (const auto& [volume, number] : volumes) {
     append_number(text, number);
     text += ' ';
     append_vector(text, low, " ");
     text += ' ';
     append_vector(text, high, " ");
-    text += reference > 0 ? " 1 " + std::to_string(reference) : " 0";
+    text += volume.reference > 0 ? " 1 " + std::to_string(volume.reference) : " 0";
     text += " 0\n";
   }
   text += "$EndEntities\n";
@@ -90,14 +97,14 @@ void append_nodes(std::string& text, const CellView& mesh) {
 }
 
 void append_elements(std::string& text, const CellView& mesh, const Blocks& blocks,
-                     const std::map<int, int>& volumes) {
+                     const std::map<Volume, int>& volumes) {
   text += "$Elements\n";
   append_line(text, {blocks.size(), mesh.num_cells(), 1, mesh.num_cells()});
   std::size_t number = 0;
   for (const auto& [key, cells] : blocks) {
-    const auto& [reference, kind, order] = key;
-    append_line(text, {3, static_cast<std::size_t>(volumes.at(reference)),
-                       static_cast<std::size_t>(gmsh_type(kind, order)), cells.size()});
+    const auto& [volume, kind] = key;
+    append_line(text, {3, static_cast<std::size_t>(volumes.at(volume)),
+                       static_cast<std::size_t>(gmsh_type(kind, volume.order)), cells.size()});
     for (const std::size_t c : cells) {
       append_number(text, ++number);
       for (const Index v : mesh.cell(c)) {
@@ -184,7 +191,7 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
                          std::span<const VertexField> fields) {
   const Blocks blocks = blocks_of(mesh);
-  const std::map<int, int> volumes = volume_numbers(blocks);
+  const std::map<Volume, int> volumes = volume_numbers(blocks);
   std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
   append_entities(text, mesh, volumes);
   append_nodes(text, mesh);

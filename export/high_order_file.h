@@ -34,7 +34,8 @@ inline constexpr int kMaxVtkOrder = 12;
 /// InputError: no cells, coefficients or minima that are not finite, arrays of wrong length.
 std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// The mesh as Gmsh 4.1 ASCII, each cell of its largest order, nodes as Gmsh numbers them.
+/// The mesh as Gmsh 4.1 ASCII, each cell of its largest order, nodes as Gmsh numbers them; one volume per reference and
+/// order, else as for linear cells.
 ///
 /// InputError as above, and for orders beyond what Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});

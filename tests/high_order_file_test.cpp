@@ -220,17 +220,17 @@ TEST_CASE("VTK evaluates the cells of a high-order .vtu as the map does") {
 TEST_CASE("Gmsh has the nodes of a high-order .msh where the map has them") {
   const TemporaryFolder folder;
   PointSource source(6);
-  // Tets and hexes side by side, prisms of order 2 elsewhere; elements are numbered kind by kind, then by order.
+  // Elements are numbered by order, then by kind.
   VolumeMesh cells;
   struct Cell {
     CellKind kind;
     int order, type;
   };
-  const std::vector<Cell> list{{CellKind::tet, 1, 4},   {CellKind::tet, 2, 11},  {CellKind::tet, 3, 29},
-                               {CellKind::tet, 4, 30},  {CellKind::tet, 5, 31},  {CellKind::tet, 10, 75},
-                               {CellKind::prism, 1, 6}, {CellKind::prism, 2, 13}, {CellKind::hex, 1, 5},
-                               {CellKind::hex, 2, 12},  {CellKind::hex, 3, 92},  {CellKind::hex, 4, 93},
-                               {CellKind::hex, 9, 98}};
+  const std::vector<Cell> list{{CellKind::tet, 1, 4},   {CellKind::prism, 1, 6}, {CellKind::hex, 1, 5},
+                               {CellKind::tet, 2, 11},  {CellKind::prism, 2, 13}, {CellKind::hex, 2, 12},
+                               {CellKind::tet, 3, 29},  {CellKind::hex, 3, 92},  {CellKind::tet, 4, 30},
+                               {CellKind::hex, 4, 93},  {CellKind::tet, 5, 31},  {CellKind::hex, 9, 98},
+                               {CellKind::tet, 10, 75}};
   std::vector<int> cell_orders;
   for (const Cell& cell : list) {
     std::vector<Index> corners;
