@@ -29,14 +29,30 @@ inline double share(const Barycentric& a, const Barycentric& b, const Barycentri
 /// m += 1/area * integral of l_i l_j over a polygon, ij = 00 01 02 11 12 22; `at` takes its corners' numbers to them.
 template <class At>
 void add_moments(std::size_t num_corners, const At& at, std::array<double, 6>& m) {
-  for (std::size_t i = 1; i + 1 < num_corners; ++i) {
-    const Barycentric &a = at(0), &b = at(i), &c = at(i + 1);
-    const double weight = share(a, b, c) / 12;
-    const Barycentric s = {a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]};
-    int k = 0;
-    for (int p = 0; p < 3; ++p)
-      for (int q = p; q < 3; ++q) m[k++] += weight * (a[p] * a[q] + b[p] * b[q] + c[p] * c[q] + s[p] * s[q]);
+  if (num_corners < 3) return;
+  // Twelve times the moments, by products of corners and of their sums. Single numbers, as arrays end up in memory.
+  double m00 = 0, m01 = 0, m02 = 0, m11 = 0, m12 = 0, m22 = 0;
+  const double a0 = at(0)[0], a1 = at(0)[1], a2 = at(0)[2];
+  double b0 = at(1)[0], b1 = at(1)[1], b2 = at(1)[2];
+  for (std::size_t i = 2; i < num_corners; ++i) {
+    const double c0 = at(i)[0], c1 = at(i)[1], c2 = at(i)[2];
+    const double s0 = a0 + b0 + c0, s1 = a1 + b1 + c1, s2 = a2 + b2 + c2;
+    const double weight = (b1 - a1) * (c2 - a2) - (b2 - a2) * (c1 - a1);
+    m00 += weight * (a0 * a0 + b0 * b0 + c0 * c0 + s0 * s0);
+    m01 += weight * (a0 * a1 + b0 * b1 + c0 * c1 + s0 * s1);
+    m02 += weight * (a0 * a2 + b0 * b2 + c0 * c2 + s0 * s2);
+    m11 += weight * (a1 * a1 + b1 * b1 + c1 * c1 + s1 * s1);
+    m12 += weight * (a1 * a2 + b1 * b2 + c1 * c2 + s1 * s2);
+    m22 += weight * (a2 * a2 + b2 * b2 + c2 * c2 + s2 * s2);
+    b0 = c0, b1 = c1, b2 = c2;
   }
+  constexpr double kFactor = 1. / 12;
+  m[0] += kFactor * m00;
+  m[1] += kFactor * m01;
+  m[2] += kFactor * m02;
+  m[3] += kFactor * m11;
+  m[4] += kFactor * m12;
+  m[5] += kFactor * m22;
 }
 
 /// Sum of all nine moments: the share of the triangle's area.

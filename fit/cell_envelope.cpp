@@ -9,26 +9,18 @@ namespace subvol {
 
 namespace {
 
-constexpr double kNever = 1e300;          // of the lanes that hold no function
 constexpr double kAreaTolerance = 1e-14;  // of the triangle's area
 
 }  // namespace
 
 void CellEnvelope::clear() {
-  size_ = 0;
   blocks_.clear();
   ranks_.clear();
 }
 
-void CellEnvelope::add(const Barycentric& values, std::int32_t rank) {
-  const int lane = size_ % kWide;
-  if (lane == 0) {
-    blocks_.emplace_back();
-    for (Wide& value : blocks_.back().value) value = Wide{} + kNever;
-  }
-  for (int k = 0; k < 3; ++k) blocks_.back().value[k][lane] = values[k];
-  ranks_.push_back(rank);
-  ++size_;
+void CellEnvelope::add(const std::array<Wide, 3>& values, const std::array<std::int32_t, kWide>& ranks) {
+  blocks_.push_back(values);
+  ranks_.insert(ranks_.end(), ranks.begin(), ranks.end());
 }
 
 Barycentric CellEnvelope::values(int function) const {
@@ -36,18 +28,17 @@ Barycentric CellEnvelope::values(int function) const {
   return {first[0], first[kWide], first[2 * kWide]};
 }
 
-double CellEnvelope::lowest(const Barycentric& at) const {
+Wide CellEnvelope::lowest(const Barycentric& at) const {
   Wide low = Wide{} + kNever;
-  for (const Block& block : blocks_)
-    take_lower(low, at[0] * block.value[0] + at[1] * block.value[1] + at[2] * block.value[2]);
-  return lowest_lane(low);
+  for (const Block& block : blocks_) take_lower(low, at[0] * block[0] + at[1] * block[1] + at[2] * block[2]);
+  return low;
 }
 
 int CellEnvelope::lowest_function(const Barycentric& at, double value) const {
   int best = -1;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const Block& block = blocks_[b];
-    const Wide v = at[0] * block.value[0] + at[1] * block.value[1] + at[2] * block.value[2];
+    const Wide v = at[0] * block[0] + at[1] * block[1] + at[2] * block[2];
     for (unsigned lanes = lanes_within(v, value); lanes != 0; lanes &= lanes - 1) {
       const int function = static_cast<int>(b) * kWide + std::countr_zero(lanes);
       if (best < 0 || ranks_[function] < ranks_[best]) best = function;
@@ -69,17 +60,25 @@ CellEnvelope::Cut CellEnvelope::cut(int inside, int outside) {
   if (out == 0) return in == 0 ? Cut::tie : Cut::untouched;
   if (in == 0) return Cut::empty;
   if (n == kMaxCorners) return Cut::tie;
-  rest_->size = 0;
-  rest_->checked = 0;
-  for (int i = 0; i < n; ++i) {
-    const int j = i + 1 < n ? i + 1 : 0;
-    if (!(out >> i & 1)) {
-      rest_->checked |= (polygon_->checked >> i & 1) << rest_->size;
-      rest_->at[rest_->size++] = polygon_->at[i];
-    }
-    if ((in >> i & out >> j & 1) || (out >> i & in >> j & 1))
-      rest_->at[rest_->size++] = between(polygon_->at[i], polygon_->at[j], height[i] / (height[i] - height[j]));
+  // What is outside lies between two corners: one run of corners is replaced by the bisector's two ends.
+  const std::uint32_t out_before = out << 1 | out >> (n - 1), all = (1u << n) - 1;
+  const std::uint32_t run_begins = out & ~out_before, run_ends = ~out & out_before & all;
+  if (!std::has_single_bit(run_begins)) return Cut::tie;
+  const int begin = std::countr_zero(run_begins), end = std::countr_zero(run_ends);
+  const int before_begin = begin > 0 ? begin - 1 : n - 1, before_end = end > 0 ? end - 1 : n - 1;
+  const auto crossing = [&](int i, int j) {
+    return between(polygon_->at[i], polygon_->at[j], height[i] / (height[i] - height[j]));
+  };
+  int size = 0;
+  std::uint32_t checked = 0;
+  for (int i = end; i != begin; i = i + 1 < n ? i + 1 : 0) {
+    checked |= (polygon_->checked >> i & 1) << size;
+    rest_->at[size++] = polygon_->at[i];
   }
+  if (in >> before_begin & 1) rest_->at[size++] = crossing(before_begin, begin);
+  if (in >> end & 1) rest_->at[size++] = crossing(before_end, end);
+  rest_->size = size;
+  rest_->checked = checked;
   std::swap(polygon_, rest_);
   return Cut::cut;
 }
@@ -96,12 +95,12 @@ CellEnvelope::Cut CellEnvelope::find_cell(int function, std::span<const Barycent
   for (std::uint32_t open; (open = ~polygon_->checked & ((1u << polygon_->size) - 1)) != 0;) {
     const int i = std::countr_zero(open);
     const Barycentric& at = polygon_->at[i];
-    const double low = lowest(at);
-    if (low >= dot(at, own) - 2 * noise_) {
+    const Wide low = lowest(at);
+    if (lanes_within(low, dot(at, own) - 2 * noise_) == 0) {
       polygon_->checked |= 1u << i;
       continue;
     }
-    const int other = lowest_function(at, low);
+    const int other = lowest_function(at, lowest_lane(low));
     note_neighbours(function, other);
     const Cut result = cut(function, other);
     if (result == Cut::empty || result == Cut::tie) return result;
@@ -112,27 +111,29 @@ CellEnvelope::Cut CellEnvelope::find_cell(int function, std::span<const Barycent
 void CellEnvelope::note_neighbours(int cell, int found) {
   Known& known = known_[found];
   if (known.count < kMaxKnown) known.neighbours[known.count++] = cell;
-  if (std::find(queue_.begin(), queue_.end(), found) == queue_.end()) queue_.push_back(found);
+  if (known.queued) return;
+  known.queued = true;
+  queue_.push_back(found);
 }
 
 bool CellEnvelope::compute(std::span<const Barycentric> polygon, int first, double noise) {
   if (polygon.size() > kMaxCorners) return false;
   noise_ = noise;
-  known_.assign(static_cast<std::size_t>(size_), Known{});
+  known_.assign(ranks_.size(), Known{});
   cells_.clear();
   queue_.assign(1, first);
+  known_[first].queued = true;
   double area = 0;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) area += share(polygon[0], polygon[i], polygon[i + 1]);
   for (std::size_t q = 0; q < queue_.size(); ++q) {
     const Cut result = find_cell(queue_[q], polygon);
     if (result == Cut::tie) return false;
     if (result == Cut::empty) continue;
-    Cell cell{queue_[q], {}};
+    Cell& cell = cells_.emplace_back(Cell{queue_[q], {}});
     add_moments(
         static_cast<std::size_t>(polygon_->size),
         [this](std::size_t i) -> const Barycentric& { return polygon_->at[i]; }, cell.moments);
     area -= total(cell.moments);
-    cells_.push_back(cell);
   }
   return std::abs(area) <= kAreaTolerance;
 }

@@ -28,13 +28,14 @@ class CellEnvelope {
 
   /// Begins a new set of functions.
   void clear();
-  /// The values at the triangle's corners; `rank` decides between equal functions: the lowest comes first.
-  void add(const Barycentric& values, std::int32_t rank);
-  int size() const { return size_; }
+  /// Adds eight functions by their values at the triangle's corners; what is kNever at all of them is none. `ranks`
+  /// decide between equal functions: the lowest comes first.
+  void add(const std::array<Wide, 3>& values, const std::array<std::int32_t, kWide>& ranks);
+  static constexpr double kNever = 1e300;
 
   /// Finds the cells of a polygon.
   ///
-  /// first   the function lowest at one of the polygon's corners.
+  /// first   the function lowest at one of the polygon's corners; functions are numbered as they were added.
   /// noise   differences of functions below it are rounding.
   /// returns whether the cells part the polygon's area exactly; where they do not (ties), use something else.
   bool compute(std::span<const Barycentric> polygon, int first, double noise);
@@ -49,21 +50,19 @@ class CellEnvelope {
   };
   struct Known {
     int count = 0;
+    bool queued = false;
     std::array<int, kMaxKnown> neighbours;
   };
-  struct Block {
-    Wide value[3];
-  };
+  using Block = std::array<Wide, 3>;
   enum class Cut { untouched, cut, empty, tie };
 
   Barycentric values(int function) const;
-  double lowest(const Barycentric& at) const;
+  Wide lowest(const Barycentric& at) const;
   int lowest_function(const Barycentric& at, double value) const;
   Cut cut(int inside, int outside);
   Cut find_cell(int function, std::span<const Barycentric> whole);
   void note_neighbours(int cell, int found);
 
-  int size_ = 0;
   double noise_ = 0;
   std::vector<Block> blocks_;
   std::vector<std::int32_t> ranks_;

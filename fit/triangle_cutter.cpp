@@ -36,11 +36,8 @@ void TriangleCutter::cut(Index triangle, const std::array<Vec3, 3>& positions, c
   positions_ = positions;
   parts_.assign(1, 0);
   corners_.clear();
-  for (int k = 0; k < 3; ++k) {
-    Corner corner{{0, 0, 0}, slot_of(nearest[k])};
-    corner.at[k] = 1;
-    corners_.push_back(corner);
-  }
+  constexpr Barycentric kCorners[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int k = 0; k < 3; ++k) corners_.push_back({kCorners[k], slot_of(nearest[k])});
   num_failures_ = 0;
   while (!parts_.empty()) {
     int c, b;
@@ -189,29 +186,54 @@ bool TriangleCutter::gather(std::span<const Corner> part) {
   return tree_.gather(balls_, kMaxCandidates, candidates_);
 }
 
+double TriangleCutter::add_candidates() {
+  const Vec3& r = position(0);
+  Wide worst{};
+  envelope_.clear();
+  for (std::size_t begin = 0; begin < candidates_.size(); begin += kWide) {
+    const int count = static_cast<int>(std::min<std::size_t>(kWide, candidates_.size() - begin));
+    Wide at[3] = {Wide{} + r[0], Wide{} + r[1], Wide{} + r[2]};
+    std::array<std::int32_t, kWide> ranks{};
+    for (int lane = 0; lane < count; ++lane) {
+      const Index place = candidates_[begin + static_cast<std::size_t>(lane)];
+      for (int axis = 0; axis < 3; ++axis) at[axis][lane] = tree_.position(place)[axis];
+      ranks[lane] = tree_.site(place);
+    }
+    std::array<Wide, 3> values;
+    const Wide dx = at[0] - r[0], dy = at[1] - r[1], dz = at[2] - r[2];
+    Wide reach{};
+    for (int k = 0; k < 3; ++k) {
+      Wide terms{};
+      values[k] = Wide{};
+      for (int axis = 0; axis < 3; ++axis) {
+        const Wide a = at[axis] - positions_[k][axis];
+        const double b = r[axis] - positions_[k][axis];
+        values[k] += (at[axis] - r[axis]) * (a + b);
+        terms += a * a + b * b;
+      }
+      take_higher(reach, terms);
+    }
+    take_higher(worst, (dx * dx + dy * dy + dz * dz) * reach);
+    for (int lane = count; lane < kWide; ++lane)
+      for (Wide& value : values) value[lane] = CellEnvelope::kNever;
+    envelope_.add(values, ranks);
+  }
+  return kRounding * std::sqrt(2 * highest_lane(worst));
+}
+
 bool TriangleCutter::part_at_once() {
   if (num_failures_ >= kMaxFailures) return false;
   const auto part = top();
   ++num_failures_;
   if (!gather(part)) return false;
-  double noise = 0;
-  int first = -1;
-  const Index first_place = slots_[part[0].slot].place;
-  envelope_.clear();
-  candidate_slots_.clear();
-  for (Index place : candidates_) {
-    const int slot = slot_of(place);
-    if (place == first_place) first = envelope_.size();
-    candidate_slots_.push_back(slot);
-    envelope_.add(slots_[slot].value, tree_.site(place));
-    noise = std::max(noise, slots_[slot].noise);
-  }
-  if (first < 0) return false;
+  const auto first = std::find(candidates_.begin(), candidates_.end(), slots_[part[0].slot].place);
+  if (first == candidates_.end()) return false;
+  const double noise = add_candidates();
   outline_.clear();
   for (const Corner& corner : part) outline_.push_back(corner.at);
-  if (!envelope_.compute(outline_, first, 2 * noise)) return false;
+  if (!envelope_.compute(outline_, static_cast<int>(first - candidates_.begin()), 2 * noise)) return false;
   for (const CellEnvelope::Cell& cell : envelope_.cells()) {
-    auto& moments = slots_[candidate_slots_[cell.function]].moments;
+    auto& moments = slots_[slot_of(candidates_[cell.function])].moments;
     for (int k = 0; k < 6; ++k) moments[k] += cell.moments[k];
   }
   num_failures_ = 0;

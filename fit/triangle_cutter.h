@@ -53,6 +53,8 @@ class TriangleCutter {
   /// Finds the cells of the part on top of the stack among the sites that may matter to it; false: must be cut in two.
   bool part_at_once();
   bool gather(std::span<const Corner> part);
+  /// Hands the candidates' values to the envelope. returns a bound on their rounding errors.
+  double add_candidates();
   void split(int c, int b);
   /// Where edge ij of `polygon_` meets the bisector; slot -1 where c and b are nearest.
   Corner crossing(std::size_t i, std::size_t j, int c, int b);
@@ -73,7 +75,6 @@ class TriangleCutter {
   CellEnvelope envelope_;
   std::vector<SiteTree::Ball> balls_;
   std::vector<Index> candidates_;
-  std::vector<int> candidate_slots_;
   std::vector<Barycentric> outline_;
   int num_failures_ = 0;  ///< of `part_at_once`, in a row
   std::vector<double> height_;

@@ -47,6 +47,7 @@ inline double lowest_lane(const Wide& v) {
   for (int k = 1; k < kWide; ++k) lowest = std::min(lowest, v[k]);
   return lowest;
 }
+inline double highest_lane(const Wide& v) { return -lowest_lane(-v); }
 
 /// Bit k tells whether v[k] <= limit.
 inline unsigned lanes_within(const Wide& v, double limit) {
