@@ -3,7 +3,9 @@
 
 #include "subvol/volume_mesh.h"
 
+#include <array>
 #include <random>
+#include <span>
 
 namespace subvol::bench {
 
@@ -26,6 +28,28 @@ inline VolumeMesh hex_grid(int n, double shake = 0) {
                               id(i, j, k + 1), id(i + 1, j, k + 1), id(i + 1, j + 1, k + 1), id(i, j + 1, k + 1)};
         mesh.add_cell(CellKind::hex, hex);
       }
+  return mesh;
+}
+
+/// The same grid in cells of a kind: each hex in two prisms or six tets around its diagonal.
+inline VolumeMesh cells_of(CellKind kind, int n, double shake = 0) {
+  const VolumeMesh hexes = hex_grid(n, shake);
+  if (kind == CellKind::hex) return hexes;
+  static constexpr int kPrisms[2][6] = {{0, 1, 2, 4, 5, 6}, {0, 2, 3, 4, 6, 7}};
+  static constexpr int kTets[6][4] = {{0, 1, 2, 6}, {0, 2, 3, 6}, {0, 3, 7, 6}, {0, 7, 4, 6}, {0, 4, 5, 6}, {0, 5, 1, 6}};
+  VolumeMesh mesh;
+  mesh.positions = hexes.positions;
+  const auto add = [&](std::span<const Index> hex, std::span<const int> corners) {
+    std::array<Index, 6> cell;
+    for (std::size_t v = 0; v < corners.size(); ++v) cell[v] = hex[corners[v]];
+    mesh.add_cell(kind, std::span(cell).first(corners.size()));
+  };
+  for (std::size_t c = 0; c < hexes.num_cells(); ++c) {
+    if (kind == CellKind::prism)
+      for (const auto& corners : kPrisms) add(hexes.cell(c), corners);
+    else
+      for (const auto& corners : kTets) add(hexes.cell(c), corners);
+  }
   return mesh;
 }
 

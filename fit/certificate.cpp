@@ -313,31 +313,35 @@ double min_bernstein(CellKind kind, std::span<const Vec3> corners) {
   return bounds(kind, corners).coefficient;
 }
 
+CertificateSummary summarize(std::span<const CellValidity> cells) {
+  CertificateSummary summary;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    ++(cells[c] == CellValidity::valid     ? summary.certified
+       : cells[c] == CellValidity::invalid ? summary.invalid
+                                           : summary.undecided);
+    if (cells[c] == CellValidity::invalid) summary.invalid_cells.push_back(static_cast<Index>(c));
+    if (cells[c] != CellValidity::valid) summary.not_certified.push_back(static_cast<Index>(c));
+  }
+  return summary;
+}
+
 CertificateSummary certify(std::span<const Vec3> positions, const VolumeMesh& mesh, const CertificateOptions& options) {
   check_options(options);
   check_size("positions", positions.size(), mesh.num_vertices(), true);
   std::vector<CellValidity> validity(mesh.num_cells());
   for_each_cell_bounds(positions, mesh, [&](std::size_t c, const Bounds& b) { validity[c] = b.validity(); });
-  CertificateSummary summary;
+  std::vector<std::size_t> open;
   for (std::size_t c = 0; c < validity.size(); ++c)
-    if (validity[c] == CellValidity::undecided) summary.not_certified.push_back(static_cast<Index>(c));
+    if (validity[c] == CellValidity::undecided) open.push_back(c);
   if (options.max_depth > 0) {
 #pragma omp parallel for schedule(dynamic, 16)
-    for (std::size_t i = 0; i < summary.not_certified.size(); ++i) {
-      const Index c = summary.not_certified[i];
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      const std::size_t c = open[i];
       const auto corners = gather_cell(positions, mesh, c);
       validity[c] = certify_checked(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, options).validity;
     }
   }
-  summary.not_certified.clear();
-  for (std::size_t c = 0; c < validity.size(); ++c) {
-    ++(validity[c] == CellValidity::valid     ? summary.certified
-       : validity[c] == CellValidity::invalid ? summary.invalid
-                                              : summary.undecided);
-    if (validity[c] == CellValidity::invalid) summary.invalid_cells.push_back(static_cast<Index>(c));
-    if (validity[c] != CellValidity::valid) summary.not_certified.push_back(static_cast<Index>(c));
-  }
-  return summary;
+  return summarize(validity);
 }
 
 CertificateSummary certify(const VolumeMesh& mesh, const CertificateOptions& options) {

@@ -56,6 +56,7 @@ struct CertificateSummary {
   std::vector<Index> invalid_cells;  ///< those of them that are invalid, ascending
   bool all_certified() const { return not_certified.empty(); }
 };
+CertificateSummary summarize(std::span<const CellValidity> cells);
 
 /// Certifies all cells of a mesh, read at the given positions (a trial step, say) instead of the mesh's own.
 ///

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #ifdef __AVX512F__
 #include <immintrin.h>
@@ -13,6 +14,14 @@ namespace subvol {
 /// Eight numbers to compute with at once: a vector type of GCC and Clang, on any processor.
 inline constexpr int kWide = 8;
 using Wide = double __attribute__((vector_size(kWide * sizeof(double))));
+
+/// Eight consecutive doubles, aligned or not.
+inline Wide load_wide(const double* from) {
+  Wide result;
+  std::memcpy(&result, from, sizeof result);
+  return result;
+}
+inline void store_wide(const Wide& value, double* to) { std::memcpy(to, &value, sizeof value); }
 
 /// Lane by lane the lower (higher) of a and b, in a.
 inline void take_lower(Wide& a, const Wide& b) { a = b < a ? b : a; }

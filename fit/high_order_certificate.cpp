@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/high_order_certificate.h"
+
+#include "fit/hex_boxes.h"
+#include "subvol/error.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <queue>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
+
+/// One cell: its functions, and its coefficients with signs, relative to its first vertex.
+struct Cell {
+  ShapeFunctions* shapes;
+  std::span<const LocalMode> modes;
+  std::span<const Vec3> coefficients;
+  Vec3 total;  ///< sum of |coefficient|
+};
+
+/// det J from the shape functions, and a bound of its rounding error.
+struct Evaluated {
+  double value, margin;
+};
+
+Evaluated evaluate(const Cell& cell, const Vec3& point) {
+  cell.shapes->set_point(point);
+  Mat3 jacobian = Mat3::Zero();
+  Vec3 gradient;
+  for (std::size_t a = 0; a < cell.modes.size(); ++a) {
+    cell.shapes->value(cell.modes[a], gradient);
+    jacobian += cell.coefficients[a] * gradient.transpose();
+  }
+  // Gradients are below 32 in size; they are good to 500 roundings of that (the sine of 16 pi x), their sum to one more
+  // per mode.
+  const Vec3 error = 32 * (static_cast<double>(cell.modes.size()) + 500) * kRoundoff * cell.total;
+  const Vec3 rows = jacobian.cwiseAbs().rowwise().sum() + 3 * error;
+  const double margin = 3 * (error[0] * rows[1] * rows[2] + error[1] * rows[0] * rows[2] + error[2] * rows[0] * rows[1]) +
+                        16 * kRoundoff * rows[0] * rows[1] * rows[2];
+  return {jacobian.determinant(), 2 * margin};
+}
+
+/// Best-first search for the sign of det J over one cell: the box with the lowest corner comes next.
+template <class Boxes>
+class Search {
+ public:
+  using Box = typename Boxes::Box;
+
+  Search(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
+      : boxes_(boxes), cell_(cell), options_(options), max_level_(std::min(options.max_depth, Boxes::max_level())) {
+    result_.lower_bound = kInfinity;
+    result_.witness_determinant = kInfinity;
+  }
+
+  CellCertificate run() {
+    look_at(Box{}, -kInfinity);
+    while (!refuted_ && !open_.empty()) {
+      const Open next = open_.top();
+      open_.pop();
+      if (next.box.level >= max_level_ || result_.boxes + Boxes::kNumChildren > options_.max_boxes) {
+        decided_ = false;
+        if (result_.boxes + Boxes::kNumChildren > options_.max_boxes) break;
+        continue;
+      }
+      for (const Box& child : Boxes::children(next.box)) {
+        look_at(child, next.lowest);
+        if (refuted_) break;
+      }
+    }
+    result_.validity = refuted_   ? CellValidity::invalid
+                       : decided_ ? CellValidity::valid
+                                  : CellValidity::undecided;
+    if (result_.validity != CellValidity::valid) result_.lower_bound = -kInfinity;
+    if (result_.witness_determinant == kInfinity) {
+      result_.witness = Boxes::corner_point(Box{}, 0);
+      result_.witness_determinant = evaluate(cell_, result_.witness).value;
+    }
+    return result_;
+  }
+
+ private:
+  struct Open {
+    double lowest;
+    std::size_t number;
+    Box box;
+    bool operator<(const Open& other) const {
+      return lowest != other.lowest ? lowest > other.lowest : number > other.number;
+    }
+  };
+
+  /// Decides a box, or keeps it for later; looks for a witness at its corners.
+  void look_at(const Box& box, double parent_lowest) {
+    ++result_.boxes;
+    if (boxes_.is_hopeless(box)) return keep(box, parent_lowest);
+    const ControlMatrices& matrices = boxes_.matrices(box);
+    const double scale = Boxes::determinant_scale(box);
+    const double bound = scale * determinant_bound(matrices, boxes_.remainder(box));
+    if (bound > 0) {
+      result_.lower_bound = std::min(result_.lower_bound, bound);
+      return;
+    }
+    int lowest_corner = 0;
+    double lowest = kInfinity;
+    for (int corner = 0; corner < Boxes::kNumCorners; ++corner) {
+      const double value = scale * matrices[boxes_.corner_matrix(corner)].determinant();
+      if (value < lowest) lowest = value, lowest_corner = corner;
+    }
+    if (lowest <= 0) lowest = try_witness(Boxes::corner_point(box, lowest_corner));
+    keep(box, lowest);
+  }
+
+  /// The model's word does not count against a cell, its own functions' does.
+  double try_witness(const Vec3& point) {
+    const Evaluated exact = evaluate(cell_, point);
+    if (exact.value < result_.witness_determinant) {
+      result_.witness = point;
+      result_.witness_determinant = exact.value;
+      refuted_ = exact.value < -exact.margin;
+    }
+    return exact.value;
+  }
+
+  void keep(const Box& box, double lowest) { open_.push({lowest, num_kept_++, box}); }
+
+  Boxes& boxes_;
+  const Cell& cell_;
+  const CertificateOptions& options_;
+  int max_level_;
+  bool refuted_ = false, decided_ = true;
+  std::priority_queue<Open> open_;
+  std::size_t num_kept_ = 0;
+  CellCertificate result_;
+};
+
+void check_options(const CertificateOptions& options) {
+  if (options.max_depth < 0 || options.max_depth > 50)
+    throw InputError("certificate: max_depth is " + std::to_string(options.max_depth) + ", expected 0 to 50");
+  if (options.max_boxes < 1)
+    throw InputError("certificate: max_boxes is " + std::to_string(options.max_boxes) + ", expected 1 or more");
+}
+
+}  // namespace
+
+struct HighOrderCertifier::Buffers {
+  std::vector<Vec3> coefficients;
+  std::map<std::pair<CellKind, int>, ShapeFunctions> shapes;  // by kind and order
+  std::map<int, HexBoxes> hexes;                              // by order
+};
+
+HighOrderCertifier::HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options)
+    : space_(&space), options_(options), buffers_(std::make_unique<Buffers>()) {
+  check_options(options);
+}
+HighOrderCertifier::~HighOrderCertifier() = default;
+HighOrderCertifier::HighOrderCertifier(HighOrderCertifier&&) noexcept = default;
+
+CellCertificate HighOrderCertifier::certify(std::span<const Vec3> coefficients, std::size_t c) {
+  assert(coefficients.size() == space_->num_nodes());
+  const std::size_t pattern = space_->pattern(c);
+  const int order = space_->pattern_order(pattern);
+  const CellKind kind = space_->kind(c);
+  const auto nodes = space_->nodes(c);
+  const auto signs = space_->signs(c);
+  Cell cell{nullptr, space_->modes(c), {}, Vec3::Zero()};
+
+  const Vec3 origin = coefficients[space_->vertices(c)[0]];
+  buffers_->coefficients.resize(nodes.size());
+  for (std::size_t a = 0; a < nodes.size(); ++a) {
+    Vec3& x = buffers_->coefficients[a];
+    x = coefficients[nodes[a]];
+    if (static_cast<std::size_t>(nodes[a]) < space_->num_vertices())
+      x -= origin;
+    else
+      x *= signs[a];
+    cell.total += x.cwiseAbs();
+  }
+  cell.coefficients = buffers_->coefficients;
+  const double size = cell.total.maxCoeff();
+  if (!(size >= 1e-50 && cell.total.sum() <= 1e50)) {
+    CellCertificate result;
+    result.lower_bound = -kInfinity;
+    return result;
+  }
+  cell.shapes = &buffers_->shapes.try_emplace({kind, order}, kind, space_->basis(), order).first->second;
+  if (kind == CellKind::hex) {
+    HexBoxes& boxes = buffers_->hexes.try_emplace(order, space_->basis(), order).first->second;
+    boxes.set_cell(cell.modes, cell.coefficients);
+    return Search<HexBoxes>(boxes, cell, options_).run();
+  }
+  CellCertificate result;
+  result.lower_bound = -kInfinity;
+  return result;
+}
+
+CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,
+                           const CertificateOptions& options) {
+  check_options(options);
+  if (coefficients.size() != space.num_nodes())
+    throw InputError("certificate: " + std::to_string(coefficients.size()) + " coefficients for " +
+                     std::to_string(space.num_nodes()) + " nodes");
+  std::vector<CellValidity> validity(space.num_cells());
+#pragma omp parallel
+  {
+    HighOrderCertifier certifier(space, options);
+#pragma omp for schedule(dynamic, 4)
+    for (std::size_t c = 0; c < validity.size(); ++c) validity[c] = certifier.certify(coefficients, c).validity;
+  }
+  return summarize(validity);
+}
+
+}  // namespace subvol

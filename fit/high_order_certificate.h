@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/certificate.h"
+#include "fit/element_space.h"
+
+#include <memory>
+#include <span>
+
+namespace subvol {
+
+/// Proves or disproves, cell by cell, that a high-order map is nowhere inverted.
+///
+/// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
+/// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
+/// for legendre up to degree 8, close for all others. Rounding is bounded a priori, about 1e-13 of the product of the
+/// lengths of a hex of order 4. A witness is a point where det J, computed from the shape functions themselves, is
+/// negative beyond its own rounding.
+/// Paper: left open there for the Fourier basis (section 5).
+///
+/// Holds buffers: one object per thread.
+class HighOrderCertifier {
+ public:
+  /// `space` must outlive it. InputError: options out of range. max_depth above 12 counts as 12 for hexes.
+  explicit HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options = {});
+  ~HighOrderCertifier();
+  HighOrderCertifier(HighOrderCertifier&&) noexcept;
+
+  /// coefficients  one per node of the space (asserted), any values: cells with one that is not finite, or so large or
+  ///               small (beyond 1e+-50) that products overflow, end undecided.
+  /// returns       as for linear cells: lower_bound > 0 exactly when valid, else -infinity; never a wrong `valid` or
+  ///               `invalid`. Cost of a hex that one to eight boxes decide: orders 1, 2, 4, 8: about 1, 2, 10, 60 us.
+  CellCertificate certify(std::span<const Vec3> coefficients, std::size_t cell);
+
+ private:
+  struct Buffers;
+  const ElementSpace* space_;
+  CertificateOptions options_;
+  std::unique_ptr<Buffers> buffers_;
+};
+
+/// Certifies all cells. Parallel; the answer does not depend on the number of threads. InputError: options out of range,
+/// or other than one coefficient per node.
+CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,
+                           const CertificateOptions& options = {});
+
+}  // namespace subvol

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/line_models.h"
+
+#include "fit/chebyshev.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <memory>
+#include <span>
+
+namespace subvol {
+
+namespace {
+
+constexpr long double kPi = std::numbers::pi_v<long double>, kSqrt2 = std::numbers::sqrt2_v<long double>;
+
+/// P_0 .. P_count at t.
+std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
+  std::array<long double, kMaxOrder + 2> p{1, t};
+  for (int i = 1; i < count; ++i) p[i + 1] = ((2 * i + 1) * t * p[i] - i * p[i - 1]) / (i + 1);
+  return p;
+}
+
+long double mode_value(Basis basis, int i, long double x) {
+  if (basis == Basis::fourier) return kSqrt2 * std::sin(i * kPi * x) / (i * kPi);
+  const auto p = legendre(i + 1, 1 - 2 * x);
+  return (p[i - 1] - p[i + 1]) / (2 * std::sqrt(2 * i + 1.0L));
+}
+
+long double mode_slope(Basis basis, int i, long double x) {
+  if (basis == Basis::fourier) return kSqrt2 * std::cos(i * kPi * x);
+  return std::sqrt(2 * i + 1.0L) * legendre(i, 1 - 2 * x)[i];
+}
+
+/// Logarithm of a bound of the k-th derivative of phi_i'; for legendre only k > i is asked for.
+double log_slope_derivative(Basis basis, int i, int k) {
+  if (basis == Basis::legendre) return -std::numeric_limits<double>::infinity();
+  return 0.5 * std::numbers::ln2 + k * std::log(i * std::numbers::pi);
+}
+
+/// Models of degree 5 cost least for the first Fourier modes, 8 for many (measured).
+int model_degree(Basis basis, int order) {
+  if (basis == Basis::legendre) return std::min(order, LineModels::kMaxDegree);
+  return order == 1 ? 1 : order <= 5 ? 5 : LineModels::kMaxDegree;
+}
+
+}  // namespace
+
+std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree) {
+  std::vector<std::vector<long double>> rows;
+  for (int k = 0; k <= degree; ++k) {
+    // T_k in its own degree: (-1)^(k-j) C(2k, 2j) / C(k, j), by ratios; then raised one degree at a time.
+    std::vector<long double> row{k % 2 ? -1.0L : 1.0L};
+    for (int j = 0; j < k; ++j) row.push_back(-row[j] * (2 * k - 2 * j - 1) / (2 * j + 1));
+    for (int n = k; n < degree; ++n) {
+      row.push_back(row[n]);
+      for (int j = n; j > 0; --j) row[j] = (j * row[j - 1] + (n + 1 - j) * row[j]) / (n + 1);
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+const LineModels& LineModels::get(Basis basis, int order) {
+  assert(order >= 1 && order <= kMaxOrder);
+  static std::array<std::array<std::unique_ptr<const LineModels>, kMaxOrder + 1>, 2> models;
+  static std::array<std::array<std::once_flag, kMaxOrder + 1>, 2> made;
+  const auto b = static_cast<std::size_t>(basis);
+  std::call_once(made[b][order], [&] { models[b][order].reset(new LineModels(basis, order)); });
+  return *models[b][order];
+}
+
+LineModels::LineModels(Basis basis, int order)
+    : basis_(basis), order_(order), degree_(model_degree(basis, order)) {
+  bounds_[0] = bounds_[1] = slope_bounds_[0] = slope_bounds_[1] = 1;
+  constexpr double kUp = 1 + 1e-14;
+  for (int i = 1; i < order; ++i) {
+    const bool fourier = basis == Basis::fourier;
+    bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : 1 / std::sqrt(2 * i + 1.0));
+    slope_bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 : std::sqrt(2 * i + 1.0));
+  }
+}
+
+const LineModels::Level& LineModels::level(int l) const {
+  assert(l >= 0 && l <= kMaxLevel);
+  std::call_once(made_[l], [&] { levels_[l] = make_level(l); });
+  return levels_[l];
+}
+
+LineModels::Level LineModels::make_level(int l) const {
+  const int q = degree_, parts = 1 << l;
+  const long double size = std::ldexp(1.0L, -l);
+  Level level;
+  level.coefficients.assign(static_cast<std::size_t>(parts) * (order_ + 1) * kStride, 0);
+  const auto row = [&](int part, int i) {
+    return level.coefficients.data() + (static_cast<std::size_t>(part) * (order_ + 1) + i) * kStride;
+  };
+  for (int part = 0; part < parts; ++part)
+    for (int o = 0; o <= q; ++o) {
+      const long double x = (part + static_cast<long double>(o) / q) * size;
+      row(part, 0)[o] = static_cast<double>(1 - x);
+      row(part, 1)[o] = static_cast<double>(x);
+    }
+
+  // Radius times frequency decides how many nodes there must be until the interpolant is exact for all purposes.
+  const double widest = order_ * std::numbers::pi * static_cast<double>(size) / 2;
+  const int num_nodes = basis_ == Basis::legendre ? std::max(order_, q) : q + 10 + static_cast<int>(2.2 * widest);
+  const ChebyshevExpansion expansion(num_nodes);
+  const auto to_bernstein = chebyshev_to_bernstein(q - 1);
+  std::vector<long double> expanded(q), slope(q), value(q + 1);
+  for (int i = 1; i < order_; ++i) {
+    double& error = level.error[i + 1];
+    double& slope_error = level.slope_error[i + 1];
+    for (int part = 0; part < parts; ++part) {
+      const long double mid = (part + 0.5L) * size;
+      double remainder = expansion.expand([&](long double x) { return mode_slope(basis_, i, x); }, mid, size / 2,
+                                          log_slope_derivative(basis_, i, num_nodes), q, expanded.data());
+      if (basis_ == Basis::legendre && i < q) remainder = 0;
+      const bool constant = remainder >= slope_bounds_[i + 1];  // better none than that one
+      if (constant) remainder = slope_bounds_[i + 1];
+      slope_error = std::max(slope_error, remainder);
+      error = std::max(error, constant ? std::min(remainder * static_cast<double>(size) / 2, 2 * bounds_[i + 1])
+                                       : remainder * static_cast<double>(size) / 2);
+
+      std::fill(slope.begin(), slope.end(), 0.0L);
+      for (int k = 0; !constant && k < q; ++k)
+        for (int o = 0; o < q; ++o) slope[o] += expanded[k] * to_bernstein[k][o];
+      value[0] = 0;
+      for (int o = 0; o < q; ++o) value[o + 1] = value[o] + slope[o] * size / q;
+      long double middle = 0, binomial = 1;
+      for (int o = 0; o <= q; ++o) {
+        middle += std::ldexp(binomial * value[o], -q);
+        binomial = binomial * (q - o) / (o + 1);
+      }
+      const long double shift = mode_value(basis_, i, mid) - middle;
+      for (int o = 0; o <= q; ++o) row(part, i + 1)[o] = static_cast<double>(value[o] + shift);
+    }
+    level.exact = level.exact && slope_error == 0;
+  }
+  for (int part = 0; part < parts; ++part)
+    for (int i = 0; i <= order_; ++i)
+      for (int o = 0; o <= q; ++o)
+        level.largest_coefficient[i] = std::max(level.largest_coefficient[i], std::abs(row(part, i)[o]));
+  return level;
+}
+
+}  // namespace subvol

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/basis.h"
+
+#include <array>
+#include <mutex>
+#include <vector>
+
+namespace subvol {
+
+/// Polynomial models of the functions N_0 .. N_order of `line_functions` over the dyadic parts of [0, 1].
+///
+///   N_i(x) = sum_o b_io B_o(t) + error,   x = (index + t) / 2^level,   B_o the Bernstein polynomials of `degree`
+///
+/// with bounds of the errors of N_i and N_i'. The model of N_i' is its Chebyshev expansion cut at degree - 1; no error
+/// is left where N_i is a polynomial of that degree. Coefficients are good to 4 units of roundoff of the largest.
+class LineModels {
+ public:
+  static constexpr int kMaxDegree = 8, kMaxLevel = 12;
+  static constexpr int kStride = 16;  ///< from one function's coefficients to the next one's; unused entries are 0
+  using PerFunction = std::array<double, kMaxOrder + 1>;
+
+  /// What holds on all parts of one level, and their coefficients.
+  struct Level {
+    PerFunction error{}, slope_error{};  ///< bounds of |N - model|, |N' - model'|
+    PerFunction largest_coefficient{};   ///< max_o |b_io|
+    bool exact = true;                   ///< there are no errors
+    std::vector<double> coefficients;    ///< b_io at (index (order + 1) + i) kStride + o
+  };
+
+  /// The models of a basis and an order of 1 .. kMaxOrder: made once, each level when it is first asked for; for all
+  /// threads. Cost of a level: about 10 us times 2^level at order 8.
+  static const LineModels& get(Basis basis, int order);
+
+  int order() const { return order_; }
+  int degree() const { return degree_; }
+  /// Bounds of |N_i| and |N_i'| over [0, 1].
+  const PerFunction& bounds() const { return bounds_; }
+  const PerFunction& slope_bounds() const { return slope_bounds_; }
+  const Level& level(int l) const;
+  const double* coefficients(const Level& level, int index) const {
+    return level.coefficients.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
+  }
+
+ private:
+  LineModels(Basis basis, int order);
+  Level make_level(int l) const;
+
+  Basis basis_;
+  int order_, degree_;
+  PerFunction bounds_{}, slope_bounds_{};
+  mutable std::array<Level, kMaxLevel + 1> levels_;
+  mutable std::array<std::once_flag, kMaxLevel + 1> made_;
+};
+
+}  // namespace subvol
