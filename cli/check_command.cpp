@@ -5,7 +5,7 @@
 #include "cli/loading.h"
 #include "cli/outputs.h"
 #include "cli/report.h"
-#include "subvol/mesh_io.h"
+#include "cli/writing.h"
 #include "subvol/surface_io.h"
 #include "subvol/version.h"
 
@@ -19,19 +19,40 @@ namespace {
 struct CheckArguments {
   RunOptions run;
   std::string mesh, target;
+  double chord_percent = WritingOptions{}.chord_percent;
   bool json = false;
 };
 
-Json report_json(const CheckArguments& arguments, const CLI::App& verb, const VolumeMesh& mesh, const MeshCheck& check,
+/// What is known of the mesh in a file.
+struct Checked {
+  MeshCheck check;
+  Json input;                             ///< what the mesh is
+  std::optional<SubdivisionAudit> audit;  ///< of a mesh that may be subdivided
+};
+
+Checked check_linear(const CheckArguments& arguments, const TriangleMesh* target, std::vector<std::string>& warnings) {
+  const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
+  Checked checked{check_mesh(mesh, target), describe(arguments.mesh, mesh), std::nullopt};
+  checked.audit = checked.check.subdivision_audit;
+  return checked;
+}
+
+Checked check_high_order(const CheckArguments& arguments, const TriangleMesh* target) {
+  const HighOrderMesh mesh = read_high_order(arguments.mesh).mesh;
+  const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
+  return {check_mesh(mesh, boundary, target), describe(arguments.mesh, mesh), std::nullopt};
+}
+
+Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Checked& checked,
                  const std::vector<std::string>& warnings) {
   Json json{{"subvol", version()},
             {"command", "check"},
             {"options", options_in_force(verb)},
-            {"input", {{"mesh", describe(arguments.mesh, mesh)}}},
-            {"valid", check.valid()}};
+            {"input", {{"mesh", checked.input}}},
+            {"valid", checked.check.valid()}};
   if (!arguments.target.empty()) json["input"]["target"] = arguments.target;
-  json.update(check_json(check));
-  if (check.has_topology) json["audit"] = audit_json(audit(mesh));
+  json.update(check_json(checked.check));
+  if (checked.audit) json["audit"] = audit_json(*checked.audit);
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = peak_memory_bytes();
   return json;
@@ -41,21 +62,22 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   checked_outputs(arguments.run, false);
   apply_threads(arguments.run);
   std::vector<std::string> warnings;
-  const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
   std::optional<TriangleMesh> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
+  const TriangleMesh* against = target ? &*target : nullptr;
+  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, against)
+                                                             : check_linear(arguments, against, warnings);
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
   }
-  const MeshCheck check = check_mesh(mesh, target ? &*target : nullptr);
-  const Json json = report_json(arguments, verb, mesh, check, warnings);
+  const Json json = report_json(arguments, verb, checked, warnings);
   if (!arguments.run.report.empty()) write_report(arguments.run.report, json);
   if (arguments.json) {
     std::cout << json_text(json);
   } else if (!arguments.run.quiet) {
-    std::cout << to_text(check);
+    std::cout << to_text(checked.check);
   }
-  return check.valid() ? kDone : kFailed;
+  return checked.check.valid() ? kDone : kFailed;
 }
 
 }  // namespace
@@ -63,9 +85,14 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
 void add_check_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
   const auto arguments = std::make_shared<CheckArguments>();
-  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + volume_mesh_formats())->required()->type_name("FILE");
+  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats())->required()->type_name("FILE");
   verb->add_option("--target", arguments->target, "Measure the distance to this surface: " + surface_formats())
       ->type_name("SURFACE");
+  verb->add_option("--chord", arguments->chord_percent,
+                   "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")
+      ->check(number_in(1e-4, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
   verb->add_flag("--json", arguments->json, "Print JSON instead of text");
   verb->add_option("--report", arguments->run.report, "Write the JSON to a file as well")->type_name("FILE.json");
   verb->add_flag("--force", arguments->run.force, "Replace a report that exists");

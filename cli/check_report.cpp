@@ -38,6 +38,14 @@ Json topology_json(const MeshCheck& check) {
           {"euler_number", check.euler_number}};
 }
 
+Json orders_json(const OrderSummary& orders) {
+  return {{"basis", to_string(orders.basis)},
+          {"min", orders.min_order},
+          {"max", orders.max_order},
+          {"nodes", orders.num_nodes},
+          {"full_order_nodes", orders.num_full_order_nodes}};
+}
+
 Json defects_json(const MeshCheck& check) {
   Json defects = Json::array();
   for (const MeshDefect& defect : check.defects) {
@@ -51,12 +59,14 @@ Json defects_json(const MeshCheck& check) {
 Json check_json(const MeshCheck& check) {
   Json json{{"valid", check.valid()}};
   if (check.distance) json["distance"] = distance_json(*check.distance, check.target_diagonal);
+  if (check.orders) json["orders"] = orders_json(*check.orders);
   if (check.quality) json["quality"] = quality_json(*check.quality);
   if (check.has_boundary_geometry) {
     json["boundary_self_intersections"] = check.num_intersecting_triangle_pairs;
     json["intersecting_boundary_faces"] = check.intersecting_faces;
     json["degenerate_boundary_triangles"] = check.num_degenerate_boundary_triangles;
     json["volume"] = check.volume;
+    if (check.orders) json["boundary_chord_error"] = check.chord_error;
   }
   if (check.has_topology) json["topology"] = topology_json(check);
   json["defects"] = defects_json(check);

@@ -33,6 +33,13 @@ void convert_volume(const ConvertArguments& arguments, const std::vector<Output>
   }
 }
 
+void convert_high_order(const ConvertArguments& arguments, const std::vector<Output>& outputs,
+                        const WritingOptions& writing) {
+  if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
+  const HighOrderFile file = read_high_order(arguments.input);
+  for (const Output& output : outputs) write_output(output, file, writing);
+}
+
 void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
                      std::vector<std::string>& warnings) {
   for (const Output& output : outputs) {
@@ -51,7 +58,9 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   writing.source = arguments.input;
   writing.options = options_in_force(verb);
   std::vector<std::string> warnings;
-  if (is_volume_file(arguments.input)) {
+  if (is_high_order_file(arguments.input)) {
+    convert_high_order(arguments, outputs, writing);
+  } else if (is_volume_file(arguments.input)) {
     convert_volume(arguments, outputs, writing, warnings);
   } else {
     convert_surface(arguments, outputs, writing, warnings);
@@ -67,20 +76,27 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
 void add_convert_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("convert", "Write a mesh in another format");
   const auto arguments = std::make_shared<ConvertArguments>();
-  verb->add_option("IN", arguments->input, "Volume mesh: " + volume_mesh_formats() + "; or surface: " + surface_formats())
+  verb->add_option("IN", arguments->input, "Volume mesh: " + cell_formats() + "; or surface: " + surface_formats())
       ->required()
       ->type_name("FILE");
   verb->add_flag("--limit", arguments->limit,
                  "Surface formats show the limit surface of the mesh as a control cage, not its flat faces");
+  verb->add_option("--intervals", arguments->writing.linear_intervals,
+                   "Of each edge of a curved cell where it is written as linear ones (.mesh, .vtk); 0: the largest order")
+      ->check(CLI::Range(0, 64))
+      ->type_name("N")
+      ->capture_default_str();
   add_output_options(*verb, arguments->run,
                      "Where to, the extension choosing the format: " + output_formats() + "; may be given several times");
   verb->get_option("--output")->required();
   add_writing_options(*verb, arguments->writing);
   verb->footer(R"(Surface formats take the boundary of a volume mesh; .usda keeps it a subdivision cage with its creases.
+The curved boundary of a high-order .vtu is cut into triangles within --chord of it.
 
 Examples:
   subvol convert cage.vtk -o cage.mesh
-  subvol convert cage.mesh --limit -o smooth.glb)");
+  subvol convert cage.mesh --limit -o smooth.glb
+  subvol convert curved.vtu -o curved.msh -o curved.glb)");
   verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_convert(*arguments, *verb); }; });
 }
 

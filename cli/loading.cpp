@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/loading.h"
 
+#include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "subvol/boundary.h"
 #include "subvol/mesh_io.h"
 #include "subvol/mesh_topology.h"
 #include "subvol/surface_io.h"
+#include "subvol/text_scanner.h"
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 namespace subvol::cli {
 
 bool is_volume_file(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(path.extension().string());
   return extension == ".mesh" || extension == ".vtk";
 }
+
+bool is_high_order_file(const std::filesystem::path& path) { return lower_case(path.extension().string()) == ".vtu"; }
 
 TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
   return is_volume_file(path) ? triangulate(load_polygons(path, warnings)) : read_triangle_mesh(path, &warnings);
@@ -77,5 +78,18 @@ Json describe(const std::string& path, const VolumeMesh& mesh) {
           {"creases", mesh.tags.creases.size()},
           {"corners", mesh.tags.corners.size()}};
 }
+
+Json describe(const std::string& path, const HighOrderMesh& mesh) {
+  Json json = describe(path, mesh.straight_sided());
+  const OrderSummary orders = order_summary(mesh.space);
+  json["basis"] = to_string(orders.basis);
+  json["min_order"] = orders.min_order;
+  json["max_order"] = orders.max_order;
+  json["nodes"] = orders.num_nodes;
+  json["full_order_nodes"] = orders.num_full_order_nodes;
+  return json;
+}
+
+std::string cell_formats() { return volume_mesh_formats() + ", .vtu (high-order, as subvol writes it)"; }
 
 }  // namespace subvol::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/run_options.h"
+#include "fit/high_order_mesh.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
@@ -13,6 +14,9 @@ namespace subvol::cli {
 
 /// Whether a path's extension is one of a volume mesh.
 bool is_volume_file(const std::filesystem::path& path);
+
+/// Whether it is that of a high-order mesh, for `read_high_order`.
+bool is_high_order_file(const std::filesystem::path& path);
 
 /// A surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
 TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
@@ -35,5 +39,9 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
 Json describe(const std::string& path, const TriangleMesh& mesh);
 Json describe(const std::string& path, const PolygonMesh& mesh);
 Json describe(const std::string& path, const VolumeMesh& mesh);
+Json describe(const std::string& path, const HighOrderMesh& mesh);
+
+/// What can be read that holds cells, for help.
+std::string cell_formats();
 
 }  // namespace subvol::cli

@@ -8,6 +8,7 @@
 #include "export/obj_writer.h"
 #include "export/usd_writer.h"
 #include "export/volume_writer.h"
+#include "fit/high_order_quality.h"
 #include "fit/quality.h"
 #include "subvol/mesh_io.h"
 
@@ -33,6 +34,18 @@ void write_polygons(const Output& output, const PolygonMesh& surface, const Feat
   if (output.extension == ".obj") return write_obj(output.path, surface);
   const SurfaceSceneOptions scene = scene_options(output, options);
   write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
+}
+
+/// Two triangles that follow one another are a quad again.
+PolygonMesh polygons_of(const CurvedBoundary& boundary) {
+  PolygonMesh mesh{boundary.triangles.positions, {0}, {}};
+  const auto& triangles = boundary.triangles.triangles;
+  for (std::size_t t = 0; t < triangles.size(); t += 2) {
+    mesh.face_vertices.insert(mesh.face_vertices.end(), triangles[t].begin(), triangles[t].end());
+    mesh.face_vertices.push_back(triangles[t + 1][2]);
+    mesh.face_offsets.push_back(mesh.face_vertices.size());
+  }
+  return mesh;
 }
 
 }  // namespace
@@ -86,6 +99,19 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
   write_polygons(output, boundary.polygons, boundary.tags, options);
 }
 
+void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
+  const HighOrderMesh& mesh = file.mesh;
+  if (output.extension == ".usda")
+    throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+  if (output.extension == ".obj") return write_obj(output.path, polygons_of(curved_boundary(mesh, options.chord_percent)));
+  const QualityReport quality = measure_quality(mesh);
+  if (is_scene(output))
+    return write_gltf(output.path, surface_scene(mesh, quality.cell_minima, scene_options(output, options)));
+  write_volume(output.path, mesh,
+               {.cell_minima = quality.cell_minima, .references = file.references,
+                .linear_intervals = options.linear_intervals});
+}
+
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
   if (is_scene(output)) return write_gltf(output.path, polygon_scene(surface, {}, scene_options(output, options)));
@@ -94,15 +120,6 @@ void write_output(const Output& output, const PolygonMesh& surface, const Writin
 
 TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options) {
   return tessellate(cage, chord_length(cage, {.max_chord_percent = options.chord_percent}));
-}
-
-TriangleMesh triangles_of(const TessellatedSurface& surface) {
-  TriangleMesh mesh{surface.positions, {}};
-  for (const auto& quad : surface.quads) {
-    mesh.triangles.push_back({quad[0], quad[1], quad[2]});
-    mesh.triangles.push_back({quad[0], quad[2], quad[3]});
-  }
-  return mesh;
 }
 
 }  // namespace subvol::cli

@@ -3,6 +3,7 @@
 
 #include "cli/outputs.h"
 #include "export/export.h"
+#include "export/high_order_file.h"
 #include "export/tessellate.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
@@ -19,6 +20,7 @@ struct WritingOptions {
   std::string up_axis = "y";
   std::filesystem::path source;   ///< file the result was made from, kept in the file
   Json options = Json::object();  ///< options in force, kept in the file
+  int linear_intervals = 0;       ///< of a curved cell's edges in .mesh and .vtk; 0: its mesh's largest order
 };
 
 /// --chord, --unit, --up.
@@ -35,6 +37,10 @@ bool is_scene(const Output& output);
 /// Writes one mesh as it stands: its cells, or the flat faces of its boundary (.usda: as a subdivision cage).
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);
 
+/// Writes a high-order mesh: curved cells (.vtu, .msh), many linear ones (.mesh, .vtk), its curved boundary coloured by
+/// quality (.glb, .gltf) or as quads (.obj). UsageError: .usda, which holds subdivision cages.
+void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options);
+
 /// What a scene written to this output says of itself.
 SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options);
 
@@ -43,6 +49,5 @@ void write_output(const Output& output, const PolygonMesh& surface, const Writin
 
 /// The limit surface of a cage as it is written to .glb.
 TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options);
-TriangleMesh triangles_of(const TessellatedSurface& surface);
 
 }  // namespace subvol::cli

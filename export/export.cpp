@@ -117,6 +117,11 @@ std::vector<BoundaryFaceCell> boundary_face_cells(const VolumeMesh& mesh) {
 
 }  // namespace
 
+double chord_length(const HighOrderPatches& patches, const SurfaceSceneOptions& options) {
+  if (!(options.max_chord_percent > 0)) throw InputError("max_chord_percent: expected a positive number");
+  return options.max_chord_percent / 100 * patches.bounding_box_diagonal();
+}
+
 double chord_length(const VolumeMesh& cage, const SurfaceSceneOptions& options) {
   if (!(options.max_chord_percent > 0)) throw InputError("max_chord_percent: expected a positive number");
   const BoundaryRefinement boundary = refine_boundary(cage, 0);
@@ -168,6 +173,28 @@ Scene surface_scene(const VolumeMesh& cage, const VolumeMesh* finest, const Surf
   const TessellatedSurface surface = tessellate(cage, chord_length(cage, options));
   const QualityReport quality = measure_quality(finest ? *finest : cage);
   return surface_scene(surface, patch_quality(cage, surface, quality.cell_minima), options);
+}
+
+Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima, const SurfaceSceneOptions& options) {
+  if (!cell_minima.empty() && cell_minima.size() != mesh.space.num_cells())
+    throw InputError("cell_minima: expected one value per cell");
+  HighOrderPatches patches(mesh, options.crease_angle_degrees);
+  const TessellatedSurface surface = tessellate(patches, chord_length(patches, options));
+  std::vector<double> quality;
+  const MeshTopology& topology = mesh.space.topology();
+  if (!cell_minima.empty())
+    for (const SurfacePatch& patch : surface.patches)
+      quality.push_back(cell_minima[topology.face_cells(topology.boundary_faces()[patch.face])[0]]);
+  return surface_scene(surface, quality, options);
+}
+
+CurvedBoundary curved_boundary(const HighOrderMesh& mesh, double max_chord_percent) {
+  HighOrderPatches patches(mesh, 180);
+  const TessellatedSurface surface = tessellate(patches, chord_length(patches, {.max_chord_percent = max_chord_percent}));
+  CurvedBoundary boundary{triangles_of(surface), {}, surface.chord_error};
+  for (const Index patch : surface.quad_patches)
+    boundary.faces.insert(boundary.faces.end(), 2, surface.patches[patch].face);
+  return boundary;
 }
 
 Scene polygon_scene(const PolygonMesh& mesh, std::span<const double> face_quality, const SurfaceSceneOptions& options) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "export/high_order_patches.h"
 #include "export/scene.h"
 #include "export/tessellate.h"
+#include "fit/curved_boundary.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
@@ -15,8 +17,8 @@ namespace subvol {
 /// What a scene of a surface says of itself, and how fine it is.
 struct SurfaceSceneOptions {
   std::string name = "subvol";          ///< of the root node
-  double max_chord_percent = 0.005;     ///< chord error of a limit surface, per cent of its bounding box's diagonal, > 0
-  double crease_angle_degrees = 30;     ///< flat faces meeting at more are not shaded smoothly, [0, 180]
+  double max_chord_percent = 0.005;     ///< chord error of a curved surface, per cent of its bounding box's diagonal, > 0
+  double crease_angle_degrees = 30;     ///< flat faces and curved cells meeting at more are not shaded smoothly, [0, 180]
   bool wireframe = true;                ///< a second node with the cells' edges as lines
   double metres_per_unit = 1;           ///< > 0
   UpAxis up_axis = UpAxis::y;
@@ -44,6 +46,18 @@ std::vector<double> patch_quality(const VolumeMesh& cage, const TessellatedSurfa
 
 /// `max_chord_percent` of the diagonal of the limit surface's bounding box (of its vertices), as a length.
 double chord_length(const VolumeMesh& cage, const SurfaceSceneOptions& options);
+double chord_length(const HighOrderPatches& patches, const SurfaceSceneOptions& options);
+
+/// The curved boundary of a high-order mesh, coloured by the quality of its cells, each boundary edge as a curve.
+///
+/// Nodes, colours and attributes as for a limit surface. Normals are those of the map, and part where faces meet at more
+/// than `crease_angle_degrees`; elsewhere they are means. cell_minima: one scaled Jacobian per cell, or empty (no colours).
+/// InputError: options out of range, minima of another number, what `HighOrderPatches` refuses.
+Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima,
+                    const SurfaceSceneOptions& options = {});
+
+/// The curved boundary as triangles within `max_chord_percent` of its box's diagonal, for measurements. InputError: as above.
+CurvedBoundary curved_boundary(const HighOrderMesh& mesh, double max_chord_percent);
 
 /// The boundary of a volume mesh as it stands, flat faces, coloured by the quality of the boundary cells.
 Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options = {});

@@ -30,7 +30,7 @@ struct PatchState {
 /// Samples of the quads of one patch.
 class PatchJudge {
  public:
-  PatchJudge(const LimitPatches& patches, const StripCuts& cuts, Index patch)
+  PatchJudge(const PatchSurface& patches, const StripCuts& cuts, Index patch)
       : hard_(patches.sharp_sides(patch)), strips_(cuts.strips(patch)) {
     for (int d : {0, 1}) {
       const std::span<const int> t = cuts.cuts(strips_[d]);
@@ -84,12 +84,12 @@ class PatchJudge {
 };
 
 int depth_of(const StripCuts& cuts) {
-  int shortest = LimitPatches::kUnits;
+  int shortest = PatchSurface::kUnits;
   for (std::size_t s = 0; s < cuts.num_strips(); ++s) {
     const std::span<const int> t = cuts.cuts(static_cast<Index>(s));
     for (std::size_t i = 0; i + 1 < t.size(); ++i) shortest = std::min(shortest, t[i + 1] - t[i]);
   }
-  return std::countr_zero(static_cast<unsigned>(LimitPatches::kUnits / shortest));
+  return std::countr_zero(static_cast<unsigned>(PatchSurface::kUnits / shortest));
 }
 
 /// For every strip the largest error that asks for an interval to be halved; 0 where nothing does.
@@ -145,7 +145,7 @@ std::vector<char> halve_above(double threshold, const Demand& demand, StripCuts&
 
 }  // namespace
 
-StripCuts::StripCuts(const LimitPatches& patches) : strips_(patches.num_patches()) {
+StripCuts::StripCuts(const PatchSurface& patches) : strips_(patches.num_patches()) {
   const SurfaceTopology& quads = patches.quads();
   std::vector<Index> parent(quads.num_edges());
   std::iota(parent.begin(), parent.end(), 0);
@@ -162,7 +162,7 @@ StripCuts::StripCuts(const LimitPatches& patches) : strips_(patches.num_patches(
       Index& strip = number[edge(p, k)];
       if (strip == kNoIndex) {
         strip = static_cast<Index>(cuts_.size());
-        cuts_.push_back({0, LimitPatches::kUnits});
+        cuts_.push_back({0, PatchSurface::kUnits});
       }
       strips_[p][k] = strip;
     }
@@ -177,7 +177,7 @@ void StripCuts::halve(Index strip, std::span<const char> chosen) {
   }
 }
 
-CutResult cut_strips(LimitPatches& patches, double max_chord_error, std::size_t max_quads) {
+CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads) {
   CutResult result{StripCuts(patches), 0};
   StripCuts& cuts = result.cuts;
   std::vector<PatchState> states(patches.num_patches());

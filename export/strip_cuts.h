@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/limit_patches.h"
+#include "subvol/patch_surface.h"
 
 #include <array>
 #include <span>
@@ -9,13 +9,13 @@
 
 namespace subvol {
 
-/// Where every patch of a limit surface is cut, so that neighbours agree.
+/// Where every patch of a surface is cut, so that neighbours agree.
 ///
 /// A strip is a chain of patches joined at opposite sides; all of them are cut across at the same parameters.
 class StripCuts {
  public:
-  /// Uncut: from 0 to LimitPatches::kUnits.
-  explicit StripCuts(const LimitPatches& patches);
+  /// Uncut: from 0 to PatchSurface::kUnits.
+  explicit StripCuts(const PatchSurface& patches);
 
   std::size_t num_strips() const { return cuts_.size(); }
   /// The strips whose cuts are at constant u, and at constant v.
@@ -39,6 +39,6 @@ struct CutResult {
 };
 
 /// max_quads  and depth: as `tessellate`. `patches` is made ready as deep as needed.
-CutResult cut_strips(LimitPatches& patches, double max_chord_error, std::size_t max_quads);
+CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads);
 
 }  // namespace subvol

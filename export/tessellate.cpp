@@ -11,6 +11,8 @@
 namespace subvol {
 namespace {
 
+constexpr double kCancelled = 1e-6;  // a sum of unit normals this short has no direction
+
 bool is_hard(const SurfaceTopology& quads, Index h) {
   return quads.edge_sharpness[quads.corner_edges[h]] >= static_cast<float>(kInfiniteSharpness);
 }
@@ -18,7 +20,7 @@ bool is_hard(const SurfaceTopology& quads, Index h) {
 /// Joins the grids of patches: each point of the surface has one position, and one vertex per side of a hard crease.
 class Assembler {
  public:
-  Assembler(const LimitPatches& patches, const StripCuts& cuts, TessellatedSurface& out)
+  Assembler(const PatchSurface& patches, const StripCuts& cuts, TessellatedSurface& out)
       : patches_(patches),
         quads_(patches.quads()),
         cuts_(cuts),
@@ -82,6 +84,8 @@ class Assembler {
                                       grid.normals[place]);
       if (first == kNoIndex) first = vertex;
       number_piece(corner, vertex);
+    } else {
+      out_.normals[corner_vertices_[corner]] += grid.normals[place];
     }
     grid.vertices[place] = corner_vertices_[corner];
   }
@@ -112,7 +116,10 @@ class Assembler {
     for (int t = 1; t < grid.side_length(side); ++t) {
       const std::size_t place = grid.on_side(side, t);
       grid.vertices[place] = first + t - 1;
-      if (!fresh) continue;
+      if (!fresh) {
+        out_.normals[first + t - 1] += grid.normals[place];
+        continue;
+      }
       const Vec3 position = other == kNoIndex ? grid.positions[place] : out_.positions[other + t - 1];
       add_vertex(position, grid.normals[place]);
     }
@@ -135,7 +142,7 @@ class Assembler {
       out_.wireframe.push_back({grid.vertices[grid.on_side(side, t)], grid.vertices[grid.on_side(side, t + 1)]});
   }
 
-  const LimitPatches& patches_;
+  const PatchSurface& patches_;
   const SurfaceTopology& quads_;
   const StripCuts& cuts_;
   TessellatedSurface& out_;
@@ -145,8 +152,9 @@ class Assembler {
   std::vector<char> drawn_;             // by edge
 };
 
-/// Replaces missing normals by those of the quads around, and turns the others to their side.
-void orient_normals(TessellatedSurface& surface) {
+/// Makes means of the patches' normals, replaces missing ones by those of the quads around, and turns the others to
+/// their side.
+void finish_normals(TessellatedSurface& surface) {
   std::vector<Vec3> facets(surface.positions.size(), Vec3::Zero());
   for (const auto& quad : surface.quads)
     for (int k = 0; k < 4; ++k) {
@@ -156,18 +164,17 @@ void orient_normals(TessellatedSurface& surface) {
     }
   for (std::size_t v = 0; v < facets.size(); ++v) {
     Vec3& normal = surface.normals[v];
-    if (normal == Vec3::Zero())
-      normal = facets[v].normalized();
-    else if (normal.dot(facets[v]) < 0)
-      normal = -normal;
+    const bool is_missing = normal.norm() < kCancelled;
+    normal = (is_missing ? facets[v] : normal).normalized();
+    if (normal == Vec3::Zero()) normal = Vec3::UnitZ();
+    if (normal.dot(facets[v]) < 0) normal = -normal;
   }
 }
 
 }  // namespace
 
-TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads) {
+TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads) {
   if (!(max_chord_error > 0)) throw InputError("tessellate: max_chord_error: expected a positive length");
-  LimitPatches patches(cage);
   const CutResult result = cut_strips(patches, max_chord_error, max_quads);
   TessellatedSurface surface;
   surface.chord_error = result.chord_error;
@@ -177,8 +184,22 @@ TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, st
     surface.patches.push_back({face, corner});
     assembler.add(static_cast<Index>(p));
   }
-  orient_normals(surface);
+  finish_normals(surface);
   return surface;
+}
+
+TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads) {
+  LimitPatches patches(cage);
+  return tessellate(patches, max_chord_error, max_quads);
+}
+
+TriangleMesh triangles_of(const TessellatedSurface& surface) {
+  TriangleMesh mesh{surface.positions, {}};
+  for (const auto& quad : surface.quads) {
+    mesh.triangles.push_back({quad[0], quad[1], quad[2]});
+    mesh.triangles.push_back({quad[0], quad[2], quad[3]});
+  }
+  return mesh;
 }
 
 }  // namespace subvol

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/patch_surface.h"
+#include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
 #include <array>
@@ -21,16 +23,16 @@ struct SurfacePatch {
 
 /// A surface cut into quads, each to be drawn as the triangles 0 1 2 and 0 2 3 of its corners.
 struct TessellatedSurface {
-  std::vector<Vec3> positions;             ///< on the limit surface; doubled where a crease parts the normals
+  std::vector<Vec3> positions;             ///< on the surface; doubled where a crease parts the normals
   std::vector<Vec3> normals;               ///< unit, outward, one per position
   std::vector<std::array<Index, 4>> quads; ///< outward; the quads of one patch follow one another
   std::vector<Index> quad_patches;         ///< number in `patches` of each quad
   std::vector<SurfacePatch> patches;       ///< by face, then corner
-  std::vector<std::array<Index, 2>> wireframe;  ///< the cage's boundary edges as curves: segments along quad edges
-  double chord_error = 0;                  ///< largest distance from the limit surface to the triangles, length unit
+  std::vector<std::array<Index, 2>> wireframe;  ///< the mesh's boundary edges as curves: segments along quad edges
+  double chord_error = 0;                  ///< largest distance from the surface to the triangles, length unit
 };
 
-/// The Catmull-Clark limit surface of a control cage, cut until its triangles are close to it.
+/// A surface of patches, cut until its triangles are close to it.
 ///
 /// Every patch becomes a grid of quads. Its cuts belong to the strips of patches that cross opposite sides, so
 /// neighbours agree along their common edge: no cracks, no T-junctions, quads only. An interval of a strip is halved as
@@ -44,10 +46,16 @@ struct TessellatedSurface {
 ///                  then is above `max_chord_error`. One quad per patch is always made. No interval is halved more than
 ///                  12 times.
 ///
-/// Normals part across creases of infinite sharpness only. Where the tangents are parallel (the one face at an untagged
-/// boundary vertex, say) the normal is the mean one of the quads around.
-/// InputError: max_chord_error not positive; a cage that `LimitPatches` refuses. The same bits for any number of
-/// threads. Cost: about 2 microseconds per quad.
+/// Normals part across creases of infinite sharpness only; elsewhere a vertex has the mean one of its patches. Where the
+/// tangents are parallel (the one face at an untagged boundary vertex, say) it is the mean one of the quads around.
+/// InputError: max_chord_error not positive. The same bits for any number of threads. Cost of a limit surface: about 2
+/// microseconds per quad.
+TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads = 4'000'000);
+
+/// The same of the Catmull-Clark limit surface of a control cage. InputError also for what `LimitPatches` refuses.
 TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads = 4'000'000);
+
+/// The triangles alone, two for each quad. Vertices along hard creases are there once for each side.
+TriangleMesh triangles_of(const TessellatedSurface& surface);
 
 }  // namespace subvol

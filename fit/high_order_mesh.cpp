@@ -73,6 +73,13 @@ HighOrderMesh HighOrderMesh::with_orders(const EntityOrders& orders) const {
   return {std::move(to), std::move(moved)};
 }
 
+VolumeMesh HighOrderMesh::straight_sided() const {
+  VolumeMesh mesh;
+  mesh.positions.assign(coefficients.begin(), coefficients.begin() + static_cast<std::ptrdiff_t>(space.num_vertices()));
+  for (std::size_t c = 0; c < space.num_cells(); ++c) mesh.add_cell(space.kind(c), space.vertices(c));
+  return mesh;
+}
+
 SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto& [c, point] = points[i];

@@ -26,6 +26,8 @@ struct HighOrderMesh {
 
   /// The same mesh in a space of other orders: the same shape where no order falls, else without what is gone.
   HighOrderMesh with_orders(const EntityOrders& orders) const;
+  /// The vertices with linear cells between them.
+  VolumeMesh straight_sided() const;
 };
 
 /// A point of a cell, in canonical coordinates.

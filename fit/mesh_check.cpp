@@ -2,6 +2,7 @@
 #include "fit/mesh_check.h"
 
 #include "fit/boundary_triangles.h"
+#include "fit/high_order_quality.h"
 #include "fit/self_intersection.h"
 #include "subvol/boundary.h"
 #include "subvol/mesh_topology.h"
@@ -80,13 +81,9 @@ double enclosed_volume(const TriangleMesh& surface) {
   return sum / 6;
 }
 
-void check_boundary(const PolygonMesh& boundary, const TriangleMesh* target, const MeshCheckOptions& options,
-                    MeshCheck& check) {
+void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const TriangleMesh* target,
+                    const MeshCheckOptions& options, MeshCheck& check) {
   check.has_boundary_geometry = true;
-  std::vector<Index> face_of_triangle;
-  const TriangleMesh triangles = options.quad_triangles == QuadTriangles::bilinear
-                                     ? refined_triangles(boundary, &face_of_triangle)
-                                     : triangulate(boundary, &face_of_triangle);
   check.volume = enclosed_volume(triangles);
   const SelfIntersections found = self_intersections(triangles);
   check.num_intersecting_triangle_pairs = found.pairs.size();
@@ -98,6 +95,15 @@ void check_boundary(const PolygonMesh& boundary, const TriangleMesh* target, con
   if (!target) return;
   check.target_diagonal = bounding_box_diagonal(*target);
   check.distance = surface_distance(triangles, *target, {.num_samples = options.distance_samples});
+}
+
+MeshCheck count_cells(const VolumeMesh& mesh) {
+  MeshCheck check;
+  check.defects = validate(mesh);
+  check.num_vertices = mesh.num_vertices();
+  check.num_cells = mesh.num_cells();
+  for (const CellKind kind : mesh.kinds) ++check.num_cells_of_kind[static_cast<std::size_t>(kind)];
+  return check;
 }
 
 /// printf into the end of a string.
@@ -116,6 +122,13 @@ void append_defects(std::string& text, const std::vector<MeshDefect>& defects) {
   for (std::size_t i = 0; i < std::min(defects.size(), kMaxLines); ++i)
     append(text, "  %s: %s\n", to_string(defects[i].kind), defects[i].message.c_str());
   if (defects.size() > kMaxLines) append(text, "  ... and %zu more\n", defects.size() - kMaxLines);
+}
+
+void append_orders(std::string& text, const OrderSummary& orders) {
+  append(text, "orders              %d to %d, %s basis; %zu nodes, %.1f %% of the %zu of full order\n", orders.min_order,
+         orders.max_order, to_string(orders.basis), orders.num_nodes,
+         100.0 * static_cast<double>(orders.num_nodes) / static_cast<double>(orders.num_full_order_nodes),
+         orders.num_full_order_nodes);
 }
 
 void append_topology(std::string& text, const MeshCheck& check) {
@@ -155,19 +168,53 @@ bool MeshCheck::valid() const {
 }
 
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const MeshCheckOptions& options) {
-  MeshCheck check;
-  check.defects = validate(mesh);
-  check.num_vertices = mesh.num_vertices();
-  check.num_cells = mesh.num_cells();
-  for (const CellKind kind : mesh.kinds) ++check.num_cells_of_kind[static_cast<std::size_t>(kind)];
+  MeshCheck check = count_cells(mesh);
   if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
   check.quality = measure_quality(mesh, options.samples_per_direction);
   if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
   check.subdivision_audit = audit(mesh);
-  if (!has_any(check.defects, {Kind::not_finite}))
-    check_boundary(boundary_surface(mesh, topology), target, options, check);
+  if (has_any(check.defects, {Kind::not_finite})) return check;
+  std::vector<Index> face_of_triangle;
+  const PolygonMesh boundary = boundary_surface(mesh, topology);
+  const TriangleMesh triangles = options.quad_triangles == QuadTriangles::bilinear
+                                     ? refined_triangles(boundary, &face_of_triangle)
+                                     : triangulate(boundary, &face_of_triangle);
+  check_boundary(triangles, face_of_triangle, target, options, check);
+  return check;
+}
+
+OrderSummary order_summary(const ElementSpace& space) {
+  const EntityOrders& orders = space.orders();
+  OrderSummary summary{space.basis(), kMaxOrder, 1, space.num_nodes(), space.num_vertices()};
+  for (const auto* list : {&orders.edges, &orders.faces, &orders.cells})
+    for (const int order : *list) {
+      summary.min_order = std::min(summary.min_order, order);
+      summary.max_order = std::max(summary.max_order, order);
+    }
+  const int order = summary.max_order;
+  std::size_t& nodes = summary.num_full_order_nodes;
+  nodes += orders.edges.size() * static_cast<std::size_t>(num_modes(EntityShape::edge, order));
+  for (std::size_t f = 0; f < orders.faces.size(); ++f)
+    nodes += static_cast<std::size_t>(num_modes(space.face_shape(f), order));
+  for (std::size_t c = 0; c < space.num_cells(); ++c)
+    nodes += static_cast<std::size_t>(num_modes(entity_shape(space.kind(c)), order));
+  return summary;
+}
+
+MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target,
+                     const MeshCheckOptions& options, int samples_per_direction) {
+  const VolumeMesh straight = mesh.straight_sided();
+  MeshCheck check = count_cells(straight);
+  std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
+  check.orders = order_summary(mesh.space);
+  check.quality = measure_quality(mesh, samples_per_direction);
+  check_topology(straight, mesh.space.topology(), check);
+  check.chord_error = boundary.chord_error;
+  const auto finite = [](const Vec3& x) { return x.allFinite(); };
+  if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
+    check_boundary(boundary.triangles, boundary.faces, target, options, check);
   return check;
 }
 
@@ -181,6 +228,7 @@ std::string to_text(const MeshCheck& check) {
     separator = ", ";
   }
   append(text, "), %zu vertices\n", check.num_vertices);
+  if (check.orders) append_orders(text, *check.orders);
   append_defects(text, check.defects);
   if (check.has_topology) append_topology(text, check);
   if (check.subdivision_audit)
@@ -189,6 +237,8 @@ std::string to_text(const MeshCheck& check) {
   if (check.quality) append_quality(text, *check.quality);
   if (check.has_boundary_geometry) {
     append(text, "volume              %.6g\n", check.volume);
+    if (check.chord_error > 0)
+      append(text, "boundary            looked at as triangles within %.3g of the curved surface\n", check.chord_error);
     append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)\n",
            check.intersecting_faces.size(), check.num_intersecting_triangle_pairs);
     if (check.num_degenerate_boundary_triangles > 0)

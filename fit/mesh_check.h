@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/curved_boundary.h"
+#include "fit/high_order_mesh.h"
 #include "fit/quality.h"
 #include "fit/surface_distance.h"
 #include "subvol/audit.h"
@@ -27,12 +29,22 @@ struct MeshCheckOptions {
   int distance_samples = 50000;    ///< `SurfaceDistanceOptions::num_samples`
 };
 
+/// How fine the cells of a high-order mesh are.
+struct OrderSummary {
+  Basis basis;
+  int min_order, max_order;                                ///< of edges, faces and cells
+  std::size_t num_nodes;
+  std::size_t num_full_order_nodes;                        ///< if everything had the largest order
+};
+OrderSummary order_summary(const ElementSpace& space);
+
 /// All that is known of a volume mesh without a fit. Parts that defects rule out are left at their defaults.
 struct MeshCheck {
   std::vector<MeshDefect> defects;                           ///< `validate`'s
 
   std::size_t num_vertices = 0, num_cells = 0;
   std::array<std::size_t, kNumCellKinds> num_cells_of_kind{};  ///< by CellKind: tets, prisms, hexes
+  std::optional<OrderSummary> orders;                        ///< of a high-order mesh
 
   bool has_topology = false;                                 ///< whether the numbers below are set
   std::size_t num_edges = 0, num_faces = 0;
@@ -47,6 +59,7 @@ struct MeshCheck {
   std::optional<QualityReport> quality;                      ///< with the certificate
 
   bool has_boundary_geometry = false;                        ///< whether the parts below were looked at
+  double chord_error = 0;                                    ///< of the triangles that stand for a curved boundary
   double volume = 0;                                         ///< enclosed by the boundary's triangles, signed
   std::vector<std::array<Index, 2>> intersecting_faces;      ///< places in `boundary_faces()`, ascending; may be equal
   std::size_t num_intersecting_triangle_pairs = 0;
@@ -72,6 +85,13 @@ struct MeshCheck {
 /// and 80 us with a target.
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {});
+
+/// The same of a curved mesh. Defects are those of the straight-sided mesh, whose cells may be inverted; there is no audit.
+///
+/// boundary               what stands for its surface in the parts that need triangles.
+/// samples_per_direction  as for `measure_quality` of a high-order mesh; those of `options` and its quads have no meaning.
+MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target = nullptr,
+                     const MeshCheckOptions& options = {}, int samples_per_direction = 0);
 
 /// The same as a text of some lines for people, the verdict last.
 std::string to_text(const MeshCheck& check);

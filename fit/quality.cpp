@@ -218,23 +218,31 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
   return result;
 }
 
-std::vector<QualityReport::WorstCell> worst_of(const VolumeMesh& mesh, const std::vector<double>& minima) {
-  std::vector<Index> order(minima.size());
-  for (std::size_t c = 0; c < order.size(); ++c) order[c] = static_cast<Index>(c);
-  const std::size_t count = std::min<std::size_t>(10, order.size());
-  std::partial_sort(order.begin(), order.begin() + count, order.end(), [&](Index a, Index b) {
-    return minima[a] != minima[b] ? minima[a] < minima[b] : a < b;
-  });
-  std::vector<QualityReport::WorstCell> worst;
-  for (std::size_t i = 0; i < count; ++i) {
-    Vec3 centre = Vec3::Zero();
-    for (const Index v : mesh.cell(order[i])) centre += mesh.positions[v];
-    worst.push_back({order[i], centre / static_cast<double>(mesh.cell(order[i]).size()), minima[order[i]]});
-  }
-  return worst;
+Vec3 mean_of_corners(const VolumeMesh& mesh, Index c) {
+  Vec3 sum = Vec3::Zero();
+  for (const Index v : mesh.cell(c)) sum += mesh.positions[v];
+  return sum / static_cast<double>(mesh.cell(c).size());
 }
 
 }  // namespace
+
+void QualityReport::add_cell(double least) {
+  cell_minima.push_back(least);
+  min_scaled_jacobian = std::min(min_scaled_jacobian, least);
+  ++histogram[std::min(static_cast<int>((least + 1) * kNumHistogramBins / 2), kNumHistogramBins - 1)];
+  inverted_cells += least <= 0;
+}
+
+void QualityReport::keep_worst(const std::function<Vec3(Index)>& centre) {
+  std::vector<Index> order(cell_minima.size());
+  for (std::size_t c = 0; c < order.size(); ++c) order[c] = static_cast<Index>(c);
+  const std::size_t count = std::min<std::size_t>(10, order.size());
+  std::partial_sort(order.begin(), order.begin() + count, order.end(), [&](Index a, Index b) {
+    return cell_minima[a] != cell_minima[b] ? cell_minima[a] < cell_minima[b] : a < b;
+  });
+  worst_cells.clear();
+  for (std::size_t i = 0; i < count; ++i) worst_cells.push_back({order[i], centre(order[i]), cell_minima[order[i]]});
+}
 
 QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction, const CellReference& reference) {
   const int n = samples_per_direction;
@@ -245,18 +253,14 @@ QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction,
   const std::vector<Sampled<double>> samples = sample_cells(mesh, n, reference);
   double sum = 0;
   for (std::size_t c = 0; c < samples.size(); ++c) {
-    const double least = samples[c].least;
-    report.cell_minima.push_back(least);
-    report.min_scaled_jacobian = std::min(report.min_scaled_jacobian, least);
+    report.add_cell(samples[c].least);
     report.num_samples += num_samples(mesh.kinds[c], n);
     sum += samples[c].sum;
-    ++report.histogram[std::min(static_cast<int>((least + 1) * kNumHistogramBins / 2), kNumHistogramBins - 1)];
-    report.inverted_cells += least <= 0;
   }
   if (report.num_samples > 0) report.mean_scaled_jacobian = sum / static_cast<double>(report.num_samples);
   report.certificate = certify(mesh);
   for (const Index c : report.certificate.invalid_cells) report.inverted_cells += report.cell_minima[c] > 0;
-  report.worst_cells = worst_of(mesh, report.cell_minima);
+  report.keep_worst([&](Index c) { return mean_of_corners(mesh, c); });
   return report;
 }
 

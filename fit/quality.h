@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 namespace subvol {
@@ -27,6 +28,11 @@ struct QualityReport {
   std::size_t inverted_cells = 0;                             ///< with a sample <= 0, or refuted by the certificate
   std::vector<WorstCell> worst_cells;                         ///< the ten lowest, ascending by value, then by number
   CertificateSummary certificate;
+
+  /// Counts one more cell: cell_minima, min_scaled_jacobian, histogram, inverted_cells.
+  void add_cell(double least);
+  /// Fills worst_cells from cell_minima.
+  void keep_worst(const std::function<Vec3(Index)>& centre);
 };
 
 /// Samples the scaled Jacobian of every cell and certifies det J > 0.

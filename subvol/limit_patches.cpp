@@ -15,14 +15,6 @@ namespace subvol {
 
 namespace {
 
-Vec3 unit_normal(const Vec3& du, const Vec3& dv) {
-  // Tangents this close to parallel carry no direction: a hundred times the rounding of their weights.
-  constexpr double kParallel = 1e-10;
-  const Vec3 cross = du.cross(dv);
-  const double length = cross.norm();
-  return length > kParallel * du.norm() * dv.norm() ? Vec3(cross / length) : Vec3(Vec3::Zero());
-}
-
 Vec3 combine(const std::array<double, 4>& w, const std::array<Vec3, 4>& p) {
   return w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3];
 }
@@ -96,12 +88,7 @@ LimitPatches::LimitPatches(const VolumeMesh& cage) {
   const SurfaceTopology& coarse = boundary.topology;
   std::vector<Vec3> points;
   for (const Index v : boundary.vertices) points.push_back(cage.positions[v]);
-  for (std::size_t i = 0; i < coarse.corner_vertices.size(); ++i) {
-    const Index h = static_cast<Index>(i), face = coarse.corner_faces[h];
-    const auto is_sharp = [&](Index g) { return coarse.edge_sharpness[coarse.corner_edges[g]] > 0; };
-    face_corners_.push_back({face, h - coarse.face_offsets[face]});
-    sharp_sides_.push_back({is_sharp(h), is_sharp(coarse.prev(h))});
-  }
+  layout_ = patch_layout(coarse);
   levels_.push_back({refined_topology(coarse), refined_points(coarse, points), {}, {}});
   classify(levels_[0], num_patches());
 }

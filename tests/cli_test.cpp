@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The program as its users run it: files in, files out, exit status.
 
+#include "export/high_order_file.h"
 #include "samples/shapes.h"
 #include "subvol/mesh_io.h"
 #include "tests/data.h"
@@ -432,4 +433,45 @@ TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
   place.file("bad.txt", "1\nx\n");
   CHECK(place.run("shell target.off --thickness-file bad.txt -o a.mesh").err.find("bad.txt:2") != std::string::npos);
   CHECK_FALSE(place.has("a.mesh"));
+}
+
+TEST_CASE("check and convert take a high-order .vtu", "[cli]") {
+  const Workplace place;
+  subvol::VolumeMesh straight = subvol::read_volume_mesh(place / "template.mesh");
+  straight.references.assign(straight.num_cells(), 7);
+  const subvol::HighOrderMesh mesh(subvol::ElementSpace(straight, subvol::Basis::fourier, 2), straight);
+  subvol::write_volume(place / "curved.vtu", mesh, {.references = straight.references});
+
+  const Run check = place.run("check curved.vtu --target template.mesh --chord 0.05 --json --report check.json");
+  INFO(check.err);
+  CHECK(check.err.empty());
+  const auto json = place.json("check.json");
+  CHECK(nlohmann::json::parse(check.out) == json);
+  CHECK(check.status == (json["valid"] ? 0 : 1));
+  CHECK(json["input"]["mesh"]["max_order"] == 2);
+  CHECK(json["orders"]["basis"] == "fourier");
+  CHECK(json["orders"]["nodes"] == mesh.coefficients.size());
+  CHECK(json["quality"]["inverted_cells"] == 0);
+  CHECK(json["boundary_self_intersections"] == 0);
+  CHECK(json["distance"]["max_percent"] < 1);
+  CHECK(json.contains("boundary_chord_error"));
+  CHECK_FALSE(json.contains("audit"));
+
+  const Run convert = place.run("convert curved.vtu -o same.vtu -o out.msh -o out.glb -o out.obj -o out.mesh --intervals 3");
+  INFO(convert.err);
+  REQUIRE(convert.status == 0);
+  CHECK(subvol::read_high_order(place / "same.vtu").mesh.coefficients == mesh.coefficients);
+  const subvol::VolumeMesh cells = subvol::read_volume_mesh(place / "out.mesh");
+  CHECK(cells.num_cells() == 27 * straight.num_cells());
+  CHECK(cells.references[0] == 7);
+  const subvol_tests::GlbFile glb(content_of(place / "out.glb"));
+  CHECK(glb.attribute<float>("surface", "_SCALED_JACOBIAN").size() > straight.num_cells());
+
+  CHECK(place.run("convert curved.vtu -o out.usda").status == 2);
+  CHECK(place.run("convert curved.vtu --limit -o more.glb").status == 2);
+  place.file("alien.vtu", "<VTKFile type=\"UnstructuredGrid\"></VTKFile>");
+  const Run alien = place.run("check alien.vtu");
+  CHECK(alien.status == 3);
+  CHECK(alien.err.find("alien.vtu") != std::string::npos);
+  CHECK(place.run("convert alien.vtu -o out2.mesh").status == 3);
 }

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/gltf_writer.h"
 
+#include "export/export.h"
+
 #include "export/color_map.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
+#include "tests/element_fixtures.h"
 #include "tests/glb_reader.h"
 
 #include <Eigen/Geometry>
@@ -219,7 +222,14 @@ TEST_CASE("the Khronos validator has nothing to say about the files") {
   scene.nodes[0].primitive.colors.clear();
   write_gltf(turned, scene);
   CHECK(slurp(glb) == gltf_bytes(two_quads(), GltfContainer::glb));
-  const int status = run_validator("\"" + glb.string() + "\" \"" + text.string() + "\" \"" + turned.string() + "\"");
+  const auto curved = scratch("curved.glb");
+  PointSource source(1);
+  HighOrderMesh mesh(ElementSpace(mixed_cells(), Basis::fourier, 3), mixed_cells());
+  for (std::size_t i = mesh.space.num_vertices(); i < mesh.coefficients.size(); ++i)
+    mesh.coefficients[i] = 0.1 * source.vector();
+  write_gltf(curved, surface_scene(mesh, std::vector<double>{0.1, 0.4, 0.7, 1}, {.max_chord_percent = 0.1}));
+  const int status = run_validator("\"" + glb.string() + "\" \"" + text.string() + "\" \"" + turned.string() + "\" \"" +
+                                   curved.string() + "\"");
   if (status == 2) {
     WARN("SKIPPED: needs node and the npm package gltf-validator under SUBVOL_NODE_MODULES");
     return;
