@@ -82,7 +82,7 @@ void add_convert_command(CLI::App& app, Action& action) {
   verb->add_flag("--limit", arguments->limit,
                  "Surface formats show the limit surface of the mesh as a control cage, not its flat faces");
   verb->add_option("--intervals", arguments->writing.linear_intervals,
-                   "Of each edge of a curved cell where it is written as linear ones (.mesh, .vtk); 0: the largest order")
+                   "Of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order")
       ->check(CLI::Range(0, 64))
       ->type_name("N")
       ->capture_default_str();

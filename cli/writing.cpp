@@ -103,7 +103,8 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
   const HighOrderMesh& mesh = file.mesh;
   if (output.extension == ".usda")
     throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
-  if (output.extension == ".obj") return write_obj(output.path, polygons_of(curved_boundary(mesh, options.chord_percent)));
+  if (output.extension == ".obj")
+    return write_obj(output.path, polygons_of(curved_boundary(mesh, options.chord_percent)));
   const QualityReport quality = measure_quality(mesh);
   if (is_scene(output))
     return write_gltf(output.path, surface_scene(mesh, quality.cell_minima, scene_options(output, options)));

@@ -175,7 +175,8 @@ Scene surface_scene(const VolumeMesh& cage, const VolumeMesh* finest, const Surf
   return surface_scene(surface, patch_quality(cage, surface, quality.cell_minima), options);
 }
 
-Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima, const SurfaceSceneOptions& options) {
+Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima,
+                    const SurfaceSceneOptions& options) {
   if (!cell_minima.empty() && cell_minima.size() != mesh.space.num_cells())
     throw InputError("cell_minima: expected one value per cell");
   HighOrderPatches patches(mesh, options.crease_angle_degrees);
@@ -190,7 +191,8 @@ Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_mini
 
 CurvedBoundary curved_boundary(const HighOrderMesh& mesh, double max_chord_percent) {
   HighOrderPatches patches(mesh, 180);
-  const TessellatedSurface surface = tessellate(patches, chord_length(patches, {.max_chord_percent = max_chord_percent}));
+  const double chord = chord_length(patches, {.max_chord_percent = max_chord_percent});
+  const TessellatedSurface surface = tessellate(patches, chord);
   CurvedBoundary boundary{triangles_of(surface), {}, surface.chord_error};
   for (const Index patch : surface.quad_patches)
     boundary.faces.insert(boundary.faces.end(), 2, surface.patches[patch].face);

@@ -18,7 +18,7 @@ namespace subvol {
 struct SurfaceSceneOptions {
   std::string name = "subvol";          ///< of the root node
   double max_chord_percent = 0.005;     ///< chord error of a curved surface, per cent of its bounding box's diagonal, > 0
-  double crease_angle_degrees = 30;     ///< flat faces and curved cells meeting at more are not shaded smoothly, [0, 180]
+  double crease_angle_degrees = 30;     ///< faces that meet at more are not shaded smoothly, [0, 180]
   bool wireframe = true;                ///< a second node with the cells' edges as lines
   double metres_per_unit = 1;           ///< > 0
   UpAxis up_axis = UpAxis::y;
@@ -50,13 +50,15 @@ double chord_length(const HighOrderPatches& patches, const SurfaceSceneOptions& 
 
 /// The curved boundary of a high-order mesh, coloured by the quality of its cells, each boundary edge as a curve.
 ///
-/// Nodes, colours and attributes as for a limit surface. Normals are those of the map, and part where faces meet at more
-/// than `crease_angle_degrees`; elsewhere they are means. cell_minima: one scaled Jacobian per cell, or empty (no colours).
+/// Nodes, colours and attributes as for a limit surface. Normals are those of the map, and part where faces meet at
+/// more than `crease_angle_degrees`; elsewhere they are means.
+/// cell_minima  one scaled Jacobian per cell, or empty (no colours then).
 /// InputError: options out of range, minima of another number, what `HighOrderPatches` refuses.
 Scene surface_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima,
                     const SurfaceSceneOptions& options = {});
 
-/// The curved boundary as triangles within `max_chord_percent` of its box's diagonal, for measurements. InputError: as above.
+/// The curved boundary as triangles within `max_chord_percent` of its box's diagonal, for measurements. InputError: as
+/// above.
 CurvedBoundary curved_boundary(const HighOrderMesh& mesh, double max_chord_percent);
 
 /// The boundary of a volume mesh as it stands, flat faces, coloured by the quality of the boundary cells.

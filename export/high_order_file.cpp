@@ -185,6 +185,27 @@ std::vector<int> read_orders(const VtuArrays& file, const std::string& array) {
   return {orders.begin(), orders.end()};
 }
 
+/// Looked at before the space is built, so that a small file cannot ask for a large one.
+void require_nodes(const VtuArrays& file, const VolumeMesh& mesh, const EntityOrders& orders, std::size_t num_nodes) {
+  const MeshTopology topology(mesh);
+  const auto in_range = [](const std::vector<int>& list) {
+    return std::all_of(list.begin(), list.end(), [](int order) { return order >= 1 && order <= kMaxOrder; });
+  };
+  if (orders.edges.size() != topology.num_edges() || orders.faces.size() != topology.num_faces() ||
+      orders.cells.size() != topology.num_cells() || !in_range(orders.edges) || !in_range(orders.faces) ||
+      !in_range(orders.cells))
+    file.fail("expected an order from 1 to " + std::to_string(kMaxOrder) + " for every edge, face and cell");
+  std::size_t expected = mesh.num_vertices();
+  const auto count = [&](EntityShape shape, int order) { expected += static_cast<std::size_t>(num_modes(shape, order)); };
+  for (const int order : orders.edges) count(EntityShape::edge, order);
+  for (std::size_t f = 0; f < topology.num_faces(); ++f)
+    count(topology.face(static_cast<Index>(f)).size() == 3 ? EntityShape::triangle : EntityShape::quad, orders.faces[f]);
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) count(entity_shape(mesh.kinds[c]), orders.cells[c]);
+  if (num_nodes != expected)
+    file.fail("subvol_coefficients: expected " + std::to_string(expected) + " nodes for the orders, found " +
+              std::to_string(num_nodes));
+}
+
 std::vector<Vec3> read_coefficients(const VtuArrays& file, const VolumeMesh& mesh) {
   const auto numbers = file.get<double>("subvol_coefficients");
   if (numbers.size() % 3 != 0 || numbers.size() / 3 < mesh.num_vertices())
@@ -264,15 +285,13 @@ HighOrderFile read_high_order(const std::filesystem::path& path) {
     if (numbers.size() != mesh.num_cells()) file.fail("reference: expected one number for each cell");
     references.assign(numbers.begin(), numbers.end());
   }
+  const EntityOrders orders{read_orders(file, "subvol_edge_orders"), read_orders(file, "subvol_face_orders"),
+                            read_orders(file, "subvol_cell_orders")};
+  require_nodes(file, mesh, orders, coefficients.size());
   try {
-    ElementSpace space(mesh, basis,
-                       EntityOrders{read_orders(file, "subvol_edge_orders"), read_orders(file, "subvol_face_orders"),
-                                    read_orders(file, "subvol_cell_orders")});
-    return {{std::move(space), std::move(coefficients)}, std::move(references)};
+    return {{ElementSpace(mesh, basis, orders), std::move(coefficients)}, std::move(references)};
   } catch (const InputError& error) {
-    const std::string message = error.what();
-    if (message.starts_with(path.string())) throw;
-    file.fail(message);
+    file.fail(error.what());
   }
 }
 

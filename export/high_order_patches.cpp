@@ -57,7 +57,7 @@ HighOrderPatches::Face HighOrderPatches::make_face(const HighOrderMesh& mesh, In
   for (const Index v : space.topology().face(f))
     face.corners.push_back(canonical_vertices(face.kind)[std::find(vertices.begin(), vertices.end(), v) -
                                                          vertices.begin()]);
-  // Functions vanish on the faces that they do not belong to, up to rounding, and elsewhere not at a point as odd as this.
+  // Functions vanish, up to rounding, on the faces that they do not belong to, and elsewhere not at a point so odd.
   ShapeFunctions at = shapes(face);
   at.set_point(patch_point(face.corners, 0, 1 / std::numbers::pi, 1 / std::numbers::e));
   const auto modes = space.modes(c);

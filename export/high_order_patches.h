@@ -8,8 +8,8 @@
 
 namespace subvol {
 
-/// The curved boundary of a high-order mesh, in the patches of its straight-sided mesh: quarters of quads, where u and v
-/// are halves of the face's coordinates, and thirds of triangles, bilinear in its barycentric coordinates.
+/// The curved boundary of a high-order mesh, in the patches of its straight-sided mesh: quarters of quads, where u and
+/// v are halves of the face's coordinates, and thirds of triangles, bilinear in its barycentric coordinates.
 ///
 /// Faces of such a mesh meet in edges that are hardly ever quite smooth: an edge becomes a crease of infinite sharpness
 /// where the normals beside it differ by more than an angle.

@@ -46,8 +46,8 @@ struct TessellatedSurface {
 ///                  then is above `max_chord_error`. One quad per patch is always made. No interval is halved more than
 ///                  12 times.
 ///
-/// Normals part across creases of infinite sharpness only; elsewhere a vertex has the mean one of its patches. Where the
-/// tangents are parallel (the one face at an untagged boundary vertex, say) it is the mean one of the quads around.
+/// Normals part across creases of infinite sharpness only; elsewhere a vertex has the mean one of its patches. Where
+/// the tangents are parallel (the one face at an untagged boundary vertex, say) it is the mean one of the quads around.
 /// InputError: max_chord_error not positive. The same bits for any number of threads. Cost of a limit surface: about 2
 /// microseconds per quad.
 TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads = 4'000'000);

@@ -2,6 +2,7 @@
 #include "fit/high_order_quality.h"
 
 #include "fit/element_rule.h"
+#include "fit/high_order_certificate.h"
 #include "fit/pattern_table.h"
 #include "fit/quadrature.h"
 #include "subvol/error.h"
@@ -83,10 +84,10 @@ QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_directi
     report.add_cell(samples[c].least);
     report.num_samples += samples[c].count;
     sum += samples[c].sum;
-    report.certificate.not_certified.push_back(static_cast<Index>(c));
   }
-  report.certificate.undecided = samples.size();
   if (report.num_samples > 0) report.mean_scaled_jacobian = sum / static_cast<double>(report.num_samples);
+  report.certificate = certify(mesh.space, mesh.coefficients);
+  for (const Index c : report.certificate.invalid_cells) report.inverted_cells += report.cell_minima[c] > 0;
   report.keep_worst([&](Index c) { return mean_of_corners(mesh, c); });
   return report;
 }

@@ -125,8 +125,8 @@ void append_defects(std::string& text, const std::vector<MeshDefect>& defects) {
 }
 
 void append_orders(std::string& text, const OrderSummary& orders) {
-  append(text, "orders              %d to %d, %s basis; %zu nodes, %.1f %% of the %zu of full order\n", orders.min_order,
-         orders.max_order, to_string(orders.basis), orders.num_nodes,
+  append(text, "orders              %d to %d, %s basis; %zu nodes, %.1f %% of the %zu of full order\n",
+         orders.min_order, orders.max_order, to_string(orders.basis), orders.num_nodes,
          100.0 * static_cast<double>(orders.num_nodes) / static_cast<double>(orders.num_full_order_nodes),
          orders.num_full_order_nodes);
 }
@@ -238,7 +238,7 @@ std::string to_text(const MeshCheck& check) {
   if (check.has_boundary_geometry) {
     append(text, "volume              %.6g\n", check.volume);
     if (check.chord_error > 0)
-      append(text, "boundary            looked at as triangles within %.3g of the curved surface\n", check.chord_error);
+      append(text, "curved boundary     looked at as triangles within %.3g of it\n", check.chord_error);
     append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)\n",
            check.intersecting_faces.size(), check.num_intersecting_triangle_pairs);
     if (check.num_degenerate_boundary_triangles > 0)

@@ -86,10 +86,11 @@ struct MeshCheck {
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {});
 
-/// The same of a curved mesh. Defects are those of the straight-sided mesh, whose cells may be inverted; there is no audit.
+/// The same of a curved mesh. Defects are those of the straight-sided mesh, whose cells may be inverted; there is no
+/// audit.
 ///
 /// boundary               what stands for its surface in the parts that need triangles.
-/// samples_per_direction  as for `measure_quality` of a high-order mesh; those of `options` and its quads have no meaning.
+/// samples_per_direction  as for `measure_quality` of a high-order mesh; that of `options` and its quads mean nothing.
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {}, int samples_per_direction = 0);
 

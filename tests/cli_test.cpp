@@ -457,7 +457,8 @@ TEST_CASE("check and convert take a high-order .vtu", "[cli]") {
   CHECK(json.contains("boundary_chord_error"));
   CHECK_FALSE(json.contains("audit"));
 
-  const Run convert = place.run("convert curved.vtu -o same.vtu -o out.msh -o out.glb -o out.obj -o out.mesh --intervals 3");
+  const Run convert =
+      place.run("convert curved.vtu -o same.vtu -o out.msh -o out.glb -o out.obj -o out.mesh --intervals 3");
   INFO(convert.err);
   REQUIRE(convert.status == 0);
   CHECK(subvol::read_high_order(place / "same.vtu").mesh.coefficients == mesh.coefficients);

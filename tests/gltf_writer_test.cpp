@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/gltf_writer.h"
 
-#include "export/export.h"
-
 #include "export/color_map.h"
+#include "export/export.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
 #include "tests/element_fixtures.h"
@@ -20,6 +19,7 @@
 #include <sstream>
 
 using namespace subvol;
+using namespace subvol::test;
 using subvol_tests::GlbFile;
 
 namespace {

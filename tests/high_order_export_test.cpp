@@ -127,7 +127,8 @@ TEST_CASE("the scene of a high-order mesh has its curved surface and curved edge
           surface.attributes[0].values.end());
   const MeshTopology& topology = mesh.space.topology();
   std::size_t num_boundary_edges = 0;
-  for (std::size_t e = 0; e < topology.num_edges(); ++e) num_boundary_edges += topology.is_boundary_edge(static_cast<Index>(e));
+  for (std::size_t e = 0; e < topology.num_edges(); ++e)
+    num_boundary_edges += topology.is_boundary_edge(static_cast<Index>(e));
   CHECK(wire.indices.size() / 2 > 2 * num_boundary_edges);
   const std::string bytes = gltf_bytes(scene, GltfContainer::glb);
   CHECK(GlbFile(bytes).attribute<float>("surface", "NORMAL").size() == 3 * surface.positions.size());
@@ -155,7 +156,8 @@ TEST_CASE("curved cells of linear shape have the quality of linear ones") {
   jitter(straight, 0.1);
   for (const Basis basis : kBothBases) {
     const ElementSpace space(straight, basis, 3);
-    const QualityReport curved = measure_quality(HighOrderMesh(space, straight), 5), linear = measure_quality(straight, 5);
+    const QualityReport curved = measure_quality(HighOrderMesh(space, straight), 5);
+    const QualityReport linear = measure_quality(straight, 5);
     CHECK(curved.num_samples == linear.num_samples);
     CHECK(curved.mean_scaled_jacobian == Approx(linear.mean_scaled_jacobian));
     for (std::size_t c = 0; c < 4; ++c) CHECK(curved.cell_minima[c] == Approx(linear.cell_minima[c]));
