@@ -105,12 +105,11 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
     throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
   if (output.extension == ".obj")
     return write_obj(output.path, polygons_of(curved_boundary(mesh, options.chord_percent)));
-  const QualityReport quality = measure_quality(mesh);
-  if (is_scene(output))
-    return write_gltf(output.path, surface_scene(mesh, quality.cell_minima, scene_options(output, options)));
+  const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
+  const std::vector<double> minima = is_linear ? std::vector<double>{} : measure_quality(mesh).cell_minima;
+  if (is_scene(output)) return write_gltf(output.path, surface_scene(mesh, minima, scene_options(output, options)));
   write_volume(output.path, mesh,
-               {.cell_minima = quality.cell_minima, .references = file.references,
-                .linear_intervals = options.linear_intervals});
+               {.cell_minima = minima, .references = file.references, .linear_intervals = options.linear_intervals});
 }
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
