@@ -41,14 +41,16 @@ struct FitLevel {
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);
 
-/// Edge lengths of the ideal box of each hex, between a cube of common size (own_share 0) and the cell's own (1):
+/// Lengths that stretch the ideal cell (`element_rule.h`) of each cell along its coordinates, between one size for all
+/// (own_share 0) and the cell's own (1):
 ///
-///   h_ci = common^(1 - own_share) own_ci^own_share,  all rescaled so that sum_c h_c0 h_c1 h_c2 = volume
+///   h_ci = common^(1 - own_share) own_ci^own_share,  all rescaled so that the stretched ideal cells have the volume
 ///
-/// own_ci is the mean length of the cell's four edges along its direction i. A box of the cell's own proportions has the
-/// cell pay for shear and for change, not for being long or flat.
+/// own_ci is the mean length of a hex's four edges along its direction i; of the edges around a prism's triangles for both
+/// directions there, and of those across; of all edges of a tet. A box of the cell's own proportions has the cell pay for
+/// shear and for change, not for being long or flat.
 ///
-/// mesh    hexes only; nodes  its vertices' positions; lengths below a thousandth of the common size are raised to it.
+/// nodes   the vertices' positions; lengths below a thousandth of the common size are raised to it.
 /// volume  > 0, in the cube of the nodes' unit.
 std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, double own_share);
 

@@ -2,6 +2,7 @@
 #include "fit/high_order_energy.h"
 
 #include "fit/element_rule.h"
+#include "fit/high_order_certificate.h"
 #include "fit/step_limit.h"
 #include "fit/wide.h"
 #include "subvol/error.h"
@@ -631,27 +632,8 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
   return steps.step();
 }
 
-/// Determinants at all points of a grid twice as dense as the quadrature's.
 std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) const {
-  std::vector<int> denser(points_);
-  for (int& n : denser) n = 2 * n - 1;
-  const HighOrderEnergy dense(*space_, std::vector<Vec3>(space_->num_cells(), Vec3::Ones()), denser);
-  std::vector<char> bad(space_->num_cells(), 0);
-  dense.sum_batches([&](std::size_t g, std::size_t b, Sweep& sweep) {
-    const Group& group = dense.groups_[g];
-    sweep.load(b, nodes);
-    sweep.template run<false>([&](std::size_t, const Wide* j) {
-      const Wide det = j[0] * (j[4] * j[8] - j[5] * j[7]) - j[1] * (j[3] * j[8] - j[5] * j[6]) +
-                       j[2] * (j[3] * j[7] - j[4] * j[6]);
-      for (int l = 0; l < group.active[b]; ++l)
-        if (!(det[l] > 0)) bad[group.batches[b][l]] = 1;
-    });
-    return 0.0;
-  });
-  std::vector<Index> cells;
-  for (std::size_t c = 0; c < bad.size(); ++c)
-    if (bad[c]) cells.push_back(static_cast<Index>(c));
-  return cells;
+  return certify(*space_, nodes).not_certified;
 }
 
 void HighOrderEnergy::densify(std::span<const Index> cells) {

@@ -2,41 +2,8 @@
 #include "fit/stage_runner.h"
 
 #include "fit/closest_point_energy.h"
-#include "fit/surface_distance.h"
 #include "fit/surface_energy.h"
-#include "subvol/error.h"
-
-#include <algorithm>
-#include <cmath>
-
 namespace subvol {
-
-Normalisation::Normalisation(const TriangleMesh& target) {
-  diagonal = bounding_box_diagonal(target);
-  if (!(diagonal > 0) || !std::isfinite(diagonal))
-    throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");
-  centre = TargetSurface(target).centre();
-}
-
-std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = (p - centre) / diagonal;
-  return points;
-}
-
-std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = centre + diagonal * p;
-  return points;
-}
-
-TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation) {
-  mesh.positions = normalisation.to_unit(std::move(mesh.positions));
-  return mesh;
-}
-
-TargetSurface sampled_target(const TriangleMesh& target, double area, std::size_t num_samples) {
-  const double spacing = 1.8 * std::sqrt(area / static_cast<double>(std::max(num_samples, kLeastTargetSamples)));
-  return TargetSurface(target, {.sample_spacing = spacing});
-}
 
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,

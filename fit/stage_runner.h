@@ -13,23 +13,6 @@
 
 namespace subvol {
 
-/// Centred coordinates in which the target's box has the diagonal 1: nothing depends on the origin or the unit.
-struct Normalisation {
-  Vec3 centre = Vec3::Zero();
-  double diagonal = 1;
-
-  /// InputError: a target without extent, or with coordinates that are not finite.
-  explicit Normalisation(const TriangleMesh& target);
-  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
-  std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
-};
-
-TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation);
-
-/// The target sampled about as densely as the fitted surface: sparse sites on large facets would claim points of the
-/// surface that belong to a neighbouring facet.
-TargetSurface sampled_target(const TriangleMesh& target, double area, std::size_t num_samples);
-
 /// E_S between samples of the fitted surface and a target, which must outlive it.
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,

@@ -3,16 +3,13 @@
 
 #include "fit/boundary_triangles.h"
 #include "fit/certificate.h"
-#include "fit/closest_point.h"
 #include "fit/fit_level.h"
 #include "fit/fit_schedule.h"
+#include "fit/fit_target.h"
 #include "fit/followed_creases.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
-#include "fit/soup_topology.h"
 #include "fit/stage_runner.h"
-#include "fit/surface_distance.h"
-#include "fit/target_surface.h"
 #include "fit/volume_energy.h"
 #include "subvol/audit.h"
 #include "subvol/boundary.h"
@@ -80,10 +77,7 @@ class SubdivisionFit {
   bool finest() const { return number_ == options_.levels; }
 
   FitOptions options_;
-  Normalisation normalisation_;
-  TriangleMesh target_mesh_;
-  ClosestPoint target_tree_;
-  TargetSurface target_;           ///< sampled for the current level
+  FitTarget target_;               ///< sampled for the current level
   VolumeMesh template_;            ///< normalised, with its creases
   VolumeMesh control_;             ///< the control mesh (its last refinement, for cage-only fits)
   VolumeMesh cage_;                ///< the mesh whose vertices are the unknowns
@@ -107,45 +101,32 @@ class SubdivisionFit {
 
 SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options)
     : options_((check_options(options), options)),
-      normalisation_(target),
-      target_mesh_(normalised(target, normalisation_)),
-      target_tree_(target_mesh_),
-      target_(target_mesh_),
+      target_(target),
       template_(template_mesh),
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
-  template_.positions = normalisation_.to_unit(template_.positions);
+  template_.positions = target_.normalisation.to_unit(template_.positions);
   if (options.crease_angle_degrees || !template_.tags.creases.empty())
-    template_creases_ = FollowedCreases(target_mesh_, options.crease_angle_degrees, template_);
+    template_creases_ = FollowedCreases(target_.mesh, options.crease_angle_degrees, template_);
 }
 
 /// What the report says of the input, and what the schedule makes of it.
 void SubdivisionFit::look_over_template() {
   FitReport& report = result_.report;
   report.warnings = audit(template_).warnings;
-  const TriangleMesh boundary = refined_triangles(boundary_surface(template_, MeshTopology(template_)));
-  const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), target_mesh_, target_tree_);
-  report.initial_distance_mean_percent = 100 * distance.mean();
-  report.initial_distance_max_percent = 100 * distance.max();
-  schedule_ = make_schedule(options_, distance.mean() / target_.length(), template_creases_.hold_the_surface());
-  const SoupTopology wanted = soup_topology(target_mesh_.positions, target_mesh_.triangles);
-  const long euler_number = soup_topology(boundary.positions, boundary.triangles).euler_number;
-  if (wanted.closed_share == 1 && wanted.euler_number != euler_number)
-    report.warnings.push_back(format("Euler numbers differ (target %ld, template's boundary %ld): their handles or "
-                                     "components do, and the fit cannot change those",
-                                     wanted.euler_number, euler_number));
-  if (target_.volume_source() != VolumeSource::signed_sum)
-    report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
+  const double distance = target_.compare_start(
+      refined_triangles(boundary_surface(template_, MeshTopology(template_))), report);
+  schedule_ = make_schedule(options_, distance / target_.surface.length(), template_creases_.hold_the_surface());
 }
 
 void SubdivisionFit::prepare_level() {
   const double begin = runner_.seconds();
-  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.triangles().size() / 2, finest());
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.triangles().size() / 2, finest());
   limit_check_.reset();
   creases_.refine(level_);
-  target_ = sampled_target(target_mesh_, target_.area(), level_.samples.num_rows());
-  ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.volume(),
+  target_.sample(level_.samples.num_rows());
+  ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.surface.volume(),
                              number_ == 1 ? own_box_share_ : 1);
   seconds_["levels"] += runner_.seconds() - begin;
 }
@@ -155,10 +136,10 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 }
 
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
-  std::unique_ptr<SurfaceTerm> term = make_surface_term(target_, level_.sample_triangles, level_.samples.num_rows(),
+  std::unique_ptr<SurfaceTerm> term = make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(),
                                                         stage.tangential_weight, options_.correspondence);
   if (!creases_.curves().empty())
-    term->add_creases(creases_.energy(level_, kCreaseWidth * target_.length(), stage.tangential_weight));
+    term->add_creases(creases_.energy(level_, kCreaseWidth * target_.surface.length(), stage.tangential_weight));
   return term;
 }
 
@@ -235,9 +216,7 @@ double SubdivisionFit::measured_mean() {
   std::vector<TriangleMesh> surfaces = {refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))};
   if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
   double mean = 0;
-  for (const TriangleMesh& surface : surfaces)
-    mean = std::max(mean, surface_distance(surface, ClosestPoint(surface), target_mesh_, target_tree_,
-                                           {.extremes = false}).mean());
+  for (const TriangleMesh& surface : surfaces) mean = std::max(mean, target_.mean_distance(surface));
   mean_ = 100 * mean;
   if (!result_.report.stages.empty()) result_.report.stages.back().mean_distance_percent = *mean_;
   seconds_["distance"] += runner_.seconds() - begin;
@@ -305,13 +284,13 @@ bool SubdivisionFit::run_stages() {
 
 void SubdivisionFit::store_result() {
   result_.mesh = level_.mesh;
-  result_.mesh.positions = normalisation_.from_unit(level_.nodes.apply(unknowns_));
+  result_.mesh.positions = target_.normalisation.from_unit(level_.nodes.apply(unknowns_));
   result_.cage = cage_;
-  result_.cage.positions = normalisation_.from_unit(unknowns_);
+  result_.cage.positions = target_.normalisation.from_unit(unknowns_);
   if (creases_.curves().empty()) return;
   const TriangleMesh limit = limit_triangles();
   CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
-  creases.farthest = normalisation_.from_unit({creases.farthest})[0];
+  creases.farthest = target_.normalisation.from_unit({creases.farthest})[0];
   result_.report.creases = creases;
 }
 

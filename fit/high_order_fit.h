@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/fit_report.h"
+#include "fit/high_order_mesh.h"
+#include "fit/subdivision_fit.h"
+
+#include <functional>
+#include <optional>
+
+namespace subvol {
+
+struct HighOrderFitOptions {
+  int order = 4;                                 ///< of the finished mesh, 1..kMaxOrder
+  Basis basis = Basis::fourier;
+  std::optional<double> tolerance_percent;       ///< lambda is lowered until the mean distance is below; > 0
+  double lambda_close = 0.05;                    ///< > 0
+  SolverKind solver = SolverKind::newton;
+  Correspondence correspondence = Correspondence::closest;
+  int max_iterations = 0;                        ///< per stage; 0: the schedule's own
+  double time_limit_seconds = 0;                 ///< 0: none
+  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+};
+
+struct HighOrderFitResult {
+  HighOrderMesh mesh;
+  FitReport report;
+};
+
+/// Fits curved elements: the template at order 1, then orders raised step by step (paper: Algorithm 1).
+///
+/// target   triangles in any state that encloses a volume; the unit of length is the target's.
+/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target is.
+/// returns  the best state reached; no step makes a cell lose its certificate (`VolumeTerm::uncertified`).
+/// InputError: options out of range, an empty target, a template that is not sound.
+HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
+                                  const HighOrderFitOptions& options);
+
+}  // namespace subvol

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "element_fixtures.h"
+#include "fit/boundary_samples.h"
+#include "fit/high_order_energy.h"
+#include "fit/high_order_fit.h"
+#include "fit/surface_distance.h"
+#include "samples/shapes.h"
+#include "subvol/error.h"
+#include "subvol/mesh_io.h"
+#include "subvol/surface_io.h"
+#include "tests/data.h"
+
+#include <catch2/catch.hpp>
+#include <omp.h>
+
+#include <cmath>
+#include <string>
+
+using namespace subvol;
+using namespace subvol::test;
+
+namespace {
+
+HighOrderFitOptions of_order(int order) {
+  HighOrderFitOptions options;
+  options.order = order;
+  return options;
+}
+
+double percent(const HighOrderMesh& mesh, const TriangleMesh& target) {
+  const BoundarySamples samples = make_boundary_samples(mesh.space, 16);
+  const TriangleMesh surface{samples.positions.apply(mesh.coefficients), samples.triangles};
+  return 100 * surface_distance(surface, target).mean() / bounding_box_diagonal(target);
+}
+
+/// Whether every determinant at n points a direction is positive.
+bool positive(const HighOrderMesh& mesh, int n) {
+  const HighOrderEnergy dense(mesh.space, std::vector(mesh.space.num_cells(), Vec3(1, 1, 1)),
+                              std::vector(mesh.space.num_cells(), n));
+  return std::isfinite(dense.value(mesh.coefficients));
+}
+
+}  // namespace
+
+TEST_CASE("curved elements reproduce the samples' surfaces, closer with every order, in both bases") {
+  for (const samples::Sample& sample : samples::all_samples())
+    for (Basis basis : kBothBases) {
+      CAPTURE(sample.name, to_string(basis));
+      double first = 0, before = 100;
+      for (int order : {1, 2, 4}) {
+        HighOrderFitOptions options = of_order(order);
+        options.basis = basis;
+        const HighOrderFitResult result = fit_high_order(sample.target, sample.template_mesh, options);
+        CHECK(result.report.stop_reason == StopReason::converged);
+        CHECK(result.mesh.space.max_order() == order);
+        CHECK(positive(result.mesh, 9));
+        const double distance = percent(result.mesh, sample.target);
+        CHECK(distance < before);
+        if (order == 1) first = distance;
+        before = distance;
+      }
+      CHECK(before < 0.2 * first);
+    }
+}
+
+TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says that it is not") {
+  const samples::Sample sample = samples::ball_sample();
+  const double plain = percent(fit_high_order(sample.target, sample.template_mesh, of_order(4)).mesh, sample.target);
+  HighOrderFitOptions options = of_order(4);
+  options.tolerance_percent = 0.9 * plain;
+  const HighOrderFitResult met = fit_high_order(sample.target, sample.template_mesh, options);
+  CHECK(met.report.stop_reason == StopReason::converged);
+  CHECK(percent(met.mesh, sample.target) < plain);
+  options.tolerance_percent = 1e-6;
+  CHECK(fit_high_order(sample.target, sample.template_mesh, options).report.stop_reason ==
+        StopReason::tolerance_missed);
+}
+
+TEST_CASE("a high-order fit has the same bits for one and two threads") {
+  const samples::Sample sample = samples::ball_sample();
+  const int threads = omp_get_max_threads();
+  std::vector<std::vector<Vec3>> results;
+  for (int n : {1, 2}) {
+    omp_set_num_threads(n);
+    results.push_back(fit_high_order(sample.target, sample.template_mesh, of_order(2)).mesh.coefficients);
+  }
+  omp_set_num_threads(threads);
+  CHECK(results[0] == results[1]);
+}
+
+TEST_CASE("a high-order fit scales with its inputs, bit for bit where scaling is exact") {
+  const samples::Sample sample = samples::ball_sample();
+  samples::Sample scaled = sample;
+  for (auto* points : {&scaled.target.positions, &scaled.template_mesh.positions})
+    for (Vec3& p : *points) p *= 1024;
+  const auto plain = fit_high_order(sample.target, sample.template_mesh, of_order(2));
+  const auto other = fit_high_order(scaled.target, scaled.template_mesh, of_order(2));
+  for (std::size_t i = 0; i < plain.mesh.coefficients.size(); ++i)
+    CHECK(other.mesh.coefficients[i] == Vec3(1024 * plain.mesh.coefficients[i]));
+}
+
+TEST_CASE("a high-order fit that is cancelled returns what it has") {
+  const samples::Sample sample = samples::ball_sample();
+  HighOrderFitOptions options = of_order(4);
+  int told = 0;
+  options.progress = [&](const FitProgress& progress) {
+    CHECK((progress.fraction >= 0 && progress.fraction <= 1));
+    return ++told < 5;
+  };
+  const HighOrderFitResult result = fit_high_order(sample.target, sample.template_mesh, options);
+  CHECK(result.report.stop_reason == StopReason::cancelled);
+  CHECK(told == 5);
+  CHECK(positive(result.mesh, 5));
+}
+
+TEST_CASE("a high-order fit refuses what it cannot do") {
+  const samples::Sample sample = samples::ball_sample();
+  for (int order : {0, 17, -1})
+    CHECK_THROWS_AS(fit_high_order(sample.target, sample.template_mesh, of_order(order)), InputError);
+  CHECK_THROWS_AS(fit_high_order({}, sample.template_mesh, of_order(2)), InputError);
+  CHECK_THROWS_AS(fit_high_order(sample.target, {}, of_order(2)), InputError);
+  HighOrderFitOptions options = of_order(2);
+  options.tolerance_percent = -1;
+  CHECK_THROWS_AS(fit_high_order(sample.target, sample.template_mesh, options), InputError);
+}
+
+TEST_CASE("real templates of prisms and tets are fitted with curved elements") {
+  const auto data = data_dir();
+  if (!data) {
+    WARN("SKIPPED: the folder of real inputs is not there");
+    return;
+  }
+  for (const char* name : {"mixed_prismlayer_bone", "tet_hand"}) {
+    CAPTURE(name);
+    const TriangleMesh target = read_triangle_mesh(*data / "fit" / name / "target.off");
+    const VolumeMesh template_mesh = read_volume_mesh(*data / "fit" / name / "template.mesh");
+    const HighOrderFitResult result = fit_high_order(target, template_mesh, of_order(2));
+    CHECK(result.report.stop_reason == StopReason::converged);
+    CHECK(positive(result.mesh, 5));
+    CHECK(percent(result.mesh, target) < 0.25 * result.report.initial_distance_mean_percent);
+  }
+}
