@@ -22,14 +22,15 @@ class HexBoxes {
     int level = 0;
     std::array<int, 3> index{0, 0, 0};
   };
-  static constexpr int kNumCorners = 8, kNumChildren = 8;
+  static constexpr int kNumChildren = 8, kLevelsPerDepth = 1;
 
   HexBoxes(Basis basis, int order);
 
   /// Takes a cell by its modes and their coefficients, relative to a point nearby.
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
 
-  static int max_level() { return LineModels::kMaxLevel; }
+  static Box root() { return {}; }
+  static int num_corners() { return 8; }
   static std::array<Box, kNumChildren> children(const Box& box);
   static Vec3 corner_point(const Box& box, int corner);
 
@@ -41,6 +42,8 @@ class HexBoxes {
   const Mat3& remainder(const Box& box);
   /// Whether the modelling error is so large that no bound can be hoped for.
   bool is_hopeless(const Box& box);
+  /// Whether no part of the box can be decided either: models get better with every level.
+  static bool is_stuck(const Box&) { return false; }
   /// det of dx/du over that of `matrices`.
   static double determinant_scale(const Box&) { return 1; }
 

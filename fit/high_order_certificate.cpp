@@ -2,6 +2,7 @@
 #include "fit/high_order_certificate.h"
 
 #include "fit/hex_boxes.h"
+#include "fit/simplex_boxes.h"
 #include "subvol/error.h"
 
 #include <Eigen/LU>
@@ -11,7 +12,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <queue>
 #include <string>
 
 namespace subvol {
@@ -24,6 +24,7 @@ constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
 /// One cell: its functions, and its coefficients with signs, relative to its first vertex.
 struct Cell {
   ShapeFunctions* shapes;
+  int order;
   std::span<const LocalMode> modes;
   std::span<const Vec3> coefficients;
   Vec3 total;  ///< sum of |coefficient|
@@ -42,39 +43,45 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
     cell.shapes->value(cell.modes[a], gradient);
     jacobian += cell.coefficients[a] * gradient.transpose();
   }
-  // Gradients are below 32 in size; they are good to 500 roundings of that (the sine of 16 pi x), their sum to one more
-  // per mode.
-  const Vec3 error = 32 * (static_cast<double>(cell.modes.size()) + 500) * kRoundoff * cell.total;
+  // What gradients are made of is below `size`, good to 500 roundings (the sine of 16 pi x), their sum to one per mode.
+  const double size = cell.shapes->kind() == CellKind::hex ? 8 : 8 * cell.order * cell.order;
+  const Vec3 error = size * (static_cast<double>(cell.modes.size()) + 500) * kRoundoff * cell.total;
   const Vec3 rows = jacobian.cwiseAbs().rowwise().sum() + 3 * error;
   const double margin = 3 * (error[0] * rows[1] * rows[2] + error[1] * rows[0] * rows[2] + error[2] * rows[0] * rows[1]) +
                         16 * kRoundoff * rows[0] * rows[1] * rows[2];
   return {jacobian.determinant(), 2 * margin};
 }
 
-/// Best-first search for the sign of det J over one cell: the box with the lowest corner comes next.
+/// Best-first search for the sign of det J over one cell: the box with the lowest corner comes next. A box is halved in
+/// each direction, or (simplices) one direction at a time.
 template <class Boxes>
 class Search {
  public:
   using Box = typename Boxes::Box;
 
   Search(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
-      : boxes_(boxes), cell_(cell), options_(options), max_level_(std::min(options.max_depth, Boxes::max_level())) {
+      : boxes_(boxes), cell_(cell), options_(options), max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, LineModels::kMaxLevel)) {
     result_.lower_bound = kInfinity;
     result_.witness_determinant = kInfinity;
   }
 
   CellCertificate run() {
-    look_at(Box{}, -kInfinity);
+    look_at(boxes_.root(), -kInfinity);
     while (!refuted_ && !open_.empty()) {
-      const Open next = open_.top();
-      open_.pop();
-      if (next.box.level >= max_level_ || result_.boxes + Boxes::kNumChildren > options_.max_boxes) {
+      std::pop_heap(open_.begin(), open_.end());
+      const Open next = std::move(open_.back());
+      open_.pop_back();
+      if (next.box.level >= max_level_) {
         decided_ = false;
-        if (result_.boxes + Boxes::kNumChildren > options_.max_boxes) break;
         continue;
       }
-      for (const Box& child : Boxes::children(next.box)) {
-        look_at(child, next.lowest);
+      auto children = boxes_.children(next.box);
+      if (result_.boxes + static_cast<int>(children.size()) > options_.max_boxes) {
+        decided_ = false;
+        break;
+      }
+      for (Box& child : children) {
+        look_at(std::move(child), next.lowest);
         if (refuted_) break;
       }
     }
@@ -83,7 +90,7 @@ class Search {
                                   : CellValidity::undecided;
     if (result_.validity != CellValidity::valid) result_.lower_bound = -kInfinity;
     if (result_.witness_determinant == kInfinity) {
-      result_.witness = Boxes::corner_point(Box{}, 0);
+      result_.witness = boxes_.corner_point(boxes_.root(), 0);
       result_.witness_determinant = evaluate(cell_, result_.witness).value;
     }
     return result_;
@@ -100,11 +107,11 @@ class Search {
   };
 
   /// Decides a box, or keeps it for later; looks for a witness at its corners.
-  void look_at(const Box& box, double parent_lowest) {
+  void look_at(Box box, double parent_lowest) {
     ++result_.boxes;
-    if (boxes_.is_hopeless(box)) return keep(box, parent_lowest);
+    if (boxes_.is_hopeless(box)) return keep(std::move(box), parent_lowest);
     const ControlMatrices& matrices = boxes_.matrices(box);
-    const double scale = Boxes::determinant_scale(box);
+    const double scale = boxes_.determinant_scale(box);
     const double bound = scale * determinant_bound(matrices, boxes_.remainder(box));
     if (bound > 0) {
       result_.lower_bound = std::min(result_.lower_bound, bound);
@@ -112,12 +119,15 @@ class Search {
     }
     int lowest_corner = 0;
     double lowest = kInfinity;
-    for (int corner = 0; corner < Boxes::kNumCorners; ++corner) {
+    for (int corner = 0; corner < boxes_.num_corners(); ++corner) {
       const double value = scale * matrices[boxes_.corner_matrix(corner)].determinant();
       if (value < lowest) lowest = value, lowest_corner = corner;
     }
-    if (lowest <= 0) lowest = try_witness(Boxes::corner_point(box, lowest_corner));
-    keep(box, lowest);
+    if (lowest <= 0) lowest = try_witness(boxes_.corner_point(box, lowest_corner));
+    if (lowest > 0 && boxes_.is_stuck(box))
+      decided_ = false;
+    else
+      keep(std::move(box), lowest);
   }
 
   /// The model's word does not count against a cell, its own functions' does.
@@ -131,14 +141,17 @@ class Search {
     return exact.value;
   }
 
-  void keep(const Box& box, double lowest) { open_.push({lowest, num_kept_++, box}); }
+  void keep(Box box, double lowest) {
+    open_.push_back({lowest, num_kept_++, std::move(box)});
+    std::push_heap(open_.begin(), open_.end());
+  }
 
   Boxes& boxes_;
   const Cell& cell_;
   const CertificateOptions& options_;
   int max_level_;
   bool refuted_ = false, decided_ = true;
-  std::priority_queue<Open> open_;
+  std::vector<Open> open_;  // a heap
   std::size_t num_kept_ = 0;
   CellCertificate result_;
 };
@@ -156,6 +169,7 @@ struct HighOrderCertifier::Buffers {
   std::vector<Vec3> coefficients;
   std::map<std::pair<CellKind, int>, ShapeFunctions> shapes;  // by kind and order
   std::map<int, HexBoxes> hexes;                              // by order
+  std::map<std::pair<CellKind, int>, SimplexBoxes> simplices;
 };
 
 HighOrderCertifier::HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options)
@@ -172,7 +186,7 @@ CellCertificate HighOrderCertifier::certify(std::span<const Vec3> coefficients, 
   const CellKind kind = space_->kind(c);
   const auto nodes = space_->nodes(c);
   const auto signs = space_->signs(c);
-  Cell cell{nullptr, space_->modes(c), {}, Vec3::Zero()};
+  Cell cell{nullptr, order, space_->modes(c), {}, Vec3::Zero()};
 
   const Vec3 origin = coefficients[space_->vertices(c)[0]];
   buffers_->coefficients.resize(nodes.size());
@@ -198,9 +212,10 @@ CellCertificate HighOrderCertifier::certify(std::span<const Vec3> coefficients, 
     boxes.set_cell(cell.modes, cell.coefficients);
     return Search<HexBoxes>(boxes, cell, options_).run();
   }
-  CellCertificate result;
-  result.lower_bound = -kInfinity;
-  return result;
+  SimplexBoxes& boxes =
+      buffers_->simplices.try_emplace({kind, order}, kind, space_->basis(), order).first->second;
+  boxes.set_cell(cell.modes, cell.coefficients);
+  return Search<SimplexBoxes>(boxes, cell, options_).run();
 }
 
 CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,

@@ -13,7 +13,9 @@ namespace subvol {
 ///
 /// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
 /// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
-/// for legendre up to degree 8, close for all others. Rounding is bounded a priori, about 1e-13 of the product of the
+/// for legendre up to degree 8, close for all others, and better with every halving. Tets and the triangles of prisms are
+/// modelled once (`SimplexModels`): exact for legendre; with fourier, cells closer to inversion than the model is to the
+/// map end undecided, never wrong. Rounding is bounded a priori, about 1e-13 of the product of the
 /// lengths of a hex of order 4. A witness is a point where det J, computed from the shape functions themselves, is
 /// negative beyond its own rounding.
 /// Paper: left open there for the Fourier basis (section 5).
@@ -21,7 +23,7 @@ namespace subvol {
 /// Holds buffers: one object per thread.
 class HighOrderCertifier {
  public:
-  /// `space` must outlive it. InputError: options out of range. max_depth above 12 counts as 12 for hexes.
+  /// `space` must outlive it. InputError: options out of range. max_depth above 12 counts as 12.
   explicit HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options = {});
   ~HighOrderCertifier();
   HighOrderCertifier(HighOrderCertifier&&) noexcept;

@@ -90,16 +90,18 @@ HighOrderMesh scaled_modes(const HighOrderMesh& mesh, double factor) {
   return result;
 }
 
-constexpr CellKind kProvedKinds[] = {CellKind::hex};
+/// Whether models get better as parts get smaller, so that every cell but those at the border of validity is decided.
+bool is_decided(CellKind kind, Basis basis) { return kind == CellKind::hex || basis == Basis::legendre; }
 
 }  // namespace
 
 TEST_CASE("affine cells of any order are certified in one box, with their exact determinant",
           "[high_order_certificate]") {
   const Mat3 matrix = (Mat3() << 1, 0.6, -0.2, 0.1, 0.8, 0.4, -0.5, 0.2, 7).finished();
-  for (const CellKind kind : kProvedKinds)
+  for (const CellKind kind : kAllKinds)
     for (const Basis basis : kBothBases)
       for (const int order : {1, 2, 3, 4, 8, 12, kMaxOrder}) {
+        if (kind != CellKind::hex && order > 8) continue;  // tables take a second
         VolumeMesh mesh = single_cell(kind);
         for (Vec3& p : mesh.positions) p = matrix * p + Vec3(100, -20, 3);
         const HighOrderMesh straight(ElementSpace(mesh, basis, order), mesh);
@@ -116,10 +118,11 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
           "[high_order_certificate]") {
   PointSource source(101);
   std::size_t valid = 0, invalid = 0, undecided = 0;
-  for (const CellKind kind : kProvedKinds)
+  for (const CellKind kind : kAllKinds)
     for (const Basis basis : kBothBases)
       for (const auto& [order, repeats] : {std::pair{2, 60}, std::pair{4, 40}, std::pair{8, 12}, std::pair{12, 4}})
         for (int repeat = 0; repeat < repeats; ++repeat) {
+          if (kind != CellKind::hex && order > 8) continue;
           VolumeMesh straight = single_cell(kind);
           jitter(straight, 0.15, source.random()());
           const HighOrderMesh mesh =
@@ -134,9 +137,10 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
           if (result.validity == CellValidity::invalid) CHECK(twin.determinant(result.witness) < 0);
           ++(result.validity == CellValidity::valid ? valid
              : result.validity == CellValidity::invalid ? invalid : undecided);
+          if (is_decided(kind, basis)) CHECK(result.validity != CellValidity::undecided);
         }
-  CAPTURE(valid, invalid);
-  CHECK(undecided == 0);
+  CAPTURE(valid, invalid, undecided);
+  CHECK(undecided < (valid + invalid) / 20);
   CHECK(valid > (valid + invalid) / 4);
   CHECK(invalid > (valid + invalid) / 4);
 }
@@ -144,10 +148,11 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
 TEST_CASE("cells that come close to inversion are decided on both sides", "[high_order_certificate]") {
   constexpr double kGap = 1e-5;  // of the amplitude
   PointSource source(103);
-  for (const CellKind kind : kProvedKinds)
+  for (const CellKind kind : kAllKinds)
     for (const Basis basis : kBothBases)
       for (const auto& [order, repeats] : {std::pair{2, 4}, std::pair{4, 3}, std::pair{8, 1}, std::pair{12, 1}})
         for (int repeat = 0; repeat < repeats; ++repeat) {
+          if (!is_decided(kind, basis) || (kind != CellKind::hex && order > 4)) continue;
           const HighOrderMesh mesh = curved(single_cell(kind), basis, order, 0.3, source);
           const auto certify_scaled = [&](double t) {
             return HighOrderCertifier(mesh.space, {.max_depth = 12, .max_boxes = 20000})
@@ -157,12 +162,16 @@ TEST_CASE("cells that come close to inversion are decided on both sides", "[high
           CAPTURE(kind, basis, order, repeat);
           while (high - low > kGap * high) {
             const double middle = 0.5 * (low + high);
-            const CellCertificate result = certify_scaled(middle);
-            const CellValidity validity = result.validity;
-            CAPTURE(low, high, result.boxes, result.witness_determinant, result.witness);
-            REQUIRE(validity != CellValidity::undecided);
+            const CellValidity validity = certify_scaled(middle).validity;
+            if (validity == CellValidity::undecided) {  // by chance as close to the border as rounding is
+              low = (1 - kGap) * middle, high = (1 + kGap) * middle;
+              break;
+            }
             (validity == CellValidity::valid ? low : high) = middle;
           }
+          CAPTURE(low, high);
+          CHECK(certify_scaled(low).validity == CellValidity::valid);
+          CHECK(certify_scaled(high).validity == CellValidity::invalid);
           const HighOrderMesh below = scaled_modes(mesh, low), above = scaled_modes(mesh, high);
           const double least = Twin(below, 0).minimum(order > 8 ? 6 : 10);
           CHECK(certify_scaled(low).lower_bound <= least);
@@ -172,7 +181,7 @@ TEST_CASE("cells that come close to inversion are decided on both sides", "[high
 
 TEST_CASE("order 1 agrees with the certificate of linear cells", "[high_order_certificate]") {
   PointSource source(107);
-  for (const CellKind kind : kProvedKinds)
+  for (const CellKind kind : kAllKinds)
     for (int repeat = 0; repeat < 2000; ++repeat) {
       VolumeMesh mesh = single_cell(kind);
       jitter(mesh, 0.5, source.random()());
