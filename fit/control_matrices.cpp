@@ -68,8 +68,9 @@ double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder)
     const std::size_t at = std::min(b, count - kWide);  // the last lanes overlap
     Wide m[3][3] = {};
     for (int c = 0; c < 3; ++c) {
-      const Wide j0 = load_wide(matrices.entries(0, c) + at) * scale[c], j1 = load_wide(matrices.entries(1, c) + at) * scale[c],
-                 j2 = load_wide(matrices.entries(2, c) + at) * scale[c];
+      const Wide j0 = load_wide(matrices.entries(0, c) + at) * scale[c];
+      const Wide j1 = load_wide(matrices.entries(1, c) + at) * scale[c];
+      const Wide j2 = load_wide(matrices.entries(2, c) + at) * scale[c];
       for (int i = 0; i < 3; ++i) m[i][c] = l(i, 0) * j0 + l(i, 1) * j1 + l(i, 2) * j2;
     }
     const Wide s00 = m[0][0] - shift[0], s11 = m[1][1] - shift[1], s22 = m[2][2] - shift[2];

@@ -70,7 +70,7 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
 }
 
 bool HexBoxes::is_hopeless(const Box& box) {
-  // The shifts of `determinant_bound` sum up to at least this where the mean edges tell the mean matrix; it needs 3 less.
+  // The shifts of `determinant_bound` sum up to at least this, if the mean edges tell the mean matrix; each must be < 1.
   return !models_.level(box.level).exact &&
          remainder(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum() > 2;
 }
@@ -162,7 +162,7 @@ const Mat3& HexBoxes::remainder(const Box& box) {
   return remainders_[box.level];
 }
 
-/// N_i' N_j N_k - P_i' P_j P_k = (N_i' - P_i') N_j N_k + P_i' ((N_j - P_j) N_k + P_j (N_k - P_k)), the P being the models.
+/// With P the models: N_i' N_j N_k - P_i' P_j P_k = (N_i' - P_i') N_j N_k + P_i' ((N_j - P_j) N_k + P_j (N_k - P_k)).
 Mat3 HexBoxes::make_remainder(int l) const {
   const LineModels::Level& level = models_.level(l);
   const auto &largest = level.largest_coefficient, &bound = models_.bounds(), &error = level.error,

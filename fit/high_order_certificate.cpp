@@ -47,8 +47,8 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
   const double size = cell.shapes->kind() == CellKind::hex ? 8 : 8 * cell.order * cell.order;
   const Vec3 error = size * (static_cast<double>(cell.modes.size()) + 500) * kRoundoff * cell.total;
   const Vec3 rows = jacobian.cwiseAbs().rowwise().sum() + 3 * error;
-  const double margin = 3 * (error[0] * rows[1] * rows[2] + error[1] * rows[0] * rows[2] + error[2] * rows[0] * rows[1]) +
-                        16 * kRoundoff * rows[0] * rows[1] * rows[2];
+  const double margin = 3 * (error[0] * rows[1] * rows[2] + error[1] * rows[0] * rows[2]) +
+                        3 * error[2] * rows[0] * rows[1] + 16 * kRoundoff * rows[0] * rows[1] * rows[2];
   return {jacobian.determinant(), 2 * margin};
 }
 
@@ -60,7 +60,8 @@ class Search {
   using Box = typename Boxes::Box;
 
   Search(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
-      : boxes_(boxes), cell_(cell), options_(options), max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, LineModels::kMaxLevel)) {
+      : boxes_(boxes), cell_(cell), options_(options),
+        max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, LineModels::kMaxLevel)) {
     result_.lower_bound = kInfinity;
     result_.witness_determinant = kInfinity;
   }

@@ -13,9 +13,9 @@ namespace subvol {
 ///
 /// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
 /// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
-/// for legendre up to degree 8, close for all others, and better with every halving. Tets and the triangles of prisms are
-/// modelled once (`SimplexModels`): exact for legendre; with fourier, cells closer to inversion than the model is to the
-/// map end undecided, never wrong. Rounding is bounded a priori, about 1e-13 of the product of the
+/// for legendre up to order 8, close for all others, and better with every halving. Tets and the triangles of prisms
+/// are modelled once (`SimplexModels`): exact for legendre; with fourier, cells closer to inversion than the model is to
+/// the map end undecided, never wrong, from order 4 on often (order 8: nearly all tets). Rounding is bounded a priori, about 1e-13 of the product of the
 /// lengths of a hex of order 4. A witness is a point where det J, computed from the shape functions themselves, is
 /// negative beyond its own rounding.
 /// Paper: left open there for the Fourier basis (section 5).
@@ -31,7 +31,8 @@ class HighOrderCertifier {
   /// coefficients  one per node of the space (asserted), any values: cells with one that is not finite, or so large or
   ///               small (beyond 1e+-50) that products overflow, end undecided.
   /// returns       as for linear cells: lower_bound > 0 exactly when valid, else -infinity; never a wrong `valid` or
-  ///               `invalid`. Cost of a hex that one to eight boxes decide: orders 1, 2, 4, 8: about 1, 2, 10, 60 us.
+  ///               `invalid`. Cost of a well-shaped hex at orders 1, 2, 4, 8: about 1, 2 to 4, 6 to 8, 120 us; tables
+  ///               first (fourier tets of order 8: 0.3 s, 16: seconds).
   CellCertificate certify(std::span<const Vec3> coefficients, std::size_t cell);
 
  private:
@@ -41,8 +42,8 @@ class HighOrderCertifier {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// Certifies all cells. Parallel; the answer does not depend on the number of threads. InputError: options out of range,
-/// or other than one coefficient per node.
+/// Certifies all cells. Parallel; the answer does not depend on the number of threads. InputError: options out of
+/// range, or other than one coefficient per node.
 CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,
                            const CertificateOptions& options = {});
 

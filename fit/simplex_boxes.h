@@ -11,11 +11,11 @@
 
 namespace subvol {
 
-/// Bernstein coefficients of the Jacobian of one high-order tet or prism over parts that halving its longest sides gives.
+/// Bernstein coefficients of the Jacobian of one high-order tet or prism over its parts, got by halving longest sides.
 ///
 /// Over the simplex (a prism's triangle) the map is modelled once, by `SimplexModels`; parts follow by de Casteljau, so
-/// what a fourier model leaves out stays, and cells closer to inversion than that stay undecided. Along a prism's w each
-/// part has `LineModels` of its own. Jacobians are by local coordinates: along the part's sides.
+/// what a fourier model leaves out stays, and cells closer to inversion than that stay undecided. Along a prism's w
+/// each part has `LineModels` of its own. Jacobians are by local coordinates: along the part's sides.
 class SimplexBoxes {
  public:
   struct Box {

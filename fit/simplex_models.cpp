@@ -126,7 +126,7 @@ Model product(int dimension, const Model& f, const Model& g) {
           f.gradient_bound * g.error + f.gradient_error * gp + g.gradient_bound * f.error + g.gradient_error * fp};
 }
 
-/// A model over [0, 1] of an argument that is affine on the simplex: `ends` are its values at the vertices, 0, 1/2 or 1.
+/// A model over [0, 1] of an argument affine on the simplex: `ends` are its values at the vertices, 0, 1/2 or 1.
 Model composed(int dimension, const Model& line, const std::array<double, 4>& ends) {
   const SimplexIndex index(dimension, line.degree);
   Model result = line;
