@@ -2,6 +2,7 @@
 #include "cli/check_report.h"
 #include "cli/commands.h"
 #include "cli/exit_status.h"
+#include "cli/high_order_fit_run.h"
 #include "cli/interrupt.h"
 #include "cli/loading.h"
 #include "cli/outputs.h"
@@ -28,7 +29,17 @@ struct FitArguments {
   FitOptions fit;
   std::string target, template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
+  int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
+  std::string basis = "fourier";
 };
+
+SolverKind solver_kind(const FitArguments& arguments) {
+  return arguments.solver == "lbfgs" ? SolverKind::lbfgs : SolverKind::newton;
+}
+
+Correspondence correspondence(const FitArguments& arguments) {
+  return arguments.correspondence == "voronoi" ? Correspondence::voronoi : Correspondence::closest;
+}
 
 /// One fit from its files to its files.
 class FitRun {
@@ -84,9 +95,8 @@ void FitRun::fit() {
   FitOptions options = arguments_.fit;
   options.surface = arguments_.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
   options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
-  options.correspondence =
-      arguments_.correspondence == "voronoi" ? Correspondence::voronoi : Correspondence::closest;
-  options.solver = arguments_.solver == "lbfgs" ? SolverKind::lbfgs : SolverKind::newton;
+  options.correspondence = correspondence(arguments_);
+  options.solver = solver_kind(arguments_);
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
     return !interrupted();
@@ -211,6 +221,38 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("DEGREES");
 }
 
+void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
+  const auto group = "Curved elements";
+  CLI::Option* order = verb.add_option("--order", arguments.order,
+                                       "Fit curved elements, orders raised up to P, in place of a subdivision volume")
+                           ->check(CLI::Range(1, kMaxOrder))
+                           ->type_name("P")
+                           ->group(group);
+  verb.add_option("--basis", arguments.basis, "Modes of the curved elements")
+      ->check(CLI::IsMember({"fourier", "legendre"}))
+      ->type_name("fourier|legendre")
+      ->capture_default_str()
+      ->needs(order)
+      ->group(group);
+  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far"})
+    order->excludes(verb.get_option(other));
+}
+
+/// The same run with curved elements: lambda has another default there.
+HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
+  HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
+  HighOrderFitOptions& fit = result.fit;
+  fit.order = arguments.order;
+  fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
+  fit.tolerance_percent = arguments.fit.tolerance_percent;
+  if (verb.count("--lambda-close") > 0) fit.lambda_close = arguments.fit.lambda_close;
+  fit.solver = solver_kind(arguments);
+  fit.correspondence = correspondence(arguments);
+  fit.max_iterations = arguments.fit.max_iterations;
+  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  return result;
+}
+
 void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
   const auto group = "Solver";
@@ -220,7 +262,8 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->group(group);
   verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
-                  "(0.015 where none is given) and falls by more than the cells' distortion rises")
+                  "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05, lowered\n"
+                  "for a --tolerance alone")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
@@ -260,6 +303,7 @@ void add_fit_command(CLI::App& app, Action& action) {
       ->type_name("MESH");
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
+  add_high_order_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "Finest mesh, or its surface, by extension: " + output_formats() +
                          "; cage:FILE for the control cage; may be given several times");
@@ -268,9 +312,16 @@ void add_fit_command(CLI::App& app, Action& action) {
   verb->footer(R"(Example:
   subvol fit bone.off --template bone.mesh --levels 3 -o bone.glb -o cage:bone_cage.usda -o bone_fine.mesh
 
+  subvol fit bone.off --template bone.mesh --order 4 -o bone.vtu -o bone.glb
+
 Ctrl-C once ends the fit with the best result so far (exit status 130), twice ends the program.
 --config FILE.toml reads options from a file: key = value, keys being the long names above.)");
-  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return FitRun(*arguments, *verb).run(); }; });
+  verb->callback([arguments, verb, &action] {
+    action = [arguments, verb] {
+      return arguments->order > 0 ? run_high_order_fit(high_order_arguments(*arguments, *verb), *verb)
+                                  : FitRun(*arguments, *verb).run();
+    };
+  });
 }
 
 }  // namespace subvol::cli

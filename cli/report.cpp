@@ -40,7 +40,7 @@ Json stage_json(const StageRecord& stage) {
     evaluations += iteration.evaluations;
   }
   Json json{{"name", stage.name},
-            {"level", stage.level},
+            {stage.order > 0 ? "order" : "level", stage.order > 0 ? stage.order : stage.level},
             {"lambda", stage.lambda},
             {"tangential_weight", stage.tangential_weight},
             {"unknowns", stage.unknowns},

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/high_order_fit_run.h"
+
+#include "cli/check_report.h"
+#include "cli/exit_status.h"
+#include "cli/interrupt.h"
+#include "cli/loading.h"
+#include "cli/outputs.h"
+#include "cli/progress.h"
+#include "cli/report.h"
+#include "fit/mesh_check.h"
+#include "subvol/version.h"
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+
+namespace subvol::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+HighOrderFitResult fit(const HighOrderFitArguments& arguments, const TriangleMesh& target,
+                       const VolumeMesh& template_mesh) {
+  ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
+  HighOrderFitOptions options = arguments.fit;
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  catch_interrupt();
+  HighOrderFitResult result = fit_high_order(target, template_mesh, options);
+  teller.finish();
+  return result;
+}
+
+// What counts is what is on the disk: the first .vtu is read back and checked in place of the result in memory.
+MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const TriangleMesh& target,
+                double chord_percent) {
+  const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& o) { return o.extension == ".vtu"; });
+  const HighOrderMesh mesh = file == outputs.end() ? result : read_high_order(file->path).mesh;
+  return check_mesh(mesh, curved_boundary(mesh, chord_percent), &target);
+}
+
+Json report_json(const CLI::App& verb, const FitReport& report,
+                 const HighOrderMesh& mesh, const MeshCheck& mesh_check) {
+  Json json{{"subvol", version()},
+            {"command", "fit"},
+            {"options", options_in_force(verb)},
+            {"stop_reason", to_string(report.stop_reason)},
+            {"explanation", report.explanation},
+            {"converged", report.stop_reason == StopReason::converged},
+            {"stages", stages_json(report)},
+            {"initial_distance",
+             {{"mean_percent", report.initial_distance_mean_percent},
+              {"max_percent", report.initial_distance_max_percent}}},
+            {"mesh", describe("", mesh)}};
+  json.update(check_json(mesh_check));
+  return json;
+}
+
+int status(const FitReport& report, const MeshCheck& mesh_check) {
+  if (report.stop_reason == StopReason::cancelled) return kInterrupted;
+  if (!mesh_check.valid()) return kFailed;
+  return report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+}
+
+}  // namespace
+
+int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& verb) {
+  if (arguments.run.outputs.empty() && arguments.run.report.empty())
+    throw UsageError("fit: nothing to write; give -o FILE or --report FILE");
+  const Clock::time_point start = Clock::now();
+  const std::vector<Output> outputs = checked_outputs(arguments.run, false);
+  apply_threads(arguments.run);
+  std::vector<std::string> warnings;
+  std::size_t told = 0;
+  const auto tell_warnings = [&] {
+    for (; !arguments.run.quiet && told < warnings.size(); ++told)
+      std::cerr << "subvol: warning: " << warnings[told] << '\n';
+  };
+  const TriangleMesh target = load_target(arguments.target, warnings);
+  const VolumeMesh template_mesh = load_volume(arguments.template_mesh, warnings);
+  tell_warnings();
+
+  const Clock::time_point fit_start = Clock::now();
+  HighOrderFitResult result = fit(arguments, target, template_mesh);
+  const double fit_seconds = seconds_since(fit_start);
+  const FitReport& report = result.report;
+  warnings.insert(warnings.end(), report.warnings.begin(), report.warnings.end());
+  tell_warnings();
+
+  const Clock::time_point write_start = Clock::now();
+  WritingOptions writing = arguments.writing;
+  writing.source = arguments.target;
+  writing.options = options_in_force(verb);
+  const HighOrderFile file{std::move(result.mesh), template_mesh.references};
+  for (const Output& output : outputs) write_output(output, file, writing);
+  const double write_seconds = seconds_since(write_start);
+
+  const Clock::time_point check_start = Clock::now();
+  const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent);
+  if (!arguments.run.report.empty()) {
+    Json json = report_json(verb, report, file.mesh, mesh_check);
+    json["input"] = {{"target", describe(arguments.target, target)},
+                     {"template", describe(arguments.template_mesh, template_mesh)}};
+    json["warnings"] = warnings;
+    json["seconds"] = {{"fit", fit_seconds},
+                       {"write", write_seconds},
+                       {"check", seconds_since(check_start)},
+                       {"total", seconds_since(start)}};
+    json["peak_memory_bytes"] = peak_memory_bytes();
+    json["outputs"] = output_names(arguments.run);
+    write_report(arguments.run.report, json);
+  }
+  if (!arguments.run.quiet) {
+    std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n' << to_text(mesh_check);
+    for (const auto& name : output_names(arguments.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+  }
+  return status(report, mesh_check);
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/run_options.h"
+#include "cli/writing.h"
+#include "fit/high_order_fit.h"
+
+#include <CLI/CLI.hpp>
+
+#include <string>
+
+namespace subvol::cli {
+
+/// What `fit --order` was asked to do.
+struct HighOrderFitArguments {
+  RunOptions run;
+  WritingOptions writing;
+  HighOrderFitOptions fit;
+  std::string target, template_mesh;
+};
+
+/// Fits curved elements from files to files; returns an ExitStatus.
+int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& verb);
+
+}  // namespace subvol::cli
