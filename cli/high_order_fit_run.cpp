@@ -22,6 +22,17 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+/// Refuses before the work what no curved mesh can be written to: the template stands for the result.
+void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
+                       const VolumeMesh& template_mesh) {
+  for (const Output& output : outputs) {
+    if (output.extension == ".usda")
+      throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+    if (output.extension == ".msh")
+      msh_text({ElementSpace(template_mesh, arguments.fit.basis, arguments.fit.order), template_mesh});
+  }
+}
+
 HighOrderFitResult fit(const HighOrderFitArguments& arguments, const TriangleMesh& target,
                        const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
@@ -84,6 +95,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const TriangleMesh target = load_target(arguments.target, warnings);
   const VolumeMesh template_mesh = load_volume(arguments.template_mesh, warnings);
   tell_warnings();
+  refuse_impossible(outputs, arguments, template_mesh);
 
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result = fit(arguments, target, template_mesh);

@@ -139,6 +139,22 @@ TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the t
   CHECK(report.at("stages").back().at("energy").at("total") > 0);
 }
 
+TEST_CASE("A fit of curved elements goes from files to files that check agrees with", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) + "--order 3 -o out.vtu -o out.glb -o out.mesh --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report.at("converged") == true);
+  CHECK(report.at("stages").back().at("order") == 3);
+  CHECK(report.at("orders").at("max") == 3);
+  CHECK(report.at("quality").at("certified_cells") == report.at("quality").at("cells"));
+  CHECK(report.at("distance").at("mean_percent") < 0.2 * report.at("initial_distance").at("mean_percent").get<double>());
+  const Run checked = place.run("check out.vtu --target target.off --json");
+  CHECK(checked.status == 0);
+  CHECK(nlohmann::json::parse(checked.out).at("distance") == report.at("distance"));
+}
+
 TEST_CASE("A fit is the same bits for one thread and for two", "[cli]") {
   const Workplace place;
   REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 1 -o one.mesh -o one.obj").status == 0);
@@ -205,7 +221,13 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   refuses(std::string(kFit) + "--solver magic -o out.glb", 2, "solver");
   refuses(std::string(kFit) + "--progress loud -o out.glb", 2, "progress");
   refuses(std::string(kFit) + "--threads 0 -o out.glb", 2, "threads");
-  refuses(std::string(kFit) + "--order 3 -o out.glb", 2, "order");
+  refuses(std::string(kFit) + "--order 17 -o out.glb", 2, "order");
+  refuses(std::string(kFit) + "--order 3 --levels 2 -o out.glb", 2, "levels");
+  refuses(std::string(kFit) + "--basis legendre -o out.glb", 2, "order");
+  refuses(std::string(kFit) + "--order 3 --basis spline -o out.glb", 2, "basis");
+  refuses(std::string(kFit) + "--order 3 -o out.usda", 2, "out.usda");
+  refuses(std::string(kFit) + "--order 3 -o cage:out.mesh", 2, "cage");
+  refuses(std::string(kFit) + "--order 10 -o out.msh", 3, "order");
   refuses(std::string(kFit) + "-o out.docx", 2, "out.docx");
   refuses(std::string(kFit) + "-o out", 2, "out");
   refuses(std::string(kFit) + "-o out.mesh -o ./out.mesh", 2, "twice");
