@@ -142,14 +142,8 @@ void FitRun::write_report() const {
             {"options", options_in_force(verb_)},
             {"input",
              {{"target", describe(arguments_.target, target_)},
-              {"template", describe(arguments_.template_mesh, template_mesh_)}}},
-            {"stop_reason", to_string(report.stop_reason)},
-            {"explanation", report.explanation},
-            {"converged", report.stop_reason == StopReason::converged},
-            {"stages", stages_json(report)},
-            {"initial_distance",
-             {{"mean_percent", report.initial_distance_mean_percent},
-              {"max_percent", report.initial_distance_max_percent}}}};
+              {"template", describe(arguments_.template_mesh, template_mesh_)}}}};
+  json.update(fit_json(report));
   json.update(check_json(mesh_check_));
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
   json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
@@ -261,7 +255,8 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("W")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--lambda-close", fit.lambda_close, "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
+  verb.add_option("--lambda-close", fit.lambda_close,
+                  "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
                   "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05, lowered\n"
                   "for a --tolerance alone")
       ->check(number_in(1e-9, 1e9))

@@ -55,19 +55,12 @@ MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result,
   return check_mesh(mesh, curved_boundary(mesh, chord_percent), &target);
 }
 
-Json report_json(const CLI::App& verb, const FitReport& report,
-                 const HighOrderMesh& mesh, const MeshCheck& mesh_check) {
+Json report_json(const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh, const MeshCheck& mesh_check) {
   Json json{{"subvol", version()},
             {"command", "fit"},
             {"options", options_in_force(verb)},
-            {"stop_reason", to_string(report.stop_reason)},
-            {"explanation", report.explanation},
-            {"converged", report.stop_reason == StopReason::converged},
-            {"stages", stages_json(report)},
-            {"initial_distance",
-             {{"mean_percent", report.initial_distance_mean_percent},
-              {"max_percent", report.initial_distance_max_percent}}},
             {"mesh", describe("", mesh)}};
+  json.update(fit_json(report));
   json.update(check_json(mesh_check));
   return json;
 }

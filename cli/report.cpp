@@ -64,6 +64,16 @@ Json stages_json(const FitReport& report) {
   return stages;
 }
 
+Json fit_json(const FitReport& report) {
+  return {{"stop_reason", to_string(report.stop_reason)},
+          {"explanation", report.explanation},
+          {"converged", report.stop_reason == StopReason::converged},
+          {"stages", stages_json(report)},
+          {"initial_distance",
+           {{"mean_percent", report.initial_distance_mean_percent},
+            {"max_percent", report.initial_distance_max_percent}}}};
+}
+
 Json seconds_json(const FitReport& report) {
   Json seconds = Json::object();
   for (const auto& [part, value] : report.seconds) seconds[part] = value;

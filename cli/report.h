@@ -12,6 +12,9 @@ namespace subvol::cli {
 /// The stages of a fit, with every iteration.
 Json stages_json(const FitReport& report);
 
+/// How a fit went: why it stopped, its stages, how far its template was.
+Json fit_json(const FitReport& report);
+
 /// Seconds by part.
 Json seconds_json(const FitReport& report);
 

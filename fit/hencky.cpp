@@ -45,7 +45,8 @@ SUBVOL_INLINE void rotate(Wide& app, Wide& aqq, Wide& apq, Wide& arp, Wide& arq,
   const Wide d = aqq - app, b = 2 * apq, size = absolute(d) + 1e-150;  // never 0
   const Wide inverse = reciprocal_square_root(size * size + b * b);
   const Wide c2 = 0.5 + 0.5 * size * inverse, inverse_c = reciprocal_square_root(c2);
-  const Wide c = c2 * inverse_c, half = 0.5 * b * inverse * inverse_c, s = d < 0 ? -half : half, shift = s * inverse_c * apq;
+  const Wide c = c2 * inverse_c, half = 0.5 * b * inverse * inverse_c, s = d < 0 ? -half : half;
+  const Wide shift = s * inverse_c * apq;
   app -= shift;
   aqq += shift;
   apq = Wide{};

@@ -15,8 +15,8 @@ namespace subvol {
 /// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
 /// for legendre up to order 8, close for all others, and better with every halving. Tets and the triangles of prisms
 /// are modelled once (`SimplexModels`): exact for legendre; with fourier, cells closer to inversion than the model is to
-/// the map end undecided, never wrong, from order 4 on often (order 8: nearly all tets). Rounding is bounded a priori, about 1e-13 of the product of the
-/// lengths of a hex of order 4. A witness is a point where det J, computed from the shape functions themselves, is
+/// the map end undecided, never wrong, from order 4 on often (order 8: nearly all tets). Rounding is bounded a priori,
+/// about 1e-13 of the product of the lengths of a hex of order 4. A witness is a point where det J, computed from the shape functions themselves, is
 /// negative beyond its own rounding.
 /// Paper: left open there for the Fourier basis (section 5).
 ///

@@ -122,7 +122,8 @@ void SubdivisionFit::look_over_template() {
 
 void SubdivisionFit::prepare_level() {
   const double begin = runner_.seconds();
-  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.triangles().size() / 2, finest());
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.triangles().size() / 2,
+                          finest());
   limit_check_.reset();
   creases_.refine(level_);
   target_.sample(level_.samples.num_rows());
@@ -242,7 +243,8 @@ bool SubdivisionFit::meets_tolerance() {
 
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
 /// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
-/// A stage that makes the boundary intersect itself more, or without a tolerance has cost too much of the shape in all, is undone.
+/// A stage that makes the boundary intersect itself more, or without a tolerance has cost too much of the shape in all,
+/// is undone.
 bool SubdivisionFit::lower_lambda() {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
