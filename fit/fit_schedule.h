@@ -22,6 +22,8 @@ inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare =
 inline constexpr double kLeastGain = 0.01;
 /// Without a tolerance, halvings of lambda may cost so much of the mean scaled Jacobian in all.
 inline constexpr double kMostShapeLoss = 0.0075;
+/// The same where only the template's vertices move: few unknowns have to reach the whole surface.
+inline constexpr double kMostCageShapeLoss = 0.015;
 /// A crease counts as much as a strip of surface so wide, by the target's length V/A.
 inline constexpr double kCreaseWidth = 1;
 /// The target is sampled at least about so many times.

@@ -253,7 +253,7 @@ bool SubdivisionFit::lower_lambda() {
     return iterations.empty() ? 0 : iterations.back().volume_energy;
   };
   double mean = measured_mean(), volume = distortion();
-  const double shape = mean_scaled_jacobian();
+  const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
   std::size_t pairs = intersecting_pairs();
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
@@ -262,7 +262,7 @@ bool SubdivisionFit::lower_lambda() {
     const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
     const double loss = shape - mean_scaled_jacobian();
     const std::size_t pairs_now = intersecting_pairs();
-    if (pairs_now > pairs || (!options_.tolerance_percent && loss > kMostShapeLoss)) {
+    if (pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
       unknowns_ = before;
       mean_ = mean;
       result_.report.stages.back().kept = false;

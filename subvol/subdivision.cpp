@@ -298,6 +298,11 @@ SubdivisionLevel subdivide(const VolumeMesh& control, BoundaryRule rule) {
   return level;
 }
 
+SparseMap subdivision_matrix(const VolumeMesh& control, BoundaryRule rule) {
+  require_usable(control);
+  return Refiner(control, rule).matrix();
+}
+
 SparseMap linear_split(const VolumeMesh& control) {
   require_usable(control);
   const MeshTopology topology(control);

@@ -34,6 +34,9 @@ struct SubdivisionLevel {
 /// infinite ones stay infinite, those that reach 0 are dropped. Cost: linear, about 0.2 microseconds per fine cell.
 SubdivisionLevel subdivide(const VolumeMesh& control, BoundaryRule rule = BoundaryRule::catmull_clark);
 
+/// S alone. InputError: as `subdivide`.
+SparseMap subdivision_matrix(const VolumeMesh& control, BoundaryRule rule = BoundaryRule::catmull_clark);
+
 /// The multi-linear split alone, with the same rows and columns as S: edge, face and cell midpoints; control vertices
 /// stay. It keeps valid whatever is valid with multi-linear cells. InputError: as `subdivide`.
 SparseMap linear_split(const VolumeMesh& control);

@@ -70,6 +70,7 @@ TEST_CASE("rows of the subdivision matrix sum to one and no weight is negative",
         if (sharpness > 0) tag_creases(mesh, 40, sharpness);
         const SubdivisionLevel level = subdivide(mesh, rule);
         CHECK(max_row_sum_error(level.matrix) <= kRowSumTolerance);
+        CHECK(subdivision_matrix(mesh, rule).values == level.matrix.values);
         CHECK(max_row_sum_error(linear_split(mesh)) <= kRowSumTolerance);
         CHECK(min_weight(level.matrix) >= 0);
         CHECK(level.matrix.num_cols == mesh.num_vertices());
