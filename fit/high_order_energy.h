@@ -25,7 +25,8 @@ namespace subvol {
 ///
 /// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for n
 /// modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept as
-/// 27 numbers per point and never assembled. Same bits for any number of threads.
+/// 27 numbers per point and never assembled. Same bits for any number of threads; one caller at a time, const functions
+/// included, for they share a buffer.
 class HighOrderEnergy final : public VolumeTerm {
  public:
   /// space  must outlive the energy.

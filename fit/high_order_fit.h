@@ -31,7 +31,8 @@ struct HighOrderFitResult {
 ///
 /// target   triangles in any state that encloses a volume; the unit of length is the target's.
 /// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target is.
-/// returns  the best state reached; no step makes a cell lose its certificate (`VolumeTerm::uncertified`).
+/// returns  the last state reached; no step makes a cell lose its certificate (`VolumeTerm::uncertified`). Cells that had
+///          none are guarded at their quadrature points only, and the boundary may come to intersect itself: check it.
 /// InputError: options out of range, an empty target, a template that is not sound.
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options);
