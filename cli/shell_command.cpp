@@ -9,6 +9,7 @@
 #include "cli/report.h"
 #include "cli/shell_output.h"
 #include "cli/writing.h"
+#include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "fit/target_surface.h"
 #include "shell/shell.h"
@@ -41,6 +42,7 @@ struct ShellArguments {
   ShellOptions shell;
   std::string surface, thickness, thickness_file, thickness_attribute, side = "outward";
   int order = 1;
+  std::string basis = "legendre";
   std::optional<double> crease_angle_degrees;
   bool straight = false;
 };
@@ -75,6 +77,7 @@ class ShellRun {
   void require_one_per_vertex(const std::string& file, const std::vector<double>& thickness) const;
   void load();
   void grow();
+  void curve();
   void write();
   void check();
   void check_subdivided();
@@ -94,6 +97,7 @@ class ShellRun {
   TaggedPolygons surface_;
   double diagonal_ = 0;
   ShellResult result_;
+  std::optional<CurvedShell> curved_;
   ShellFailures failures_;
   std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
   Json seconds_ = Json::object();
@@ -182,18 +186,52 @@ void ShellRun::grow() {
   warn(before);
 }
 
+// The time that the linear shell has left; none left, or a call to end: cells of the order asked for, but straight.
+void ShellRun::curve() {
+  if (arguments_.order == 1) return;
+  if (!result_.failures.none()) {
+    warnings_.push_back("the cells were left straight, for the shell is not valid");
+    return warn(warnings_.size() - 1);
+  }
+  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
+  CurvedShellOptions options{.order = arguments_.order, .basis = arguments_.basis == "fourier" ? Basis::fourier : Basis::legendre,
+                             .max_iterations = arguments_.shell.max_iterations};
+  if (const double limit = arguments_.shell.time_limit_seconds; limit > 0)
+    options.time_limit_seconds = std::max(1e-3, limit - std::chrono::duration<double>(Clock::now() - start_).count());
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  options.boundary = [&](const HighOrderMesh& mesh) {
+    return curved_boundary(mesh, arguments_.writing.chord_percent);
+  };
+  curved_ = curve_shell(result_, options);
+  teller.finish();
+  take_figures(*curved_, result_);
+  warnings_.insert(warnings_.end(), curved_->report.warnings.begin(), curved_->report.warnings.end());
+  warn(warnings_.size() - curved_->report.warnings.size());
+}
+
 void ShellRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.surface;
   writing.options = options_in_force(verb_);
-  for (const Output& output : outputs_) write_shell(output, result_, writing);
+  for (const Output& output : outputs_)
+    curved_ ? write_shell(output, result_, *curved_, writing) : write_shell(output, result_, writing);
 }
 
-// What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
+// What counts is what is on the disk: the first .mesh, of curved cells the first .vtu, is read back and checked in place
+// of the result in memory.
 void ShellRun::check() {
   failures_ = result_.failures;
   for (const Output& output : outputs_) {
-    if (output.extension != ".mesh") continue;
+    if (curved_ && output.extension == ".vtu") {
+      const HighOrderMesh reread = read_high_order(output.path).mesh;
+      const MeshCheck found = check_mesh(reread, curved_boundary(reread, arguments_.writing.chord_percent));
+      failures_ = {found.quality->certificate, found.intersecting_faces};
+      break;
+    }
+    if (curved_ || output.extension != ".mesh") continue;
     const VolumeMesh reread = read_volume_mesh(output.path, {.check = false});
     failures_ = ShellCheck(result_.layers, reread, CheckedSheets::all).failures(reread.positions);
     break;
@@ -231,7 +269,7 @@ void ShellRun::write_report() const {
             {"not_certified_cells", failures_.certificate.not_certified},
             {"boundary_self_intersections", failures_.intersecting.size()},
             {"intersecting_faces", failures_.intersecting},
-            {"mesh", describe("", result_.mesh)},
+            {"mesh", curved_ ? describe("", curved_->mesh) : describe("", result_.mesh)},
             {"warnings", warnings_},
             {"seconds", std::move(seconds)},
             {"peak_memory_bytes", peak_memory_bytes()},
@@ -273,11 +311,13 @@ int ShellRun::run() {
   if (arguments_.thickness.empty() + arguments_.thickness_file.empty() + arguments_.thickness_attribute.empty() != 2)
     throw UsageError("shell: give one of --thickness, --thickness-file and --thickness-attribute");
   if (!arguments_.thickness.empty()) parse_length(arguments_.thickness, 1);
-  if (arguments_.order > 1) throw UsageError("--order: curved shells are not offered yet; the cells are of order 1");
+  if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
   outputs_ = checked_outputs(arguments_.run, true);
   apply_threads(arguments_.run);
   timed("read", &ShellRun::load);
+  if (arguments_.order > 1) refuse_curved(outputs_, surface_.polygons, arguments_.order);
   timed("grow", &ShellRun::grow);
+  timed("curve", &ShellRun::curve);
   timed("write", &ShellRun::write);
   timed("check", &ShellRun::check);
   timed("subdivide", &ShellRun::check_subdivided);
@@ -316,10 +356,16 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
-  verb.add_option("--order", arguments.order, "Order of the cells; only 1 so far")
-      ->check(CLI::Range(1, 12))
-      ->type_name("P")
-      ->capture_default_str();
+  CLI::Option* order =
+      verb.add_option("--order", arguments.order, "Order of the cells; above 1 they are curved, but for the surface itself")
+          ->check(CLI::Range(1, kMaxOrder))
+          ->type_name("P")
+          ->capture_default_str();
+  verb.add_option("--basis", arguments.basis, "Modes of curved cells")
+      ->check(CLI::IsMember({"fourier", "legendre"}))
+      ->type_name("fourier|legendre")
+      ->capture_default_str()
+      ->needs(order);
   verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");

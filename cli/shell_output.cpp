@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/shell_output.h"
 
+#include "cli/exit_status.h"
+#include "export/cell_text.h"
 #include "export/gltf_writer.h"
 #include "export/volume_writer.h"
+#include "subvol/boundary.h"
+#include "subvol/cell_topology.h"
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <span>
 
 namespace subvol::cli {
@@ -40,19 +45,18 @@ std::vector<double> by_vertex(const ShellLayers& layers, const std::vector<doubl
   return values;
 }
 
-Scene scene_of(const ShellResult& shell, const SurfaceSceneOptions& options) {
-  const ShellLayers& layers = shell.layers;
-  const std::vector<double> achieved = by_vertex(layers, shell.achieved), asked = by_vertex(layers, shell.asked);
+/// Makes a sheet of a shell with its mesh, number and wires; its thickness as (achieved, asked, 0) at each of its points.
+using MakeSheet = std::function<std::vector<Vec3>(int sheet, SceneSheet& made)>;
+
+Scene scene_of(const ShellLayers& layers, const MakeSheet& make, const SurfaceSceneOptions& options) {
   std::vector<SceneSheet> sheets;
   const auto add = [&](const char* name, int sheet) {
     SceneSheet& added = sheets.emplace_back();
     added.name = name;
-    added.mesh = sheet_surface(layers, shell.mesh, sheet);
     added.attribute.name = "_THICKNESS";
-    for (std::size_t v = 0; v < layers.num_columns(); ++v) {
-      const Index vertex = layers.vertex(sheet, static_cast<Index>(v));
-      added.attribute.values.push_back(achieved[vertex]);
-      added.shades.push_back(achieved[vertex] / asked[vertex]);
+    for (const Vec3& thickness : make(sheet, added)) {
+      added.attribute.values.push_back(thickness[0]);
+      added.shades.push_back(thickness[0] / thickness[1]);
     }
   };
   if (layers.inside > 0) add("inner", 0);
@@ -61,19 +65,99 @@ Scene scene_of(const ShellResult& shell, const SurfaceSceneOptions& options) {
   return sheet_scene(sheets, "viridis over achieved / asked thickness 0..1, above 1 as 1", options);
 }
 
+/// (achieved, asked, 0) at every vertex.
+std::vector<Vec3> thickness_at_vertices(const ShellResult& shell) {
+  const std::vector<double> achieved = by_vertex(shell.layers, shell.achieved),
+                            asked = by_vertex(shell.layers, shell.asked);
+  std::vector<Vec3> thickness;
+  for (std::size_t v = 0; v < achieved.size(); ++v) thickness.emplace_back(achieved[v], asked[v], 0);
+  return thickness;
+}
+
+Scene scene_of(const ShellResult& shell, const SurfaceSceneOptions& options) {
+  const std::vector<Vec3> thickness = thickness_at_vertices(shell);
+  const auto make = [&](int sheet, SceneSheet& made) {
+    made.mesh = sheet_surface(shell.layers, shell.mesh, sheet);
+    const auto first = thickness.begin() + shell.layers.vertex(sheet, 0);
+    return std::vector<Vec3>(first, first + static_cast<std::ptrdiff_t>(shell.layers.num_columns()));
+  };
+  return scene_of(shell.layers, make, options);
+}
+
+/// Sheets of curved cells, sampled; thickness is linear between the vertices.
+Scene scene_of(const ShellResult& shell, const CurvedShell& curved, const SurfaceSceneOptions& options) {
+  const ElementSpace& space = curved.mesh.space;
+  const ElementSpace linear = space.with_orders(EntityOrders::uniform(space.topology(), 1));
+  const std::vector<Vec3> thickness = thickness_at_vertices(shell);
+  const int intervals = std::max(4, 2 * space.max_order());
+  const auto make = [&](int sheet, SceneSheet& made) {
+    const BoundarySamples samples = sheet_samples(shell.layers, space, sheet, intervals);
+    made.mesh = as_polygons({samples.positions.apply(curved.mesh.coefficients), samples.triangles});
+    made.wires = samples.crease_edges;
+    return point_map(linear, samples.points).apply(thickness);
+  };
+  return scene_of(shell.layers, make, options);
+}
+
+std::vector<VertexField> thickness_fields(const ShellResult& shell) {
+  return {{"thickness", by_vertex(shell.layers, shell.achieved)},
+          {"thickness_asked", by_vertex(shell.layers, shell.asked)},
+          {"thickness_limited", by_vertex(shell.layers, shell.limited)},
+          {"clearance", by_vertex(shell.layers, shell.clearance)}};
+}
+
 }  // namespace
 
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {
   if (is_scene(output) && !output.cage) {
     write_gltf(output.path, scene_of(shell, scene_options(output, options)));
   } else if (output.extension == ".vtu" || output.extension == ".msh") {
-    const VertexField fields[] = {{"thickness", by_vertex(shell.layers, shell.achieved)},
-                                  {"thickness_asked", by_vertex(shell.layers, shell.asked)},
-                                  {"thickness_limited", by_vertex(shell.layers, shell.limited)},
-                                  {"clearance", by_vertex(shell.layers, shell.clearance)}};
-    write_volume(output.path, shell.mesh, shell.quality.cell_minima, fields);
+    write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell));
   } else {
     write_output(output, shell.mesh, options);
+  }
+}
+
+void write_shell(const Output& output, const ShellResult& shell, const CurvedShell& curved,
+                 const WritingOptions& options) {
+  if (output.cage) return write_output(output, shell.mesh, options);
+  if (is_scene(output)) return write_gltf(output.path, scene_of(shell, curved, scene_options(output, options)));
+  if (output.extension == ".vtu" || output.extension == ".msh") {
+    const std::vector<VertexField> fields = thickness_fields(shell);
+    return write_volume(output.path, curved.mesh,
+                        {.cell_minima = curved.quality.cell_minima, .references = shell.mesh.references,
+                         .fields = fields});
+  }
+  write_output(output, HighOrderFile{curved.mesh, shell.mesh.references}, options);
+}
+
+void take_figures(const CurvedShell& curved, ShellResult& shell) {
+  shell.achieved = curved.thickness.achieved;
+  shell.clearance = curved.thickness.clearance;
+  shell.quality = curved.quality;
+  shell.failures = {curved.quality.certificate, curved.intersecting_faces};
+  FitReport& report = shell.report;
+  const FitReport& added = curved.report;
+  report.stages.insert(report.stages.end(), added.stages.begin(), added.stages.end());
+  report.warnings.insert(report.warnings.end(), added.warnings.begin(), added.warnings.end());
+  if (report.stop_reason != StopReason::converged) return;
+  report.stop_reason = added.stop_reason;
+  report.explanation = added.explanation;
+}
+
+void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surface, int order) {
+  for (const Output& output : outputs) {
+    if (output.cage) continue;
+    if (output.extension == ".usda")
+      throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or cage:" +
+                       output.path.string());
+    if (output.extension != ".msh") continue;
+    for (std::size_t f = 0; f < surface.num_faces(); ++f) {
+      const CellKind kind = surface.face_offsets[f + 1] - surface.face_offsets[f] == 3 ? CellKind::prism : CellKind::hex;
+      if (order > max_gmsh_order(kind))
+        throw UsageError(output.path.string() + ": Gmsh evaluates a " + cell_topology(kind).name + " up to order " +
+                         std::to_string(max_gmsh_order(kind)) + " only; take .vtu");
+    }
   }
 }
 

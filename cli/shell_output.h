@@ -3,7 +3,7 @@
 
 #include "cli/outputs.h"
 #include "cli/writing.h"
-#include "shell/shell.h"
+#include "shell/curved_shell.h"
 
 #include <string>
 
@@ -12,6 +12,13 @@ namespace subvol::cli {
 /// Writes a shell: its cells with thickness at the vertices where the format has fields, its sheets as named nodes of a
 /// scene, or its boundary as polygons.
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options);
+/// The same of a shell that has been curved; `shell` has its figures (`take_figures`). As a control mesh: the linear cells.
+void write_shell(const Output& output, const ShellResult& shell, const CurvedShell& curved,
+                 const WritingOptions& options);
+/// What is true of a curved shell in place of what was of the linear one; faces that meet are those of its boundary.
+void take_figures(const CurvedShell& curved, ShellResult& shell);
+/// UsageError: a format that cannot hold curved cells on such a surface.
+void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surface, int order);
 
 /// Thicknesses of each side that has layers: asked, limited, achieved, clearance, also in per cent of a diagonal.
 Json thickness_json(const ShellResult& shell, double diagonal);

@@ -243,7 +243,8 @@ Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_
     if (!sheet.attribute.name.empty())
       primitive.attributes.push_back({sheet.attribute.name, by_shaded(sheet.attribute.values)});
     for (const Vec3& p : primitive.positions) box.extend(p);
-    const ScenePrimitive wire = wire_primitive(shaded.positions, edges_of(sheet.mesh, shaded));
+    const ScenePrimitive wire = sheet.wires.empty() ? wire_primitive(shaded.positions, edges_of(sheet.mesh, shaded))
+                                                    : wire_primitive(sheet.mesh.positions, sheet.wires);
     for (const Index v : wire.indices) wires.indices.push_back(static_cast<Index>(wires.positions.size()) + v);
     wires.positions.insert(wires.positions.end(), wire.positions.begin(), wire.positions.end());
     scene.nodes.push_back({sheet.name, std::move(primitive)});

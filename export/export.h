@@ -8,6 +8,7 @@
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,6 +71,7 @@ struct SceneSheet {
   PolygonMesh mesh;
   SceneAttribute attribute{};     ///< one value per vertex; without a name: none
   std::vector<double> shades{};   ///< per vertex, coloured as `quality_color` colours 0 .. 1; empty: no colours
+  std::vector<std::array<Index, 2>> wires{};  ///< edges to draw, by vertex; empty: those of all polygons
 };
 
 /// Several sheets as they stand, flat faces, and one "wireframe" with the edges of all. `colour_map` names what the shades

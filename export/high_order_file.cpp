@@ -10,6 +10,7 @@
 #include "subvol/mesh_io.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <string_view>
@@ -30,6 +31,26 @@ void require_writable(const HighOrderMesh& mesh, const HighOrderFileOptions& opt
   require_cell_minima(options.cell_minima, num_cells);
   if (!options.references.empty() && options.references.size() != num_cells)
     throw InputError("references: expected one per cell");
+  for (const VertexField& field : options.fields)
+    if (field.values.size() != mesh.space.num_vertices() ||
+        !std::all_of(field.values.begin(), field.values.end(), [](double value) { return std::isfinite(value); }))
+      throw InputError(field.name + ": expected one finite number per vertex");
+}
+
+/// The fields at the points of Lagrange cells. These have the numbers that the points of the straight-sided mesh have,
+/// so one coordinate of a mesh of order 1 carries each field along.
+std::vector<VertexField> fields_at_points(const HighOrderMesh& mesh, std::span<const int> orders, NodeOrdering ordering,
+                                          std::span<const VertexField> fields) {
+  std::vector<VertexField> result;
+  if (fields.empty()) return result;
+  HighOrderMesh carrier = mesh.with_orders(EntityOrders::uniform(mesh.space.topology(), 1));
+  for (const VertexField& field : fields) {
+    for (std::size_t v = 0; v < field.values.size(); ++v) carrier.coefficients[v] = Vec3(field.values[v], 0, 0);
+    VertexField& at_points = result.emplace_back();
+    at_points.name = field.name;
+    for (const Vec3& value : lagrange_mesh(carrier, orders, ordering).positions) at_points.values.push_back(value[0]);
+  }
+  return result;
 }
 
 CellView view_of(const LagrangeMesh& mesh, std::span<const int> references) {
@@ -233,8 +254,10 @@ Basis read_basis(const VtuArrays& file, const std::vector<std::int64_t>& format)
 
 std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
   require_writable(mesh, options);
-  const LagrangeMesh cells = lagrange_mesh(mesh, lagrange_orders(mesh.space, kMaxVtkOrder), NodeOrdering::vtk);
-  return vtu_document(view_of(cells, options.references), options.cell_minima, {}, field_data(mesh));
+  const std::vector<int> orders = lagrange_orders(mesh.space, kMaxVtkOrder);
+  const LagrangeMesh cells = lagrange_mesh(mesh, orders, NodeOrdering::vtk);
+  return vtu_document(view_of(cells, options.references), options.cell_minima,
+                      fields_at_points(mesh, orders, NodeOrdering::vtk, options.fields), field_data(mesh));
 }
 
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
@@ -249,7 +272,8 @@ std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
                        " only; write a .vtu, or a .mesh of many linear cells");
   }
   const LagrangeMesh cells = lagrange_mesh(mesh, orders, NodeOrdering::gmsh);
-  return msh_document(view_of(cells, options.references), options.cell_minima, {});
+  return msh_document(view_of(cells, options.references), options.cell_minima,
+                      fields_at_points(mesh, orders, NodeOrdering::gmsh, options.fields));
 }
 
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {

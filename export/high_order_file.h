@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "export/volume_writer.h"
 #include "fit/high_order_mesh.h"
 
 #include <filesystem>
@@ -14,6 +15,8 @@ namespace subvol {
 struct HighOrderFileOptions {
   std::span<const double> cell_minima{};  ///< one scaled Jacobian per cell, or empty: cell data `scaled_jacobian`
   std::span<const int> references{};      ///< one per cell, or empty: all 0
+  /// One number per vertex of the mesh each: point data of .vtu and .msh, linear in between (order 1 of the cell's kind).
+  std::span<const VertexField> fields{};
   int linear_intervals = 0;               ///< of `linear_cells` in .mesh and .vtk; 0: the largest order of the mesh
 };
 

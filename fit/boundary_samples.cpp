@@ -17,15 +17,29 @@ class BoundarySampler {
       : space_(space), n_(intervals), vertex_samples_(space.num_vertices(), kNoIndex),
         edge_samples_(space.topology().num_edges(), kNoIndex) {}
 
-  BoundarySamples run(std::span<const CreaseEdge> creases) {
-    for (const Index f : space_.topology().boundary_faces()) {
+  void add_faces(std::span<const Index> faces) {
+    for (const Index f : faces) {
       begin_face(f);
       if (corners_.size() == 4)
         sample_quad(f);
       else
         sample_triangle(f);
     }
-    for (const CreaseEdge& crease : creases) add_crease(crease);
+  }
+
+  /// False: the edge belongs to no face added.
+  bool add_edge(Index e, bool forward = true) {
+    const auto& [low, high] = space_.topology().edge(e);
+    if (vertex_samples_[low] == kNoIndex || vertex_samples_[high] == kNoIndex ||
+        (n_ > 1 && edge_samples_[e] == kNoIndex))
+      return false;
+    for (int i = 0; i < n_; ++i)
+      samples_.crease_edges.push_back(
+          {edge_sample(e, forward ? i : n_ - i), edge_sample(e, forward ? i + 1 : n_ - i - 1)});
+    return true;
+  }
+
+  BoundarySamples take() {
     samples_.positions = point_map(space_, samples_.points);
     return std::move(samples_);
   }
@@ -117,19 +131,6 @@ class BoundarySampler {
       }
   }
 
-  void add_crease(const CreaseEdge& crease) {
-    const auto num_vertices = static_cast<Index>(space_.num_vertices());
-    const bool known = crease.v0 >= 0 && crease.v1 >= 0 && crease.v0 < num_vertices && crease.v1 < num_vertices;
-    const Index e = known ? space_.topology().find_edge(crease.v0, crease.v1) : kNoIndex;
-    if (e == kNoIndex || !space_.topology().is_boundary_edge(e))
-      throw InputError("make_boundary_samples: crease " + std::to_string(crease.v0) + ' ' + std::to_string(crease.v1) +
-                       " is no edge of the boundary");
-    const bool forward = crease.v0 < crease.v1;
-    for (int i = 0; i < n_; ++i)
-      samples_.crease_edges.push_back(
-          {edge_sample(e, forward ? i : n_ - i), edge_sample(e, forward ? i + 1 : n_ - i - 1)});
-  }
-
   const ElementSpace& space_;
   int n_;
   std::vector<Index> vertex_samples_, edge_samples_;  // of an edge, the first inside
@@ -140,12 +141,48 @@ class BoundarySampler {
   std::vector<Index> grid_;
 };
 
+void require_intervals(const char* function, int intervals) {
+  if (intervals < 1)
+    throw InputError(std::string(function) + ": intervals must be at least 1, got " + std::to_string(intervals));
+}
+
+void require_numbers(const char* what, std::span<const Index> numbers, std::size_t limit) {
+  for (const Index i : numbers)
+    if (i < 0 || static_cast<std::size_t>(i) >= limit)
+      throw InputError(std::string("make_face_samples: ") + what + ' ' + std::to_string(i) + " of " +
+                       std::to_string(limit));
+}
+
 }  // namespace
 
 BoundarySamples make_boundary_samples(const ElementSpace& space, int intervals, std::span<const CreaseEdge> creases) {
-  if (intervals < 1)
-    throw InputError("make_boundary_samples: intervals must be at least 1, got " + std::to_string(intervals));
-  return BoundarySampler(space, intervals).run(creases);
+  require_intervals("make_boundary_samples", intervals);
+  const MeshTopology& topology = space.topology();
+  BoundarySampler sampler(space, intervals);
+  sampler.add_faces(topology.boundary_faces());
+  for (const CreaseEdge& crease : creases) {
+    const auto num_vertices = static_cast<Index>(space.num_vertices());
+    const bool known = crease.v0 >= 0 && crease.v1 >= 0 && crease.v0 < num_vertices && crease.v1 < num_vertices;
+    const Index e = known ? topology.find_edge(crease.v0, crease.v1) : kNoIndex;
+    if (e == kNoIndex || !topology.is_boundary_edge(e))
+      throw InputError("make_boundary_samples: crease " + std::to_string(crease.v0) + ' ' + std::to_string(crease.v1) +
+                       " is no edge of the boundary");
+    sampler.add_edge(e, crease.v0 < crease.v1);
+  }
+  return sampler.take();
+}
+
+BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Index> faces, int intervals,
+                                  std::span<const Index> edges) {
+  require_intervals("make_face_samples", intervals);
+  require_numbers("face", faces, space.topology().num_faces());
+  require_numbers("edge", edges, space.topology().num_edges());
+  BoundarySampler sampler(space, intervals);
+  sampler.add_faces(faces);
+  for (const Index e : edges)
+    if (!sampler.add_edge(e))
+      throw InputError("make_face_samples: edge " + std::to_string(e) + " belongs to none of the faces");
+  return sampler.take();
 }
 
 }  // namespace subvol

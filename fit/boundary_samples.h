@@ -29,4 +29,11 @@ struct BoundarySamples {
 BoundarySamples make_boundary_samples(const ElementSpace& space, int intervals,
                                       std::span<const CreaseEdge> creases = {});
 
+/// The same of any faces of the mesh, inside or on its boundary. Triangles run as `MeshTopology::face` does.
+///
+/// edges  of these faces, as MeshTopology numbers them: `intervals` `crease_edges` for each, from its smaller vertex.
+/// InputError: intervals < 1, a number out of range, an edge of none of the faces.
+BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Index> faces, int intervals,
+                                  std::span<const Index> edges = {});
+
 }  // namespace subvol

@@ -32,7 +32,7 @@ double scaled_jacobian(const Mat3& jacobian, const Mat3& ideal_inverse) {
 }
 
 void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<const Index> cells, int n,
-                    std::vector<Sampled>& samples) {
+                    const CellReference& reference, std::vector<Sampled>& samples) {
   const CellKind kind = mesh.space.pattern_kind(pattern);
   const std::vector<Vec3> points = make_quadrature(kind, QuadratureRule::trapezoidal, n).points;
   const Mat3 inverse = ideal_inverse(kind);
@@ -47,8 +47,9 @@ void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<co
       for (std::size_t i = 0; i < cells.size(); ++i) {
         table.jacobians(mesh, cells[i], jacobians);
         Sampled& sampled = samples[cells[i]];
-        for (const Mat3& jacobian : jacobians) {
-          const double value = scaled_jacobian(jacobian, inverse);
+        for (std::size_t q = 0; q < size; ++q) {
+          const double value = scaled_jacobian(
+              jacobians[q], reference ? Mat3(reference(cells[i], points[begin + q]).inverse()) : inverse);
           sampled.least = std::min(sampled.least, value);
           sampled.sum += value;
         }
@@ -67,7 +68,7 @@ Vec3 mean_of_corners(const HighOrderMesh& mesh, Index c) {
 
 }  // namespace
 
-QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_direction) {
+QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_direction, const CellReference& reference) {
   if (samples_per_direction != 0 && samples_per_direction < 2)
     throw InputError("quality: samples_per_direction is " + std::to_string(samples_per_direction) +
                      ", expected 2 or more, or 0");
@@ -75,7 +76,8 @@ QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_directi
   const auto cells = cells_by_pattern(mesh.space);
   for (std::size_t pattern = 0; pattern < cells.size(); ++pattern) {
     const int dense = std::max(5, 2 * mesh.space.pattern_order(pattern) + 3);
-    sample_pattern(mesh, pattern, cells[pattern], samples_per_direction ? samples_per_direction : dense, samples);
+    sample_pattern(mesh, pattern, cells[pattern], samples_per_direction ? samples_per_direction : dense, reference,
+                   samples);
   }
   QualityReport report;
   report.num_cells = samples.size();

@@ -81,31 +81,48 @@ std::vector<Index> ShellCheck::strands(const ShellFailures& failures) const {
   return result;
 }
 
-std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
-                          std::span<const Vec3> wanted, std::vector<double>* shares_out) {
+NodeStrands vertex_strands(const ShellLayers& layers) {
+  NodeStrands nodes;
+  const auto num_columns = static_cast<Index>(layers.num_columns());
+  for (Index v = 0; v < layers.num_sheets() * num_columns; ++v) {
+    const Index strand = layers.strand(v), column = v % num_columns;
+    if (strand != kNoIndex)
+      nodes.strands.push_back(strand);
+    else
+      nodes.strands.insert(nodes.strands.end(), {column, num_columns + column});
+    nodes.offsets.push_back(nodes.strands.size());
+  }
+  return nodes;
+}
+
+std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
+                          std::span<const Vec3> safe, std::span<const Vec3> wanted, std::vector<double>* shares_out) {
   constexpr double kShrink = 0.7, kLeast = 0.05;
   std::vector<double> shares(layers.num_strands(), 1.0);
-  std::vector<Vec3> positions(wanted.begin(), wanted.end());
+  std::vector<Vec3> state(wanted.begin(), wanted.end());
   for (;;) {
-    const ShellFailures failures = check.failures(positions);
-    if (failures.none()) break;
     bool moved = false;
-    for (const Index strand : check.strands(failures)) {
+    for (const Index strand : failing(state)) {
       double& share = shares[strand];
       moved = moved || share > 0;
       share = kShrink * share < kLeast ? 0 : kShrink * share;
     }
-    if (!moved) break;  // the safe state was not valid
+    if (!moved) break;  // valid, or the safe state was not
     grade(layers, shares);
-    const std::size_t n = layers.num_columns();
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-      const Index strand = layers.strand(static_cast<Index>(i));
-      const double share = strand != kNoIndex ? shares[strand] : std::min(shares[i % n], shares[n + i % n]);
-      positions[i] = safe[i] + share * (wanted[i] - safe[i]);
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      double share = 1;
+      for (const Index strand : nodes.of_node(i)) share = std::min(share, shares[strand]);
+      state[i] = safe[i] + share * (wanted[i] - safe[i]);
     }
   }
   if (shares_out) *shares_out = std::move(shares);
-  return positions;
+  return state;
+}
+
+std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
+                          std::span<const Vec3> wanted, std::vector<double>* shares) {
+  const auto failing = [&](std::span<const Vec3> positions) { return check.strands(check.failures(positions)); };
+  return advance(layers, vertex_strands(layers), failing, safe, wanted, shares);
 }
 
 }  // namespace subvol

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -49,11 +50,28 @@ class ShellCheck {
   bool surface_moves_;
 };
 
+/// The strands that each node of a shell goes with. The nodes of linear cells are their vertices: a vertex goes with its
+/// own strand, one of the surface with both of its column. Nodes of curved cells: `curved_shell.h`.
+struct NodeStrands {
+  std::vector<std::size_t> offsets{0};
+  std::vector<Index> strands;
+  std::span<const Index> of_node(std::size_t i) const { return {strands.data() + offsets[i], offsets[i + 1] - offsets[i]}; }
+};
+NodeStrands vertex_strands(const ShellLayers& layers);
+
+/// Strands that stand in the way of a shell with the given nodes, ascending; none where it is valid.
+using FailingStrands = std::function<std::vector<Index>(std::span<const Vec3> nodes)>;
+
 /// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the
-/// wanted one, less where cells or faces fail; a vertex of the surface goes the least share of its strands.
+/// wanted one, less where strands fail, and neighbours differ by a quarter at most; a node goes the least share of its
+/// strands.
 ///
-/// safe  valid by `check`, so that this ends: a failing cell or face always has a strand that can go back farther.
+/// safe  valid, so that this ends: there always is a failing strand that can go back farther.
 /// shares  if given: how far each strand got, 0 .. 1.
+std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
+                          std::span<const Vec3> safe, std::span<const Vec3> wanted,
+                          std::vector<double>* shares = nullptr);
+/// The same for linear cells.
 std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
                           std::span<const Vec3> wanted, std::vector<double>* shares = nullptr);
 

@@ -115,4 +115,13 @@ TriangleMesh triangulate(const PolygonMesh& polygons, std::vector<Index>* polygo
   return result;
 }
 
+PolygonMesh as_polygons(const TriangleMesh& mesh) {
+  PolygonMesh polygons{.positions = mesh.positions};
+  for (const auto& triangle : mesh.triangles) {
+    polygons.face_vertices.insert(polygons.face_vertices.end(), triangle.begin(), triangle.end());
+    polygons.face_offsets.push_back(polygons.face_vertices.size());
+  }
+  return polygons;
+}
+
 }  // namespace subvol

@@ -27,5 +27,7 @@ PolygonMesh boundary_surface(const VolumeMesh& mesh, const MeshTopology& topolog
 /// polygon_of_triangle  if given: the polygon each triangle comes from. The triangles of one polygon are consecutive.
 /// Polygons of fewer than three corners give nothing. Cost: cubic in the corners of one polygon.
 TriangleMesh triangulate(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle = nullptr);
+/// Triangles as polygons of three corners, in their order.
+PolygonMesh as_polygons(const TriangleMesh& mesh);
 
 }  // namespace subvol

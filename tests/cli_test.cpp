@@ -408,6 +408,24 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
     CHECK(glb.find(name) != std::string::npos);
 }
 
+TEST_CASE("A shell of curved cells goes to its files with its thickness, and is what the files say", "[cli]") {
+  const Workplace place;
+  const Run run = place.run("shell target.off --thickness 2% --side both --order 2 -o shell.vtu -o shell.msh -o shell.glb "
+                            "-o cage:cage.mesh --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report["valid"] == true);
+  CHECK(report["mesh"]["max_order"] == 2);
+  CHECK(report["stages"].back()["order"] == 2);
+  CHECK(report["quality"]["certified_cells"] == report["mesh"]["cells"]);
+  CHECK(place.run("check shell.vtu").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "cage.mesh").num_cells() == report["mesh"]["cells"]);
+  for (const char* file : {"shell.vtu", "shell.msh"})
+    CHECK(content_of(place / file).find("thickness_limited") != std::string::npos);
+  CHECK(content_of(place / "shell.glb").find("_THICKNESS") != std::string::npos);
+}
+
 TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property of the surface", "[cli]") {
   const Workplace place;
   const std::string faces = "3 0 1 2\n3 0 3 1\n3 1 3 2\n3 2 3 0\n";
@@ -447,7 +465,8 @@ TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
   CHECK(place.run("shell target.off --thickness nan -o a.mesh").status == 2);
   CHECK(place.run("shell target.off --thickness 1 --layers 0 -o a.mesh").status == 2);
   CHECK(place.run("shell target.off --thickness 1 --side up -o a.mesh").status == 2);
-  CHECK(place.run("shell target.off --thickness 1 --order 2 -o a.mesh").err.find("not offered yet") != std::string::npos);
+  CHECK(place.run("shell target.off --thickness 1 --order 2 --straight -o a.mesh").status == 2);
+  CHECK(place.run("shell target.off --thickness 1 --order 3 -o a.msh").err.find("up to order 2") != std::string::npos);
   place.file("few.txt", "1\n2\n");
   const Run few = place.run("shell target.off --thickness-file few.txt -o a.mesh");
   CHECK(few.status == 3);

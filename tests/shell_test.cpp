@@ -11,6 +11,7 @@
 #include "subvol/error.h"
 #include "subvol/surface_io.h"
 #include "tests/data.h"
+#include "tests/shell_fixtures.h"
 #include "tests/surface_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -28,43 +29,6 @@ using namespace subvol::test;
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-
-void add_face(PolygonMesh& mesh, std::initializer_list<Index> corners) {
-  mesh.face_vertices.insert(mesh.face_vertices.end(), corners);
-  mesh.face_offsets.push_back(mesh.face_vertices.size());
-}
-
-PolygonMesh polygons(const TriangleMesh& mesh) {
-  PolygonMesh result{mesh.positions, {0}, {}};
-  for (const auto& [a, b, c] : mesh.triangles) add_face(result, {a, b, c});
-  return result;
-}
-
-enum class Faces { triangles, quads, mixed };
-
-/// A grid of nu x nv squares, placed by a function of its lattice points; `closed`: its last column is the first.
-PolygonMesh grid(int nu, int nv, Faces faces, const std::function<Vec3(double, double)>& place, bool closed = false) {
-  PolygonMesh mesh;
-  const int columns = closed ? nu : nu + 1;
-  for (int j = 0; j <= nv; ++j)
-    for (int i = 0; i < columns; ++i) mesh.positions.push_back(place(i, j));
-  for (int j = 0; j < nv; ++j)
-    for (int i = 0; i < nu; ++i) {
-      const auto at = [&](int di, int dj) { return static_cast<Index>((i + di) % columns + (j + dj) * columns); };
-      const Index a = at(0, 0), b = at(1, 0), c = at(1, 1), d = at(0, 1);
-      if (faces == Faces::quads || (faces == Faces::mixed && (i + j) % 2)) {
-        add_face(mesh, {a, b, c, d});
-      } else {
-        add_face(mesh, {a, b, c});
-        add_face(mesh, {a, c, d});
-      }
-    }
-  return mesh;
-}
-
-PolygonMesh plane(Faces faces) {
-  return grid(6, 4, faces, [](double i, double j) { return Vec3(i / 6, j / 4, 0); });
-}
 
 double volume(const VolumeMesh& mesh) {
   const TriangleMesh boundary = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
@@ -172,7 +136,7 @@ TEST_CASE("A sphere's shell is as thick as its energy says, and has that volume"
   for (const double sign : {1.0, -1.0}) {
     const auto slope = [&](double t) { return std::log(t / d) / t + sign * std::log(1 + sign * t) / (1 + sign * t); };
     const double h = zero_of(slope, 0.1, 0.3);
-    const ShellResult shell = make_shell(polygons(cube_surface(16, true)),
+    const ShellResult shell = make_shell(as_polygons(cube_surface(16, true)),
                                          {.thickness = d, .side = sign > 0 ? ShellSide::outward : ShellSide::inward});
     check_valid(shell);
     const std::size_t n = shell.layers.num_columns();
@@ -197,10 +161,10 @@ TEST_CASE("A tube's shell is as thick as its energy says", "[shell]") {
 
 TEST_CASE("Scaling, moving and turning the surface does the same to its shell", "[shell]") {
   TriangleMesh ball = cube_surface(4, true);
-  const ShellResult shell = make_shell(polygons(ball), {.thickness = 0.1, .layers = 2});
+  const ShellResult shell = make_shell(as_polygons(ball), {.thickness = 0.1, .layers = 2});
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   for (Vec3& p : ball.positions) p = 1e3 * (turn * p) + Vec3(1e4, -2e4, 0);
-  const ShellResult moved = make_shell(polygons(ball), {.thickness = 100, .layers = 2});
+  const ShellResult moved = make_shell(as_polygons(ball), {.thickness = 100, .layers = 2});
   check_valid(moved);
   for (std::size_t i = 0; i < shell.mesh.num_vertices(); ++i)
     CHECK((moved.mesh.positions[i] - (1e3 * (turn * shell.mesh.positions[i]) + Vec3(1e4, -2e4, 0))).norm() < 1e-5);
@@ -209,20 +173,12 @@ TEST_CASE("Scaling, moving and turning the surface does the same to its shell", 
 TEST_CASE("Walls that face each other share the room between them", "[shell]") {
   // A slot of width 1, outward being into the slot: twice 0.8 does not fit. And an L, whose sides bend towards each
   // other.
-  const auto profile = [](const std::vector<Vec3>& corners, int cuts) {
-    std::vector<Vec3> points;
-    for (std::size_t k = 0; k + 1 < corners.size(); ++k)
-      for (int i = 0; i < cuts; ++i) points.push_back(corners[k] + (corners[k + 1] - corners[k]) * (double(i) / cuts));
-    points.push_back(corners.back());
-    return points;
-  };
   const std::vector<Vec3> u = profile({{0, 2, 0}, {0, 0, 0}, {1, 0, 0}, {1, 2, 0}}, 8);
   const std::vector<Vec3> l = profile({{0, 2, 0}, {0, 0, 0}, {2, 0, 0}}, 8);
   for (const auto* points : {&u, &l})
     for (const Faces faces : {Faces::triangles, Faces::quads})
       for (const double d : {0.3, 0.8, 2.0}) {
-        const auto place = [&](double i, double j) { return Vec3((*points)[int(i)] + Vec3(0, 0, -j / 4)); };
-        const PolygonMesh surface = grid(static_cast<int>(points->size()) - 1, 4, faces, place);
+        const PolygonMesh surface = drawn_profile(*points, faces);
         for (const ShellSide side : {ShellSide::outward, ShellSide::inward, ShellSide::both}) {
           const ShellResult shell = make_shell(surface, {.thickness = d, .side = side, .layers = 2});
           INFO("points " << points->size() << ", thickness " << d << ", side " << static_cast<int>(side));
@@ -255,7 +211,7 @@ TEST_CASE("Ray gaps are distances to the other side", "[shell]") {
 
 TEST_CASE("What is certified is nowhere inverted, however the shell is spoilt", "[shell]") {
   RandomPoints random(5);
-  const ShellResult shell = make_shell(polygons(cube_surface(4, true)), {.thickness = 0.2, .side = ShellSide::both});
+  const ShellResult shell = make_shell(as_polygons(cube_surface(4, true)), {.thickness = 0.2, .side = ShellSide::both});
   const ElementRule rule = make_element_rule(CellKind::prism, 17);
   std::size_t certified = 0, refuted = 0;
   for (const double amount : {0.02, 0.05, 0.1, 0.2}) {
@@ -274,7 +230,7 @@ TEST_CASE("What is certified is nowhere inverted, however the shell is spoilt", 
 }
 
 TEST_CASE("A shell that is advanced into itself stops short of it", "[shell]") {
-  const ShellLayers layers = make_layers(polygons(cube_surface(4, true)), 1, 0, 1);
+  const ShellLayers layers = make_layers(as_polygons(cube_surface(4, true)), 1, 0, 1);
   const VolumeMesh cells = stack_cells(layers);
   const ShellCheck check(layers, cells, CheckedSheets::all);
   const VisibleNormals visible = visible_normals(layers.surface);
@@ -292,7 +248,7 @@ TEST_CASE("A free surface slides where that helps the cells, and stays near wher
   RandomPoints random(9);
   TriangleMesh ball = cube_surface(8, true);
   for (Vec3& p : ball.positions) p = (p + random.point(0.04)).normalized();
-  const PolygonMesh surface = polygons(ball);
+  const PolygonMesh surface = as_polygons(ball);
   const ShellResult fixed = make_shell(surface, {.thickness = 0.2, .layers = 2});
   const ShellResult free = make_shell(surface, {.thickness = 0.2, .layers = 2, .free_surface = true});
   check_valid(fixed);
@@ -331,13 +287,13 @@ TEST_CASE("Creases and corners are kept on both outer sheets, and borders become
 }
 
 TEST_CASE("Sharp edges of a surface are found by their angle", "[shell]") {
-  const FeatureTags tags = surface_features(polygons(cube_surface(2, false)), 40);
+  const FeatureTags tags = surface_features(as_polygons(cube_surface(2, false)), 40);
   CHECK(tags.creases.size() == 24);
   CHECK(tags.corners.size() == 8);
 }
 
 TEST_CASE("A shell has the same bits for one thread and for two", "[shell]") {
-  const PolygonMesh surface = polygons(cube_surface(6, false));
+  const PolygonMesh surface = as_polygons(cube_surface(6, false));
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
   const ShellResult one = make_shell(surface, {.thickness = 0.5, .side = ShellSide::both, .layers = 2});
@@ -349,7 +305,7 @@ TEST_CASE("A shell has the same bits for one thread and for two", "[shell]") {
 
 TEST_CASE("A shell can be stopped at any step and is valid all the same", "[shell]") {
   int calls = 0;
-  const ShellResult shell = make_shell(polygons(cube_surface(6, false)),
+  const ShellResult shell = make_shell(as_polygons(cube_surface(6, false)),
                                        {.thickness = 0.5, .layers = 2, .progress = [&](const FitProgress& progress) {
                                           CHECK(progress.fraction >= 0);
                                           CHECK(progress.fraction <= 1);
