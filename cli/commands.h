@@ -16,5 +16,6 @@ void add_shell_command(CLI::App& app, Action& action);
 void add_subdivide_command(CLI::App& app, Action& action);
 void add_check_command(CLI::App& app, Action& action);
 void add_convert_command(CLI::App& app, Action& action);
+void add_report_command(CLI::App& app, Action& action);
 
 }  // namespace subvol::cli

@@ -2,6 +2,7 @@
 #include "cli/commands.h"
 #include "cli/config_file.h"
 #include "cli/exit_status.h"
+#include "cli/report.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
 
@@ -17,6 +18,7 @@ constexpr const char* kFooter = R"(Examples:
   subvol shell bone.off --thickness 2% --layers 2 --side both -o bone_shell.vtu -o bone_shell.glb
   subvol check bone_fine.mesh --target bone.off
   subvol convert cage.mesh -o cage.usda
+  subvol report bone.json -o bone.html
 
 Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not converged (best result written);
              130 interrupted (best result written).
@@ -39,6 +41,7 @@ void require_known_verb(const CLI::App& app, int argc, char** argv) {
 }
 
 int run(int argc, char** argv) {
+  remember_command_line(argc, argv);
   CLI::App app{"Fits volume meshes to surfaces: subdivision volumes and shells.", "subvol"};
   app.footer(kFooter);
   app.set_version_flag("--version", std::string("subvol ") + version());
@@ -55,6 +58,7 @@ int run(int argc, char** argv) {
   add_subdivide_command(app, action);
   add_check_command(app, action);
   add_convert_command(app, action);
+  add_report_command(app, action);
   require_known_verb(app, argc, argv);
   try {
     app.parse(argc, argv);

@@ -54,6 +54,8 @@ void require_writable_folder(const fs::path& file) {
   unlink(probe.c_str());
 }
 
+}  // namespace
+
 void require_free(const fs::path& file, bool force) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) throw UsageError(file.string() + ": is a folder");
@@ -62,8 +64,6 @@ void require_free(const fs::path& file, bool force) {
   }
   if (!fs::exists(file, ignored) || fs::is_regular_file(file, ignored)) require_writable_folder(file);
 }
-
-}  // namespace
 
 bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }
 

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <vector>
 
 #include <sys/resource.h>
 
@@ -17,6 +18,11 @@ void require_finite(const Json& value, const std::string& where) {
   }
   if (!value.is_structured()) return;
   for (const auto& [key, item] : value.items()) require_finite(item, where + '/' + key);
+}
+
+Json& command_line() {
+  static Json words = Json::array();
+  return words;
 }
 
 Json energy_json(const StageRecord& stage, const IterationRecord& iteration) {
@@ -92,8 +98,14 @@ std::string json_text(const Json& report) {
   return report.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
+void remember_command_line(int argc, const char* const* argv) {
+  command_line() = std::vector<std::string>(argv, argv + argc);
+}
+
 void write_report(const std::filesystem::path& path, const Json& report) {
-  write_file_atomically(path, json_text(report));
+  Json whole = report;
+  if (!command_line().empty()) whole["command_line"] = command_line();
+  write_file_atomically(path, json_text(whole));
 }
 
 }  // namespace subvol::cli

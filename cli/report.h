@@ -24,6 +24,9 @@ std::size_t peak_memory_bytes();
 /// JSON text of a report. std::runtime_error, naming the entry, where a number is not finite: JSON has no word for it.
 std::string json_text(const Json& report);
 
+/// The words of the command line, which every report written from now on holds as "command_line".
+void remember_command_line(int argc, const char* const* argv);
+
 /// Writes a report, all of it or nothing. IoError: the file cannot be written.
 void write_report(const std::filesystem::path& path, const Json& report);
 

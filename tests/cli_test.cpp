@@ -139,6 +139,48 @@ TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the t
   CHECK(report.at("stages").back().at("energy").at("total") > 0);
 }
 
+TEST_CASE("A report becomes a page that needs nothing else", "[cli]") {
+  const Workplace place;
+  REQUIRE(place.run(std::string(kFit) + "--levels 1 -o a&b.mesh -o cage:cage.mesh --report report.json").status == 0);
+  const auto words = place.json("report.json").at("command_line");
+  CHECK(words.at(1) == "fit");
+  const Run run = place.run("report report.json -o page.html");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const std::string page = content_of(place / "page.html");
+  std::size_t pictures = 0;
+  for (std::size_t at = page.find("data:image/png;base64,"); at != std::string::npos;
+       at = page.find("data:image/png;base64,", at + 1))
+    ++pictures;
+  CHECK(pictures == 4);
+  for (const char* word : {"Valid", "converged", "<svg", "prefers-color-scheme: dark", "a&amp;b.mesh", "Worst cells"})
+    CHECK(page.find(word) != std::string::npos);
+  for (const char* word : {"<script", "http:", "https:", "a&b", "NaN"}) CHECK(page.find(word) == std::string::npos);
+
+  CHECK(place.run("report report.json -o page.html").status == 2);
+  CHECK(place.run("report report.json -o page.htm").status == 2);
+  std::filesystem::remove(place / "a&b.mesh");
+  const Run without = place.run("report report.json -o page.html --force");
+  CHECK(without.status == 0);
+  CHECK(without.err.find("the result is not shown") != std::string::npos);
+}
+
+TEST_CASE("What is no report is refused, and nothing is written", "[cli]") {
+  const Workplace place;
+  for (const char* text : {"", "{", "[]", "{\"subvol\": 1}", "null",
+                           "{\"subvol\": \"1\", \"command\": 7}",
+                           "{\"subvol\": \"1\", \"command\": \"fit\", \"stages\": [{\"history\": [3]}]}",
+                           "{\"subvol\": \"1\", \"command\": \"fit\", \"quality\": {\"cells\": \"many\"}}"}) {
+    place.file("report.json", text);
+    const Run run = place.run("report report.json -o page.html");
+    INFO(text << '\n' << run.err);
+    CHECK(run.status == 3);
+    CHECK(run.err.find("report.json") != std::string::npos);
+    CHECK(!std::filesystem::exists(place / "page.html"));
+  }
+  CHECK(place.run("report none.json -o page.html").status == 3);
+}
+
 TEST_CASE("A fit of curved elements goes from files to files that check agrees with", "[cli]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--order 3 -o out.vtu -o out.glb -o out.mesh --report report.json");
@@ -287,7 +329,7 @@ TEST_CASE("Every verb explains itself", "[cli]") {
   const Workplace place;
   const Run all = place.run("--help");
   CHECK(all.status == 0);
-  for (const std::string verb : {"fit", "shell", "subdivide", "check", "convert"}) {
+  for (const std::string verb : {"fit", "shell", "subdivide", "check", "convert", "report"}) {
     CHECK(all.out.find("\n  " + verb) != std::string::npos);
     const Run run = place.run(verb + " --help");
     INFO(run.out);
