@@ -31,6 +31,7 @@ struct FitArguments {
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
   int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
   std::string basis = "fourier";
+  bool adaptive = false;
 };
 
 SolverKind solver_kind(const FitArguments& arguments) {
@@ -228,6 +229,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->needs(order)
       ->group(group);
+  verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")->needs(order)->group(group);
   for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far"})
     order->excludes(verb.get_option(other));
 }
@@ -238,6 +240,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   HighOrderFitOptions& fit = result.fit;
   fit.order = arguments.order;
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
+  fit.adaptive = arguments.adaptive;
   fit.tolerance_percent = arguments.fit.tolerance_percent;
   if (verb.count("--lambda-close") > 0) fit.lambda_close = arguments.fit.lambda_close;
   fit.solver = solver_kind(arguments);

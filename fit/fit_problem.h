@@ -60,7 +60,8 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 
 /// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
 /// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`VolumeTerm`) certified; cells
-/// that stand in the way get a denser quadrature for the steps to come.
+/// that stand in the way get a denser quadrature for the steps to come. Where few points would make the step shorter than a
+/// half, the Hessian is made stiffer there (`VolumeTerm::stiffen`) and the direction found again.
 ///
 /// x  feasible start (finite E), else `no_step`; receives the result.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);

@@ -28,10 +28,14 @@ Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTang
 
 double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
 
+std::vector<double> own_box_shares(double distance) {
+  return distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
+}
+
 FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold) {
   FitSchedule schedule;
   schedule.levels = options.levels;
-  schedule.own_box_shares = distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
+  schedule.own_box_shares = own_box_shares(distance);
   const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
   schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
   schedule.middle = {{coarse, kCloseTangentialWeight}};

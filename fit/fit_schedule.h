@@ -52,6 +52,9 @@ struct FitSchedule {
   double fraction(int number) const;
 };
 
+/// How much the cells' own boxes are taken for ideal at first, by the template's distance: first choice first.
+std::vector<double> own_box_shares(double distance);
+
 /// distance      mean distance of template and target by the target's length V/A.
 /// creases_hold  whether creases are tied to most of the target's sharp edges.
 FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold = false);

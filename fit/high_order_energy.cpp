@@ -8,6 +8,7 @@
 #include "subvol/error.h"
 
 #include <Eigen/LU>
+#include <omp.h>
 
 #include <algorithm>
 #include <atomic>
@@ -106,6 +107,7 @@ struct HighOrderEnergy::Group {
   std::vector<std::int8_t> signs;
   std::size_t local_begin = 0;                     ///< of the first batch in local_
   std::vector<Wide> to_reference;                  ///< A^-1: 9 per batch, or per point of each where cells have references
+  std::vector<Wide> cell_weights;                  ///< of each batch
   bool by_point = false;
   std::vector<Wide> frozen;                        ///< kFrozen per point of every batch
   std::vector<Wide> mean_blocks;                   ///< 54 per batch: `add_blocks` over all points
@@ -353,6 +355,7 @@ HighOrderEnergy::HighOrderEnergy(const ElementSpace& space, CellReference refere
 
 void HighOrderEnergy::rebuild_groups() {
   const ElementSpace& space = *space_;
+  cell_weights_.resize(space.num_cells(), 1.0);
   if (points_.size() != space.num_cells())
     throw InputError("HighOrderEnergy: points_per_direction must hold one entry per cell");
   std::map<std::array<int, 3>, std::vector<Index>> lists;
@@ -381,8 +384,10 @@ void HighOrderEnergy::rebuild_groups() {
       group.nodes.resize(group.nodes.size() + group.num_modes * kLanes, kNoIndex);
       group.signs.resize(group.nodes.size(), 0);
       const std::size_t first = (group.batches.size() - 1) * group.num_modes * kLanes;
+      Wide& weights = group.cell_weights.emplace_back();
       for (int l = 0; l < kLanes; ++l) {
         const Index c = batch[l] = cells[std::min(i + l, cells.size() - 1)];
+        weights[l] = cell_weights_[c];
         const auto modes = space.modes(c);
         for (std::size_t a = 0; a < modes.size(); ++a) {
           const std::size_t place = first + group.mode_number(modes[a]) * kLanes + l;
@@ -503,7 +508,7 @@ double HighOrderEnergy::value(std::span<const Vec3> nodes) const {
       sum += group.weights[q] * load(hencky.energy);
     });
     double total = 0;
-    for (int l = 0; l < group.active[b]; ++l) total += sum[l];
+    for (int l = 0; l < group.active[b]; ++l) total += group.cell_weights[b][l] * sum[l];
     return total;
   });
 }
@@ -514,6 +519,7 @@ double HighOrderEnergy::add_gradient(std::span<const Vec3> nodes, double scale, 
     const Group& group = groups_[g];
     HenckyBatch hencky;
     Wide sum{};
+    const Wide cell_weight = group.cell_weights[b];
     sweep.load(b, nodes);
     sweep.template run<true>([&](std::size_t q, Wide* j) {
       const Wide* reference = group.reference(b, q);
@@ -521,13 +527,13 @@ double HighOrderEnergy::add_gradient(std::span<const Vec3> nodes, double scale, 
       product(j, reference, f);
       for (int e = 0; e < 9; ++e) store(f[e], hencky.jacobian[e]);
       hencky_gradient(hencky);
-      for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * load(hencky.stress[e]);
+      for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load(hencky.stress[e]);
       product_with_transpose(f, reference, j);
       sum += group.weights[q] * load(hencky.energy);
     });
     keep(group, b, sweep.coefficients());
     double total = 0;
-    for (int l = 0; l < group.active[b]; ++l) total += sum[l];
+    for (int l = 0; l < group.active[b]; ++l) total += group.cell_weights[b][l] * sum[l];
     return total;
   });
   if (energy < kInfinity) gather_nodes(scale * weight, gradient);
@@ -545,6 +551,7 @@ double HighOrderEnergy::linearize(std::span<const Vec3> nodes, double scale, std
     HenckyBatch hencky;
     Wide sum{};
     Wide* blocks = &group.mean_blocks[54 * b];
+    const Wide cell_weight = group.cell_weights[b];
     std::fill_n(blocks, 54, Wide{});
     sweep.load(b, nodes);
     sweep.template run<true>([&](std::size_t q, Wide* j) {
@@ -554,10 +561,10 @@ double HighOrderEnergy::linearize(std::span<const Vec3> nodes, double scale, std
       product(j, reference, f);
       for (int e = 0; e < 9; ++e) store(f[e], hencky.jacobian[e]);
       hencky_hessian(hencky);
-      for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * load(hencky.stress[e]);
+      for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load(hencky.stress[e]);
       product_with_transpose(f, reference, j);
       sum += group.weights[q] * load(hencky.energy);
-      const double w = scale * weight * group.weights[q];
+      const Wide w = scale * weight * group.weights[q] * cell_weight;
       for (int e = 0; e < 9; ++e) frozen[e] = load(hencky.u[e]);
       for (int e = 0; e < 9; ++e) f[e] = load(hencky.v[e]);
       product(reference, f, frozen + 9);
@@ -570,7 +577,7 @@ double HighOrderEnergy::linearize(std::span<const Vec3> nodes, double scale, std
     });
     keep(group, b, sweep.coefficients());
     double total = 0;
-    for (int l = 0; l < group.active[b]; ++l) total += sum[l];
+    for (int l = 0; l < group.active[b]; ++l) total += group.cell_weights[b][l] * sum[l];
     return total;
   });
   gather_nodes(scale * weight, gradient);
@@ -609,27 +616,58 @@ void HighOrderEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap&
     }
 }
 
-double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
-  StepLimit steps(limit);
+/// Calls per_point(group, batch, q, lane, J, D) with the Jacobians of two fields at every point, batches in parallel.
+template <class PerPoint>
+void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction,
+                                    const PerPoint& per_point) const {
+  std::vector<std::vector<Wide>> jacobians(omp_get_max_threads());
   sum_batches([&](std::size_t g, std::size_t b, Sweep& sweep) {
     const Group& group = groups_[g];
-    std::vector<Wide> jacobians(9 * group.num_points());
+    std::vector<Wide>& kept = jacobians[omp_get_thread_num()];
+    kept.resize(9 * group.num_points());
     sweep.load(b, nodes);
-    sweep.template run<false>([&](std::size_t q, const Wide* j) { std::copy_n(j, 9, &jacobians[9 * q]); });
+    sweep.template run<false>([&](std::size_t q, const Wide* j) { std::copy_n(j, 9, &kept[9 * q]); });
     sweep.load(b, direction);
     sweep.template run<false>([&](std::size_t q, const Wide* d) {
       for (int l = 0; l < group.active[b]; ++l) {
         Mat3 j, e;
         for (int k = 0; k < 9; ++k) {
-          j(k / 3, k % 3) = jacobians[9 * q + k][l];
+          j(k / 3, k % 3) = kept[9 * q + k][l];
           e(k / 3, k % 3) = d[k][l];
         }
-        steps.admit(j, e);
+        per_point(g, b, q, l, j, e);
       }
     });
     return 0.0;
   });
+}
+
+double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
+  StepLimit steps(limit);
+  for_each_pair(nodes, direction, [&](std::size_t, std::size_t, std::size_t, int, const Mat3& j, const Mat3& d) {
+    steps.admit(j, d);
+  });
   return steps.step();
+}
+
+bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) {
+  constexpr double kStiffer = 10;
+  std::atomic<bool> changed{false};
+  for_each_pair(nodes, direction, [&](std::size_t g, std::size_t b, std::size_t q, int l, const Mat3& j, const Mat3& d) {
+    if (StepLimit::safe(j, d, t)) return;
+    Group& group = groups_[g];
+    Wide* frozen = &group.frozen[kFrozen * (b * group.num_points() + q)];
+    Wide more[kFrozen];
+    std::copy_n(frozen, kFrozen, more);
+    for (int k = 18; k < kFrozen; ++k) {
+      more[k] = Wide{};
+      more[k][l] = (kStiffer - 1) * frozen[k][l];
+      frozen[k][l] *= kStiffer;
+    }
+    add_blocks(more, &group.mean_blocks[54 * b]);
+    changed = true;
+  });
+  return changed;
 }
 
 std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) const {
@@ -638,7 +676,11 @@ std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) con
 
 void HighOrderEnergy::densify(std::span<const Index> cells) {
   constexpr int kMostPoints = 33;
-  for (Index c : cells) points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
+  constexpr double kHeavier = 2, kHeaviest = 64;
+  for (Index c : cells) {
+    points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
+    cell_weights_[c] = std::min(kHeaviest, kHeavier * cell_weights_[c]);
+  }
   rebuild_groups();
 }
 

@@ -21,7 +21,8 @@ namespace subvol {
 ///
 /// e is the Hencky energy (`hencky.h`), A_cq the derivative of the ideal cell's map: edge length 1, stretched by h_c along
 /// its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
-/// coefficients of edge, face and cell modes. Cells weigh equally.
+/// coefficients of edge, face and cell modes. Cells weigh equally, but those that were densified twice as much each time,
+/// up to 64 times: e grows too slowly towards inversion to keep them from it.
 ///
 /// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for n
 /// modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept as
@@ -48,6 +49,7 @@ class HighOrderEnergy final : public VolumeTerm {
   void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                            std::span<Mat3> diagonal) const override;
   double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
+  bool stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) override;
   /// Number of quadrature points of all cells.
   std::size_t num_points() const;
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
@@ -60,6 +62,8 @@ class HighOrderEnergy final : public VolumeTerm {
   void rebuild_groups();
   void fill_references(Group& group) const;
   void find_incidences();
+  template <class PerPoint>
+  void for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction, const PerPoint& per_point) const;
   template <class PerBatch>
   double sum_batches(PerBatch&& per_batch) const;
   void keep(const Group& group, std::size_t batch, const std::vector<Wide>& coefficients) const;
@@ -70,6 +74,7 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell, where cells have one for all their points
   CellReference reference_;
   std::vector<int> points_;
+  std::vector<double> cell_weights_;
   std::vector<Group> groups_;
   /// What every batch adds to its cells' modes, and where each node finds its parts: signed places, by node.
   mutable std::vector<double> local_;

@@ -6,7 +6,10 @@
 #include "fit/fit_level.h"
 #include "fit/fit_target.h"
 #include "fit/high_order_energy.h"
+#include "fit/high_order_schedule.h"
+#include "fit/order_indicator.h"
 #include "fit/quadrature.h"
+#include "fit/self_intersection.h"
 #include "fit/stage_runner.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -14,13 +17,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
 
 namespace subvol {
 
 namespace {
 
-constexpr double kCoarseLambda = 0.05, kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
-constexpr int kMaxIterations = 40;
+/// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is worth one.
+constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
 
 template <class... Values>
 std::string format(const char* form, Values... values) {
@@ -56,22 +60,35 @@ class HighOrderFit {
 
  private:
   void look_over_template();
-  void raise_order(int order);
+  int sample_intervals(int order) const;
+  void set_orders(const EntityOrders& orders);
+  FitProblem problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const;
   bool run_stage(const Stage& stage);
   void take_own_boxes();
-  bool run_order(int order);
+  void begin_try(const HighOrderTry& attempt);
+  bool run_order(Approach approach, int order);
+  bool run_first_orders(int last);
+  bool run_higher_orders();
+  bool raise_where_it_pays();
+  bool run_adaptive_orders();
   bool lower_lambda();
+  bool meets_tolerance();
+  TriangleMesh boundary(int intervals) const;
   double measured_mean();
+  std::size_t intersecting_pairs() const;
+  void conclude();
 
   HighOrderFitOptions options_;
   FitTarget target_;
   VolumeMesh template_;
-  FitSchedule schedule_;
+  HighOrderSchedule schedule_;
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
   BoundarySamples samples_;
-  int order_ = 1;
-  double lambda_ = 0;
+  int try_ = 0;              ///< tries begun
+  Approach approach_ = Approach::direct;
+  int order_ = 1;            ///< the highest of any entity
+  double lambda_ = 0;        ///< of the last stage
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
   StageRunner runner_;
@@ -90,49 +107,73 @@ HighOrderFit::HighOrderFit(const TriangleMesh& target, const VolumeMesh& templat
 void HighOrderFit::look_over_template() {
   const double distance =
       target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))), report_);
-  FitOptions options;
-  options.levels = options_.order;
-  options.lambda_close = options_.lambda_close;
-  schedule_ = make_schedule(options, distance / target_.surface.length());
-  ideal_boxes_ = ideal_boxes(template_, template_.positions, target_.surface.volume(), schedule_.own_box_shares[0]);
+  schedule_ = make_high_order_schedule(options_.lambda_close, distance / target_.surface.length());
 }
 
-void HighOrderFit::raise_order(int order) {
-  constexpr int kMostIntervals = 16;
-  order_ = order;
-  mesh_ = mesh_.with_orders(EntityOrders::uniform(mesh_.space.topology(), order));
+/// Intervals along an edge: about as fine as the target, and as the curves need so that their chords do not matter; less
+/// for surfaces of many faces, where they matter less.
+int HighOrderFit::sample_intervals(int order) const {
+  constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;
+  constexpr double kMostTriangles = 60000;
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
   const double triangles = static_cast<double>(target_.surface.triangles().size());
-  const int wanted = static_cast<int>(std::ceil(std::sqrt(triangles / faces)));
-  samples_ = make_boundary_samples(mesh_.space, std::max(std::min(wanted, kMostIntervals), 2 * order));
+  const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), kMostIntervals);
+  const int affordable = static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)));
+  return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
+}
+
+void HighOrderFit::set_orders(const EntityOrders& orders) {
+  mesh_ = mesh_.with_orders(orders);
+  order_ = mesh_.space.max_order();
+  samples_ = make_boundary_samples(mesh_.space, sample_intervals(order_));
   target_.sample(samples_.points.size());
   mean_.reset();
 }
 
-bool HighOrderFit::run_stage(const Stage& stage) {
+FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const {
   constexpr int kLeastPoints = 5;
+  std::vector<int> points(mesh.space.num_cells());
+  for (std::size_t c = 0; c < points.size(); ++c)
+    points[c] = std::max(kLeastPoints, points_for_order(mesh.space.pattern_order(mesh.space.pattern(c))));
+  return {identity_map(mesh.space.num_nodes()), samples.positions,
+          std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes_, points),
+          make_surface_term(target_.surface, samples.triangles, samples.points.size(), stage.tangential_weight,
+                            options_.correspondence),
+          stage.lambda};
+}
+
+bool HighOrderFit::run_stage(const Stage& stage) {
   StageRecord record;
-  record.name = format("order %d, lambda %g, tangential weight %g", order_, stage.lambda, stage.tangential_weight);
+  const int least = std::ranges::min(mesh_.space.orders().cells);
+  record.name = (try_ > 1 ? format("try %d, ", try_) : "") +
+                (least < order_ ? format("orders %d to %d", least, order_) : format("order %d", order_)) +
+                format(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
   record.order = order_;
   record.cells = mesh_.space.num_cells();
   lambda_ = stage.lambda;
-  const std::vector<int> points(mesh_.space.num_cells(), std::max(kLeastPoints, points_for_order(order_)));
-  FitProblem problem(identity_map(mesh_.space.num_nodes()), samples_.positions,
-                     std::make_unique<HighOrderEnergy>(mesh_.space, ideal_boxes_, points),
-                     make_surface_term(target_.surface, samples_.triangles, samples_.points.size(),
-                                       stage.tangential_weight, options_.correspondence),
-                     stage.lambda);
   mean_.reset();
-  return runner_.run(problem, stage, std::move(record), schedule_.fraction(order_), mesh_.coefficients, report_);
+  FitProblem stage_problem = problem(mesh_, samples_, stage);
+  const double fraction = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_) + 1);
+  return runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
+}
+
+TriangleMesh HighOrderFit::boundary(int intervals) const {
+  BoundarySamples fine = make_boundary_samples(mesh_.space, intervals);
+  return {fine.positions.apply(mesh_.coefficients), std::move(fine.triangles)};
 }
 
 double HighOrderFit::measured_mean() {
   if (!mean_) {
-    const BoundarySamples fine = make_boundary_samples(mesh_.space, 3 * order_ + 4);
-    mean_ = 100 * target_.mean_distance({fine.positions.apply(mesh_.coefficients), fine.triangles});
+    mean_ = 100 * target_.mean_distance(boundary(2 * sample_intervals(order_) + 1));
     if (!report_.stages.empty()) report_.stages.back().mean_distance_percent = *mean_;
   }
   return *mean_;
+}
+
+std::size_t HighOrderFit::intersecting_pairs() const { return self_intersections(boundary(sample_intervals(order_) + 1)).pairs.size(); }
+
+bool HighOrderFit::meets_tolerance() {
+  return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
 /// From now on, cells are ideal as boxes of the size they have: graded meshes stay graded.
@@ -141,47 +182,113 @@ void HighOrderFit::take_own_boxes() {
                              target_.surface.volume(), 1);
 }
 
-/// Far templates need their curves before their own boxes tell what their cells should look like.
-bool HighOrderFit::run_order(int order) {
-  constexpr int kLastCommonOrder = 2;
-  const bool far = schedule_.own_box_shares[0] < 1;
-  if (order > (far ? kLastCommonOrder : 1)) take_own_boxes();
-  raise_order(order);
-  const bool last = order == options_.order;
-  if (order == 1 && !run_stage({kCoarseLambda, kFarTangentialWeight})) return false;
-  if (last && far && order > 1 && order <= kLastCommonOrder) {
-    if (!run_stage({kCoarseLambda, kCloseTangentialWeight, kMaxIterations})) return false;
-    take_own_boxes();
-  }
-  return run_stage({last ? options_.lambda_close : kCoarseLambda, kCloseTangentialWeight, kMaxIterations}) &&
-         (!last || lower_lambda());
+void HighOrderFit::begin_try(const HighOrderTry& attempt) {
+  ++try_;
+  approach_ = attempt.approach;
+  mesh_ = HighOrderMesh(mesh_.space.with_orders(EntityOrders::uniform(mesh_.space.topology(), 1)), template_);
+  ideal_boxes_ = ideal_boxes(template_, template_.positions, target_.surface.volume(), attempt.own_box_share);
 }
 
+bool HighOrderFit::run_order(Approach approach, int order) {
+  if (order > schedule_.last_common_order()) take_own_boxes();
+  set_orders(EntityOrders::uniform(mesh_.space.topology(), order));
+  for (const Stage& stage : schedule_.stages(approach, order, options_.order))
+    if (!run_stage(stage)) return false;
+  return true;
+}
+
+/// The orders up to `last`, in the first way that gets near the target without folding its surface; else in the one of
+/// the tries that got nearest.
+bool HighOrderFit::run_first_orders(int last) {
+  struct Outcome {
+    std::size_t pairs;
+    double mean;
+    HighOrderMesh mesh;
+    std::vector<Vec3> ideal_boxes;
+    Approach approach;
+  };
+  std::optional<Outcome> best;
+  for (const HighOrderTry& attempt : schedule_.tries) {
+    begin_try(attempt);
+    for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
+      if (!run_order(attempt.approach, order)) return false;
+    if (schedule_.tries.size() == 1) return true;
+    Outcome outcome{intersecting_pairs(), measured_mean(), mesh_, ideal_boxes_, approach_};
+    const bool better = !best || std::tuple(outcome.pairs > 0, outcome.mean) < std::tuple(best->pairs > 0, best->mean);
+    if (better) best = std::move(outcome);
+    const bool near = last < kTellingOrder || best->mean <= kFairDistancePercent;
+    if (best->pairs == 0 && near) break;
+  }
+  mesh_ = std::move(best->mesh);
+  ideal_boxes_ = std::move(best->ideal_boxes);
+  approach_ = best->approach;
+  set_orders(EntityOrders(mesh_.space.orders()));
+  return true;
+}
+
+bool HighOrderFit::run_higher_orders() {
+  while (order_ < options_.order)
+    if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
+  return lower_lambda();
+}
+
+/// Raises the orders of what gains most. False where that is not worth its nodes.
+bool HighOrderFit::raise_where_it_pays() {
+  const EntityOrders next = next_orders(mesh_.space.orders(), options_.order);
+  const HighOrderMesh raised = mesh_.with_orders(next);
+  if (raised.space.num_nodes() == mesh_.space.num_nodes()) return false;
+  const BoundarySamples samples = make_boundary_samples(raised.space, sample_intervals(raised.space.max_order()));
+  FitProblem raised_problem = problem(raised, samples, schedule_.final_stage(lambda_));
+  const EntityValues gains = order_gains(raised_problem, raised.space, mesh_.space.orders(), raised.coefficients);
+  const double surface = raised_problem.surface->target_to_surface() + raised_problem.surface->surface_to_target();
+  if (!(gains.sum() > kLeastOrderGain * surface)) return false;
+  set_orders(raised_where_it_pays(mesh_.space, next, gains, kRaisedShare));
+  return true;
+}
+
+/// Orders rise where it pays; where it does not any more, lambda falls for the sake of the tolerance.
+bool HighOrderFit::run_adaptive_orders() {
+  while (!meets_tolerance() && raise_where_it_pays()) {
+    take_own_boxes();
+    if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
+  }
+  return lower_lambda();
+}
+
+/// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the surface
+/// intersect itself more is undone.
 bool HighOrderFit::lower_lambda() {
-  if (!options_.tolerance_percent) return true;
-  for (double lambda = lambda_ / 2; measured_mean() > *options_.tolerance_percent && lambda > 1e-3 * options_.lambda_close;
-       lambda /= 2) {
+  if (!options_.tolerance_percent || meets_tolerance()) return true;
+  std::size_t pairs = intersecting_pairs();
+  for (double lambda = lambda_ / 2; !meets_tolerance() && lambda > 1e-3 * options_.lambda_close; lambda /= 2) {
     const double before = measured_mean();
-    if (!run_stage({lambda, kCloseTangentialWeight, kMaxIterations})) return false;
+    const std::vector<Vec3> coefficients = mesh_.coefficients;
+    if (!run_stage(schedule_.final_stage(lambda))) return false;
+    const std::size_t pairs_now = intersecting_pairs();
+    if (pairs_now > pairs) {
+      mesh_.coefficients = coefficients;
+      mean_ = before;
+      report_.stages.back().kept = false;
+      break;
+    }
+    pairs = pairs_now;
     if (1 - measured_mean() / before < kLeastGain) break;
   }
   return true;
 }
 
+void HighOrderFit::conclude() {
+  const bool missed = options_.tolerance_percent && !meets_tolerance();
+  report_.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
+  report_.explanation = missed ? format("mean distance %.4g %% is above the tolerance of %.4g %%", measured_mean(),
+                                        *options_.tolerance_percent)
+                               : format("all stages done, mean distance %.4g %%", measured_mean());
+}
+
 HighOrderFitResult HighOrderFit::run() {
   look_over_template();
-  bool going = true;
-  for (int order = 1; going; order = std::min(2 * order, options_.order)) {
-    going = run_order(order);
-    if (order == options_.order) break;
-  }
-  if (going) {
-    const bool missed = options_.tolerance_percent && measured_mean() > *options_.tolerance_percent;
-    report_.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
-    report_.explanation = missed ? format("mean distance %.4g %% is above the tolerance of %.4g %%", measured_mean(),
-                                          *options_.tolerance_percent)
-                                 : format("all stages done, mean distance %.4g %%", measured_mean());
-  }
+  const int first = std::min(schedule_.first_orders(options_.adaptive), options_.order);
+  if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders())) conclude();
   report_.seconds = {{"total", runner_.seconds()}};
   const std::size_t num_vertices = mesh_.space.num_vertices();
   std::vector<Vec3>& x = mesh_.coefficients;

@@ -13,6 +13,8 @@ namespace subvol {
 struct HighOrderFitOptions {
   int order = 4;                                 ///< of the finished mesh, 1..kMaxOrder
   Basis basis = Basis::fourier;
+  /// Orders rise only where the energy asks for it, up to `order`, and only until the tolerance is met.
+  bool adaptive = false;
   std::optional<double> tolerance_percent;       ///< lambda is lowered until the mean distance is below; > 0
   double lambda_close = 0.05;                    ///< > 0
   SolverKind solver = SolverKind::newton;
@@ -27,7 +29,8 @@ struct HighOrderFitResult {
   FitReport report;
 };
 
-/// Fits curved elements: the template at order 1, then orders raised step by step (paper: Algorithm 1).
+/// Fits curved elements: the template at order 1, then orders raised step by step (paper: Algorithm 1), of all edges, faces
+/// and cells alike or of those that gain most (`order_indicator.h`).
 ///
 /// target   triangles in any state that encloses a volume; the unit of length is the target's.
 /// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target is.

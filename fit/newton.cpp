@@ -134,7 +134,8 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
   constexpr double kArmijo = 1e-4;
-  constexpr int kMaxHalvings = 30, kPreconditionerLife = 4;
+  constexpr int kMaxHalvings = 30, kPreconditionerLife = 4, kMaxStiffenings = 5;
+  constexpr double kShortStep = 0.5;
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
   const std::size_t n = x.size();
   std::vector<Vec3> y(problem.nodes.num_rows()), z(problem.samples.num_rows());
@@ -168,18 +169,26 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
 
     // The diagonal changes slowly once the first steps are done.
     if (iteration < 2 || iteration % kPreconditionerLife == 0) inverse_diagonal.clear();
-    ReducedHessian reduced(problem, inverse_diagonal);
-    record.linear_iterations = conjugate_gradients(reduced, gradient, options, d);
-    const double slope = dot(gradient, d);
+    double slope = 0, t = 0;
+    for (int round = 0;; ++round) {
+      ReducedHessian reduced(problem, inverse_diagonal);
+      record.linear_iterations += conjugate_gradients(reduced, gradient, options, d);
+      slope = dot(gradient, d);
+      if (!(slope < 0)) break;
+      problem.nodes.apply(d, dy);
+      t = problem.volume->max_step(y, dy);
+      // Few points would have the whole step be short: better that they stay.
+      if (t >= kShortStep || round == kMaxStiffenings || !problem.volume->stiffen(y, dy, kShortStep)) break;
+      inverse_diagonal.clear();
+    }
     if (!(slope < 0)) {
       result.stop = MinimizerStop::converged;
       result.explanation = "the gradient vanishes";
       return result;
     }
-    problem.nodes.apply(d, dy);
     problem.samples.apply(d, dz);
 
-    double t = problem.volume->max_step(y, dy), trial = 0, trial_surface = 0, trial_volume = 0;
+    double trial = 0, trial_surface = 0, trial_volume = 0;
     std::vector<Index> blocking, trial_uncertified;
     bool accepted = false;
     for (int halving = 0; halving < kMaxHalvings && !accepted; ++halving, t *= accepted ? 1 : 0.5) {

@@ -34,9 +34,15 @@ class VolumeTerm {
   /// on the way from y to y + t d at the quadrature points. The nodes must be feasible.
   virtual double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const = 0;
 
+  /// Makes H stiffer where the way from y to y + t d would be too long for `max_step`, so that the next direction leaves
+  /// those points nearly as they are and the rest may move on. False where nothing was changed, or cannot be.
+  virtual bool stiffen(std::span<const Vec3> /*nodes*/, std::span<const Vec3> /*direction*/, double /*t*/) {
+    return false;
+  }
+
   /// Cells that are not proved to be nowhere inverted, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
-  /// Gives these cells more quadrature points from now on, for they invert between those they have.
+  /// Gives these cells more quadrature points from now on, for they invert between those they have. May weigh them more.
   virtual void densify(std::span<const Index> cells) = 0;
 };
 

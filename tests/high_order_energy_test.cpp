@@ -144,6 +144,40 @@ TEST_CASE("an inverted curved cell costs infinity and leaves the gradient alone;
   CHECK(energy.num_points() == 9 * 9 * 9);
 }
 
+TEST_CASE("cells that stand in the way weigh more, with the same derivatives as ever", "[elements]") {
+  PointSource source(6);
+  const VolumeMesh mesh = mixed_cells();
+  const ElementSpace space(mesh, Basis::fourier, 2);
+  HighOrderEnergy energy(space, std::vector(space.num_cells(), Vec3(0.8, 0.8, 0.8)), points_of(space, 5));
+  const std::vector<Vec3> x = bent(space, mesh, source, 0.01);
+  std::vector<Vec3> d(space.num_nodes());
+  for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
+  const double before = energy.value(x);
+  energy.densify(std::vector<Index>{0});
+  CHECK(energy.value(x) > 1.01 * before);
+  CHECK(energy.value(x) < 2.2 * before);
+  check_derivatives(energy, x, d);
+}
+
+TEST_CASE("points that would stop a step short are made stiffer, others are not", "[elements]") {
+  const VolumeMesh mesh = single_cell(CellKind::hex);
+  const ElementSpace space(mesh, Basis::fourier, 2);
+  HighOrderEnergy energy(space, std::vector{Vec3(1, 1, 1)}, points_of(space, 5));
+  const std::vector<Vec3> x = HighOrderMesh(space, mesh).coefficients;
+  std::vector<Vec3> d(x.size(), Vec3::Zero()), gradient = d, soft = d, stiff = d;
+  d[space.cell_nodes(0)] = Vec3(10, 0, 0);
+  energy.linearize(x, 1, gradient);
+  energy.multiply(d, soft);
+  const double step = energy.max_step(x, d);
+  CHECK(!energy.stiffen(x, d, 0.99 * step));
+  energy.multiply(d, stiff);
+  CHECK(stiff == soft);
+  CHECK(energy.stiffen(x, d, 1.5 * step));
+  energy.multiply(d, stiff);
+  const double ratio = stiff[space.cell_nodes(0)].x() / soft[space.cell_nodes(0)].x();
+  CHECK((ratio > 1 && ratio < 10));
+}
+
 TEST_CASE("the diagonal blocks of an affine mesh are those of its Hessian", "[elements]") {
   for (CellKind kind : kAllKinds) {
     const VolumeMesh mesh = single_cell(kind);

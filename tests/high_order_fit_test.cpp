@@ -4,6 +4,7 @@
 #include "fit/high_order_energy.h"
 #include "fit/high_order_fit.h"
 #include "fit/surface_distance.h"
+#include "sample_meshes.h"
 #include "samples/shapes.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
@@ -74,6 +75,37 @@ TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says th
   options.tolerance_percent = 1e-6;
   CHECK(fit_high_order(sample.target, sample.template_mesh, options).report.stop_reason ==
         StopReason::tolerance_missed);
+}
+
+TEST_CASE("an adaptive fit raises orders where the target has its detail, and meets the tolerance with fewer nodes") {
+  const VolumeMesh bar = lattice(6, 1, 1);
+  HighOrderMesh wanted(ElementSpace(bar, Basis::fourier, 6), bar);
+  const MeshTopology& topology = wanted.space.topology();
+  for (std::size_t e = 0; e < topology.num_edges(); ++e) {  // waves on the last cell's edges across the bar
+    const auto [a, b] = topology.edge(static_cast<Index>(e));
+    if (bar.positions[a].x() < 5.5 || bar.positions[b].x() < 5.5) continue;
+    wanted.coefficients[wanted.space.edge_nodes(e) + 3] = Vec3(0.8, 0, 0);
+  }
+  const BoundarySamples samples = make_boundary_samples(wanted.space, 24);
+  const TriangleMesh target{samples.positions.apply(wanted.coefficients), samples.triangles};
+  HighOrderFitOptions options = of_order(6);
+  options.adaptive = true;
+  options.tolerance_percent = 0.006;
+  const HighOrderFitResult result = fit_high_order(target, bar, options);
+  CHECK(result.report.stop_reason == StopReason::converged);
+  CHECK(percent(result.mesh, target) < 0.0065);
+  CHECK(positive(result.mesh, 13));
+  CHECK(result.mesh.space.num_nodes() < wanted.space.num_nodes() / 2);
+  int first = 0, last = 0;
+  for (std::size_t e = 0; e < topology.num_edges(); ++e) {
+    const auto [a, b] = topology.edge(static_cast<Index>(e));
+    const double x = bar.positions[a].x() + bar.positions[b].x();
+    const int order = result.mesh.space.orders().edges[e];
+    if (x < 0.5) first = std::max(first, order);
+    if (x > 11.5) last = std::max(last, order);
+  }
+  CHECK(first == 2);
+  CHECK(last > 4);
 }
 
 TEST_CASE("a high-order fit has the same bits for one and two threads") {
