@@ -15,6 +15,8 @@
 
 namespace subvol {
 
+struct CellGroup;
+
 /// Mean distortion of a mesh of curved cells against ideal or given reference cells.
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
@@ -56,17 +58,17 @@ class HighOrderEnergy final : public VolumeTerm {
   void densify(std::span<const Index> cells) override;
 
  private:
-  struct Group;
-  class Sweep;
-
   void rebuild_groups();
-  void fill_references(Group& group) const;
+  void fill_references(CellGroup& group) const;
   void find_incidences();
+  template <bool kBack, class Kernel, class PerPoint>
+  double integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const;
+  double cell_share() const { return 1.0 / static_cast<double>(space_->num_cells()); }
   template <class PerPoint>
   void for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction, const PerPoint& per_point) const;
   template <class PerBatch>
   double sum_batches(PerBatch&& per_batch) const;
-  void keep(const Group& group, std::size_t batch, const std::vector<Wide>& coefficients) const;
+  void keep(const CellGroup& group, std::size_t batch, const std::vector<Wide>& coefficients) const;
   void gather_nodes(double scale, std::span<Vec3> out) const;
 
   const ElementSpace* space_;
@@ -75,7 +77,7 @@ class HighOrderEnergy final : public VolumeTerm {
   CellReference reference_;
   std::vector<int> points_;
   std::vector<double> cell_weights_;
-  std::vector<Group> groups_;
+  std::vector<CellGroup> groups_;
   /// What every batch adds to its cells' modes, and where each node finds its parts: signed places, by node.
   mutable std::vector<double> local_;
   std::vector<std::size_t> incidence_offsets_;

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/cell_sweep.h"
+
+#include <algorithm>
+
+namespace subvol {
+
+void CellSweep::load(std::size_t batch, std::span<const Vec3> nodes) {
+  const std::size_t first = batch * group_.num_modes * kLanes;
+  for (std::size_t a = 0; a < group_.num_modes; ++a)
+    for (int l = 0; l < kLanes; ++l) {
+      const Index node = group_.nodes[first + a * kLanes + l];
+      const double sign = group_.signs[first + a * kLanes + l];
+      for (int r = 0; r < 3; ++r) lanes(coefficients_[3 * a + r])[l] = node == kNoIndex ? 0.0 : sign * nodes[node][r];
+    }
+}
+
+void CellSweep::to_lines() {
+  for (int kj = 0; kj < m_ * m_; ++kj)
+    for (int q = 0; q < n_; ++q) {
+      Wide sum[6] = {};
+      for (int i = 0; i < m_; ++i) {
+        const Wide* c = &coefficients_[3 * (kj * m_ + i)];
+        const double v = group_.values[q * m_ + i], d = group_.derivatives[q * m_ + i];
+        for (int r = 0; r < 3; ++r) {
+          sum[r] += v * c[r];
+          sum[3 + r] += d * c[r];
+        }
+      }
+      std::copy_n(sum, 6, &lines_[6 * (static_cast<std::size_t>(kj) * n_ + q)]);
+    }
+}
+
+void CellSweep::to_planes() {
+  for (int k = 0; k < m_; ++k)
+    for (int q2 = 0; q2 < n_; ++q2)
+      for (int q1 = 0; q1 < n_; ++q1) {
+        Wide sum[9] = {};
+        for (int j = 0; j < m_; ++j) {
+          const Wide* a = &lines_[6 * (static_cast<std::size_t>(k * m_ + j) * n_ + q1)];
+          const double v = group_.values[q2 * m_ + j], d = group_.derivatives[q2 * m_ + j];
+          for (int r = 0; r < 3; ++r) {
+            sum[r] += v * a[3 + r];
+            sum[3 + r] += d * a[r];
+            sum[6 + r] += v * a[r];
+          }
+        }
+        std::copy_n(sum, 9, &planes_[9 * ((static_cast<std::size_t>(k) * n_ + q2) * n_ + q1)]);
+      }
+}
+
+void CellSweep::from_planes() {
+  for (int k = 0; k < m_; ++k)
+    for (int j = 0; j < m_; ++j)
+      for (int q1 = 0; q1 < n_; ++q1) {
+        Wide sum[6] = {};
+        for (int q2 = 0; q2 < n_; ++q2) {
+          const Wide* b = &plane_sums_[9 * ((static_cast<std::size_t>(k) * n_ + q2) * n_ + q1)];
+          const double v = group_.values[q2 * m_ + j], d = group_.derivatives[q2 * m_ + j];
+          for (int r = 0; r < 3; ++r) {
+            sum[r] += d * b[3 + r] + v * b[6 + r];
+            sum[3 + r] += v * b[r];
+          }
+        }
+        std::copy_n(sum, 6, &lines_[6 * (static_cast<std::size_t>(k * m_ + j) * n_ + q1)]);
+      }
+}
+
+void CellSweep::from_lines() {
+  for (int kj = 0; kj < m_ * m_; ++kj)
+    for (int i = 0; i < m_; ++i) {
+      Wide sum[3] = {};
+      for (int q = 0; q < n_; ++q) {
+        const Wide* a = &lines_[6 * (static_cast<std::size_t>(kj) * n_ + q)];
+        const double v = group_.values[q * m_ + i], d = group_.derivatives[q * m_ + i];
+        for (int r = 0; r < 3; ++r) sum[r] += v * a[r] + d * a[3 + r];
+      }
+      std::copy_n(sum, 3, &coefficients_[3 * (kj * m_ + i)]);
+    }
+}
+
+}  // namespace subvol

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/wide_matrix.h"
+
+namespace subvol {
+
+/// The second derivative of the Hencky energy at points of eight cells, as numbers that are kept while conjugate gradients
+/// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), as in `hencky.h`, R being
+/// A^-1 and the three latter multiplied by the point's weight.
+inline constexpr int kFrozen = 27;
+/// Symmetric 3x3 blocks of a second derivative by pairs (0,0) (1,1) (2,2) (0,1) (1,2) (2,0) of directions.
+inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+
+/// Writes a point's numbers. `weight` multiplies the second derivative.
+inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide& weight, Wide* frozen) {
+  Wide v[9];
+  for (int e = 0; e < 9; ++e) frozen[e] = load_wide(hencky.u[e]);
+  for (int e = 0; e < 9; ++e) v[e] = load_wide(hencky.v[e]);
+  product(reference, v, frozen + 9);
+  for (int i = 0; i < 3; ++i) {
+    frozen[18 + i] = weight * load_wide(hencky.stretch[i]);
+    frozen[21 + i] = weight * load_wide(hencky.pair_same[i]);
+    frozen[24 + i] = weight * load_wide(hencky.pair_cross[i]);
+  }
+}
+
+/// Makes the second derivative of one lane `factor` times as large; `more` receives the numbers of what was added.
+inline void scale_frozen(Wide* frozen, int lane, double factor, Wide* more) {
+  std::copy_n(frozen, kFrozen, more);
+  for (int k = 18; k < kFrozen; ++k) {
+    more[k] = Wide{};
+    more[k][lane] = (factor - 1) * frozen[k][lane];
+    frozen[k][lane] *= factor;
+  }
+}
+
+/// A change G of the Jacobian, by canonical coordinates, becomes the change U P (R V)^T of the stress:
+///   W = U^T G R V,  P_ii = stretch_i W_ii,  P_ij = same_ij W_ij + cross_ij W_ji.
+inline void apply_frozen(const Wide* frozen, Wide* g) {
+  const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
+  Wide t[9], w[9], p[9];
+  product(g, rv, t);
+  transpose_product(u, t, w);
+  for (int i = 0; i < 3; ++i) {
+    const int j = i == 2 ? 0 : i + 1;
+    p[4 * i] = stretch[i] * w[4 * i];
+    p[3 * i + j] = same[i] * w[3 * i + j] + cross[i] * w[3 * j + i];
+    p[3 * j + i] = same[i] * w[3 * j + i] + cross[i] * w[3 * i + j];
+  }
+  product(u, p, t);
+  product_with_transpose(t, rv, g);
+}
+
+/// Adds, for every pair (c, d) of canonical directions, the symmetric part of the block that couples gradients e_c, e_d.
+inline void add_blocks(const Wide* frozen, Wide* blocks) {
+  const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
+  for (int pair = 0; pair < 6; ++pair) {
+    const Wide *a = rv + 3 * kPairs[pair][0], *b = rv + 3 * kPairs[pair][1];
+    Wide z[9], t[9], k[9];
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, l = (i + 2) % 3;
+      z[4 * i] = stretch[i] * a[i] * b[i] + same[i] * a[j] * b[j] + same[l] * a[l] * b[l];
+      z[3 * i + j] = cross[i] * a[j] * b[i];
+      z[3 * j + i] = cross[i] * a[i] * b[j];
+    }
+    product(u, z, t);
+    product_with_transpose(t, u, k);
+    const double both = pair < 3 ? 0.5 : 1;  // (c, d) and (d, c)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) blocks[9 * pair + 3 * i + j] += both * (k[3 * i + j] + k[3 * j + i]);
+  }
+}
+
+}  // namespace subvol
