@@ -202,7 +202,7 @@ bool HighOrderFit::run_order(Approach approach, int order) {
 bool HighOrderFit::run_first_orders(int last) {
   struct Outcome {
     std::size_t pairs;
-    double mean;
+    double mean, distortion;
     HighOrderMesh mesh;
     std::vector<Vec3> ideal_boxes;
     Approach approach;
@@ -213,11 +213,13 @@ bool HighOrderFit::run_first_orders(int last) {
     for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
       if (!run_order(attempt.approach, order)) return false;
     if (schedule_.tries.size() == 1) return true;
-    Outcome outcome{intersecting_pairs(), measured_mean(), mesh_, ideal_boxes_, approach_};
+    const auto& steps = report_.stages.back().iterations;
+    const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
+    Outcome outcome{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_};
     const bool better = !best || std::tuple(outcome.pairs > 0, outcome.mean) < std::tuple(best->pairs > 0, best->mean);
     if (better) best = std::move(outcome);
-    const bool near = last < kTellingOrder || best->mean <= kFairDistancePercent;
-    if (best->pairs == 0 && near) break;
+    const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
+    if (best->pairs == 0 && fair) break;
   }
   mesh_ = std::move(best->mesh);
   ideal_boxes_ = std::move(best->ideal_boxes);

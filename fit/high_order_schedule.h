@@ -22,7 +22,7 @@ struct HighOrderTry {
 
 /// Which minimisations a high-order fit runs, decided from the template's initial distance.
 struct HighOrderSchedule {
-  std::vector<HighOrderTry> tries;  ///< a later one is made where those before left the target (`kFairDistancePercent`)
+  std::vector<HighOrderTry> tries;  ///< a later one is made where those before went wrong (`kFairDistancePercent`)
   double lambda_close = 0;          ///< of the last stage of all
 
   bool far = false;  ///< the template's cells do not tell what is wanted
@@ -34,8 +34,9 @@ struct HighOrderSchedule {
   Stage final_stage(double lambda) const;
 };
 
-/// Mean distance, in per cent of the diagonal, above which the first orders of a far template are tried in another way.
-inline constexpr double kFairDistancePercent = 0.12;
+/// The first orders of a far template are tried in another way where the mean distance, in per cent of the diagonal, is above
+/// the one and E_W above the other: far from the target for what cells suffer, not for what they cannot represent.
+inline constexpr double kFairDistancePercent = 0.12, kFairDistortion = 0.3;
 /// Below this order the distance does not tell whether an approach went wrong.
 inline constexpr int kTellingOrder = 4;
 

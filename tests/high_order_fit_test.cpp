@@ -78,22 +78,22 @@ TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says th
 }
 
 TEST_CASE("an adaptive fit raises orders where the target has its detail, and meets the tolerance with fewer nodes") {
-  const VolumeMesh bar = lattice(6, 1, 1);
+  const VolumeMesh bar = lattice(4, 1, 1);
   HighOrderMesh wanted(ElementSpace(bar, Basis::fourier, 6), bar);
   const MeshTopology& topology = wanted.space.topology();
   for (std::size_t e = 0; e < topology.num_edges(); ++e) {  // waves on the last cell's edges across the bar
     const auto [a, b] = topology.edge(static_cast<Index>(e));
-    if (bar.positions[a].x() < 5.5 || bar.positions[b].x() < 5.5) continue;
+    if (bar.positions[a].x() < 3.5 || bar.positions[b].x() < 3.5) continue;
     wanted.coefficients[wanted.space.edge_nodes(e) + 3] = Vec3(0.8, 0, 0);
   }
   const BoundarySamples samples = make_boundary_samples(wanted.space, 24);
   const TriangleMesh target{samples.positions.apply(wanted.coefficients), samples.triangles};
   HighOrderFitOptions options = of_order(6);
   options.adaptive = true;
-  options.tolerance_percent = 0.006;
+  options.tolerance_percent = 0.01;
   const HighOrderFitResult result = fit_high_order(target, bar, options);
   CHECK(result.report.stop_reason == StopReason::converged);
-  CHECK(percent(result.mesh, target) < 0.0065);
+  CHECK(percent(result.mesh, target) < 0.011);
   CHECK(positive(result.mesh, 13));
   CHECK(result.mesh.space.num_nodes() < wanted.space.num_nodes() / 2);
   int first = 0, last = 0;
@@ -102,7 +102,7 @@ TEST_CASE("an adaptive fit raises orders where the target has its detail, and me
     const double x = bar.positions[a].x() + bar.positions[b].x();
     const int order = result.mesh.space.orders().edges[e];
     if (x < 0.5) first = std::max(first, order);
-    if (x > 11.5) last = std::max(last, order);
+    if (x > 7.5) last = std::max(last, order);
   }
   CHECK(first == 2);
   CHECK(last > 4);
