@@ -197,6 +197,17 @@ TEST_CASE("A fit of curved elements goes from files to files that check agrees w
   CHECK(nlohmann::json::parse(checked.out).at("distance") == report.at("distance"));
 }
 
+TEST_CASE("An adaptive fit goes from files to files", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) +
+                            "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto orders = place.json("report.json").at("orders");
+  CHECK(orders.at("nodes") <= orders.at("full_order_nodes"));
+  CHECK(place.run("check out.vtu --target target.off").status == 0);
+}
+
 TEST_CASE("A fit is the same bits for one thread and for two", "[cli]") {
   const Workplace place;
   REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 1 -o one.mesh -o one.obj").status == 0);
@@ -266,6 +277,7 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   refuses(std::string(kFit) + "--order 17 -o out.glb", 2, "order");
   refuses(std::string(kFit) + "--order 3 --levels 2 -o out.glb", 2, "levels");
   refuses(std::string(kFit) + "--basis legendre -o out.glb", 2, "order");
+  refuses(std::string(kFit) + "--adaptive -o out.glb", 2, "order");
   refuses(std::string(kFit) + "--order 3 --basis spline -o out.glb", 2, "basis");
   refuses(std::string(kFit) + "--order 3 -o out.usda", 2, "out.usda");
   refuses(std::string(kFit) + "--order 3 -o cage:out.mesh", 2, "cage");
