@@ -39,6 +39,11 @@ ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<
   for (Index t : target.sample_triangles()) sample_areas_.push_back(target.areas()[t] / samples_of[t]);
 }
 
+void ClosestPointEnergy::emphasize_far(double length) {
+  if (!(length > 0)) throw InputError("ClosestPointEnergy: the length beyond which ties count more must be positive");
+  inverse_far_ = 1 / length;
+}
+
 void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   const std::vector<Vec3>& points = target_->samples();
   if (surface_tree_) {
@@ -57,7 +62,8 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
     const Index t = target_hits_[j].triangle;
     const auto& q = triangles()[t];
     target_links_[next[t]++] = {t, barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]), points[j],
-                                target_->normals()[target_->sample_triangles()[j]], sample_areas_[j]};
+                                target_->normals()[target_->sample_triangles()[j]],
+                                emphasis(target_hits_[j].distance) * sample_areas_[j]};
   }
 }
 
@@ -68,6 +74,7 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
   const int n = points_per_triangle_;
   surface_links_.resize(n * triangles().size());
   surface_hints_.resize(n * triangles().size(), kNoIndex);
+  surface_distances_.resize(n * triangles().size());
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < triangles().size(); ++t) {
     const auto& q = triangles()[t];
@@ -78,8 +85,9 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       Index& hint = surface_hints_[n * t + k];
       const ClosestPoint::Hit hit = target_tree_.closest(x, hint == kNoIndex ? before : hint);
       hint = before = hit.triangle;
+      surface_distances_[n * t + k] = hit.distance;
       surface_links_[n * t + k] = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
-                                   triangle_area(t) / n};
+                                   emphasis(hit.distance) * triangle_area(t) / n};
     }
   }
 }
@@ -90,7 +98,7 @@ void ClosestPointEnergy::add_link(const Link& link, const Incidence& incidence, 
   const auto& q = triangles()[link.triangle];
   Vec3 d = -link.point;
   for (int l = 0; l < 3; ++l) d += link.barycentric[l] * assigned()[q[l]];
-  const double height = link.normal.dot(d), weight = own * link.area;
+  const double height = link.normal.dot(d), weight = own * link.weight;
   const Vec3 pull = ((1 - tau_) * height) * link.normal + tau_ * d;
   value += weight * pull.dot(d);
   row.gradient += 2 * weight * pull;
@@ -115,6 +123,21 @@ void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
         add_link(surface_links_[points_per_triangle_ * t + k], incidence, row, row.surface_to_target);
     }
   });
+}
+
+ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
+  double to_surface = 0, to_target = 0, area = 0, max = 0;
+  for (std::size_t j = 0; j < target_hits_.size(); ++j) {
+    to_surface += sample_areas_[j] * target_hits_[j].distance;
+    max = std::max(max, target_hits_[j].distance);
+  }
+  for (std::size_t q = 0; q < surface_distances_.size(); ++q) {
+    const double part = triangle_area(q / points_per_triangle_) / points_per_triangle_;
+    area += part;
+    to_target += part * surface_distances_[q];
+    max = std::max(max, surface_distances_[q]);
+  }
+  return {std::max(to_surface / target_->area(), area > 0 ? to_target / area : 0), max};
 }
 
 }  // namespace subvol

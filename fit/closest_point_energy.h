@@ -26,9 +26,19 @@ class ClosestPointEnergy final : public SurfaceTerm {
   ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                      std::size_t num_samples, double tangential_weight, int points_per_triangle);
 
+  /// From the next `assign` on a tie of length d counts 1 + (d / length)^2 times: places that are far off are drawn more than
+  /// the mean asks for, which keeps the largest distance down. length > 0 in the target's unit, else InputError.
+  void emphasize_far(double length);
+
   /// Cost: one closest-point query per target sample and per quadrature point. The answers of the call before are where
   /// the search starts, and the tree over S~ moves along.
   void assign(std::span<const Vec3> samples) override;
+
+  /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by area.
+  struct Distance {
+    double mean, max;
+  };
+  Distance assigned_distance() const;
 
  private:
   /// A point of the target tied to a point of one sample triangle.
@@ -36,7 +46,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
     Index triangle;
     std::array<double, 3> barycentric;
     Vec3 point, normal;
-    double area;
+    double weight;  ///< area, and emphasis
   };
 
   void link_target(std::span<const Vec3> samples);
@@ -47,13 +57,16 @@ class ClosestPointEnergy final : public SurfaceTerm {
   ClosestPoint target_tree_;
   std::optional<ClosestPoint> surface_tree_;       ///< of S~
   std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
-  double tau_, scale_;
+  double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
+
+  double tau_, scale_, inverse_far_ = 0;
   int points_per_triangle_;
   std::vector<double> sample_areas_;         ///< a_j
   std::vector<Link> target_links_;           ///< by sample triangle
   std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
   std::vector<Link> surface_links_;          ///< points_per_triangle_ for each sample triangle
   std::vector<Index> surface_hints_;         ///< target triangles of t(x_q)
+  std::vector<double> surface_distances_;    ///< |x_q - t(x_q)|
 };
 
 }  // namespace subvol

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/fit_target.h"
 
-#include "fit/fit_schedule.h"
 #include "fit/soup_topology.h"
 #include "fit/surface_distance.h"
 #include "subvol/error.h"
@@ -40,8 +39,8 @@ std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {
 FitTarget::FitTarget(const TriangleMesh& target)
     : normalisation(target), mesh(normalised(target, normalisation)), tree(mesh), surface(mesh) {}
 
-void FitTarget::sample(std::size_t num_samples) {
-  const double count = static_cast<double>(std::max(num_samples, kLeastTargetSamples));
+void FitTarget::sample(std::size_t num_samples, std::size_t least) {
+  const double count = static_cast<double>(std::max(num_samples, least));
   surface = TargetSurface(mesh, {.sample_spacing = 1.8 * std::sqrt(surface.area() / count)});
 }
 

@@ -3,6 +3,7 @@
 
 #include "fit/closest_point.h"
 #include "fit/fit_report.h"
+#include "fit/fit_schedule.h"
 #include "fit/target_surface.h"
 
 namespace subvol {
@@ -30,7 +31,8 @@ struct FitTarget {
 
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
   /// surface that belong to a neighbouring facet.
-  void sample(std::size_t num_samples);
+  /// least  samples that are taken in any case (triangles have one each at least).
+  void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples);
 
   /// Mean symmetric distance to another surface.
   double mean_distance(const TriangleMesh& fitted) const;

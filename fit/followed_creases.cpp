@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 namespace subvol {
 
@@ -48,6 +49,23 @@ bool FollowedCreases::hold_the_surface() const {
   return followed > kMost * all;
 }
 
+void FollowedCreases::release(std::span<const std::uint8_t> vertices, VolumeMesh& mesh) {
+  std::vector<CreaseEdge>& creases = mesh.tags.creases;
+  std::set<Index> curves;
+  for (std::size_t k = 0; k < creases.size(); ++k)
+    if (vertices[creases[k].v0] || vertices[creases[k].v1]) curves.insert(curve_of_crease_[k]);
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < creases.size(); ++k) {
+    const bool marked = vertices[creases[k].v0] || vertices[creases[k].v1];
+    if (marked || (curve_of_crease_[k] != kNoIndex && curves.contains(curve_of_crease_[k]))) continue;
+    creases[kept] = creases[k];
+    curve_of_crease_[kept++] = curve_of_crease_[k];
+  }
+  creases.resize(kept);
+  curve_of_crease_.resize(kept);
+  std::erase_if(mesh.tags.corners, [&](const CornerVertex& corner) { return vertices[corner.vertex]; });
+}
+
 void FollowedCreases::refine(const FitLevel& level) {
   if (curve_of_crease_.empty()) return;
   std::vector<Index> children;
@@ -63,9 +81,14 @@ std::vector<CreaseSegment> FollowedCreases::segments(std::span<const std::array<
 }
 
 CreaseEnergy FollowedCreases::energy(const FitLevel& level, double width, double tangential_weight) const {
-  std::vector<CreaseSegment> following = segments(level.crease_edges);
+  return energy(level.crease_edges, level.samples.num_rows(), width, tangential_weight);
+}
+
+CreaseEnergy FollowedCreases::energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,
+                                     double tangential_weight) const {
+  std::vector<CreaseSegment> following = segments(edges);
   std::erase_if(following, [](const CreaseSegment& s) { return s.curve == kNoIndex; });
-  return CreaseEnergy(curves_, std::move(following), level.samples.num_rows(), width, tangential_weight);
+  return CreaseEnergy(curves_, std::move(following), num_samples, width, tangential_weight);
 }
 
 CreaseDistance FollowedCreases::distance(const BoundaryRefinement& limit, std::span<const Vec3> points,

@@ -10,6 +10,7 @@
 #include "subvol/volume_mesh.h"
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -34,11 +35,17 @@ class FollowedCreases {
   /// Whether most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
   bool hold_the_surface() const;
 
+  /// Gives up the curves that have a crease at one of the vertices marked, with their tags and the corners marked.
+  void release(std::span<const std::uint8_t> vertices, VolumeMesh& mesh);
+
   /// Goes over to the creases of the mesh of a level made from the present ones.
   void refine(const FitLevel& level);
 
   /// Draws the samples on a level's creases to their curves.
   CreaseEnergy energy(const FitLevel& level, double width, double tangential_weight) const;
+  /// The same for any samples: `edges` between them run along the mesh's creases in their order, equally many for each.
+  CreaseEnergy energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,
+                      double tangential_weight) const;
   /// limit  refinement of the present level's mesh, at `points`.
   CreaseDistance distance(const BoundaryRefinement& limit, std::span<const Vec3> points, double diagonal) const;
 

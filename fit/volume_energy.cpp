@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/volume_energy.h"
 
+#include "fit/cell_kernels.h"
 #include "fit/certificate.h"
 #include "fit/step_limit.h"
 #include "subvol/error.h"
@@ -39,103 +40,6 @@ std::vector<int> color_cells(const VolumeMesh& mesh) {
     }
   }
   return colors;
-}
-
-/// J_q of all lanes: J = sum_a x_a g_a^T diag(1/h).
-inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes],
-                      const double (*inverse_h)[kLanes], double (*jacobian)[kLanes]) {
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) {
-      double sum[kLanes] = {};
-      for (const ElementRule::Entry& entry : entries)
-#pragma omp simd
-        for (int l = 0; l < kLanes; ++l) sum[l] += entry.gradient[c] * x[entry.vertex][r][l];
-      for (int l = 0; l < kLanes; ++l) jacobian[3 * r + c][l] = sum[l] * inverse_h[c][l];
-    }
-}
-
-/// m = m b, lane by lane: from the ideal to the reference shape.
-inline void multiply_lanes(double (*m)[kLanes], const double (*b)[kLanes]) {
-  for (int r = 0; r < 3; ++r)
-#pragma omp simd
-    for (int l = 0; l < kLanes; ++l) {
-      const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
-      for (int c = 0; c < 3; ++c) m[3 * r + c][l] = m0 * b[c][l] + m1 * b[3 + c][l] + m2 * b[6 + c][l];
-    }
-}
-
-/// m = m b^T: the stress against the ideal shape.
-inline void multiply_lanes_transposed(double (*m)[kLanes], const double (*b)[kLanes]) {
-  for (int r = 0; r < 3; ++r)
-#pragma omp simd
-    for (int l = 0; l < kLanes; ++l) {
-      const double m0 = m[3 * r][l], m1 = m[3 * r + 1][l], m2 = m[3 * r + 2][l];
-      for (int c = 0; c < 3; ++c)
-        m[3 * r + c][l] = m0 * b[3 * c][l] + m1 * b[3 * c + 1][l] + m2 * b[3 * c + 2][l];
-    }
-}
-
-/// v = b v: right singular vectors, so that V^T grad N becomes V^T b^T grad N.
-inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
-  for (int c = 0; c < 3; ++c)
-#pragma omp simd
-    for (int l = 0; l < kLanes; ++l) {
-      const double v0 = v[c][l], v1 = v[3 + c][l], v2 = v[6 + c][l];
-      for (int r = 0; r < 3; ++r) v[3 * r + c][l] = b[3 * r][l] * v0 + b[3 * r + 1][l] * v1 + b[3 * r + 2][l] * v2;
-    }
-}
-
-/// Adds K_ab = U Z_ab U^T for the active vertices of one point, a <= b: with w_a = V^T diag(1/h) grad N_a,
-///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi.
-void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
-                       const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
-  constexpr int kPairs = kMaxCellVertices;
-  alignas(64) double w[kPairs][3][kLanes];
-  for (std::size_t a = 0; a < entries.size(); ++a)
-    for (int i = 0; i < 3; ++i)
-#pragma omp simd
-      for (int l = 0; l < kLanes; ++l)
-        w[a][i][l] = batch.v[i][l] * inverse_h[0][l] * entries[a].gradient[0] +
-                     batch.v[3 + i][l] * inverse_h[1][l] * entries[a].gradient[1] +
-                     batch.v[6 + i][l] * inverse_h[2][l] * entries[a].gradient[2];
-  for (std::size_t a = 0; a < entries.size(); ++a)
-    for (std::size_t b = a; b < entries.size(); ++b) {
-      double (*block)[kLanes] = k[entries[a].vertex * kMaxCellVertices + entries[b].vertex];
-#pragma omp simd
-      for (int l = 0; l < kLanes; ++l) {
-        const double p00 = w[a][0][l] * w[b][0][l], p11 = w[a][1][l] * w[b][1][l], p22 = w[a][2][l] * w[b][2][l];
-        const double s01 = batch.pair_same[0][l], s12 = batch.pair_same[1][l], s20 = batch.pair_same[2][l];
-        const double f = weight[l];
-        const double z00 = f * (batch.stretch[0][l] * p00 + s01 * p11 + s20 * p22);
-        const double z11 = f * (batch.stretch[1][l] * p11 + s01 * p00 + s12 * p22);
-        const double z22 = f * (batch.stretch[2][l] * p22 + s20 * p00 + s12 * p11);
-        const double c01 = f * batch.pair_cross[0][l], c12 = f * batch.pair_cross[1][l], c20 = f * batch.pair_cross[2][l];
-        const double z01 = c01 * w[a][1][l] * w[b][0][l], z10 = c01 * w[a][0][l] * w[b][1][l];
-        const double z12 = c12 * w[a][2][l] * w[b][1][l], z21 = c12 * w[a][1][l] * w[b][2][l];
-        const double z20 = c20 * w[a][0][l] * w[b][2][l], z02 = c20 * w[a][2][l] * w[b][0][l];
-        const double u[9] = {batch.u[0][l], batch.u[1][l], batch.u[2][l], batch.u[3][l], batch.u[4][l],
-                             batch.u[5][l], batch.u[6][l], batch.u[7][l], batch.u[8][l]};
-        for (int r = 0; r < 3; ++r) {
-          const double t0 = u[3 * r] * z00 + u[3 * r + 1] * z10 + u[3 * r + 2] * z20;
-          const double t1 = u[3 * r] * z01 + u[3 * r + 1] * z11 + u[3 * r + 2] * z21;
-          const double t2 = u[3 * r] * z02 + u[3 * r + 1] * z12 + u[3 * r + 2] * z22;
-          for (int c = 0; c < 3; ++c) block[3 * r + c][l] += t0 * u[3 * c] + t1 * u[3 * c + 1] + t2 * u[3 * c + 2];
-        }
-      }
-    }
-}
-
-/// Adds the stresses of one point to the gradients of its active vertices.
-inline void add_point_gradient(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
-                               const double (*factor)[kLanes], double (*g)[3][kLanes]) {
-  for (const ElementRule::Entry& entry : entries)
-    for (int r = 0; r < 3; ++r)
-#pragma omp simd
-      for (int l = 0; l < kLanes; ++l)
-        g[entry.vertex][r][l] +=
-            factor[0][l] * batch.stress[3 * r][l] * entry.gradient[0] +
-            factor[1][l] * batch.stress[3 * r + 1][l] * entry.gradient[1] +
-            factor[2][l] * batch.stress[3 * r + 2][l] * entry.gradient[2];
 }
 
 }  // namespace
@@ -272,41 +176,44 @@ struct VolumeEnergy::BatchState {
   }
 };
 
-double VolumeEnergy::value(std::span<const Vec3> nodes) const {
+template <class Kernel>
+double VolumeEnergy::value_of(std::span<const Vec3> nodes) const {
   return sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
-    HenckyBatch hencky;
+    Kernel kernel(epsilon_);
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
-      if (reference_) multiply_lanes(hencky.jacobian, group.reference(b, q));
-      hencky_energy(hencky);
+      jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
+      if (reference_) multiply_lanes(kernel.batch.jacobian, group.reference(b, q));
+      kernel.evaluate_energy();
       for (int l = 0; l < group.active[b]; ++l)
-        sum += weights_[group.batches[b][l]] * group.rule.weights[q] * hencky.energy[l];
+        sum += weights_[group.batches[b][l]] * group.rule.weights[q] * kernel.batch.energy[l];
     }
     return sum;
   });
 }
 
-double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
+template <class Kernel>
+double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale,
+                                 std::span<Vec3> gradient) const {
   // Feasibility is known only at the end: gather into a copy, so that an infeasible state adds nothing.
   std::vector<Vec3> local(num_nodes_, Vec3::Zero());
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
     alignas(64) double g[kMaxCellVertices][3][kLanes] = {}, factor[3][kLanes];
-    HenckyBatch hencky;
+    Kernel kernel(epsilon_);
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
-      if (reference_) multiply_lanes(hencky.jacobian, group.reference(b, q));
-      hencky_gradient(hencky);
-      if (reference_) multiply_lanes_transposed(hencky.stress, group.reference(b, q));
+      jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
+      if (reference_) multiply_lanes(kernel.batch.jacobian, group.reference(b, q));
+      kernel.evaluate_gradient();
+      if (reference_) multiply_lanes_transposed(kernel.batch.stress, group.reference(b, q));
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
-        if (l < group.active[b]) sum += w * hencky.energy[l];
+        if (l < group.active[b]) sum += w * kernel.batch.energy[l];
       }
-      add_point_gradient(group.rule.point(q), hencky, factor, g);
+      add_point_gradient(group.rule.point(q), kernel.batch.stress, factor, g);
     }
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int l = 0; l < group.active[b]; ++l) {
@@ -322,33 +229,32 @@ double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std
   return energy;
 }
 
-double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
-                                 BlockSparse& hessian) const {
-  const double energy = sum_batches([&](const Group& group, std::size_t b) {
+template <class Kernel>
+double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                                BlockSparse& hessian) const {
+  return sum_batches([&](const Group& group, std::size_t b) {
     constexpr int n_max = kMaxCellVertices;
     const BatchState state(*this, group, b, nodes);
     alignas(64) double g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], factor[3][kLanes], weight[kLanes];
-    HenckyBatch hencky;
+    Kernel kernel(epsilon_);
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int a = 0; a < n; ++a)
       for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), state.x, state.inverse_h, hencky.jacobian);
-      if (reference_) multiply_lanes(hencky.jacobian, group.reference(b, q));
-      hencky_hessian(hencky);
-      if (reference_) {
-        multiply_lanes_transposed(hencky.stress, group.reference(b, q));
-        premultiply(group.reference(b, q), hencky.v);
-      }
+      const double(*reference)[kLanes] = reference_ ? group.reference(b, q) : nullptr;
+      jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
+      if (reference) multiply_lanes(kernel.batch.jacobian, reference);
+      kernel.evaluate_hessian();
+      if (reference) multiply_lanes_transposed(kernel.batch.stress, reference);
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         weight[l] = scale * w;
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
-        if (l < group.active[b]) sum += w * hencky.energy[l];
+        if (l < group.active[b]) sum += w * kernel.batch.energy[l];
       }
-      add_point_gradient(group.rule.point(q), hencky, factor, g);
-      add_point_hessian(group.rule.point(q), hencky, state.inverse_h, weight, k);
+      add_point_gradient(group.rule.point(q), kernel.batch.stress, factor, g);
+      kernel.add_hessian(group.rule.point(q), reference, state.inverse_h, weight, k);
     }
     for (int l = 0; l < group.active[b]; ++l) {
       const Index cell = group.batches[b][l];
@@ -368,7 +274,59 @@ double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std:
     }
     return sum;
   });
-  return energy;
+}
+
+double VolumeEnergy::value(std::span<const Vec3> nodes) const {
+  return epsilon_ > 0 ? value_of<RegularisedKernel>(nodes) : value_of<HenckyKernel>(nodes);
+}
+
+double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
+  return epsilon_ > 0 ? gradient_of<RegularisedKernel>(nodes, scale, gradient)
+                      : gradient_of<HenckyKernel>(nodes, scale, gradient);
+}
+
+double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                                 BlockSparse& hessian) const {
+  return epsilon_ > 0 ? hessian_of<RegularisedKernel>(nodes, scale, gradient, hessian)
+                      : hessian_of<HenckyKernel>(nodes, scale, gradient, hessian);
+}
+
+void VolumeEnergy::set_regularisation(double epsilon) {
+  if (!(epsilon >= 0) || !std::isfinite(epsilon))
+    throw InputError("VolumeEnergy: epsilon must be 0 or positive and finite");
+  epsilon_ = epsilon;
+}
+
+void VolumeEnergy::set_weights(std::span<const double> weights) {
+  if (weights.size() != weights_.size())
+    throw InputError("VolumeEnergy: expected one weight per cell (" + std::to_string(weights_.size()) + "), got " +
+                     std::to_string(weights.size()));
+  double sum = 0;
+  for (double w : weights) {
+    if (!(w > 0) || !std::isfinite(w)) throw InputError("VolumeEnergy: weights must be positive and finite");
+    sum += w;
+  }
+  for (std::size_t c = 0; c < weights.size(); ++c) weights_[c] = weights[c] / sum;
+}
+
+void VolumeEnergy::least_determinants(std::span<const Vec3> nodes, std::span<double> least) const {
+  if (least.size() != mesh_->num_cells()) throw InputError("VolumeEnergy: expected one place per cell");
+  std::fill(least.begin(), least.end(), kInfinity);
+  sum_batches([&](const Group& group, std::size_t b) {
+    const BatchState state(*this, group, b, nodes);
+    alignas(64) double jacobian[9][kLanes];
+    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
+      jacobians(group.rule.point(q), state.x, state.inverse_h, jacobian);
+      if (reference_) multiply_lanes(jacobian, group.reference(b, q));
+      for (int l = 0; l < group.active[b]; ++l) {
+        Mat3 j;
+        for (int k = 0; k < 9; ++k) j(k / 3, k % 3) = jacobian[k][l];
+        double& lowest = least[group.batches[b][l]];
+        lowest = std::min(lowest, j.determinant());
+      }
+    }
+    return 0.0;
+  });
 }
 
 double VolumeEnergy::linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
@@ -385,10 +343,12 @@ void VolumeEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& ma
 }
 
 std::vector<Index> VolumeEnergy::uncertified(std::span<const Vec3> nodes) const {
+  if (epsilon_ > 0) return {};
   return certify(nodes, *mesh_).not_certified;
 }
 
 double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit) const {
+  if (epsilon_ > 0) return limit;
   StepLimit steps(limit);
   sum_batches([&](const Group& group, std::size_t b) {
     alignas(64) double x[kMaxCellVertices][3][kLanes], d[kMaxCellVertices][3][kLanes], ones[3][kLanes];

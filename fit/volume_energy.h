@@ -24,6 +24,9 @@ namespace subvol {
 ///
 /// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
 /// number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
+///
+/// With a regularisation epsilon > 0 the density is that of `regularised_barrier.h`: finite also where cells are inverted,
+/// so that minimising it untangles them. No step is limited then, and no cell counts as uncertified.
 class VolumeEnergy final : public VolumeTerm {
  public:
   /// mesh  must outlive the energy; its positions are not read.
@@ -43,6 +46,13 @@ class VolumeEnergy final : public VolumeTerm {
   double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   void densify(std::span<const Index> cells) override;
+
+  /// epsilon  0 (the start): the Hencky barrier; > 0: the regularised one. InputError: negative, not finite.
+  void set_regularisation(double epsilon);
+  /// w_c by one positive weight per cell, of any common scale. InputError: another number, or not positive and finite.
+  void set_weights(std::span<const double> weights);
+  /// The least det J_cq of each cell, into one place per cell (else InputError).
+  void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const;
 
   /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `hencky.h`) to
   /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both
@@ -68,8 +78,14 @@ class VolumeEnergy final : public VolumeTerm {
 
   struct BatchState;
 
+  template <class Kernel>
+  double value_of(std::span<const Vec3> nodes) const;
+  template <class Kernel>
+  double gradient_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const;
+  template <class Kernel>
+  double hessian_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                    BlockSparse& hessian) const;
   void find_pattern();
-
   void rebuild_groups();
   void fill_references(Group& group) const;
   void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
@@ -80,6 +96,7 @@ class VolumeEnergy final : public VolumeTerm {
   std::size_t num_nodes_;
   std::vector<Vec3> inverse_lengths_;
   std::vector<double> weights_;
+  double epsilon_ = 0;
   CellReference reference_;        ///< empty: ideal cells
   std::vector<int> points_;        ///< points per direction of each cell
   std::vector<int> colors_;

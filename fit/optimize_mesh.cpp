@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/optimize_mesh.h"
+
+#include "fit/boundary_samples.h"
+#include "fit/boundary_triangles.h"
+#include "fit/cell_sizes.h"
+#include "fit/closest_point_energy.h"
+#include "fit/fit_level.h"
+#include "fit/fit_target.h"
+#include "fit/free_nodes.h"
+#include "fit/quality.h"
+#include "fit/stage_runner.h"
+#include "fit/untangle.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kTangentialWeight = 0.003;
+/// While cells are untangled, the weight of their shape against the surface.
+constexpr double kUntangleLambda = 0.01;
+/// Ties of this share of the diagonal count twice (`ClosestPointEnergy::emphasize_far`).
+constexpr double kFarDistance = 0.002;
+/// Cells' corners only: where they are worst. What inverts between them is seen by the certificate, and sampled densely.
+constexpr int kPointsPerDirection = 2;
+/// Cells with a lower scaled Jacobian say nothing about the size they should have.
+constexpr double kTrustedJacobian = 0.3;
+/// Cells with a lower one may move the corners of the surface's sharp edges.
+constexpr double kPoorJacobian = 0.2;
+
+template <class... Values>
+std::string format(const char* form, Values... values) {
+  char text[160];
+  std::snprintf(text, sizeof text, form, values...);
+  return text;
+}
+
+OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
+  const auto in_range = [](const char* name, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      throw InputError(format("OptimizeOptions::%s must be in [%g, %g], got %g", name, low, high, value));
+  };
+  in_range("crease_angle_degrees", options.crease_angle_degrees, 0, 180);
+  in_range("lambda", options.lambda, 1e-9, 1e9);
+  in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
+  in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
+  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  if (has_target && options.fixed_boundary)
+    throw InputError("OptimizeOptions: a boundary that is fixed cannot be drawn to a target");
+  return options;
+}
+
+VolumeMesh checked(VolumeMesh mesh) {
+  for (const MeshDefect& defect : validate(mesh))
+    if (defect.kind != MeshDefect::Kind::unused_vertex && defect.kind != MeshDefect::Kind::inverted_cell)
+      throw InputError("mesh: " + defect.message);
+  return mesh;
+}
+
+double mean_of(std::span<const double> values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// One optimisation, in normalised coordinates.
+class MeshOptimizer {
+ public:
+  MeshOptimizer(const VolumeMesh& mesh, const TriangleMesh* target, const OptimizeOptions& options)
+      : options_(checked(options, target)),
+        mesh_(checked(mesh)),
+        topology_(mesh_),
+        own_boundary_(!target),
+        target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
+        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress}) {
+    mesh_.positions = target_.normalisation.to_unit(std::move(mesh_.positions));
+  }
+  OptimizeResult run(const VolumeMesh& original);
+
+ private:
+  enum class Boundary { fixed, sliding };
+
+  void find_features();
+  void sample_boundary();
+  std::vector<std::uint8_t> vertices_of(std::span<const Index> cells) const;
+  void release_corners(std::span<const Index> cells);
+  void release_features(std::span<const Index> cells);
+  void find_sizes();
+  std::vector<std::uint8_t> fixed_vertices(Boundary boundary) const;
+  FitProblem make_problem(Boundary boundary, double lambda, bool untangles, std::vector<Vec3>& x) const;
+  std::unique_ptr<SurfaceTerm> surface_term(bool emphasize_far) const;
+  StageRecord record(std::string name) const;
+  bool untangle_all();
+  bool untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options);
+  bool improve();
+  bool run_stage(const std::string& name, double lambda, int steps, double fraction);
+  void weigh_cells(std::span<const double> least_jacobians);
+  void finish(bool going);
+
+  OptimizeOptions options_;
+  VolumeMesh mesh_;
+  MeshTopology topology_;
+  bool own_boundary_;
+  FitTarget target_;
+  FollowedCreases creases_;
+  BoundarySamples samples_;
+  std::vector<Vec3> ideal_boxes_;
+  std::vector<double> weights_;     ///< of the cells; empty: equal
+  std::vector<Index> uncertified_;
+  double mean_percent_ = 0, max_percent_ = 0;  ///< distances as the last stage saw them
+  FitReport report_;
+  StageRunner runner_;
+};
+
+void MeshOptimizer::find_features() {
+  if (options_.fixed_boundary) return;
+  creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_);
+  sample_boundary();
+  target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
+}
+
+void MeshOptimizer::sample_boundary() {
+  constexpr int kIntervals = 2;
+  samples_ = make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
+}
+
+/// Per vertex, whether one of the cells has it.
+std::vector<std::uint8_t> MeshOptimizer::vertices_of(std::span<const Index> cells) const {
+  std::vector<std::uint8_t> marked(mesh_.num_vertices(), 0);
+  for (const Index c : cells)
+    for (const Index v : mesh_.cell(c)) marked[v] = 1;
+  return marked;
+}
+
+/// Corners of cells that do not get well beside them may move with the sharp edges that end there.
+void MeshOptimizer::release_corners(std::span<const Index> cells) {
+  const std::vector<std::uint8_t> marked = vertices_of(cells);
+  std::erase_if(mesh_.tags.corners, [&](const CornerVertex& corner) { return marked[corner.vertex] != 0; });
+}
+
+/// Where a boundary is folded, its sharp edges are those of the folds.
+void MeshOptimizer::release_features(std::span<const Index> cells) {
+  const std::size_t before = mesh_.tags.creases.size();
+  creases_.release(vertices_of(cells), mesh_);
+  sample_boundary();
+  const std::size_t released = before - mesh_.tags.creases.size();
+  if (released > 0)
+    report_.warnings.push_back(
+        format("%zu of %zu sharp edges stood against valid cells and were given up", released, before));
+}
+
+void MeshOptimizer::find_sizes() {
+  const double volume = target_.surface.volume();
+  if (options_.sizes == CellSizes::uniform) {
+    ideal_boxes_ = ideal_boxes(mesh_, mesh_.positions, volume, 0);
+    return;
+  }
+  std::vector<std::uint8_t> trusted;
+  for (const double least : measure_quality(mesh_, kPointsPerDirection).cell_minima)
+    trusted.push_back(least > kTrustedJacobian);
+  ideal_boxes_ = interpolated_boxes(mesh_, mesh_.positions, volume, trusted);
+}
+
+std::vector<std::uint8_t> MeshOptimizer::fixed_vertices(Boundary boundary) const {
+  std::vector<std::uint8_t> fixed(mesh_.num_vertices(), 0);
+  if (boundary == Boundary::fixed) {
+    for (std::size_t v = 0; v < fixed.size(); ++v) fixed[v] = topology_.is_boundary_vertex(static_cast<Index>(v));
+  } else if (own_boundary_) {
+    for (const CornerVertex& corner : mesh_.tags.corners) fixed[corner.vertex] = 1;
+  }
+  return fixed;
+}
+
+std::unique_ptr<SurfaceTerm> MeshOptimizer::surface_term(bool emphasize_far) const {
+  const int points = samples_.triangles.size() > target_.surface.triangles().size() ? 1 : 3;
+  auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples_.triangles, samples_.points.size(),
+                                                      kTangentialWeight, points);
+  if (emphasize_far) surface->emphasize_far(kFarDistance);
+  if (!creases_.curves().empty())
+    surface->add_creases(creases_.energy(samples_.crease_edges, samples_.points.size(),
+                                         kCreaseWidth * target_.surface.length(), kTangentialWeight));
+  return surface;
+}
+
+FitProblem MeshOptimizer::make_problem(Boundary boundary, double lambda, bool untangles, std::vector<Vec3>& x) const {
+  FreeNodes free = free_nodes(fixed_vertices(boundary), mesh_.positions);
+  x = std::move(free.unknowns);
+  auto volume = std::make_unique<VolumeEnergy>(mesh_, ideal_boxes_, kPointsPerDirection);
+  if (!weights_.empty()) volume->set_weights(weights_);
+  const bool slides = boundary == Boundary::sliding;
+  SparseMap samples = slides ? compose(samples_.positions, free.map) : SparseMap{x.size(), {0}, {}, {}};
+  FitProblem problem(std::move(free.map), std::move(samples), std::move(volume),
+                     slides ? surface_term(!untangles) : nullptr, lambda);
+  if (slides) problem.fixed_samples = samples_.positions.apply(free.fixed);
+  problem.fixed_nodes = std::move(free.fixed);
+  return problem;
+}
+
+StageRecord MeshOptimizer::record(std::string name) const {
+  StageRecord result;
+  result.name = std::move(name);
+  result.cells = mesh_.num_cells();
+  return result;
+}
+
+bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options) {
+  std::vector<Vec3> x;
+  FitProblem problem = make_problem(boundary, boundary == Boundary::fixed ? 1 : kUntangleLambda, true, x);
+  UntangleResult result = untangle(problem, mesh_, options, runner_, record(name), 0.1, x, report_);
+  problem.apply_nodes(x, mesh_.positions);
+  uncertified_ = std::move(result.uncertified);
+  return result.going;
+}
+
+bool MeshOptimizer::untangle_all() {
+  const std::vector<Vec3> start = mesh_.positions;
+  const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = options_.fixed_boundary ? 30 : 8,
+                              .patience = options_.fixed_boundary ? 6 : 2};
+  if (!untangle_cells(Boundary::fixed, "untangle, boundary fixed", fixed)) return false;
+  if (uncertified_.empty() || options_.fixed_boundary) return true;
+  std::vector<Index> stuck = uncertified_;
+  release_corners(stuck);
+  const UntangleOptions sliding{.tangential_weight = kTangentialWeight, .max_rounds = 4};
+  if (!untangle_cells(Boundary::sliding, "untangle, boundary sliding", sliding)) return false;
+  if (uncertified_.empty()) return true;
+  stuck.insert(stuck.end(), uncertified_.begin(), uncertified_.end());
+  release_features(stuck);
+  mesh_.positions = start;
+  return untangle_cells(Boundary::sliding, "untangle, sharp edges released", {.tangential_weight = kTangentialWeight});
+}
+
+bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps, double fraction) {
+  std::vector<Vec3> x;
+  const Boundary boundary = options_.fixed_boundary ? Boundary::fixed : Boundary::sliding;
+  FitProblem problem = make_problem(boundary, lambda, false, x);
+  const bool going =
+      runner_.run(problem, {lambda, kTangentialWeight, steps}, record(name), fraction, x, report_);
+  problem.apply_nodes(x, mesh_.positions);
+  if (const auto* surface = dynamic_cast<const ClosestPointEnergy*>(problem.surface.get())) {
+    const auto [mean, max] = surface->assigned_distance();
+    mean_percent_ = 100 * mean;
+    max_percent_ = 100 * max;
+    report_.stages.back().mean_distance_percent = mean_percent_;
+  }
+  return going;
+}
+
+void MeshOptimizer::weigh_cells(std::span<const double> least_jacobians) {
+  constexpr double kLeast = 1e-3;
+  weights_.clear();
+  for (const double least : least_jacobians) weights_.push_back(1 / std::max(least, kLeast));
+}
+
+/// Rounds of a few steps, between which ideal boxes, weights and lambda follow what has been reached.
+bool MeshOptimizer::improve() {
+  constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
+  constexpr double kLeastGain = 5e-4, kLeastLambdaShare = 1.0 / 64, kMeanMargin = 0.9, kMaxMargin = 0.65, kMostOfDistance = 0.97;
+  double lambda = options_.lambda, mean_before = -1, min_before = -1, excess_before = 0;
+  if (!run_stage(format("improve, lambda %g", lambda), lambda, kFirstSteps, 0.3)) return false;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
+    const double mean = mean_of(minima), min = *std::min_element(minima.begin(), minima.end());
+    const double excess = std::max(mean_percent_ / (kMeanMargin * options_.mean_tolerance_percent),
+                                   max_percent_ / (kMaxMargin * options_.max_tolerance_percent));
+    if (excess > 1 && lambda > kLeastLambdaShare * options_.lambda) {
+      lambda /= 2;
+    } else if (mean - mean_before < kLeastGain && min - min_before < 10 * kLeastGain &&
+               (excess <= 1 || excess > kMostOfDistance * excess_before)) {
+      break;
+    }
+    mean_before = mean, min_before = min, excess_before = excess;
+    if (options_.sizes == CellSizes::local)
+      ideal_boxes_ = ideal_boxes(mesh_, mesh_.positions, target_.surface.volume(), 1);
+    std::vector<Index> poor;
+    for (std::size_t c = 0; c < minima.size(); ++c)
+      if (minima[c] < kPoorJacobian) poor.push_back(static_cast<Index>(c));
+    release_corners(poor);
+    weigh_cells(minima);
+    if (!run_stage(format("round %d, lambda %g", round + 1, lambda), lambda, kSteps, 0.4 + 0.6 * round / kMaxRounds))
+      return false;
+  }
+  return true;
+}
+
+void MeshOptimizer::finish(bool going) {
+  report_.seconds = {{"total", runner_.seconds()}};
+  if (!going) return;
+  if (!uncertified_.empty()) {
+    report_.stop_reason = StopReason::stalled;
+    report_.explanation = format("%zu cells could not be made valid", uncertified_.size());
+  } else if (mean_percent_ > options_.mean_tolerance_percent || max_percent_ > options_.max_tolerance_percent) {
+    report_.stop_reason = StopReason::tolerance_missed;
+    report_.explanation = format("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%",
+                                 mean_percent_, max_percent_);
+  } else {
+    report_.explanation = format("all cells are valid and no longer gain; boundary within %.4g %% of its surface",
+                                 max_percent_);
+  }
+}
+
+OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
+  find_features();
+  find_sizes();
+  uncertified_ = certify(mesh_).not_certified;
+  bool going = uncertified_.empty() || untangle_all();
+  // Cells that are positive at their points though not certified may still come right.
+  going = going && improve();
+  OptimizeResult result{original, {}, {}};
+  result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);
+  if (options_.fixed_boundary)
+    for (std::size_t v = 0; v < original.num_vertices(); ++v)
+      if (topology_.is_boundary_vertex(static_cast<Index>(v))) result.mesh.positions[v] = original.positions[v];
+  uncertified_ = certify(result.mesh).not_certified;
+  finish(going);
+  result.uncertified = std::move(uncertified_);
+  result.report = std::move(report_);
+  return result;
+}
+
+}  // namespace
+
+OptimizeResult optimize_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const OptimizeOptions& options) {
+  return MeshOptimizer(mesh, target, options).run(mesh);
+}
+
+}  // namespace subvol
