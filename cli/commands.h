@@ -12,6 +12,7 @@ using Action = std::function<int()>;
 
 /// One verb each: its options, its help, and its action.
 void add_fit_command(CLI::App& app, Action& action);
+void add_optimize_command(CLI::App& app, Action& action);
 void add_shell_command(CLI::App& app, Action& action);
 void add_subdivide_command(CLI::App& app, Action& action);
 void add_check_command(CLI::App& app, Action& action);

@@ -9,6 +9,8 @@
 #include "cli/progress.h"
 #include "cli/report.h"
 #include "fit/mesh_check.h"
+#include "fit/optimize_mesh.h"
+#include "subvol/error.h"
 #include "subvol/version.h"
 
 #include <algorithm>
@@ -33,6 +35,29 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
   }
 }
 
+/// Makes the template valid where it is not. It is what curved cells start from, so nothing is done where this fails.
+void untangle(const HighOrderFitArguments& arguments, VolumeMesh& template_mesh, std::vector<std::string>& warnings) {
+  const std::size_t before = certify(template_mesh).not_certified.size();
+  if (before == 0) return;
+  ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
+  OptimizeOptions options;
+  options.time_limit_seconds = arguments.fit.time_limit_seconds;
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  catch_interrupt();
+  OptimizeResult result = optimize_mesh(template_mesh, nullptr, options);
+  teller.finish();
+  if (!result.uncertified.empty())
+    throw InputError(arguments.template_mesh + ": " + std::to_string(result.uncertified.size()) +
+                     " cells could not be made valid before curving, the first is cell " +
+                     std::to_string(result.uncertified[0]));
+  warnings.push_back(arguments.template_mesh + ": " + std::to_string(before) +
+                     " cells were not valid; they were untangled before curving");
+  template_mesh = std::move(result.mesh);
+}
+
 HighOrderFitResult fit(const HighOrderFitArguments& arguments, const TriangleMesh& target,
                        const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
@@ -55,9 +80,10 @@ MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result,
   return check_mesh(mesh, curved_boundary(mesh, chord_percent), &target);
 }
 
-Json report_json(const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh, const MeshCheck& mesh_check) {
+Json report_json(const char* command, const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh,
+                 const MeshCheck& mesh_check) {
   Json json{{"subvol", version()},
-            {"command", "fit"},
+            {"command", command},
             {"options", options_in_force(verb)},
             {"mesh", describe("", mesh)}};
   json.update(fit_json(report));
@@ -75,7 +101,7 @@ int status(const FitReport& report, const MeshCheck& mesh_check) {
 
 int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty() && arguments.run.report.empty())
-    throw UsageError("fit: nothing to write; give -o FILE or --report FILE");
+    throw UsageError(std::string(arguments.command) + ": nothing to write; give -o FILE or --report FILE");
   const Clock::time_point start = Clock::now();
   const std::vector<Output> outputs = checked_outputs(arguments.run, false);
   apply_threads(arguments.run);
@@ -86,9 +112,10 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
       std::cerr << "subvol: warning: " << warnings[told] << '\n';
   };
   const TriangleMesh target = load_target(arguments.target, warnings);
-  const VolumeMesh template_mesh = load_volume(arguments.template_mesh, warnings);
+  VolumeMesh template_mesh = load_volume(arguments.template_mesh, warnings);
   tell_warnings();
   refuse_impossible(outputs, arguments, template_mesh);
+  if (arguments.untangles) untangle(arguments, template_mesh, warnings);
 
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result = fit(arguments, target, template_mesh);
@@ -108,7 +135,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Clock::time_point check_start = Clock::now();
   const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent);
   if (!arguments.run.report.empty()) {
-    Json json = report_json(verb, report, file.mesh, mesh_check);
+    Json json = report_json(arguments.command, verb, report, file.mesh, mesh_check);
     json["input"] = {{"target", describe(arguments.target, target)},
                      {"template", describe(arguments.template_mesh, template_mesh)}};
     json["warnings"] = warnings;

@@ -11,12 +11,14 @@
 
 namespace subvol::cli {
 
-/// What `fit --order` was asked to do.
+/// What `fit --order`, or `optimize --order`, was asked to do.
 struct HighOrderFitArguments {
   RunOptions run;
   WritingOptions writing;
   HighOrderFitOptions fit;
   std::string target, template_mesh;
+  const char* command = "fit";  ///< the verb, for messages and the report
+  bool untangles = false;       ///< a template with inverted cells is made valid first, over its own boundary
 };
 
 /// Fits curved elements from files to files; returns an ExitStatus.

@@ -15,6 +15,7 @@ namespace {
 
 constexpr const char* kFooter = R"(Examples:
   subvol fit bone.off --template bone.mesh -o bone.glb -o cage:bone_cage.mesh --report bone.json
+  subvol optimize tangled.mesh -o valid.mesh
   subvol shell bone.off --thickness 2% --layers 2 --side both -o bone_shell.vtu -o bone_shell.glb
   subvol check bone_fine.mesh --target bone.off
   subvol convert cage.mesh -o cage.usda
@@ -54,6 +55,7 @@ int run(int argc, char** argv) {
 
   Action action;
   add_fit_command(app, action);
+  add_optimize_command(app, action);
   add_shell_command(app, action);
   add_subdivide_command(app, action);
   add_check_command(app, action);
