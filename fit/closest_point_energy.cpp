@@ -140,4 +140,14 @@ ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
   return {std::max(to_surface / target_->area(), area > 0 ? to_target / area : 0), max};
 }
 
+std::vector<double> ClosestPointEnergy::triangle_distances() const {
+  std::vector<double> result(triangles().size(), 0.0);
+  for (std::size_t q = 0; q < surface_distances_.size(); ++q) {
+    double& largest = result[q / points_per_triangle_];
+    largest = std::max(largest, surface_distances_[q]);
+  }
+  for (const ClosestPoint::Hit& hit : target_hits_) result[hit.triangle] = std::max(result[hit.triangle], hit.distance);
+  return result;
+}
+
 }  // namespace subvol

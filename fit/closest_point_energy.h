@@ -39,6 +39,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
     double mean, max;
   };
   Distance assigned_distance() const;
+  /// The largest of them at each sample triangle.
+  std::vector<double> triangle_distances() const;
 
  private:
   /// A point of the target tied to a point of one sample triangle.

@@ -10,6 +10,7 @@
 #include "fit/free_nodes.h"
 #include "fit/quality.h"
 #include "fit/stage_runner.h"
+#include "fit/surface_distance.h"
 #include "fit/untangle.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -33,6 +34,22 @@ constexpr int kPointsPerDirection = 2;
 constexpr double kTrustedJacobian = 0.3;
 /// Cells with a lower one may move the corners of the surface's sharp edges.
 constexpr double kPoorJacobian = 0.2;
+
+/// Distances are kept this much below what is asked for: they are seen at samples, which miss the farthest places.
+constexpr double kMeanMargin = 0.9, kMaxMargin = 0.65;
+/// Cells' weights are not lowered further for the sake of the distance.
+constexpr double kLeastRelief = 0.25;
+
+/// What a round has reached.
+struct Progress {
+  double mean_jacobian = -1, least_jacobian = -1, max_percent = 0;
+
+  bool gains_on(const Progress& before, double wanted_percent) const {
+    constexpr double kLeastGain = 7e-4, kLeastOfWorst = 5e-3, kLeastApproach = 0.03;
+    return mean_jacobian - before.mean_jacobian >= kLeastGain || least_jacobian - before.least_jacobian >= kLeastOfWorst ||
+           (max_percent > wanted_percent && max_percent < (1 - kLeastApproach) * before.max_percent);
+  }
+};
 
 template <class... Values>
 std::string format(const char* form, Values... values) {
@@ -79,6 +96,7 @@ class MeshOptimizer {
         topology_(mesh_),
         own_boundary_(!target),
         target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
+        relief_(mesh.num_cells(), 1),
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress}) {
     mesh_.positions = target_.normalisation.to_unit(std::move(mesh_.positions));
   }
@@ -101,7 +119,9 @@ class MeshOptimizer {
   bool untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options);
   bool improve();
   bool run_stage(const std::string& name, double lambda, int steps, double fraction);
+  void relieve_far_cells(std::span<const double> triangle_distances);
   void weigh_cells(std::span<const double> least_jacobians);
+  void measure_distance();
   void finish(bool going);
 
   OptimizeOptions options_;
@@ -113,6 +133,7 @@ class MeshOptimizer {
   BoundarySamples samples_;
   std::vector<Vec3> ideal_boxes_;
   std::vector<double> weights_;     ///< of the cells; empty: equal
+  std::vector<double> relief_;      ///< of the cells: share of its weight that each keeps for being beside a far place
   std::vector<Index> uncertified_;
   double mean_percent_ = 0, max_percent_ = 0;  ///< distances as the last stage saw them
   FitReport report_;
@@ -248,34 +269,50 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
     mean_percent_ = 100 * mean;
     max_percent_ = 100 * max;
     report_.stages.back().mean_distance_percent = mean_percent_;
+    relieve_far_cells(surface->triangle_distances());
   }
   return going;
+}
+
+/// The cells beside places that are too far off count half as much from now on. Lowering lambda for the sake of a few
+/// places would cost shape everywhere.
+void MeshOptimizer::relieve_far_cells(std::span<const double> triangle_distances) {
+  std::vector<std::uint8_t> far(mesh_.num_vertices(), 0);
+  for (std::size_t t = 0; t < triangle_distances.size(); ++t) {
+    if (100 * triangle_distances[t] <= kMaxMargin * options_.max_tolerance_percent) continue;
+    for (const Index v : topology_.face(samples_.triangle_faces[t])) far[v] = 1;
+  }
+  for (std::size_t c = 0; c < mesh_.num_cells(); ++c) {
+    const auto cell = mesh_.cell(c);
+    if (std::any_of(cell.begin(), cell.end(), [&](Index v) { return far[v] != 0; }))
+      relief_[c] = std::max(relief_[c] / 2, kLeastRelief);
+  }
 }
 
 void MeshOptimizer::weigh_cells(std::span<const double> least_jacobians) {
   constexpr double kLeast = 1e-3;
   weights_.clear();
-  for (const double least : least_jacobians) weights_.push_back(1 / std::max(least, kLeast));
+  for (std::size_t c = 0; c < least_jacobians.size(); ++c)
+    weights_.push_back(relief_[c] / std::max(least_jacobians[c], kLeast));
 }
 
 /// Rounds of a few steps, between which ideal boxes, weights and lambda follow what has been reached.
 bool MeshOptimizer::improve() {
   constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
-  constexpr double kLeastGain = 5e-4, kLeastLambdaShare = 1.0 / 64, kMeanMargin = 0.9, kMaxMargin = 0.65, kMostOfDistance = 0.97;
-  double lambda = options_.lambda, mean_before = -1, min_before = -1, excess_before = 0;
+  constexpr double kLeastLambdaShare = 1.0 / 64;
+  double lambda = options_.lambda;
+  Progress before;
   if (!run_stage(format("improve, lambda %g", lambda), lambda, kFirstSteps, 0.3)) return false;
   for (int round = 0; round < kMaxRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
-    const double mean = mean_of(minima), min = *std::min_element(minima.begin(), minima.end());
-    const double excess = std::max(mean_percent_ / (kMeanMargin * options_.mean_tolerance_percent),
-                                   max_percent_ / (kMaxMargin * options_.max_tolerance_percent));
-    if (excess > 1 && lambda > kLeastLambdaShare * options_.lambda) {
+    const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
+    const bool too_far = mean_percent_ > kMeanMargin * options_.mean_tolerance_percent;
+    if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
       lambda /= 2;
-    } else if (mean - mean_before < kLeastGain && min - min_before < 10 * kLeastGain &&
-               (excess <= 1 || excess > kMostOfDistance * excess_before)) {
+    } else if (!now.gains_on(before, kMaxMargin * options_.max_tolerance_percent)) {
       break;
     }
-    mean_before = mean, min_before = min, excess_before = excess;
+    before = now;
     if (options_.sizes == CellSizes::local)
       ideal_boxes_ = ideal_boxes(mesh_, mesh_.positions, target_.surface.volume(), 1);
     std::vector<Index> poor;
@@ -289,7 +326,19 @@ bool MeshOptimizer::improve() {
   return true;
 }
 
+/// Distances of the result, exactly where the stages only sampled them.
+void MeshOptimizer::measure_distance() {
+  constexpr int kSamples = 20000;
+  if (options_.fixed_boundary) return;
+  const TriangleMesh boundary = refined_triangles(boundary_surface(mesh_, topology_));
+  const SurfaceDistance distance =
+      surface_distance(boundary, ClosestPoint(boundary), target_.mesh, target_.tree, {.num_samples = kSamples});
+  mean_percent_ = 100 * distance.mean();
+  max_percent_ = 100 * distance.max();
+}
+
 void MeshOptimizer::finish(bool going) {
+  if (going) measure_distance();
   report_.seconds = {{"total", runner_.seconds()}};
   if (!going) return;
   if (!uncertified_.empty()) {

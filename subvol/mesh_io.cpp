@@ -63,11 +63,19 @@ void warn_of(const std::vector<MeshDefect>& defects, MeshDefect::Kind kind, cons
 void check_mesh(const std::string& name, ParsedMesh& parsed) {
   std::vector<MeshDefect> defects = validate(parsed.mesh);
   const auto is_fatal = [](const MeshDefect& d) { return !is_warning(d) && d.kind != MeshDefect::Kind::bad_tag; };
-  const auto fatal = std::find_if(defects.begin(), defects.end(), is_fatal);
-  if (fatal != defects.end()) {
-    const auto more = std::count_if(fatal + 1, defects.end(), is_fatal);
-    throw InputError(name + ": " + fatal->message + " (" + to_string(fatal->kind) + ")" +
-                     (more ? "; and " + std::to_string(more) + " more defects" : ""));
+  if (std::any_of(defects.begin(), defects.end(), is_fatal)) {
+    constexpr int kMostNamed = 20;
+    std::string text;
+    int named = 0, more = 0;
+    for (const MeshDefect& defect : defects) {
+      if (!is_fatal(defect)) continue;
+      if (named == kMostNamed) {
+        ++more;
+        continue;
+      }
+      text += (named++ ? "; " : "") + defect.message + " (" + to_string(defect.kind) + ")";
+    }
+    throw InputError(name + ": " + text + (more ? "; and " + std::to_string(more) + " more defects" : ""));
   }
   if (const std::size_t n = drop_inner_tags(parsed.mesh))
     parsed.warnings.push_back(std::to_string(n) + " tagged edges or corners are not on the boundary: dropped");

@@ -105,7 +105,8 @@ class MeditParser {
   }
 
   void refuse_pyramids() {
-    if (scan_.count("the number of Pyramids", 6) > 0) scan_.fail(kNoPyramids);
+    if (const std::size_t n = scan_.count("the number of Pyramids", 6); n > 0)
+      scan_.fail(std::to_string(n) + " pyramids: " + kNoPyramids);
   }
 
   void skip_section(std::size_t numbers_per_entry) {

@@ -305,7 +305,9 @@ class VtkParser {
         continue;
       }
       const std::string name = "cell " + std::to_string(c);
-      if (types_[c] == kPyramid) scan_.fail(name + " is a pyramid: " + kNoPyramids, types_line_);
+      if (types_[c] == kPyramid)
+        scan_.fail(name + " is a pyramid, of " + std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) + ": " +
+                       kNoPyramids, types_line_);
       if (std::find(std::begin(kLowerDimensions), std::end(kLowerDimensions), types_[c]) == std::end(kLowerDimensions))
         scan_.fail(name + " has VTK type " + std::to_string(types_[c]) +
                        ", expected 10 (tet), 11 (voxel), 12 (hex) or 13 (wedge)", types_line_);
