@@ -28,6 +28,16 @@ Json quality_json(const QualityReport& quality) {
 
 namespace {
 
+Json witnesses_json(std::span<const InversionWitness> witnesses) {
+  Json json = Json::array();
+  for (const auto& [cell, canonical, position, determinant] : witnesses)
+    json.push_back({{"cell", cell},
+                    {"canonical", point_json(canonical)},
+                    {"position", point_json(position)},
+                    {"determinant", determinant}});
+  return json;
+}
+
 Json topology_json(const MeshCheck& check) {
   return {{"components", check.num_components},
           {"boundary_components", check.num_boundary_components},
@@ -61,6 +71,7 @@ Json check_json(const MeshCheck& check) {
   if (check.distance) json["distance"] = distance_json(*check.distance, check.target_diagonal);
   if (check.orders) json["orders"] = orders_json(*check.orders);
   if (check.quality) json["quality"] = quality_json(*check.quality);
+  if (!check.witnesses.empty()) json["inverted_at"] = witnesses_json(check.witnesses);
   if (check.has_boundary_geometry) {
     json["boundary_self_intersections"] = check.num_intersecting_triangle_pairs;
     json["intersecting_boundary_faces"] = check.intersecting_faces;

@@ -2,6 +2,7 @@
 #include "fit/mesh_check.h"
 
 #include "fit/boundary_triangles.h"
+#include "fit/high_order_certificate.h"
 #include "fit/high_order_quality.h"
 #include "fit/self_intersection.h"
 #include "subvol/boundary.h"
@@ -106,6 +107,31 @@ MeshCheck count_cells(const VolumeMesh& mesh) {
   return check;
 }
 
+/// Calls certify(cell) for the first cells that are refuted, and position(cell, canonical) for where.
+template <class Certify, class Position>
+std::vector<InversionWitness> witnesses(const QualityReport& quality, const Certify& certify, const Position& position) {
+  constexpr std::size_t kMostWitnesses = 10;
+  std::vector<InversionWitness> result;
+  for (const Index c : quality.certificate.invalid_cells) {
+    if (result.size() == kMostWitnesses) break;
+    const CellCertificate found = certify(c);
+    result.push_back({c, found.witness, position(c, found.witness), found.witness_determinant});
+  }
+  return result;
+}
+
+/// One cell of a mesh as a mesh of its own.
+HighOrderMesh single_cell(const VolumeMesh& mesh, std::size_t c) {
+  VolumeMesh single;
+  std::vector<Index> corners;
+  for (const Index v : mesh.cell(c)) {
+    corners.push_back(static_cast<Index>(corners.size()));
+    single.positions.push_back(mesh.positions[v]);
+  }
+  single.add_cell(mesh.kinds[c], corners);
+  return {ElementSpace(single, Basis::legendre, 1), single};
+}
+
 /// printf into the end of a string.
 template <class... Values>
 void append(std::string& text, const char* format, Values... values) {
@@ -145,10 +171,24 @@ void append_quality(std::string& text, const QualityReport& quality) {
   append(text, "inverted cells      %zu\n", quality.inverted_cells);
   append(text, "certified cells     %zu of %zu (%zu invalid, %zu undecided)\n", certificate.certified,
          quality.num_cells, certificate.invalid, certificate.undecided);
-  append(text, "worst cells        ");
-  for (std::size_t i = 0; i < std::min<std::size_t>(5, quality.worst_cells.size()); ++i)
-    append(text, " %d (%.4f)", static_cast<int>(quality.worst_cells[i].cell), quality.worst_cells[i].value);
-  append(text, "\n");
+  append(text, "histogram          ");
+  for (int bin = 0; bin < kNumHistogramBins; ++bin)
+    if (quality.histogram[bin] > 0)
+      append(text, " %.1f..%.1f: %zu", 2.0 * bin / kNumHistogramBins - 1, 2.0 * (bin + 1) / kNumHistogramBins - 1,
+             quality.histogram[bin]);
+  append(text, "\nworst cells\n");
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, quality.worst_cells.size()); ++i) {
+    const auto& [cell, centre, value] = quality.worst_cells[i];
+    append(text, "  %-8d %.4f at (%.6g, %.6g, %.6g)\n", static_cast<int>(cell), value, centre[0], centre[1], centre[2]);
+  }
+}
+
+void append_witnesses(std::string& text, std::span<const InversionWitness> witnesses) {
+  if (witnesses.empty()) return;
+  append(text, "inverted at\n");
+  for (const auto& [cell, canonical, position, determinant] : witnesses)
+    append(text, "  %-8d det J %.3g at (%.6g, %.6g, %.6g)\n", static_cast<int>(cell), determinant, position[0],
+           position[1], position[2]);
 }
 
 void append_distance(std::string& text, const MeshCheck& check) {
@@ -171,6 +211,13 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const M
   MeshCheck check = count_cells(mesh);
   if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
   check.quality = measure_quality(mesh, options.samples_per_direction);
+  check.witnesses = witnesses(
+      *check.quality,
+      [&](Index c) {
+        const HighOrderMesh cell = single_cell(mesh, c);
+        return certify_cell(mesh.kinds[c], cell.coefficients);
+      },
+      [&](Index c, const Vec3& point) { return single_cell(mesh, c).position(0, point); });
   if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
@@ -210,6 +257,10 @@ MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, 
   std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
   check.orders = order_summary(mesh.space);
   check.quality = measure_quality(mesh, samples_per_direction);
+  HighOrderCertifier certifier(mesh.space);
+  check.witnesses = witnesses(
+      *check.quality, [&](Index c) { return certifier.certify(mesh.coefficients, c); },
+      [&](Index c, const Vec3& point) { return mesh.position(c, point); });
   check_topology(straight, mesh.space.topology(), check);
   check.chord_error = boundary.chord_error;
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
@@ -235,6 +286,7 @@ std::string to_text(const MeshCheck& check) {
     for (const std::string& warning : check.subdivision_audit->warnings)
       append(text, "warning             %s\n", warning.c_str());
   if (check.quality) append_quality(text, *check.quality);
+  append_witnesses(text, check.witnesses);
   if (check.has_boundary_geometry) {
     append(text, "volume              %.6g\n", check.volume);
     if (check.chord_error > 0)

@@ -38,6 +38,14 @@ struct OrderSummary {
 };
 OrderSummary order_summary(const ElementSpace& space);
 
+/// A point that shows a cell to be inverted.
+struct InversionWitness {
+  Index cell;
+  Vec3 canonical;      ///< in the cell's canonical coordinates
+  Vec3 position;       ///< in space
+  double determinant;  ///< det J by canonical coordinates, <= 0 beyond rounding
+};
+
 /// All that is known of a volume mesh without a fit. Parts that defects rule out are left at their defaults.
 struct MeshCheck {
   std::vector<MeshDefect> defects;                           ///< `validate`'s
@@ -57,6 +65,7 @@ struct MeshCheck {
   std::optional<SubdivisionAudit> subdivision_audit;         ///< what works against subdividing it; no defect
 
   std::optional<QualityReport> quality;                      ///< with the certificate
+  std::vector<InversionWitness> witnesses;                   ///< of the first ten cells that are refuted
 
   bool has_boundary_geometry = false;                        ///< whether the parts below were looked at
   double chord_error = 0;                                    ///< of the triangles that stand for a curved boundary

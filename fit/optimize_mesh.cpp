@@ -242,7 +242,7 @@ bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const Un
 
 bool MeshOptimizer::untangle_all() {
   const std::vector<Vec3> start = mesh_.positions;
-  const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = options_.fixed_boundary ? 30 : 8,
+  const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = 40,
                               .patience = options_.fixed_boundary ? 6 : 2};
   if (!untangle_cells(Boundary::fixed, "untangle, boundary fixed", fixed)) return false;
   if (uncertified_.empty() || options_.fixed_boundary) return true;

@@ -55,11 +55,4 @@ void regularised_barrier(RegularisedBatch& batch, double epsilon) {
   }
 }
 
-double next_epsilon(double epsilon, double decrease, double determinant, double floor) {
-  constexpr double kLeastDecrease = 0.1;
-  const double root = std::hypot(epsilon, determinant);
-  const double mu = (1 - std::clamp(decrease, kLeastDecrease, 1.0)) * chi_of(determinant, root, epsilon);
-  return determinant < mu ? std::max(2 * std::sqrt(mu * (mu - determinant)), floor) : floor;
-}
-
 }  // namespace subvol

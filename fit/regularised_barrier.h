@@ -32,13 +32,4 @@ struct RegularisedBatch {
 /// Fills everything. epsilon > 0, dimensionless.
 void regularised_barrier(RegularisedBatch& batch, double epsilon);
 
-/// The next epsilon, from how far the last solve came: it falls so fast that the worst determinant, if it were the only
-/// thing to gain, would be reached.
-///
-///   mu = (1 - sigma) chi(D, eps),  eps' = 2 sqrt(mu (mu - D)) while D < mu, else `floor`
-///
-/// decrease  share sigma of the energy that the solve took off, at least a tenth is reckoned with.
-/// determinant  the least one, D.                                              Source: as above, section 2.3
-double next_epsilon(double epsilon, double decrease, double determinant, double floor);
-
 }  // namespace subvol

@@ -12,9 +12,11 @@ namespace subvol {
 
 namespace {
 
-/// Epsilon starts at the size of an ideal determinant and is at most this share of the worst one from then on. It falls
-/// to half at least in every round: where a few cells are stuck, the rule alone would take very long.
-constexpr double kFirstEpsilon = 1, kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
+/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell, and falls as fast as they
+/// come right (the rule of the published code). Where a round gains little it is at most half the last one.
+constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
+/// A round that takes off less of the energy is as far as it gets with its epsilon.
+constexpr double kStuck = 0.1;
 /// Cells that are still not certified after a round count so much more in the next.
 constexpr double kWeightGrowth = 1.5;
 constexpr int kSteps = 5;
@@ -90,7 +92,7 @@ UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const Untan
                         FitReport& report) {
   TangledCells cells(problem, mesh);
   if (cells.look(x)) return {};
-  double epsilon = kFirstEpsilon;
+  double epsilon = std::max(kShareOfWorst * std::abs(cells.determinant()), kLeastEpsilon);
   std::size_t fewest = cells.uncertified().size();
   double best = cells.determinant();
   int idle = 0;
@@ -107,10 +109,12 @@ UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const Untan
     idle = gained ? 0 : idle + 1;
     fewest = std::min(fewest, cells.uncertified().size());
     best = std::max(best, cells.determinant());
-    const double by_rule = next_epsilon(epsilon, decrease, cells.determinant(), kLeastEpsilon);
-    const double by_worst = std::min(kLeastFall * epsilon, kShareOfWorst * -cells.determinant());
-    epsilon = std::max(std::min(by_rule, by_worst), kLeastEpsilon);
-    cells.raise_weights();
+    double next = kShareOfWorst * std::abs(cells.determinant());
+    if (decrease < kStuck) {
+      next = std::min(next, kLeastFall * epsilon);
+      cells.raise_weights();
+    }
+    epsilon = std::max(next, kLeastEpsilon);
   }
   return {true, cells.uncertified()};
 }

@@ -10,7 +10,7 @@ namespace subvol {
 
 struct UntangleOptions {
   double tangential_weight = 0;  ///< of the problem's surface term, for the report
-  int max_rounds = 30;           ///< solves of some Newton steps, each with a smaller epsilon
+  int max_rounds = 40;           ///< solves of some Newton steps, each with a smaller epsilon
   int patience = 6;              ///< rounds without a gain after which it ends
 };
 

@@ -4,6 +4,7 @@
 #include "fit/boundary_triangles.h"
 #include "fit/closest_point_energy.h"
 #include "fit/fit_problem.h"
+#include "fit/free_nodes.h"
 #include "fit/self_intersection.h"
 #include "fit/volume_energy.h"
 #include "shell/thickness.h"
@@ -90,7 +91,7 @@ class ShellMaker {
   void find_thickness();
   void start();
   void optimize();
-  std::vector<char> fixed_vertices() const;
+  std::vector<std::uint8_t> fixed_vertices() const;
   FitProblem make_problem(std::vector<Vec3>& unknowns) const;
   MinimizerStop solve(int round);
   void finish(const PolygonMesh& surface, ShellResult& result);
@@ -176,8 +177,8 @@ void ShellMaker::start() {
 }
 
 /// Vertices that are no unknowns.
-std::vector<char> ShellMaker::fixed_vertices() const {
-  std::vector<char> fixed(positions_.size(), 0);
+std::vector<std::uint8_t> ShellMaker::fixed_vertices() const {
+  std::vector<std::uint8_t> fixed(positions_.size(), 0);
   const SurfaceTopology& topology = layers_.topology;
   const auto fix = [&](Index v) { fixed[layers_.vertex(layers_.inside, v)] = 1; };
   if (!options_.free_surface)
@@ -192,20 +193,10 @@ std::vector<char> ShellMaker::fixed_vertices() const {
 
 /// The energy with the surface's vertices fixed, or drawn to where the surface was.
 FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
-  const std::vector<char> is_fixed = fixed_vertices();
-  SparseMap nodes;
-  std::vector<Vec3> fixed(positions_.size(), Vec3::Zero());
-  for (std::size_t i = 0; i < positions_.size(); ++i) {
-    if (is_fixed[i]) {
-      fixed[i] = positions_[i];
-    } else {
-      nodes.columns.push_back(static_cast<Index>(unknowns.size()));
-      nodes.values.push_back(1);
-      unknowns.push_back(positions_[i]);
-    }
-    nodes.offsets.push_back(nodes.columns.size());
-  }
-  nodes.num_cols = unknowns.size();
+  FreeNodes free = free_nodes(fixed_vertices(), positions_);
+  unknowns = std::move(free.unknowns);
+  SparseMap nodes = std::move(free.map);
+  std::vector<Vec3> fixed = std::move(free.fixed);
   std::vector<Index> sampled;
   std::vector<Vec3> fixed_samples;
   std::unique_ptr<SurfaceTerm> surface;

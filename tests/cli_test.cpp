@@ -6,6 +6,7 @@
 #include "subvol/mesh_io.h"
 #include "tests/data.h"
 #include "tests/glb_reader.h"
+#include "tests/sample_meshes.h"
 #include "tests/temporary_folder.h"
 #include "tests/usda_reader.h"
 
@@ -570,4 +571,54 @@ TEST_CASE("check and convert take a high-order .vtu", "[cli]") {
   CHECK(alien.status == 3);
   CHECK(alien.err.find("alien.vtu") != std::string::npos);
   CHECK(place.run("convert alien.vtu -o out2.mesh").status == 3);
+}
+
+TEST_CASE("optimize untangles a mesh, proves it, and says which cells it could not make valid", "[cli]") {
+  const Workplace place;
+  subvol::VolumeMesh mesh = subvol::test::lattice(3, 3, 3);
+  const subvol::MeshTopology topology(mesh);
+  double shift = 1.3;
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+    if (!topology.is_boundary_vertex(static_cast<subvol::Index>(v))) mesh.positions[v].x() += shift = -shift;
+  subvol::write_volume_mesh(place / "tangled.mesh", mesh);
+  const Run run = place.run("optimize tangled.mesh -o valid.mesh -o valid.glb --report report.json --progress none");
+  INFO(run.err);
+  CHECK(run.status == 0);
+  const nlohmann::json report = place.json("report.json");
+  CHECK(report["command"] == "optimize");
+  CHECK(report["input"]["quality"]["inverted_cells"] > 0);
+  CHECK(report["quality"]["certified_cells"] == mesh.num_cells());
+  CHECK(report["quality"]["min_scaled_jacobian"] > 0.99);
+  CHECK(report["distance"]["max_percent"] < 0.1);
+  CHECK(report["not_certified_cells"].empty());
+  CHECK(place.run("check valid.mesh").status == 0);
+
+  // A corner of the block on the wrong side, and a boundary that may not move.
+  mesh.positions[0] = {1.5, 1.5, 1.5};
+  subvol::write_volume_mesh(place / "stuck.mesh", mesh);
+  const Run stuck = place.run("optimize stuck.mesh --fixed-boundary -o left.mesh --report left.json --progress none");
+  CHECK(stuck.status == 1);
+  CHECK(stuck.err.find("NOT VALID") != std::string::npos);
+  CHECK(place.json("left.json")["valid"] == false);
+  CHECK(place.json("left.json")["not_certified_cells"][0] == 0);
+  CHECK(place.json("left.json")["inverted_at"][0]["determinant"] < 0);
+
+  CHECK(place.run("optimize tangled.mesh").status == 2);
+  CHECK(place.run("optimize tangled.mesh --fixed-boundary --target target.off -o a.mesh").status == 2);
+  CHECK(place.run("optimize tangled.mesh --order 2 -o a.vtu").status == 2);
+}
+
+TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(
+      "optimize template.mesh --target target.off --order 2 --tolerance 0.5 -o curved.vtu --report report.json --progress none");
+  INFO(run.err);
+  CHECK(run.status == 0);
+  const nlohmann::json report = place.json("report.json");
+  CHECK(report["command"] == "optimize");
+  CHECK(report["orders"]["max"] == 2);
+  CHECK(report["valid"] == true);
+  CHECK(report["distance"]["mean_percent"] < 0.5);
+  // Seven cells of order 2 cannot come closer.
+  CHECK(place.run("optimize template.mesh --target target.off --order 2 -o b.vtu --progress none").status == 4);
 }

@@ -79,6 +79,14 @@ TEST_CASE("an inverted cell and a boundary that runs through itself are not vali
   CHECK_FALSE(inverted.valid());
   CHECK(inverted.quality->inverted_cells == 1);
   CHECK(inverted.quality->certificate.invalid == 1);
+  REQUIRE(inverted.witnesses.size() == 1);
+  const InversionWitness& witness = inverted.witnesses[0];
+  CHECK(witness.cell == inverted.quality->certificate.invalid_cells[0]);
+  CHECK(witness.determinant < 0);
+  CHECK(witness.position.minCoeff() >= 0);
+  CHECK(witness.position.maxCoeff() <= 2);
+  CHECK(to_text(inverted).find("inverted at\n") != std::string::npos);
+  CHECK(to_text(inverted).find("histogram ") != std::string::npos);
 
   // Two cubes of a bar bent round until its ends overlap: every cell is sound, the whole is not.
   VolumeMesh overlapping = voxels(3, 1, 1, [](int i, int, int) { return i != 1; });

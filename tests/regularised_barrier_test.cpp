@@ -105,14 +105,6 @@ TEST_CASE("The regularised barrier is finite wherever the Jacobian is, and grows
   }
 }
 
-TEST_CASE("Epsilon falls to its floor once the worst determinant is above the reach of the last one") {
-  CHECK(next_epsilon(1, 0.5, 2, 1e-4) == 1e-4);
-  const double epsilon = next_epsilon(1, 0, -0.5, 1e-4);
-  CHECK(epsilon < 1);
-  CHECK(epsilon > 1e-4);
-  CHECK(next_epsilon(1, 0.9, -0.5, 1e-4) < epsilon);
-}
-
 TEST_CASE("A regularised volume energy does not depend on place, orientation or unit") {
   std::mt19937 random(6);
   VolumeMesh mesh = test::mixed_cells();
