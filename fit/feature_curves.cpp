@@ -129,10 +129,15 @@ double FeatureCurve::length() const {
   return length;
 }
 
-FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees) {
+FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
+                             std::span<const std::array<Index, 2>> tagged) {
   if (!(angle_degrees >= 0 && angle_degrees <= 180))
     throw InputError("feature_curves: angle_degrees must be in [0, 180], got " + std::to_string(angle_degrees));
-  return EdgeWalk(mesh, sharp_edges(mesh, angle_degrees), angle_degrees).curves();
+  std::vector<std::array<Index, 2>> sharp = sharp_edges(mesh, angle_degrees);
+  for (const auto& [a, b] : tagged) sharp.push_back({std::min(a, b), std::max(a, b)});
+  std::sort(sharp.begin(), sharp.end());
+  sharp.erase(std::unique(sharp.begin(), sharp.end()), sharp.end());
+  return EdgeWalk(mesh, sharp, angle_degrees).curves();
 }
 
 ClosestPoint polyline_tree(std::span<const Vec3> points) {

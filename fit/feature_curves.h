@@ -40,8 +40,10 @@ struct CreaseSegment {
 /// mesh           connected by common vertices; triangles need not be oriented alike. Those without area make no edge
 ///                sharp.
 /// angle_degrees  deviation from flat, in [0, 180]; outside or NaN: InputError, as a corner out of range.
+/// tagged         edges of the mesh that are sharp whatever their angle.
 /// Each sharp edge is in exactly one curve. Cost: linear but for one sort of the edges.
-FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees);
+FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
+                             std::span<const std::array<Index, 2>> tagged = {});
 
 /// Tree over the segments of a polyline, numbered in its order. points: at least 2, finite.
 ClosestPoint polyline_tree(std::span<const Vec3> points);

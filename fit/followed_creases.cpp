@@ -18,8 +18,8 @@ constexpr double kMost = 0.5;
 }  // namespace
 
 FollowedCreases::FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees,
-                                 VolumeMesh& template_mesh)
-    : curves_(feature_curves(target, angle_degrees.value_or(kUsualCreaseAngle))),
+                                 VolumeMesh& template_mesh, std::span<const std::array<Index, 2>> tagged)
+    : curves_(feature_curves(target, angle_degrees.value_or(kUsualCreaseAngle), tagged)),
       paths_(follow_curves(template_mesh, curves_, angle_degrees ? PathEdges::all : PathEdges::creases)) {
   if (angle_degrees) tag(template_mesh);
   std::map<std::pair<Index, Index>, Index> curve_of_edge;

@@ -29,7 +29,9 @@ class FollowedCreases {
   /// With an angle: tags a template by the target's edges that are sharper, with creases along the paths that follow
   /// them (`follow_curves`) and what keeps the boundary from folding at their corners (`unfolding_tags`); tags it has
   /// already stay. Without: finds out which of the template's own creases follow edges sharper than kUsualCreaseAngle.
-  FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees, VolumeMesh& template_mesh);
+  /// tagged: edges of the target that are sharp whatever their angle.
+  FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees, VolumeMesh& template_mesh,
+                  std::span<const std::array<Index, 2>> tagged = {});
 
   const FeatureCurves& curves() const { return curves_; }
   /// Whether most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.

@@ -105,6 +105,7 @@ class MeshOptimizer {
  private:
   enum class Boundary { fixed, sliding };
 
+  std::vector<std::array<Index, 2>> tagged_edges() const;
   void find_features();
   void sample_boundary();
   std::vector<std::uint8_t> vertices_of(std::span<const Index> cells) const;
@@ -140,9 +141,22 @@ class MeshOptimizer {
   StageRunner runner_;
 };
 
+/// The mesh's own creases as edges of its boundary surface, which are sharp there whatever their angle.
+std::vector<std::array<Index, 2>> MeshOptimizer::tagged_edges() const {
+  std::vector<std::array<Index, 2>> edges;
+  if (!own_boundary_) return edges;
+  std::vector<Index> volume_vertex;  // ascending
+  boundary_surface(mesh_, topology_, &volume_vertex);
+  const auto number = [&](Index v) {
+    return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
+  };
+  for (const CreaseEdge& crease : mesh_.tags.creases) edges.push_back({number(crease.v0), number(crease.v1)});
+  return edges;
+}
+
 void MeshOptimizer::find_features() {
   if (options_.fixed_boundary) return;
-  creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_);
+  creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_, tagged_edges());
   sample_boundary();
   target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
 }

@@ -20,7 +20,8 @@ enum class CellSizes {
 struct OptimizeOptions {
   bool fixed_boundary = false;           ///< boundary vertices stay; otherwise they slide along the surface
   CellSizes sizes = CellSizes::local;
-  /// Edges of the surface sharper than this stay sharp: vertices there slide along them. In [0, 180].
+  /// Edges of the surface sharper than this stay sharp, as without a target the creases that the mesh's tags name: vertices
+  /// there slide along them. In [0, 180].
   double crease_angle_degrees = kUsualCreaseAngle;
   /// Weight of the cells' shape, > 0: lowered while the boundary is farther from its surface than these distances, in per
   /// cent of the diagonal, > 0.

@@ -103,6 +103,34 @@ TEST_CASE("Optimisation: fixed boundary vertices stay bit by bit; the others sli
   }
 }
 
+TEST_CASE("Optimisation keeps creases that the mesh's tags name, whatever their angle") {
+  constexpr int kSize = 4;
+  constexpr double kLine = 1.5;
+  VolumeMesh mesh = test::lattice(kSize, kSize, kSize);
+  std::vector<Index> line;
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) {
+    Vec3& p = mesh.positions[v];
+    if (p.y() != 2 || p.z() != kSize) continue;
+    p.y() = kLine;  // a line across the top that even cells would leave
+    line.push_back(static_cast<Index>(v));
+  }
+  std::sort(line.begin(), line.end(),
+            [&](Index a, Index b) { return mesh.positions[a].x() < mesh.positions[b].x(); });
+  const auto farthest_from_line = [&] {
+    const OptimizeResult result = optimize_mesh(mesh, nullptr, {.sizes = CellSizes::uniform});
+    CHECK(result.uncertified.empty());
+    double farthest = 0;
+    for (const Index v : line) farthest = std::max(farthest, std::abs(result.mesh.positions[v].y() - kLine));
+    return farthest;
+  };
+  CHECK(farthest_from_line() > 0.2);
+  for (std::size_t i = 0; i + 1 < line.size(); ++i)
+    mesh.tags.creases.push_back({std::min(line[i], line[i + 1]), std::max(line[i], line[i + 1])});
+  std::sort(mesh.tags.creases.begin(), mesh.tags.creases.end(),
+            [](const CreaseEdge& a, const CreaseEdge& b) { return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1); });
+  CHECK(farthest_from_line() < 0.005 * kSize * std::sqrt(3.0));  // the largest distance asked for
+}
+
 TEST_CASE("Graded meshes stay graded with local sizes, and become even with uniform ones") {
   constexpr int kSize = 6;
   VolumeMesh graded = test::lattice(kSize, kSize, kSize);
