@@ -111,7 +111,8 @@ void OptimizeRun::write() {
 
 // What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
 void OptimizeRun::check() {
-  const auto file = std::find_if(outputs_.begin(), outputs_.end(), [](const Output& o) { return o.extension == ".mesh"; });
+  const auto is_mesh = [](const Output& output) { return output.extension == ".mesh"; };
+  const auto file = std::find_if(outputs_.begin(), outputs_.end(), is_mesh);
   mesh_check_ = check_mesh(file == outputs_.end() ? result_.mesh : read_volume_mesh(file->path, {.check = false}),
                            &surface_);
 }
@@ -126,7 +127,8 @@ void OptimizeRun::write_report() const {
   if (target_) json["input"]["target"] = describe(arguments_.target, *target_);
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
-  json["not_certified_cells"] = mesh_check_.quality ? mesh_check_.quality->certificate.not_certified : std::vector<Index>{};
+  json["not_certified_cells"] =
+      mesh_check_.quality ? mesh_check_.quality->certificate.not_certified : std::vector<Index>{};
   json["warnings"] = warnings_;
   json["seconds"] = std::move(seconds);
   json["peak_memory_bytes"] = peak_memory_bytes();
@@ -137,8 +139,8 @@ void OptimizeRun::write_report() const {
 void OptimizeRun::summarise() const {
   constexpr std::size_t kMostNamed = 10;
   std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
-            << "before: " << before_.inverted_cells << " cells inverted, scaled Jacobian min " << before_.min_scaled_jacobian
-            << ", mean " << before_.mean_scaled_jacobian << '\n'
+            << "before: " << before_.inverted_cells << " cells inverted, scaled Jacobian min "
+            << before_.min_scaled_jacobian << ", mean " << before_.mean_scaled_jacobian << '\n'
             << to_text(mesh_check_);
   const std::vector<Index>& left = result_.uncertified;
   for (std::size_t i = 0; i < std::min(left.size(), kMostNamed); ++i)
