@@ -15,6 +15,7 @@ void add_fit_command(CLI::App& app, Action& action);
 void add_optimize_command(CLI::App& app, Action& action);
 void add_shell_command(CLI::App& app, Action& action);
 void add_subdivide_command(CLI::App& app, Action& action);
+void add_template_command(CLI::App& app, Action& action);
 void add_check_command(CLI::App& app, Action& action);
 void add_convert_command(CLI::App& app, Action& action);
 void add_report_command(CLI::App& app, Action& action);

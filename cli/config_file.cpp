@@ -6,16 +6,17 @@
 namespace subvol::cli {
 
 std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const {
-  const auto verbs = app_.get_subcommands();
-  const std::string verb = verbs.empty() ? "" : verbs.front()->get_name();
+  std::vector<std::string> path;  // the verb, and the verb under it where it is a group
+  for (auto verbs = app_.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands())
+    path.push_back(verbs.front()->get_name());
   const auto names_a_verb = [&](const std::string& name) {
     return !app_.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == name; }).empty();
   };
   std::vector<CLI::ConfigItem> kept;
   for (CLI::ConfigItem& item : CLI::ConfigTOML::from_config(input)) {
     if (item.name == "++" || item.name == "--") continue;
-    if (item.parents.empty()) item.parents = {verb};
-    if (item.parents.front() != verb && names_a_verb(item.parents.front())) continue;
+    if (item.parents.empty()) item.parents = path;
+    if ((path.empty() || item.parents.front() != path.front()) && names_a_verb(item.parents.front())) continue;
     kept.push_back(std::move(item));
   }
   return kept;

@@ -17,6 +17,7 @@ constexpr const char* kFooter = R"(Examples:
   subvol fit bone.off --template bone.mesh -o bone.glb -o cage:bone_cage.mesh --report bone.json
   subvol optimize tangled.mesh -o valid.mesh
   subvol shell bone.off --thickness 2% --layers 2 --side both -o bone_shell.vtu -o bone_shell.glb
+  subvol template auto bone.off --cells 300 -o bone_template.mesh
   subvol check bone_fine.mesh --target bone.off
   subvol convert cage.mesh -o cage.usda
   subvol report bone.json -o bone.html
@@ -58,6 +59,7 @@ int run(int argc, char** argv) {
   add_optimize_command(app, action);
   add_shell_command(app, action);
   add_subdivide_command(app, action);
+  add_template_command(app, action);
   add_check_command(app, action);
   add_convert_command(app, action);
   add_report_command(app, action);
