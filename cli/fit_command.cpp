@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/automatic_template.h"
 #include "cli/check_report.h"
 #include "cli/commands.h"
 #include "cli/exit_status.h"
@@ -10,6 +11,7 @@
 #include "cli/report.h"
 #include "cli/writing.h"
 #include "fit/subdivision_fit.h"
+#include "subvol/auto_template.h"
 #include "subvol/mesh_io.h"
 #include "subvol/surface_io.h"
 #include "subvol/version.h"
@@ -17,6 +19,7 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 namespace subvol::cli {
 namespace {
@@ -27,7 +30,8 @@ struct FitArguments {
   RunOptions run;
   WritingOptions writing;
   FitOptions fit;
-  std::string target, template_mesh;
+  std::string target;
+  TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
   int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
   std::string basis = "fourier";
@@ -50,6 +54,7 @@ class FitRun {
 
  private:
   void load();
+  void load_template();
   void fit();
   void write();
   void check();
@@ -67,6 +72,7 @@ class FitRun {
   std::vector<std::string> warnings_;
   TriangleMesh target_;
   VolumeMesh template_mesh_;
+  std::optional<TemplateChoice> choice_;  ///< where the template was made
   FitResult result_;
   MeshCheck mesh_check_;
   TessellatedSurface limit_;
@@ -87,8 +93,17 @@ void FitRun::warn(std::size_t first) const {
 
 void FitRun::load() {
   target_ = load_target(arguments_.target, warnings_);
-  template_mesh_ = load_volume(arguments_.template_mesh, warnings_);
   warn();
+}
+
+void FitRun::load_template() {
+  const std::size_t before = warnings_.size();
+  LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, arguments_.fit.crease_angle_degrees,
+                                             arguments_.run, warnings_);
+  template_mesh_ = std::move(loaded.mesh);
+  choice_ = std::move(loaded.choice);
+  warn(before);
+  if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
 }
 
 void FitRun::fit() {
@@ -143,7 +158,8 @@ void FitRun::write_report() const {
             {"options", options_in_force(verb_)},
             {"input",
              {{"target", describe(arguments_.target, target_)},
-              {"template", describe(arguments_.template_mesh, template_mesh_)}}}};
+              {"template", describe(arguments_.template_mesh.path, template_mesh_)}}}};
+  if (choice_) json["template"] = choice_json(*choice_);
   json.update(fit_json(report));
   json.update(check_json(mesh_check_));
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
@@ -181,6 +197,8 @@ int FitRun::run() {
   outputs_ = checked_outputs(arguments_.run, true);
   apply_threads(arguments_.run);
   timed("read", &FitRun::load);
+  timed("template", &FitRun::load_template);
+  if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   timed("fit", &FitRun::fit);
   timed("write", &FitRun::write);
   timed("check", &FitRun::check);
@@ -296,9 +314,15 @@ void add_fit_command(CLI::App& app, Action& action) {
                    "Surface to reproduce: " + surface_formats() + "; or a volume mesh, for its boundary")
       ->required()
       ->type_name("FILE");
-  verb->add_option("--template", arguments->template_mesh, "Coarse mesh to start from: " + volume_mesh_formats())
-      ->required()
-      ->type_name("MESH");
+  CLI::Option* file = verb->add_option("--template", arguments->template_mesh.path,
+                                       "Coarse mesh to start from: " + volume_mesh_formats() +
+                                           " (default: made from the target)")
+                          ->type_name("MESH");
+  verb->add_option("--cells", arguments->template_mesh.cells,
+                   "About how many cells a template made from the target has (default: as many as it needs)")
+      ->check(CLI::Range(kLeastTemplateCells, kMostTemplateCells))
+      ->type_name("N")
+      ->excludes(file);
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
   add_high_order_options(*verb, *arguments);
@@ -310,6 +334,7 @@ void add_fit_command(CLI::App& app, Action& action) {
   verb->footer(R"(Example:
   subvol fit bone.off --template bone.mesh --levels 3 -o bone.glb -o cage:bone_cage.usda -o bone_fine.mesh
 
+  subvol fit bone.off -o bone.glb                  (with a template made from the surface)
   subvol fit bone.off --template bone.mesh --order 4 -o bone.vtu -o bone.glb
 
 Ctrl-C once ends the fit with the best result so far (exit status 130), twice ends the program.

@@ -50,10 +50,10 @@ void untangle(const HighOrderFitArguments& arguments, VolumeMesh& template_mesh,
   OptimizeResult result = optimize_mesh(template_mesh, nullptr, options);
   teller.finish();
   if (!result.uncertified.empty())
-    throw InputError(arguments.template_mesh + ": " + std::to_string(result.uncertified.size()) +
+    throw InputError(arguments.template_mesh.path + ": " + std::to_string(result.uncertified.size()) +
                      " cells could not be made valid before curving, the first is cell " +
                      std::to_string(result.uncertified[0]));
-  warnings.push_back(arguments.template_mesh + ": " + std::to_string(before) +
+  warnings.push_back(arguments.template_mesh.path + ": " + std::to_string(before) +
                      " cells were not valid; they were untangled before curving");
   template_mesh = std::move(result.mesh);
 }
@@ -112,8 +112,13 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
       std::cerr << "subvol: warning: " << warnings[told] << '\n';
   };
   const TriangleMesh target = load_target(arguments.target, warnings);
-  VolumeMesh template_mesh = load_volume(arguments.template_mesh, warnings);
+  const Clock::time_point template_start = Clock::now();
+  LoadedTemplate loaded = load_template(arguments.template_mesh, target, std::nullopt, arguments.run, warnings);
+  const double template_seconds = seconds_since(template_start);
+  VolumeMesh& template_mesh = loaded.mesh;
   tell_warnings();
+  if (loaded.choice && !arguments.run.quiet) std::cerr << to_text(*loaded.choice);
+  if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   refuse_impossible(outputs, arguments, template_mesh);
   if (arguments.untangles) untangle(arguments, template_mesh, warnings);
 
@@ -137,9 +142,11 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (!arguments.run.report.empty()) {
     Json json = report_json(arguments.command, verb, report, file.mesh, mesh_check);
     json["input"] = {{"target", describe(arguments.target, target)},
-                     {"template", describe(arguments.template_mesh, template_mesh)}};
+                     {"template", describe(arguments.template_mesh.path, template_mesh)}};
+    if (loaded.choice) json["template"] = choice_json(*loaded.choice);
     json["warnings"] = warnings;
-    json["seconds"] = {{"fit", fit_seconds},
+    json["seconds"] = {{"template", template_seconds},
+                       {"fit", fit_seconds},
                        {"write", write_seconds},
                        {"check", seconds_since(check_start)},
                        {"total", seconds_since(start)}};

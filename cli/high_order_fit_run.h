@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/automatic_template.h"
 #include "cli/run_options.h"
 #include "cli/writing.h"
 #include "fit/high_order_fit.h"
@@ -16,7 +17,8 @@ struct HighOrderFitArguments {
   RunOptions run;
   WritingOptions writing;
   HighOrderFitOptions fit;
-  std::string target, template_mesh;
+  std::string target;
+  TemplateSource template_mesh;
   const char* command = "fit";  ///< the verb, for messages and the report
   bool untangles = false;       ///< a template with inverted cells is made valid first, over its own boundary
 };

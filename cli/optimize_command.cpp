@@ -174,7 +174,7 @@ constexpr double kCurvingLambda = 0.0025;
 
 /// Curving is a fit of curved elements whose template is the mesh.
 HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, const CLI::App& verb) {
-  HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.mesh, "optimize", true};
+  HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, {arguments.mesh, std::nullopt}, "optimize", true};
   HighOrderFitOptions& fit = result.fit;
   fit.order = arguments.order;
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;

@@ -53,6 +53,7 @@ void add_template_command(CLI::App& app, Action& action) {
   CLI::App* group = app.add_subcommand("template", "Make and edit coarse meshes to fit with");
   group->require_subcommand(1);
   add_template_auto(*group, action);
+  add_template_edits(*group, action);
   group->footer("\"subvol template VERB --help\" tells more.");
 }
 

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/automatic_template.h"
+
+#include "cli/interrupt.h"
+#include "cli/loading.h"
+#include "cli/progress.h"
+
+#include <sstream>
+
+namespace subvol::cli {
+
+LoadedTemplate load_template(const TemplateSource& source, const TriangleMesh& target,
+                             std::optional<double> crease_angle_degrees, const RunOptions& run,
+                             std::vector<std::string>& warnings) {
+  if (!source.path.empty()) return {load_volume(source.path, warnings), std::nullopt};
+  ProgressTeller teller(run.progress, run.quiet);
+  TemplateChoiceOptions options{.cells = source.cells, .crease_angle_degrees = crease_angle_degrees};
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  catch_interrupt();
+  TemplateChoice choice = choose_template(target, options);
+  teller.finish();
+  warnings.insert(warnings.end(), choice.warnings.begin(), choice.warnings.end());
+  VolumeMesh mesh = choice.mesh;
+  return {std::move(mesh), std::move(choice)};
+}
+
+Json choice_json(const TemplateChoice& choice) {
+  Json trials = Json::array();
+  for (const TemplateTrial& trial : choice.trials)
+    trials.push_back({{"cells", trial.cells},
+                      {"pillowed", trial.pillowed},
+                      {"mean_percent", trial.mean_percent},
+                      {"max_percent", trial.max_percent},
+                      {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
+                      {"self_intersections", trial.self_intersections},
+                      {"merit", trial.merit}});
+  return {{"components", choice.topology.components},
+          {"handles", choice.topology.handles},
+          {"cavities", choice.topology.cavities},
+          {"trials", std::move(trials)},
+          {"chosen", choice.chosen}};
+}
+
+std::string to_text(const TemplateChoice& choice) {
+  if (choice.trials.empty()) return "no template was chosen\n";
+  const TemplateTrial& trial = choice.trials[choice.chosen];
+  std::ostringstream text;
+  text << "template made: " << trial.cells << " cells" << (trial.pillowed ? ", pillowed" : "") << ", "
+       << to_string(choice.topology) << "; best of " << choice.trials.size() << " tried\n";
+  return text.str();
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/template_choice.h"
+
+#include "fit/boundary_triangles.h"
+#include "fit/quality.h"
+#include "fit/self_intersection.h"
+#include "fit/subdivision_fit.h"
+#include "fit/surface_distance.h"
+#include "subvol/auto_template.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+#include "subvol/mesh_topology.h"
+
+#include <algorithm>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kGoodMaxPercent = 1.5, kGoodMeanPercent = 0.15, kGoodShape = 0.9, kShapeWeight = 5;
+
+class Chooser {
+ public:
+  Chooser(const TriangleMesh& target, const TemplateChoiceOptions& options)
+      : target_(target), options_(options), tree_(target), diagonal_(bounding_box_diagonal(target)) {}
+  TemplateChoice run();
+
+ private:
+  bool tell(const char* stage, double fraction) const {
+    return !options_.progress || options_.progress({stage, 0, 0, 0, fraction});
+  }
+  std::vector<AutoTemplate> candidates(std::size_t cells, bool pillow, std::size_t most);
+  bool try_count(std::size_t cells);
+  bool try_template(VolumeMesh mesh, bool pillowed);
+
+  const TriangleMesh& target_;
+  const TemplateChoiceOptions& options_;
+  ClosestPoint tree_;
+  double diagonal_;
+  TemplateChoice choice_;
+};
+
+std::vector<AutoTemplate> Chooser::candidates(std::size_t cells, bool pillow, std::size_t most) {
+  AutoTemplateOptions options{.cells = cells, .pillow = pillow};
+  options.progress = [this](double fraction) { return tell("template", fraction); };
+  AutoTemplateResult result = auto_templates(target_, options, most);
+  choice_.cancelled |= result.cancelled;
+  choice_.topology = result.wanted;
+  return std::move(result.templates);
+}
+
+/// Whether the cells within the pillow are mostly several cells thick: a cube of three has two faces per cell.
+bool has_thick_core(const VolumeMesh& pillowed) {
+  constexpr double kMostFacesPerCell = 2.2;
+  const std::size_t faces = MeshTopology(pillowed).boundary_faces().size();
+  return static_cast<double>(faces) <= kMostFacesPerCell * static_cast<double>(pillowed.num_cells() - faces);
+}
+
+/// Fits a template a little and notes how that went. False where cancelled.
+bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
+  constexpr int kMostSteps = 16;  // enough to tell templates apart; the fit itself begins anew
+  int steps = 0;
+  FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
+  options.progress = [&](const FitProgress& progress) {
+    FitProgress told = progress;
+    told.stage = "trying a template";
+    choice_.cancelled = choice_.cancelled || (options_.progress && !options_.progress(told));
+    return !choice_.cancelled && ++steps <= kMostSteps;
+  };
+  const FitResult fit = fit_subdivision_volume(target_, mesh, options);
+  if (choice_.cancelled) return false;
+  const TriangleMesh surface = refined_triangles(boundary_surface(fit.mesh, MeshTopology(fit.mesh)));
+  const SurfaceDistance distance = surface_distance(surface, ClosestPoint(surface), target_, tree_);
+  TemplateTrial trial{.cells = mesh.num_cells(), .pillowed = pillowed};
+  trial.mean_percent = 100 * distance.mean() / diagonal_;
+  trial.max_percent = 100 * distance.max() / diagonal_;
+  trial.mean_scaled_jacobian = measure_quality(fit.mesh).mean_scaled_jacobian;
+  trial.self_intersections = self_intersections(surface).pairs.size();
+  trial.merit = trial.max_percent / kGoodMaxPercent + trial.mean_percent / kGoodMeanPercent +
+                kShapeWeight * std::max(0.0, kGoodShape - trial.mean_scaled_jacobian) +
+                (trial.self_intersections > 0 ? 1 : 0);
+  choice_.trials.push_back(trial);
+  if (choice_.mesh.num_cells() == 0 || trial.merit < choice_.trials[choice_.chosen].merit) {
+    choice_.chosen = choice_.trials.size() - 1;
+    choice_.mesh = std::move(mesh);
+  }
+  return true;
+}
+
+/// False where cancelled.
+bool Chooser::try_count(std::size_t cells) {
+  constexpr std::size_t kPlain = 2;
+  std::vector<AutoTemplate> plain = candidates(cells, false, kPlain);
+  if (choice_.cancelled) return false;
+  if (plain.empty())
+    throw InputError("target: no grid of up to 20 times " + std::to_string(cells) + " cells has its " +
+                     to_string(choice_.topology) + "; give a --template");
+  if (plain.front().cells_asked != cells)
+    choice_.warnings.push_back(std::to_string(cells) + " cells cannot carry the target's " + to_string(choice_.topology) +
+                               "; the template is made for " + std::to_string(plain.front().cells_asked));
+  for (AutoTemplate& candidate : plain)
+    if (!try_template(std::move(candidate.mesh), false)) return false;
+  std::vector<AutoTemplate> pillowed = candidates(cells, true, 1);
+  if (choice_.cancelled) return false;
+  if (pillowed.empty() || pillowed.front().cells_asked != cells || !has_thick_core(pillowed.front().mesh)) return true;
+  return try_template(std::move(pillowed.front().mesh), true);
+}
+
+TemplateChoice Chooser::run() {
+  std::vector<std::size_t> counts{kFirstCells, kSecondCells, kLastCells};
+  if (options_.cells) counts = {*options_.cells};
+  for (std::size_t cells : counts) {
+    if (!try_count(cells)) {
+      choice_.mesh = {};
+      break;
+    }
+    const TemplateTrial& best = choice_.trials[choice_.chosen];
+    if (best.self_intersections == 0 && best.max_percent <= kGoodMaxPercent) break;
+  }
+  return std::move(choice_);
+}
+
+}  // namespace
+
+TemplateChoice choose_template(const TriangleMesh& target, const TemplateChoiceOptions& options) {
+  return Chooser(target, options).run();
+}
+
+}  // namespace subvol
