@@ -49,16 +49,16 @@ std::vector<AutoTemplate> Chooser::candidates(std::size_t cells, bool pillow, st
   return std::move(result.templates);
 }
 
-/// Whether the cells within the pillow are mostly several cells thick: a cube of three has two faces per cell.
+/// Whether the cells within the pillow are several cells thick: a cube of three has two faces per cell.
 bool has_thick_core(const VolumeMesh& pillowed) {
-  constexpr double kMostFacesPerCell = 2.2;
+  constexpr double kMostFacesPerCell = 1.9;
   const std::size_t faces = MeshTopology(pillowed).boundary_faces().size();
   return static_cast<double>(faces) <= kMostFacesPerCell * static_cast<double>(pillowed.num_cells() - faces);
 }
 
 /// Fits a template a little and notes how that went. False where cancelled.
 bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
-  constexpr int kMostSteps = 16;  // enough to tell templates apart; the fit itself begins anew
+  constexpr int kMostSteps = 10;  // enough to tell templates apart; the fit itself begins anew
   int steps = 0;
   FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
   options.progress = [&](const FitProgress& progress) {

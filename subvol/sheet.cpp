@@ -73,29 +73,30 @@ VolumeMesh merge_pairs(const VolumeMesh& mesh, const MeshTopology& topology, std
   return merge_vertices(moved, target, name);
 }
 
-/// Corners of a cell with the sheet's edges upright: those at the lower ends, then those above them.
-std::vector<Index> upright(const VolumeMesh& mesh, std::size_t c, const std::map<Index, Index>& above) {
+/// For each corner of a cell that a sheet cuts: the lower end of the sheet's edge at that corner, and whether the corner is
+/// the upper one.
+struct CutCorner {
+  Index lower;
+  bool upper;
+};
+std::vector<CutCorner> cut_corners(const VolumeMesh& mesh, std::size_t c, const std::map<Index, Index>& above) {
   const auto cell = mesh.cell(c);
-  std::vector<Index> lower;
-  std::size_t crossed = 0;
+  const auto holds = [&](Index v) { return std::find(cell.begin(), cell.end(), v) != cell.end(); };
+  std::vector<CutCorner> corners;
   for (Index v : cell) {
     const auto up = above.find(v);
-    if (up != above.end() && std::find(cell.begin(), cell.end(), up->second) != cell.end()) ++crossed;
-  }
-  const CellTopology& local = cell_topology(mesh.kinds[c]);
-  if (2 * crossed == cell.size())
-    for (int f = 0; f < local.num_faces; ++f) {
-      lower.clear();
-      for (int i = local.face_sizes[f] - 1; i >= 0; --i) {  // seen from inside
-        const auto up = above.find(cell[local.faces[f][i]]);
-        if (up != above.end() && std::find(cell.begin(), cell.end(), up->second) != cell.end()) lower.push_back(up->first);
-      }
-      if (2 * lower.size() == cell.size() && static_cast<int>(lower.size()) == local.face_sizes[f]) {
-        for (std::size_t i = 0, n = lower.size(); i < n; ++i) lower.push_back(above.at(lower[i]));
-        return lower;
-      }
+    if (up != above.end() && holds(up->second)) corners.push_back({v, false});
+    for (Index below : cell) {
+      const auto edge = above.find(below);
+      if (edge != above.end() && edge->second == v) corners.push_back({below, true});
     }
-  throw InputError("sheet: it crosses itself, or runs into a triangle, in cell " + std::to_string(c));
+  }
+  // Each corner once: a sheet that crosses itself finds some twice, one that runs into a triangle misses some.
+  bool sound = corners.size() == cell.size();
+  for (std::size_t i = 0; sound && i < cell.size(); ++i)
+    sound = (corners[i].upper ? above.at(corners[i].lower) : corners[i].lower) == cell[i];
+  if (!sound) throw InputError("sheet: it crosses itself, or runs into a triangle, in cell " + std::to_string(c));
+  return corners;
 }
 
 }  // namespace
@@ -148,14 +149,11 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const auto edges = topology.cell_edges(c);
     const bool cut = std::any_of(edges.begin(), edges.end(), [&](Index e) { return cut_edge[e] != 0; });
-    const std::vector<Index> column = cut ? upright(mesh, c, above) : std::vector<Index>{};
+    const std::vector<CutCorner> column = cut ? cut_corners(mesh, c, above) : std::vector<CutCorner>{};
     for (int k = 0; k < (cut ? parts : 1); ++k) {
       corners.assign(mesh.cell(c).begin(), mesh.cell(c).end());
-      const std::size_t half = column.size() / 2;
-      for (std::size_t i = 0; i < half; ++i) {
-        corners[i] = vertex_at(column[i], k);
-        corners[i + half] = vertex_at(column[i], k + 1);
-      }
+      for (std::size_t i = 0; i < column.size(); ++i)
+        corners[i] = vertex_at(column[i].lower, column[i].upper ? k + 1 : k);
       result.add_cell(mesh.kinds[c], corners);
       if (!mesh.references.empty()) result.references.push_back(mesh.references[c]);
     }

@@ -81,14 +81,15 @@ bool handle_flip(const VoxelSolid& solid, Index cell, bool add_handle, HandleFli
 }
 
 /// The best flip that changes the number of handles, or none. To add one, long loops are best; to remove one, short ones.
-std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& goal, bool add_handle, LoopLengths& loops) {
+/// Flips may go against the fractions by `tolerance`.
+std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& goal, bool add_handle, double tolerance,
+                                      LoopLengths& loops) {
   constexpr std::size_t kLookedAt = 40;  // most promising flips whose loops are measured
-  constexpr double kOffset = 0.25;       // flips may go against the fractions a little
   std::vector<HandleFlip> flips;
   for (std::size_t c = 0; c < solid.num_cells(); ++c) {
     HandleFlip flip;
     flip.gain = solid.may_flip(static_cast<Index>(c)) ? goal.gain(solid, static_cast<Index>(c)) : -1;
-    if (flip.gain > -kOffset && handle_flip(solid, static_cast<Index>(c), add_handle, flip)) flips.push_back(flip);
+    if (flip.gain > -tolerance && handle_flip(solid, static_cast<Index>(c), add_handle, flip)) flips.push_back(flip);
   }
   std::stable_sort(flips.begin(), flips.end(), [](const HandleFlip& a, const HandleFlip& b) { return a.gain > b.gain; });
   if (flips.size() > kLookedAt) flips.resize(kLookedAt);
@@ -98,7 +99,7 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
     const int length = loops.length(solid, flip.cell, flip.through_filled, flip.ends);
     if (length == 0) continue;  // it would join or part components, or open or shut a cavity
     const double measure = std::min(length, kLongLoop);
-    const double score = (flip.gain + kOffset) * (add_handle ? measure : 1 / measure);
+    const double score = (flip.gain + tolerance) * (add_handle ? measure : 1 / measure);
     if (!best || score > best_score) best = flip.cell, best_score = score;
   }
   return best;
@@ -190,7 +191,9 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
   if (std::abs(missing) > kMostFlips) return false;
   LoopLengths loops(solid.num_cells());
   for (int i = 0; i < std::abs(missing); ++i) {
-    const std::optional<Index> cell = best_handle_flip(solid, goal, missing > 0, loops);
+    std::optional<Index> cell;
+    for (double tolerance : {0.25, 1.0})  // a little against the shape, or if need be through it
+      if (!cell) cell = best_handle_flip(solid, goal, missing > 0, tolerance, loops);
     if (!cell) return false;
     solid.flip(*cell);
     evolve(solid, goal);

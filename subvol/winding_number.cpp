@@ -16,8 +16,8 @@ namespace subvol {
 namespace {
 
 constexpr Index kLeafSize = 8;
-// A node counts as a whole from this many of its radii on: the third-order terms left out are then below 0.002.
-constexpr double kFarRadii = 3;
+// A node counts as a whole from this many of its radii on: what second moments would add is then below 0.01 in all.
+constexpr double kFarRadii = 6;
 
 /// Signed solid angle of a triangle seen from the origin:  tan(A/2) = det / (|a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|)
 double solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {

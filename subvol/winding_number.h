@@ -20,7 +20,7 @@ class WindingNumber {
   /// InputError: no triangles, a vertex number out of range, a position that is not finite.
   explicit WindingNumber(const TriangleMesh& mesh);
 
-  /// w(p), within about 0.003 of the sum over all triangles. On the surface the value is that of either side, or
+  /// w(p), within about 0.01 of the sum over all triangles. On the surface the value is that of either side, or
   /// between. Safe from many threads at once. Cost: logarithmic for points away from the surface.
   double at(const Vec3& p) const;
 

@@ -621,4 +621,58 @@ TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
   CHECK(report["distance"]["mean_percent"] < 0.5);
   // Seven cells of order 2 cannot come closer.
   CHECK(place.run("optimize template.mesh --target target.off --order 2 -o b.vtu --progress none").status == 4);
+
+TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][templates]") {
+  const Workplace place;
+  const Run made = place.run("template auto target.off --cells 60 -o made.mesh --report made.json");
+  INFO(made.err);
+  REQUIRE(made.status == 0);
+  const auto report = place.json("made.json");
+  CHECK(report.at("command") == "template auto");
+  CHECK(report.at("options").at("cells") == 60);
+  CHECK(report.at("template").at("topology").at("euler_number") == 1);
+  CHECK(report.at("topology").at("boundary_euler_number") == 2);
+  CHECK(report.at("valid") == true);
+
+  // Figure 11 of the paper: grid, carve, pillow, fit.
+  CHECK(place.run("template grid target.off --size 0.5 -o grid.mesh").status == 0);
+  CHECK(place.run("template carve grid.mesh --inside target.off -o carved.mesh").status == 0);
+  CHECK(place.run("template pillow carved.mesh -o pillowed.mesh").status == 0);
+  const Run fit = place.run("fit target.off --template pillowed.mesh --levels 1 -o fitted.mesh");
+  INFO(fit.err);
+  CHECK(fit.status == 0);
+
+  CHECK(place.run("template grid --box 0 0 0 2 2 2 --counts 2 2 2 -o box.mesh").status == 0);
+  CHECK(place.run("template split box.mesh --edge 0 1 -o split.mesh").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "split.mesh").num_cells() == 12);
+  CHECK(place.run("template collapse box.mesh --vertices 0 1 -o collapsed.mesh").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "collapsed.mesh").num_cells() == 4);
+  CHECK(place.run("template split box.mesh --into tets -o tets.mesh").status == 0);
+  CHECK(place.run("template merge box.mesh -o merged.mesh").status == 0);
+  CHECK(place.run("template extrude target.off --thickness 0.01 -o extruded.mesh").status == 0);
+
+  CHECK(place.run("template").status == 2);
+  CHECK(place.run("template grid -o x.mesh").status == 2);
+  CHECK(place.run("template carve box.mesh -o x.mesh").status == 2);
+  CHECK(place.run("template auto target.off --cells 3 -o x.mesh").status == 2);
+  CHECK(place.run("template pillow box.mesh --list 8 -o x.mesh").status == 3);
+  CHECK(place.run("template collapse box.mesh --what edge --vertices 0 1 -o x.mesh").status == 3);
+  CHECK(!place.has("x.mesh"));
+}
+
+TEST_CASE("A surface alone is enough for a fit", "[cli][templates]") {
+  const Workplace place;
+  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 27\nlevels = 1\n");
+  const Run run = place.run("fit target.off --config options.toml -o out.mesh --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report.at("template").at("trials").size() >= 1);
+  CHECK(report.at("template").at("handles") == 0);
+  CHECK(report.at("topology").at("boundary_euler_number") == 2);
+  CHECK(report.at("distance").at("mean_percent") < 0.5);
+  CHECK(place.run("template auto target.off --config options.toml -o auto.mesh --report auto.json").status == 0);
+  CHECK(place.json("auto.json").at("options").at("cells") == 50);
+  CHECK(place.run("fit target.off --order 1 --cells 27 -o out.vtu").status == 0);
+  CHECK(place.run("fit target.off --template template.mesh --cells 60 -o x.mesh").status == 2);
 }
