@@ -621,6 +621,7 @@ TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
   CHECK(report["distance"]["mean_percent"] < 0.5);
   // Seven cells of order 2 cannot come closer.
   CHECK(place.run("optimize template.mesh --target target.off --order 2 -o b.vtu --progress none").status == 4);
+}
 
 TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][templates]") {
   const Workplace place;
