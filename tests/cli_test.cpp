@@ -263,7 +263,7 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   };
   refuses("", 2, "subcommand");
   refuses("frobnicate", 2, "frobnicate");
-  refuses("fit target.off -o out.glb", 2, "--template");
+  refuses("fit target.off --cells 3 -o out.glb", 2, "--cells");
   refuses("fit target.off --template template.mesh", 2, "-o");
   refuses(std::string(kFit) + "--levels 0 -o out.glb", 2, "levels");
   refuses(std::string(kFit) + "--levels 7 -o out.glb", 2, "levels");
