@@ -94,8 +94,10 @@ std::size_t peak_memory_bytes() {
 
 std::string json_text(const Json& report) {
   require_finite(report, "");
+  Json whole = report;
+  if (!command_line().empty()) whole["command_line"] = command_line();
   // File names need not be UTF-8.
-  return report.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+  return whole.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 void remember_command_line(int argc, const char* const* argv) {
@@ -103,9 +105,7 @@ void remember_command_line(int argc, const char* const* argv) {
 }
 
 void write_report(const std::filesystem::path& path, const Json& report) {
-  Json whole = report;
-  if (!command_line().empty()) whole["command_line"] = command_line();
-  write_file_atomically(path, json_text(whole));
+  write_file_atomically(path, json_text(report));
 }
 
 }  // namespace subvol::cli

@@ -21,7 +21,8 @@ Json seconds_json(const FitReport& report);
 /// Largest amount of memory this process has held.
 std::size_t peak_memory_bytes();
 
-/// JSON text of a report. std::runtime_error, naming the entry, where a number is not finite: JSON has no word for it.
+/// JSON text of a report, with the command line if it is known. std::runtime_error, naming the entry, where a number is
+/// not finite: JSON has no word for it.
 std::string json_text(const Json& report);
 
 /// The words of the command line, which every report written from now on holds as "command_line".

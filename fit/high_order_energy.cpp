@@ -332,10 +332,10 @@ std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) con
 
 void HighOrderEnergy::densify(std::span<const Index> cells) {
   constexpr int kMostPoints = 33;
-  constexpr double kHeavier = 2, kHeaviest = 64;
+  constexpr double kHeavier = 2;
   for (Index c : cells) {
     points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
-    cell_weights_[c] = std::min(kHeaviest, kHeavier * cell_weights_[c]);
+    cell_weights_[c] = std::min(heaviest_weight_, kHeavier * cell_weights_[c]);
   }
   rebuild_groups();
 }

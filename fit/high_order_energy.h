@@ -55,7 +55,10 @@ class HighOrderEnergy final : public VolumeTerm {
   /// Number of quadrature points of all cells.
   std::size_t num_points() const;
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
+  /// Cells that are in the way twice as dense, and twice as heavy up to `heaviest_weight`.
   void densify(std::span<const Index> cells) override;
+  /// How much heavier than others a cell may become, >= 1 (default 64); 1: all weigh equally for good.
+  void set_heaviest_weight(double heaviest) { heaviest_weight_ = heaviest; }
 
  private:
   void rebuild_groups();
@@ -76,6 +79,7 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell, where cells have one for all their points
   CellReference reference_;
   std::vector<int> points_;
+  double heaviest_weight_ = 64;
   std::vector<double> cell_weights_;
   std::vector<CellGroup> groups_;
   /// What every batch adds to its cells' modes, and where each node finds its parts: signed places, by node.

@@ -123,9 +123,10 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
   }
   nodes.num_cols = unknowns.size();
   const std::vector<int> points(mesh.space.num_cells(), std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
-  FitProblem problem(std::move(nodes), select_rows(nodes, {}),
-                     std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points),
-                     nullptr, 1);
+  auto energy =
+      std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
+  energy->set_heaviest_weight(1);  // cells in creases end near inversion: they are not to outweigh all others
+  FitProblem problem(std::move(nodes), select_rows(nodes, {}), std::move(energy), nullptr, 1);
   problem.fixed_nodes = std::move(fixed);
   return problem;
 }
