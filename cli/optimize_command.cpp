@@ -174,7 +174,8 @@ constexpr double kCurvingLambda = 0.0025;
 
 /// Curving is a fit of curved elements whose template is the mesh.
 HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, const CLI::App& verb) {
-  HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, {arguments.mesh, std::nullopt}, "optimize", true};
+  HighOrderFitArguments result{
+      arguments.run, arguments.writing, {}, arguments.target, {arguments.mesh, std::nullopt}, "optimize", true};
   HighOrderFitOptions& fit = result.fit;
   fit.order = arguments.order;
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
@@ -195,44 +196,48 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
   CLI::Option* fixed = verb.add_flag("--fixed-boundary", optimize.fixed_boundary,
                                      "Keep boundary vertices where they are; otherwise they slide along the surface")
                            ->excludes(target);
-  CLI::Option* sizes = verb.add_option("--sizes", arguments.sizes,
-                                       "Ideal sizes of the cells: all alike, or as they are, so that graded meshes stay graded")
-                           ->check(CLI::IsMember({"uniform", "local"}))
-                           ->type_name("uniform|local")
-                           ->capture_default_str();
-  CLI::Option* angle =
-      verb.add_option("--crease-angle", optimize.crease_angle_degrees, "Keep edges of the surface sharper than this sharp")
-          ->check(number_in(0.0, 180.0))
-          ->type_name("DEGREES")
+  CLI::Option* sizes =
+      verb.add_option("--sizes", arguments.sizes,
+                      "Ideal sizes of the cells: all alike, or as they are, so that graded meshes stay graded")
+          ->check(CLI::IsMember({"uniform", "local"}))
+          ->type_name("uniform|local")
           ->capture_default_str();
+  CLI::Option* angle = verb.add_option("--crease-angle", optimize.crease_angle_degrees,
+                                       "Keep edges of the surface sharper than this sharp")
+                           ->check(number_in(0.0, 180.0))
+                           ->type_name("DEGREES")
+                           ->capture_default_str();
   verb.add_option("--tolerance", optimize.mean_tolerance_percent,
                   "Mean distance from the surface to keep within, in per cent of the diagonal of its bounding box;\n"
                   "exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
-  CLI::Option* max = verb.add_option("--max-tolerance", optimize.max_tolerance_percent, "The same for the largest distance")
-                         ->check(number_in(1e-9, 100.0))
-                         ->type_name("PERCENT")
-                         ->capture_default_str();
+  CLI::Option* max =
+      verb.add_option("--max-tolerance", optimize.max_tolerance_percent, "The same for the largest distance")
+          ->check(number_in(1e-9, 100.0))
+          ->type_name("PERCENT")
+          ->capture_default_str();
   verb.add_option("--lambda", optimize.lambda,
                   "Weight of the cells' shape against the distance; lowered while distances are above the tolerances\n"
                   "(with --order: 0.0025)")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str();
-  verb.add_option("--max-iterations", optimize.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
+  verb.add_option("--max-iterations", optimize.max_iterations,
+                  "Steps per stage (default: as many as the schedule asks for)")
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");
   verb.add_option("--time-limit", optimize.time_limit_seconds, "Stop after this time with the best result so far")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");
   const auto group = "Curved elements";
-  CLI::Option* order = verb.add_option("--order", arguments.order, "Curve the cells to this order so that they follow --target")
-                           ->check(CLI::Range(2, kMaxOrder))
-                           ->type_name("P")
-                           ->needs(target)
-                           ->group(group);
+  CLI::Option* order =
+      verb.add_option("--order", arguments.order, "Curve the cells to this order so that they follow --target")
+          ->check(CLI::Range(2, kMaxOrder))
+          ->type_name("P")
+          ->needs(target)
+          ->group(group);
   verb.add_option("--basis", arguments.basis, "Modes of the curved elements")
       ->check(CLI::IsMember({"fourier", "legendre"}))
       ->type_name("fourier|legendre")

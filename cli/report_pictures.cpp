@@ -165,7 +165,8 @@ class Painter {
   void add(const std::string& title, const Shown& what, std::vector<LinearColor> colors, std::string low = {},
            std::string high = {}) {
     const RasterSurface surface{what.triangles, std::move(colors), what.wires};
-    pictures_.push_back({title, png_bytes(rasterize(surface, view_, kWidth, kHeight)), std::move(low), std::move(high)});
+    pictures_.push_back(
+        {title, png_bytes(rasterize(surface, view_, kWidth, kHeight)), std::move(low), std::move(high)});
   }
 
   void add_quality(const Shown& result) {
@@ -198,7 +199,8 @@ class Painter {
 
 }  // namespace
 
-std::vector<ReportPicture> report_pictures(const Json& report, const fs::path& folder, std::vector<std::string>& notes) {
+std::vector<ReportPicture> report_pictures(const Json& report, const fs::path& folder,
+                                           std::vector<std::string>& notes) {
   return Painter(report, folder, notes).run();
 }
 

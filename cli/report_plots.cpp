@@ -69,13 +69,15 @@ std::string energy_plot(const Json& stages) {
     svg += format("<path class=\"axis\" d=\"M%g %.1fH%g\"/><text x=\"4\" y=\"%.1f\">1e%d</text>", kLeft,
                   y(std::pow(10.0, decade)), kWidth, y(std::pow(10.0, decade)) + 4, decade);
   for (const std::size_t end : ends)
-    if (end < num_steps) svg += format("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kTop, kHeight - kBottom);
+    if (end < num_steps)
+      svg += format("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kTop, kHeight - kBottom);
   for (std::size_t k = kTerms.size(); k-- > 0;) {
     svg += format("<polyline class=\"%s\" points=\"", kTerms[k]);
     for (std::size_t i = 0; i < num_steps; ++i) svg += format("%.1f,%.1f ", x(double(i)), y(energies[k][i]));
     svg += "\"/>";
   }
-  return svg + format("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5, num_steps);
+  return svg +
+         format("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5, num_steps);
 }
 
 std::string histogram_plot(const Json& counts) {
@@ -92,8 +94,8 @@ std::string histogram_plot(const Json& counts) {
                   kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
   }
   for (int i = 0; i <= 4; ++i)
-    svg += format("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4, kHeight - 5,
-                  i == 4 ? "end" : "middle", -1 + 0.5 * i);
+    svg += format("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4,
+                  kHeight - 5, i == 4 ? "end" : "middle", -1 + 0.5 * i);
   return svg + format("<text x=\"4\" y=\"%g\">%.0f</text></svg>", kTop + 10, most);
 }
 

@@ -13,9 +13,11 @@
 namespace subvol::cli {
 
 void add_template_options(CLI::App& verb, TemplateRun& run) {
-  add_output_options(verb, run.run,
-                     "The template, or its boundary, by extension: " + output_formats() + "; may be given several times");
-  verb.add_option("--report", run.run.report, "Write what was done and what is true of the result")->type_name("FILE.json");
+  add_output_options(
+      verb, run.run,
+      "The template, or its boundary, by extension: " + output_formats() + "; may be given several times");
+  verb.add_option("--report", run.run.report, "Write what was done and what is true of the result")
+      ->type_name("FILE.json");
 }
 
 std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& verb) {
@@ -26,8 +28,8 @@ std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& ver
   return outputs;
 }
 
-int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs, const VolumeMesh& mesh,
-                   const Json& details) {
+int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs,
+                   const VolumeMesh& mesh, const Json& details) {
   WritingOptions writing = run.writing;
   writing.options = options_in_force(verb);
   for (const Output& output : outputs) write_output(output, mesh, writing);

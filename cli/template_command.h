@@ -24,10 +24,10 @@ void add_template_options(CLI::App& verb, TemplateRun& run);
 /// The outputs of a verb under `template`, checked before any work. UsageError: none.
 std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& verb);
 
-/// Writes a template, its report (`details` and what `check_mesh` finds) and a summary. Returns kDone, or kFailed where the
-/// mesh is not valid.
-int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs, const VolumeMesh& mesh,
-                   const Json& details);
+/// Writes a template, its report (`details` and what `check_mesh` finds) and a summary. Returns kDone, or kFailed where
+/// the mesh is not valid.
+int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs,
+                   const VolumeMesh& mesh, const Json& details);
 
 /// One group of verbs each.
 void add_template_auto(CLI::App& group, Action& action);

@@ -42,8 +42,10 @@ Vec3 low_corner(const std::vector<double>& box) { return {box[0], box[1], box[2]
 Vec3 high_corner(const std::vector<double>& box) { return {box[3], box[4], box[5]}; }
 
 VolumeMesh make_grid(EditArguments& arguments) {
-  if (arguments.box.empty() == arguments.mesh.empty()) throw UsageError("template grid: give a SURFACE or --box, one of them");
-  if (arguments.counts.empty() == (arguments.size == 0)) throw UsageError("template grid: give --counts or --size, one of them");
+  if (arguments.box.empty() == arguments.mesh.empty())
+    throw UsageError("template grid: give a SURFACE or --box, one of them");
+  if (arguments.counts.empty() == (arguments.size == 0))
+    throw UsageError("template grid: give --counts or --size, one of them");
   Vec3 low, high;
   if (arguments.mesh.empty()) {
     low = low_corner(arguments.box);
@@ -128,12 +130,16 @@ CLI::App* add_edit(CLI::App& group, Action& action, const std::shared_ptr<EditAr
                    const char* help, Maker make) {
   CLI::App* verb = group.add_subcommand(name, help);
   add_template_options(*verb, *arguments);
-  verb->callback([arguments, verb, make, &action] { action = [arguments, verb, make] { return run_edit(*arguments, *verb, make); }; });
+  verb->callback([arguments, verb, make, &action] {
+    action = [arguments, verb, make] { return run_edit(*arguments, *verb, make); };
+  });
   return verb;
 }
 
 CLI::Option* add_mesh(CLI::App& verb, EditArguments& arguments) {
-  return verb.add_option("MESH", arguments.mesh, "Mesh to edit: " + volume_mesh_formats())->required()->type_name("FILE");
+  return verb.add_option("MESH", arguments.mesh, "Mesh to edit: " + volume_mesh_formats())
+      ->required()
+      ->type_name("FILE");
 }
 
 CLI::Option* add_box(CLI::App& verb, EditArguments& arguments, const char* help) {
@@ -141,7 +147,10 @@ CLI::Option* add_box(CLI::App& verb, EditArguments& arguments, const char* help)
 }
 
 CLI::Option* add_cell_list(CLI::App& verb, EditArguments& arguments, const char* help) {
-  return verb.add_option("--list", arguments.cells, help)->delimiter(',')->check(CLI::NonNegativeNumber)->type_name("CELL,...");
+  return verb.add_option("--list", arguments.cells, help)
+      ->delimiter(',')
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("CELL,...");
 }
 
 CLI::Option* add_vertices(CLI::App& verb, EditArguments& arguments, const char* name, const char* help) {
@@ -153,8 +162,13 @@ void add_grid(CLI::App& group, Action& action) {
   CLI::App* verb = add_edit(group, action, a, "grid", "Fill a box with equal hexes", make_grid);
   verb->add_option("SURFACE", a->mesh, "Take the box around this surface")->type_name("FILE");
   add_box(*verb, *a, "Or take this box");
-  verb->add_option("--counts", a->counts, "Cells along each axis")->expected(3)->check(CLI::Range(1, 100'000))->type_name("NX NY NZ");
-  verb->add_option("--size", a->size, "Or: about how long a cell is")->check(number_in(1e-300, 1e300))->type_name("LENGTH");
+  verb->add_option("--counts", a->counts, "Cells along each axis")
+      ->expected(3)
+      ->check(CLI::Range(1, 100'000))
+      ->type_name("NX NY NZ");
+  verb->add_option("--size", a->size, "Or: about how long a cell is")
+      ->check(number_in(1e-300, 1e300))
+      ->type_name("LENGTH");
   verb->add_option("--margin", a->margin, "How far the box stands off the surface, in per cent of its diagonal")
       ->check(number_in(0.0, 1000.0))->type_name("PERCENT")->capture_default_str();
 }
@@ -173,49 +187,73 @@ void add_carve(CLI::App& group, Action& action) {
 
 void add_extrude(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "extrude", "Stack hexes and prisms on the faces of a surface", make_extruded);
-  verb->add_option("SURFACE", a->mesh, "Surface of triangles and quads: " + surface_formats())->required()->type_name("FILE");
-  verb->add_option("--thickness", a->thickness, "Of all layers together")->required()->check(number_in(1e-300, 1e300))->type_name("LENGTH");
-  verb->add_option("--layers", a->layers, "How many")->check(CLI::Range(1, 10'000))->type_name("N")->capture_default_str();
+  CLI::App* verb =
+      add_edit(group, action, a, "extrude", "Stack hexes and prisms on the faces of a surface", make_extruded);
+  verb->add_option("SURFACE", a->mesh, "Surface of triangles and quads: " + surface_formats())
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--thickness", a->thickness, "Of all layers together")
+      ->required()
+      ->check(number_in(1e-300, 1e300))
+      ->type_name("LENGTH");
+  verb->add_option("--layers", a->layers, "How many")
+      ->check(CLI::Range(1, 10'000))
+      ->type_name("N")
+      ->capture_default_str();
   verb->add_option("--growth", a->growth, "Thickness of a layer against the one below")
       ->check(number_in(0.01, 100.0))->type_name("FACTOR")->capture_default_str();
-  verb->add_option("--direction", a->direction, "Where to (default: along the surface's normals)")->expected(3)->type_name("X Y Z");
+  verb->add_option("--direction", a->direction, "Where to (default: along the surface's normals)")
+      ->expected(3)
+      ->type_name("X Y Z");
 }
 
 void add_pillow(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "pillow", "Put a layer of cells inside the boundary, or around some cells", make_pillowed);
+  CLI::App* verb = add_edit(group, action, a, "pillow",
+                            "Put a layer of cells inside the boundary, or around some cells", make_pillowed);
   add_mesh(*verb, *a);
   add_cell_list(*verb, *a, "Around these cells, numbered from 0 (default: all)");
 }
 
 void add_collapse(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "collapse", "Take cells out by shrinking a sheet, a face or an edge", make_collapsed);
+  CLI::App* verb =
+      add_edit(group, action, a, "collapse", "Take cells out by shrinking a sheet, a face or an edge", make_collapsed);
   add_mesh(*verb, *a);
-  verb->add_option("--what", a->what, "The sheet of edge A B; the quad with opposite corners A B, and its column; the edge A B")
-      ->check(CLI::IsMember({"sheet", "face", "edge"}))->default_str("sheet")->type_name("sheet|face|edge");
+  verb->add_option("--what", a->what,
+                   "The sheet of edge A B; the quad with opposite corners A B, and its column; the edge A B")
+      ->check(CLI::IsMember({"sheet", "face", "edge"}))
+      ->default_str("sheet")
+      ->type_name("sheet|face|edge");
   add_vertices(*verb, *a, "--vertices", "Two vertices, numbered from 0")->required();
 }
 
 void add_merge(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
-  CLI::App* verb = add_edit(group, action, a, "merge", "Glue faces that lie on each other, of one mesh or two", make_merged);
+  CLI::App* verb =
+      add_edit(group, action, a, "merge", "Glue faces that lie on each other, of one mesh or two", make_merged);
   add_mesh(*verb, *a);
   verb->add_option("OTHER", a->other, "Mesh to put beside it first")->type_name("FILE");
-  verb->add_option("--tolerance", a->tolerance, "Distance up to which vertices are one, in per cent of the box's diagonal")
-      ->check(number_in(0.0, 10.0))->type_name("PERCENT")->capture_default_str();
+  verb->add_option("--tolerance", a->tolerance,
+                   "Distance up to which vertices are one, in per cent of the box's diagonal")
+      ->check(number_in(0.0, 10.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
 }
 
 void add_split(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
   a->what = "parts";
-  CLI::App* verb = add_edit(group, action, a, "split", "Cut a sheet into layers, or all cells into prisms or tets", make_split);
+  CLI::App* verb =
+      add_edit(group, action, a, "split", "Cut a sheet into layers, or all cells into prisms or tets", make_split);
   add_mesh(*verb, *a);
   verb->add_option("--into", a->what, "Layers of the sheet of an edge; prisms along an edge; tets")
       ->check(CLI::IsMember({"parts", "prisms", "tets"}))->type_name("parts|prisms|tets")->capture_default_str();
   add_vertices(*verb, *a, "--edge", "Ends of the edge, numbered from 0");
-  verb->add_option("--parts", a->parts, "Into how many layers")->check(CLI::Range(2, 1000))->type_name("N")->capture_default_str();
+  verb->add_option("--parts", a->parts, "Into how many layers")
+      ->check(CLI::Range(2, 1000))
+      ->type_name("N")
+      ->capture_default_str();
 }
 
 }  // namespace

@@ -27,9 +27,13 @@ double srgb(double linear) {
 class Canvas {
  public:
   Canvas(const RasterView& view, int width, int height)
-      : width_(width * kSamples), height_(height * kSamples), scale_(std::min(width_, height_) / (2 * view.radius)),
-        centre_(view.centre), depths_(static_cast<std::size_t>(width_) * height_, -std::numeric_limits<double>::infinity()),
-        colors_(depths_.size(), Vec3::Zero()), wired_(depths_.size()) {
+      : width_(width * kSamples),
+        height_(height * kSamples),
+        scale_(std::min(width_, height_) / (2 * view.radius)),
+        centre_(view.centre),
+        depths_(static_cast<std::size_t>(width_) * height_, -std::numeric_limits<double>::infinity()),
+        colors_(depths_.size(), Vec3::Zero()),
+        wired_(depths_.size()) {
     axes_.row(2) = view.towards_viewer.normalized();
     axes_.row(0) = view.up.cross(view.towards_viewer).normalized();
     axes_.row(1) = axes_.row(2).cross(axes_.row(0));
@@ -56,8 +60,10 @@ class Canvas {
       return std::pair{static_cast<int>(std::clamp(std::ceil(low - 0.5), 0.0, double(limit))),
                        static_cast<int>(std::clamp(std::floor(high - 0.5), -1.0, double(limit - 1)))};
     };
-    const auto [left, right] = range(std::min({p[0].x(), p[1].x(), p[2].x()}), std::max({p[0].x(), p[1].x(), p[2].x()}), width_);
-    const auto [top, bottom] = range(std::min({p[0].y(), p[1].y(), p[2].y()}), std::max({p[0].y(), p[1].y(), p[2].y()}), height_);
+    const auto [left, right] =
+        range(std::min({p[0].x(), p[1].x(), p[2].x()}), std::max({p[0].x(), p[1].x(), p[2].x()}), width_);
+    const auto [top, bottom] =
+        range(std::min({p[0].y(), p[1].y(), p[2].y()}), std::max({p[0].y(), p[1].y(), p[2].y()}), height_);
     for (int y = top; y <= bottom; ++y)
       for (int x = left; x <= right; ++x) {
         const double dx = x + 0.5 - p[0].x(), dy = y + 0.5 - p[0].y();
@@ -98,7 +104,8 @@ class Canvas {
           ++covered;
         }
         for (int channel = 0; channel < 3; ++channel)
-          image.pixels.push_back(covered ? static_cast<std::uint8_t>(std::lround(255 * srgb(sum[channel] / covered))) : 0);
+          image.pixels.push_back(covered ? static_cast<std::uint8_t>(std::lround(255 * srgb(sum[channel] / covered)))
+                                         : 0);
         image.pixels.push_back(static_cast<std::uint8_t>(255 * covered / (kSamples * kSamples)));
       }
     return image;

@@ -12,7 +12,8 @@
 
 namespace subvol {
 
-/// Cells of one kind, order and quadrature, in batches of eight: the tables they share and what each batch has of its own.
+/// Cells of one kind, order and quadrature, in batches of eight: the tables they share and what each batch has of its
+/// own.
 struct CellGroup {
   CellKind kind;
   int order, points_per_direction;
@@ -29,7 +30,7 @@ struct CellGroup {
   std::vector<Index> nodes;                        ///< by batch, mode, lane; kNoIndex: the cell has no such mode
   std::vector<std::int8_t> signs;
   std::size_t local_begin = 0;                     ///< of the first batch in what the energy keeps of all groups
-  std::vector<Wide> to_reference;                  ///< A^-1: 9 per batch, or per point of each where cells have references
+  std::vector<Wide> to_reference;  ///< A^-1: 9 per batch, or per point of each where cells have references
   std::vector<Wide> cell_weights;                  ///< of each batch
   bool by_point = false;
   std::vector<Wide> frozen;                        ///< kFrozen per point of every batch

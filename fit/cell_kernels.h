@@ -79,7 +79,8 @@ inline void add_point_hessian(std::span<const ElementRule::Entry> entries, const
         const double z00 = f * (batch.stretch[0][l] * p00 + s01 * p11 + s20 * p22);
         const double z11 = f * (batch.stretch[1][l] * p11 + s01 * p00 + s12 * p22);
         const double z22 = f * (batch.stretch[2][l] * p22 + s20 * p00 + s12 * p11);
-        const double c01 = f * batch.pair_cross[0][l], c12 = f * batch.pair_cross[1][l], c20 = f * batch.pair_cross[2][l];
+        const double c01 = f * batch.pair_cross[0][l], c12 = f * batch.pair_cross[1][l],
+                     c20 = f * batch.pair_cross[2][l];
         const double z01 = c01 * w[a][1][l] * w[b][0][l], z10 = c01 * w[a][0][l] * w[b][1][l];
         const double z12 = c12 * w[a][2][l] * w[b][1][l], z21 = c12 * w[a][1][l] * w[b][2][l];
         const double z20 = c20 * w[a][0][l] * w[b][2][l], z02 = c20 * w[a][2][l] * w[b][0][l];

@@ -49,7 +49,8 @@ class CellSweep {
       if constexpr (kBack)
         for (std::size_t a = 0; a < num_modes; ++a)
           for (int r = 0; r < 3; ++r)
-            sums[3 * a + r] += gradients[a][0] * j[3 * r] + gradients[a][1] * j[3 * r + 1] + gradients[a][2] * j[3 * r + 2];
+            sums[3 * a + r] +=
+                gradients[a][0] * j[3 * r] + gradients[a][1] * j[3 * r + 1] + gradients[a][2] * j[3 * r + 2];
     }
     if constexpr (kBack) coefficients_.swap(sums);
   }

@@ -5,9 +5,9 @@
 
 namespace subvol {
 
-/// The second derivative of the Hencky energy at points of eight cells, as numbers that are kept while conjugate gradients
-/// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), as in `hencky.h`, R being
-/// A^-1 and the three latter multiplied by the point's weight.
+/// The second derivative of the Hencky energy at points of eight cells, as numbers that are kept while conjugate
+/// gradients multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), as in `hencky.h`,
+/// R being A^-1 and the three latter multiplied by the point's weight.
 inline constexpr int kFrozen = 27;
 /// Symmetric 3x3 blocks of a second derivative by pairs (0,0) (1,1) (2,2) (0,1) (1,2) (2,0) of directions.
 inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
@@ -52,7 +52,8 @@ inline void apply_frozen(const Wide* frozen, Wide* g) {
   product_with_transpose(t, rv, g);
 }
 
-/// Adds, for every pair (c, d) of canonical directions, the symmetric part of the block that couples gradients e_c, e_d.
+/// Adds, for every pair (c, d) of canonical directions, the symmetric part of the block that couples gradients e_c,
+/// e_d.
 inline void add_blocks(const Wide* frozen, Wide* blocks) {
   const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
   for (int pair = 0; pair < 6; ++pair) {

@@ -10,7 +10,8 @@ namespace subvol {
 /// How curved elements come near the target.
 ///
 ///   direct  lambda 0.05 from order 1 on: no feature of the target is lost
-///   stiff   lambda 1 while the orders are raised, then lowered: cells stay well shaped on the way, which carries templates
+///   stiff   lambda 1 while the orders are raised, then lowered: cells stay well shaped on the way, which carries
+///   templates
 ///           of few cells over distances where direct fits end among flattened cells
 enum class Approach { direct, stiff };
 
@@ -34,8 +35,9 @@ struct HighOrderSchedule {
   Stage final_stage(double lambda) const;
 };
 
-/// The first orders of a far template are tried in another way where the mean distance, in per cent of the diagonal, is above
-/// the one and E_W above the other: far from the target for what cells suffer, not for what they cannot represent.
+/// The first orders of a far template are tried in another way where the mean distance, in per cent of the diagonal, is
+/// above the one and E_W above the other: far from the target for what cells suffer, not for what they cannot
+/// represent.
 inline constexpr double kFairDistancePercent = 0.12, kFairDistortion = 0.3;
 /// Below this order the distance does not tell whether an approach went wrong.
 inline constexpr int kTellingOrder = 4;

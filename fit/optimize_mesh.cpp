@@ -28,7 +28,8 @@ constexpr double kTangentialWeight = 0.003;
 constexpr double kUntangleLambda = 0.01;
 /// Ties of this share of the diagonal count twice (`ClosestPointEnergy::emphasize_far`).
 constexpr double kFarDistance = 0.002;
-/// Cells' corners only: where they are worst. What inverts between them is seen by the certificate, and sampled densely.
+/// Cells' corners only: where they are worst. What inverts between them is seen by the certificate, and sampled
+/// densely.
 constexpr int kPointsPerDirection = 2;
 /// Cells with a lower scaled Jacobian say nothing about the size they should have.
 constexpr double kTrustedJacobian = 0.3;
@@ -46,7 +47,8 @@ struct Progress {
 
   bool gains_on(const Progress& before, double wanted_percent) const {
     constexpr double kLeastGain = 7e-4, kLeastOfWorst = 5e-3, kLeastApproach = 0.03;
-    return mean_jacobian - before.mean_jacobian >= kLeastGain || least_jacobian - before.least_jacobian >= kLeastOfWorst ||
+    return mean_jacobian - before.mean_jacobian >= kLeastGain ||
+           least_jacobian - before.least_jacobian >= kLeastOfWorst ||
            (max_percent > wanted_percent && max_percent < (1 - kLeastApproach) * before.max_percent);
   }
 };
@@ -360,8 +362,9 @@ void MeshOptimizer::finish(bool going) {
     report_.explanation = format("%zu cells could not be made valid", uncertified_.size());
   } else if (mean_percent_ > options_.mean_tolerance_percent || max_percent_ > options_.max_tolerance_percent) {
     report_.stop_reason = StopReason::tolerance_missed;
-    report_.explanation = format("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%",
-                                 mean_percent_, max_percent_);
+    report_.explanation =
+        format("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%", mean_percent_,
+               max_percent_);
   } else {
     report_.explanation = format("all cells are valid and no longer gain; boundary within %.4g %% of its surface",
                                  max_percent_);

@@ -20,11 +20,11 @@ enum class CellSizes {
 struct OptimizeOptions {
   bool fixed_boundary = false;           ///< boundary vertices stay; otherwise they slide along the surface
   CellSizes sizes = CellSizes::local;
-  /// Edges of the surface sharper than this stay sharp, as without a target the creases that the mesh's tags name: vertices
-  /// there slide along them. In [0, 180].
+  /// Edges of the surface sharper than this stay sharp, as without a target the creases that the mesh's tags name:
+  /// vertices there slide along them. In [0, 180].
   double crease_angle_degrees = kUsualCreaseAngle;
-  /// Weight of the cells' shape, > 0: lowered while the boundary is farther from its surface than these distances, in per
-  /// cent of the diagonal, > 0.
+  /// Weight of the cells' shape, > 0: lowered while the boundary is farther from its surface than these distances, in
+  /// per cent of the diagonal, > 0.
   double lambda = 0.1;
   double mean_tolerance_percent = 0.05, max_tolerance_percent = 0.5;
   int max_iterations = 0;                ///< per stage; 0: the schedule's own
@@ -41,12 +41,13 @@ struct OptimizeResult {
 /// Makes the cells of a mesh valid, then well shaped, while its boundary keeps its surface.    Paper: section 4.2
 ///
 /// Cells that are not certified are untangled (`untangle`): with the boundary as it is; where that does not do with its
-/// vertices sliding and its sharp edges held; and at last without those sharp edges that touch the cells in question. Then
-/// E = E_S + lambda E_W is minimised with the Hencky barrier, as in the fits: no step makes a cell lose its certificate.
-/// Between rounds each cell's ideal box takes the proportions the cell has got (for `CellSizes::local`), and its weight
-/// becomes the reciprocal of its least scaled Jacobian.
+/// vertices sliding and its sharp edges held; and at last without those sharp edges that touch the cells in question.
+/// Then E = E_S + lambda E_W is minimised with the Hencky barrier, as in the fits: no step makes a cell lose its
+/// certificate. Between rounds each cell's ideal box takes the proportions the cell has got (for `CellSizes::local`),
+/// and its weight becomes the reciprocal of its least scaled Jacobian.
 ///
-/// mesh    must pass `validate` but for inverted cells and unused vertices, else InputError. Vertices where its sharp edges
+/// mesh    must pass `validate` but for inverted cells and unused vertices, else InputError. Vertices where its sharp
+/// edges
 ///         meet (`FollowedCreases`) stay, but for those of cells that are or stay badly shaped.
 /// target  what its boundary is to reproduce; null: its boundary as it is.
 /// returns the last state. Where cells are left that are not certified, they are listed, and report.stop_reason is

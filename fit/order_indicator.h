@@ -24,12 +24,14 @@ EntityOrders next_orders(const EntityOrders& orders, int max_order);
 ///
 ///   gain = 1/2 sum_m g_m . D_m^-1 g_m
 ///
-/// over its new modes m, with g the gradient of E where they are zero and D the 3x3 diagonal blocks of its clamped second
-/// derivative: one step of Newton's method with the new modes uncoupled, which those of the Fourier basis nearly are.
+/// over its new modes m, with g the gradient of E where they are zero and D the 3x3 diagonal blocks of its clamped
+/// second derivative: one step of Newton's method with the new modes uncoupled, which those of the Fourier basis nearly
+/// are.
 ///
 /// problem       E over the nodes of `raised`, an identity map of nodes.
 /// coefficients  a mesh of orders `now`, its new modes being zero.
-/// returns       per entity, >= 0; 0 without new modes. All zero where the state is infeasible at the raised quadrature.
+/// returns       per entity, >= 0; 0 without new modes. All zero where the state is infeasible at the raised
+/// quadrature.
 EntityValues order_gains(FitProblem& problem, const ElementSpace& raised, const EntityOrders& now,
                          std::span<const Vec3> coefficients);
 

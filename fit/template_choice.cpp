@@ -96,8 +96,9 @@ bool Chooser::try_count(std::size_t cells) {
     throw InputError("target: no grid of up to 20 times " + std::to_string(cells) + " cells has its " +
                      to_string(choice_.topology) + "; give a --template");
   if (plain.front().cells_asked != cells)
-    choice_.warnings.push_back(std::to_string(cells) + " cells cannot carry the target's " + to_string(choice_.topology) +
-                               "; the template is made for " + std::to_string(plain.front().cells_asked));
+    choice_.warnings.push_back(std::to_string(cells) + " cells cannot carry the target's " +
+                               to_string(choice_.topology) + "; the template is made for " +
+                               std::to_string(plain.front().cells_asked));
   for (AutoTemplate& candidate : plain)
     if (!try_template(std::move(candidate.mesh), false)) return false;
   std::vector<AutoTemplate> pillowed = candidates(cells, true, 1);

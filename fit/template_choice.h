@@ -15,7 +15,7 @@
 namespace subvol {
 
 struct TemplateChoiceOptions {
-  std::optional<std::size_t> cells;            ///< about so many; empty: as many as the trials ask for, from kFirstCells on
+  std::optional<std::size_t> cells;  ///< about so many; empty: as many as the trials ask for, from kFirstCells on
   std::optional<double> crease_angle_degrees;  ///< as `FitOptions` has it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
 };
@@ -44,10 +44,11 @@ struct TemplateChoice {
 
 /// Makes several templates from a surface (`auto_templates`) and keeps the one that fits best.
 ///
-/// Right Betti numbers alone do not make a good template: a handle may sit in the wrong place. So each candidate is fitted
-/// with one subdivision, for a limited number of steps, and judged by
+/// Right Betti numbers alone do not make a good template: a handle may sit in the wrong place. So each candidate is
+/// fitted with one subdivision, for a limited number of steps, and judged by
 ///
-///   max distance / 1.5 % + mean distance / 0.15 % + 5 max(0, 0.9 - mean scaled Jacobian) + 1 where the boundary meets itself
+///   max distance / 1.5 % + mean distance / 0.15 % + 5 max(0, 0.9 - mean scaled Jacobian) + 1 where the boundary meets
+///   itself
 ///
 /// A pillowed candidate is tried where its core is several cells thick: on thin parts a pillow only takes cells away.
 /// Where the best candidate's max distance is above 1.5 % the next larger count is tried.

@@ -12,8 +12,8 @@ namespace subvol {
 
 namespace {
 
-/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell, and falls as fast as they
-/// come right (the rule of the published code). Where a round gains little it is at most half the last one.
+/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell, and falls as fast as
+/// they come right (the rule of the published code). Where a round gains little it is at most half the last one.
 constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
 /// A round that takes off less of the energy is as far as it gets with its epsilon.
 constexpr double kStuck = 0.1;

@@ -19,9 +19,9 @@ struct UntangleResult {
   std::vector<Index> uncertified;  ///< cells that are not proved positive in the end, ascending
 };
 
-/// Minimises E = E_S + lambda E_W with the regularised barrier (`regularised_barrier.h`) while epsilon falls, until every
-/// cell is certified. Cells that are positive at their points but not certified get denser quadrature; cells that fail
-/// round after round get more weight.
+/// Minimises E = E_S + lambda E_W with the regularised barrier (`regularised_barrier.h`) while epsilon falls, until
+/// every cell is certified. Cells that are positive at their points but not certified get denser quadrature; cells that
+/// fail round after round get more weight.
 ///
 /// problem   its volume term is a VolumeEnergy over `mesh`, which is left without regularisation.
 /// record    name, level and cells of the stages to report; one per round.

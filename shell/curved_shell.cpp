@@ -122,7 +122,8 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
     nodes.offsets.push_back(nodes.columns.size());
   }
   nodes.num_cols = unknowns.size();
-  const std::vector<int> points(mesh.space.num_cells(), std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
+  const std::vector<int> points(mesh.space.num_cells(),
+                                std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
   auto energy =
       std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
   energy->set_heaviest_weight(1);  // cells in creases end near inversion: they are not to outweigh all others
@@ -142,7 +143,8 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
   record.name = "order " + std::to_string(options.order);
   record.order = options.order;
   record.cells = mesh.space.num_cells();
-  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultIterations}, std::move(record), 0.97, unknowns, report))
+  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultIterations}, std::move(record), 0.97, unknowns,
+                 report))
     report.explanation = report.stages.back().stop;
   problem.apply_nodes(unknowns, mesh.coefficients);
 }
@@ -196,9 +198,9 @@ CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& unch
 
   const CurvedShellCheck check(shell.layers, space, options);
   std::vector<double> shares;
-  curved.mesh.coefficients =
-      advance(shell.layers, strands, [&](std::span<const Vec3> nodes) { return check.failing_strands(nodes); }, straight,
-              curved.mesh.coefficients, &shares);
+  curved.mesh.coefficients = advance(
+      shell.layers, strands, [&](std::span<const Vec3> nodes) { return check.failing_strands(nodes); }, straight,
+      curved.mesh.coefficients, &shares);
   if (const auto held = std::count_if(shares.begin(), shares.end(), [](double share) { return share < 1; }); held > 0)
     curved.report.warnings.push_back(std::to_string(held) + " columns are curved less than the solve had them: there "
                                      "faces met or cells were not certified");

@@ -13,7 +13,8 @@ struct ExtrudeOptions {
   double thickness = 0;            ///< length of the columns, in the surface's unit, > 0
   int layers = 1;                  ///< >= 1
   double growth = 1;               ///< thickness of a layer against that of the one below it, > 0
-  std::optional<Vec3> direction;   ///< of all columns, any length; empty: along the surface's normals (`visible_normals`)
+  std::optional<Vec3>
+      direction;  ///< of all columns, any length; empty: along the surface's normals (`visible_normals`)
   FeatureTags tags;                ///< of the surface; repeated on both ends
 };
 

@@ -27,7 +27,8 @@ struct Placement {
   std::array<bool, 3> half_offset{}; ///< moved by half a cell along each axis
 };
 
-/// The grid around a surface, with two layers of cells to spare on all sides: one stays empty, one lets holes go around.
+/// The grid around a surface, with two layers of cells to spare on all sides: one stays empty, one lets holes go
+/// around.
 VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
   constexpr int kSpare = 2;
   Eigen::AlignedBox3d box;
@@ -69,7 +70,8 @@ class Search {
       : solid_(solid), options_(options), cells_(static_cast<double>(cells)), frames_(std::move(frames)) {}
 
   /// False where cancelled. Candidates come in the order of their grids.
-  bool run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before, double fraction_share);
+  bool run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
+           double fraction_share);
 
  private:
   std::vector<Placement> placements() const;
@@ -193,12 +195,14 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
     std::vector<Candidate> candidates;
     const double done = static_cast<double>(rung) / kLadder.size();
     // Most often the first rung is all there is.
-    if (!Search(solid, options, cells, frames).run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
+    if (!Search(solid, options, cells, frames)
+             .run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
       result.cancelled = true;
       return result;
     }
     if (candidates.empty()) continue;
-    std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.score < b.score; });
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const auto& a, const auto& b) { return a.score < b.score; });
     for (std::size_t i = 0; i < std::min(most, candidates.size()); ++i)
       result.templates.push_back(finished(candidates[i], options, solid.topology, cells));
     break;

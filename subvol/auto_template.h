@@ -40,9 +40,9 @@ struct AutoTemplateResult {
 
 /// Makes templates from a surface: carved grids with the topology of its solid, whatever the surface's details.
 ///
-/// Grids of several orientations (`template_frames`), offsets and sizes are tried. In each, the cells that lie in the solid
-/// by more than some share are repaired until the boundary is a manifold that can be pillowed, or cells are grown and
-/// shrunk one by one without a change of topology; handles that are missing or too many are added and removed one
+/// Grids of several orientations (`template_frames`), offsets and sizes are tried. In each, the cells that lie in the
+/// solid by more than some share are repaired until the boundary is a manifold that can be pillowed, or cells are grown
+/// and shrunk one by one without a change of topology; handles that are missing or too many are added and removed one
 /// by one (`voxel_evolution.h`). Of what has the right Betti numbers, the one that covers the solid best is taken.
 ///
 /// surface  as `solid_boundary` takes it. Handles are counted over all components together.
@@ -52,6 +52,7 @@ struct AutoTemplateResult {
 ///
 /// InputError: as `solid_boundary`; options out of range.
 /// Deterministic, parallel, same bits for any number of threads. Cost: seconds; grows with cells and triangles.
-AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options = {}, std::size_t most = 1);
+AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options = {},
+                                  std::size_t most = 1);
 
 }  // namespace subvol

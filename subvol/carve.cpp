@@ -25,7 +25,8 @@ void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& poi
         switch (mesh.kinds[c]) {
           case CellKind::hex:
             points.push_back(between(between(between(corner(0), corner(1), u), between(corner(3), corner(2), u), v),
-                                     between(between(corner(4), corner(5), u), between(corner(7), corner(6), u), v), w));
+                                     between(between(corner(4), corner(5), u), between(corner(7), corner(6), u), v),
+                                     w));
             break;
           case CellKind::prism: {
             const double s = u + v > 1 ? 1 - u : u, t = u + v > 1 ? 1 - v : v;

@@ -14,15 +14,14 @@ namespace subvol {
 /// Tags stay where their edge or vertex is still on the boundary.
 ///
 /// mesh    index-correct cells.
-/// InputError: no cell is kept; what is kept touches itself along an edge or at a vertex, with the place: its boundary would
-/// be no manifold (`validate`).
+/// InputError: no cell is kept; what is kept touches itself along an edge or at a vertex, with the place: its boundary
+/// would be no manifold (`validate`).
 VolumeMesh carve(const VolumeMesh& mesh, const std::function<bool(std::size_t cell)>& keep);
 
 /// The cells that lie in a surface by at least a share of their volume, non-zero for those to keep.
 ///
-/// A cell counts by the mean over 27 points of whether the generalised winding number (`WindingNumber`) is above 1/2; so
-/// the surface may have holes.
-/// least_share  in (0, 1], else InputError. InputError as `WindingNumber`.
+/// A cell counts by the mean over 27 points of whether the generalised winding number (`WindingNumber`) is above 1/2;
+/// so the surface may have holes. least_share  in (0, 1], else InputError. InputError as `WindingNumber`.
 std::vector<char> cells_inside(const VolumeMesh& mesh, const TriangleMesh& surface, double least_share = 0.5);
 
 /// The cells whose centre (mean of the corners) lies in a closed box.

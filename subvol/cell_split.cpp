@@ -41,7 +41,8 @@ std::vector<int> carried_axes(const VolumeMesh& mesh, const MeshTopology& topolo
   // Axis of each local edge: edges of a hex are parallel to 0-1, 0-3 or 0-4.
   const auto axis_of = [&](std::size_t c, Index a, Index b) {
     const auto cell = mesh.cell(c);
-    const auto i = std::find(cell.begin(), cell.end(), a) - cell.begin(), j = std::find(cell.begin(), cell.end(), b) - cell.begin();
+    const auto i = std::find(cell.begin(), cell.end(), a) - cell.begin(),
+               j = std::find(cell.begin(), cell.end(), b) - cell.begin();
     if (i / 4 != j / 4) return 2;
     const auto low = std::min(i % 4, j % 4), high = std::max(i % 4, j % 4);
     return (low == 0 && high == 1) || (low == 2 && high == 3) ? 0 : 1;
@@ -62,7 +63,9 @@ std::vector<int> carried_axes(const VolumeMesh& mesh, const MeshTopology& topolo
   };
   std::vector<int> axes(mesh.num_cells(), kNoIndex);
   std::vector<std::size_t> queue;
-  const Index start = v0 >= 0 && v1 >= 0 && v0 != v1 && std::max<std::size_t>(v0, v1) < mesh.num_vertices() ? topology.find_edge(v0, v1) : kNoIndex;
+  const Index start = v0 >= 0 && v1 >= 0 && v0 != v1 && std::max<std::size_t>(v0, v1) < mesh.num_vertices()
+                          ? topology.find_edge(v0, v1)
+                          : kNoIndex;
   if (start == kNoIndex)
     throw InputError("split: there is no edge between vertices " + std::to_string(v0) + " and " + std::to_string(v1));
   const auto give = [&](std::size_t c, int axis) {
@@ -109,7 +112,8 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
   const MeshTopology topology(mesh);
   const std::vector<int> axes = carried_axes(mesh, topology, v0, v1);
   // Lower faces in right-hand order about each axis, and the corners above them.
-  constexpr std::array<std::array<int, 8>, 3> kUpright{{{0, 3, 7, 4, 1, 2, 6, 5}, {0, 4, 5, 1, 3, 7, 6, 2}, {0, 1, 2, 3, 4, 5, 6, 7}}};
+  constexpr std::array<std::array<int, 8>, 3> kUpright{
+      {{0, 3, 7, 4, 1, 2, 6, 5}, {0, 4, 5, 1, 3, 7, 6, 2}, {0, 1, 2, 3, 4, 5, 6, 7}}};
   // The diagonal of each face that is cut: one of its ends.
   std::vector<Index> cut_at(topology.num_faces(), kNoIndex);
   const auto upright = [&](std::size_t c) {
@@ -123,7 +127,8 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
     for (Index f : topology.cell_faces(c)) {
       const auto face = topology.face(f);
       const auto in_face = [&](std::size_t first) {
-        return std::all_of(corners.begin() + static_cast<std::ptrdiff_t>(first), corners.begin() + static_cast<std::ptrdiff_t>(first) + 4,
+        return std::all_of(corners.begin() + static_cast<std::ptrdiff_t>(first),
+                           corners.begin() + static_cast<std::ptrdiff_t>(first) + 4,
                            [&](Index v) { return std::find(face.begin(), face.end(), v) != face.end(); });
       };
       if (in_face(0)) ends[0] = f;
@@ -133,7 +138,8 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
   };
   std::vector<std::size_t> column;
   for (std::size_t seed = 0; seed < mesh.num_cells(); ++seed) {
-    if (axes[seed] == kNoIndex) throw InputError("split: cell " + std::to_string(seed) + " is not connected with the edge");
+    if (axes[seed] == kNoIndex)
+      throw InputError("split: cell " + std::to_string(seed) + " is not connected with the edge");
     const Index first = end_faces(seed)[0];
     if (cut_at[first] != kNoIndex) continue;
     const auto face = topology.face(first);
@@ -150,7 +156,8 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
       }
       for (Index f : ends)
         for (Index other : topology.face_cells(f))
-          if (other != kNoIndex && std::find(column.begin(), column.end(), static_cast<std::size_t>(other)) == column.end())
+          if (other != kNoIndex &&
+              std::find(column.begin(), column.end(), static_cast<std::size_t>(other)) == column.end())
             column.push_back(static_cast<std::size_t>(other));
     }
   }
@@ -159,7 +166,8 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
   result.tags = mesh.tags;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const auto corners = upright(c);
-    const auto at = static_cast<std::size_t>(std::find(corners.begin(), corners.begin() + 4, cut_at[end_faces(c)[0]]) - corners.begin());
+    const auto at = static_cast<std::size_t>(std::find(corners.begin(), corners.begin() + 4, cut_at[end_faces(c)[0]]) -
+                                             corners.begin());
     for (std::size_t half = 0; half < 2; ++half) {
       const std::size_t a = at % 4, b = (at + 1 + half) % 4, d = (at + 2 + half) % 4;
       result.add_cell(CellKind::prism, std::array<Index, 6>{corners[a], corners[b], corners[d], corners[a + 4],

@@ -19,8 +19,8 @@ namespace subvol {
 /// mesh    passes `validate` but for unused vertices.
 /// cells   numbers of the set, each once; or empty: all cells.
 /// returns the same cells, those of the set on new vertices, then one cell per face of the set's boundary, by cell and
-///         local order. Old vertices keep their numbers and places, and so do tags, which lie on the old boundary; new ones
-///         are appended. New cells get their neighbour's reference.
+///         local order. Old vertices keep their numbers and places, and so do tags, which lie on the old boundary; new
+///         ones are appended. New cells get their neighbour's reference.
 ///
 /// New vertices move inward by 0.15 of the shortest edge along the sum of the distinct normals around, and less where a
 /// cell would be inverted. On a mesh of equal cubes no cell can be inverted where some direction sees all faces around

@@ -63,7 +63,8 @@ VolumeMesh merge_pairs(const VolumeMesh& mesh, const MeshTopology& topology, std
     return v;
   };
   for (const Edge& pair : pairs) {
-    const Vec3 otherwise = half_way ? Vec3((mesh.positions[pair[0]] + mesh.positions[pair[1]]) / 2) : mesh.positions[pair[0]];
+    const Vec3 otherwise =
+        half_way ? Vec3((mesh.positions[pair[0]] + mesh.positions[pair[1]]) / 2) : mesh.positions[pair[0]];
     const Index a = root(pair[0]), b = root(pair[1]);
     if (a == b) continue;
     target[b] = a;
@@ -73,8 +74,8 @@ VolumeMesh merge_pairs(const VolumeMesh& mesh, const MeshTopology& topology, std
   return merge_vertices(moved, target, name);
 }
 
-/// For each corner of a cell that a sheet cuts: the lower end of the sheet's edge at that corner, and whether the corner is
-/// the upper one.
+/// For each corner of a cell that a sheet cuts: the lower end of the sheet's edge at that corner, and whether the
+/// corner is the upper one.
 struct CutCorner {
   Index lower;
   bool upper;
@@ -101,8 +102,7 @@ std::vector<CutCorner> cut_corners(const VolumeMesh& mesh, std::size_t c, const 
 
 }  // namespace
 
-std::vector<Edge> sheet_edges(const VolumeMesh& mesh, const MeshTopology& topology, Index v0, Index v1) {
-  (void)mesh;
+std::vector<Edge> sheet_edges(const MeshTopology& topology, Index v0, Index v1) {
   const auto quads = quads_of_edges(topology);
   std::vector<Edge> directed(topology.num_edges(), Edge{kNoIndex, kNoIndex});
   std::vector<Edge> sheet{{v0, v1}};
@@ -127,7 +127,7 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
   if (parts < 2) throw InputError("split: a sheet must be cut into at least 2 parts, got " + std::to_string(parts));
   require_sound(mesh, "split");
   const MeshTopology topology(mesh);
-  const std::vector<Edge> sheet = sheet_edges(mesh, topology, v0, v1);
+  const std::vector<Edge> sheet = sheet_edges(topology, v0, v1);
   std::map<Index, Index> above;   // upper end of the sheet's edge at each lower end
   std::map<Index, Index> between; // first new vertex of that edge
   VolumeMesh result;
@@ -177,7 +177,7 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
 VolumeMesh collapse_sheet(const VolumeMesh& mesh, Index v0, Index v1) {
   require_sound(mesh, "collapse");
   const MeshTopology topology(mesh);
-  return merge_pairs(mesh, topology, sheet_edges(mesh, topology, v0, v1), false, "collapse");
+  return merge_pairs(mesh, topology, sheet_edges(topology, v0, v1), false, "collapse");
 }
 
 VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1) {
@@ -206,7 +206,8 @@ VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2) {
       if (face[i] == v0 && face[(i + 2) % 4] == v2) add(static_cast<Index>(f), {v0, v2});
   }
   if (faces.size() != 1)
-    throw InputError("collapse: there is no single quad with opposite corners " + std::to_string(v0) + " and " + std::to_string(v2));
+    throw InputError("collapse: there is no single quad with opposite corners " + std::to_string(v0) + " and " +
+                     std::to_string(v2));
   for (std::size_t i = 0; i < faces.size(); ++i)
     for (Index c : topology.face_cells(faces[i])) {
       if (c == kNoIndex) continue;

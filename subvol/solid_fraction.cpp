@@ -54,7 +54,8 @@ class LineCrossings {
   /// Range of the lines with low <= coordinate <= high.
   static std::pair<int, int> range(double low, double high, int count) {
     const double first = std::ceil(low - 0.5 - kShift), last = std::floor(high - 0.5 - kShift);
-    return {static_cast<int>(std::clamp(first, 0.0, double(count))), static_cast<int>(std::clamp(last, -1.0, count - 1.0))};
+    return {static_cast<int>(std::clamp(first, 0.0, double(count))),
+            static_cast<int>(std::clamp(last, -1.0, count - 1.0))};
   }
 
   void add(const std::array<Index, 3>& t) {
@@ -93,7 +94,8 @@ class LineCrossings {
 };
 
 /// Adds the length of [low, high] within each cell of a column of cells.
-void add_length(double low, double high, int count, Index first, Index stride, double weight, std::vector<double>& sums) {
+void add_length(double low, double high, int count, Index first, Index stride, double weight,
+                std::vector<double>& sums) {
   low = std::max(low, 0.0);
   high = std::min(high, double(count));
   for (int k = static_cast<int>(low); k < count && k < high; ++k)
@@ -111,7 +113,8 @@ std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid
   for (std::size_t first = 0, last; first < crossings.size(); first = last) {
     const Index line = crossings[first].line;
     int total = 0;
-    for (last = first; last < crossings.size() && crossings[last].line == line; ++last) total += crossings[last].winding;
+    for (last = first; last < crossings.size() && crossings[last].line == line; ++last)
+      total += crossings[last].winding;
     if (total != 0) continue;
     const Index column = grid.cell(line % lines_along_x / num_lines, line / lines_along_x / num_lines, 0);
     int winding = 0;

@@ -13,7 +13,8 @@ namespace subvol {
 ///   f(cell) = mean over n x n lines through the cell, along its third edge, of the share of the line with w(x) > 0
 ///
 /// w(x) is the number of times the surface winds around x: crossings along the line, counted by the side they are
-/// crossed from. Two triangles decide about their common edge by the same number, so a line crosses exactly one of them.
+/// crossed from. Two triangles decide about their common edge by the same number, so a line crosses exactly one of
+/// them.
 ///
 /// surface  closed: every edge as often in one direction as in the other; normals point outward. Where it is not closed
 ///          a line may end inside; such lines do not count.

@@ -147,7 +147,8 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
   std::vector<std::array<Index, 3>> rims;  // from, to, triangle
   for_each_edge(sorted_half_edges(mesh), [&](std::span<const HalfEdge> run) {
     if (run.size() == 1)
-      rims.push_back({run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
+      rims.push_back(
+          {run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
   });
   std::sort(rims.begin(), rims.end());
   std::vector<char> used(rims.size(), 0);
@@ -230,7 +231,8 @@ std::vector<Component> measured(const TriangleMesh& mesh, std::span<const int> c
 
 /// Void walls are the components that were oriented against the whole and lie inside another one's box.
 std::vector<char> find_cavities(std::span<const Component> parts) {
-  const double total = std::accumulate(parts.begin(), parts.end(), 0.0, [](double s, const Component& c) { return s + c.volume; });
+  const double total =
+      std::accumulate(parts.begin(), parts.end(), 0.0, [](double s, const Component& c) { return s + c.volume; });
   std::vector<char> cavity(parts.size(), 0);
   for (std::size_t c = 0; c < parts.size(); ++c) {
     if (parts[c].volume * total > 0) continue;

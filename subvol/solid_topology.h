@@ -22,7 +22,7 @@ std::string to_string(const BettiNumbers& numbers);
 
 /// A triangle surface made to bound a solid, and that solid's topology.
 struct SolidBoundary {
-  TriangleMesh surface;       ///< closed and oriented outward: every edge runs between two triangles in opposite directions
+  TriangleMesh surface;  ///< closed and oriented outward: every edge runs between two triangles in opposite directions
   BettiNumbers topology;
   double volume = 0;          ///< > 0
   std::size_t flipped_triangles = 0, closed_holes = 0, dropped_triangles = 0;  ///< what was done to the input
@@ -34,9 +34,9 @@ struct SolidBoundary {
 /// oriented inward and lies in another component's box. Holes are closed by a fan around the mean of their rim, as if
 /// they were discs. Triangles with two equal corners, and those without a neighbour, are dropped.
 ///
-/// InputError, naming an edge: more than two triangles at an edge, a surface that cannot be oriented, or one that encloses
-/// no volume. A vertex with several fans of triangles counts as that many.
-/// Cost: sorts of the vertices and edges.
+/// InputError, naming an edge: more than two triangles at an edge, a surface that cannot be oriented, or one that
+/// encloses no volume. A vertex with several fans of triangles counts as that many. Cost: sorts of the vertices and
+/// edges.
 SolidBoundary solid_boundary(const TriangleMesh& surface);
 
 }  // namespace subvol

@@ -21,14 +21,15 @@ inline int reference_of(const VolumeMesh& mesh, std::size_t cell) {
   return mesh.references.empty() ? 0 : mesh.references[cell];
 }
 
-/// The cells whose entry in `kept` is not zero, with references, on the vertices they use; both keep their order. Tags stay
-/// where their edge or vertex is still on the boundary. kept: one entry per cell.
+/// The cells whose entry in `kept` is not zero, with references, on the vertices they use; both keep their order. Tags
+/// stay where their edge or vertex is still on the boundary. kept: one entry per cell.
 VolumeMesh kept_cells(const VolumeMesh& mesh, std::span<const char> kept);
 
 /// Tags that name edges and vertices of the boundary of the mesh they are in; the others are dropped.
 void drop_lost_tags(VolumeMesh& mesh);
 
-/// Sorts tags as `FeatureTags` wants them, the larger sharpness of two equal entries counting; drops creases of one vertex.
+/// Sorts tags as `FeatureTags` wants them, the larger sharpness of two equal entries counting; drops creases of one
+/// vertex.
 void normalise_tags(FeatureTags& tags);
 
 }  // namespace subvol

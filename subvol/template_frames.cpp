@@ -52,14 +52,16 @@ std::vector<Vec3> facing_directions(const std::vector<Facet>& facets) {
     const double area = f.area_vector.norm();
     if (!(area > 0)) continue;
     std::array<int, 3> key{};
-    for (std::size_t a = 0; a < 3; ++a) key[a] = static_cast<int>(std::lround(kBins * f.area_vector[static_cast<Index>(a)] / area));
+    for (std::size_t a = 0; a < 3; ++a)
+      key[a] = static_cast<int>(std::lround(kBins * f.area_vector[static_cast<Index>(a)] / area));
     const std::array<int, 3> opposite{-key[0], -key[1], -key[2]};
     Vec3& sum = bins.try_emplace(std::max(key, opposite), Vec3::Zero()).first->second;
     sum += key >= opposite ? f.area_vector : Vec3(-f.area_vector);
   }
   std::vector<Vec3> directions;
   for (const auto& [key, sum] : bins) directions.push_back(sum);
-  std::stable_sort(directions.begin(), directions.end(), [](const Vec3& a, const Vec3& b) { return a.norm() > b.norm(); });
+  std::stable_sort(directions.begin(), directions.end(),
+                   [](const Vec3& a, const Vec3& b) { return a.norm() > b.norm(); });
   return directions;
 }
 

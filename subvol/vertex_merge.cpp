@@ -59,7 +59,8 @@ std::optional<std::array<Index, 6>> prism_of(const CellTopology& hex, std::span<
   // Seen from inside the cell the bottom runs against its outward order.
   for (int i = 3; i >= 0; --i) {
     const int bottom = hex.faces[triangles[0]][i];
-    if (std::find(prism.begin(), prism.begin() + static_cast<std::ptrdiff_t>(n), corners[bottom]) != prism.begin() + static_cast<std::ptrdiff_t>(n))
+    if (std::find(prism.begin(), prism.begin() + static_cast<std::ptrdiff_t>(n), corners[bottom]) !=
+        prism.begin() + static_cast<std::ptrdiff_t>(n))
       continue;
     int top = -1;
     for (int e = 0; e < hex.num_edges; ++e)

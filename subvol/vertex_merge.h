@@ -10,10 +10,10 @@ namespace subvol {
 
 /// The mesh in which every vertex v is replaced by target[v], and what becomes of its cells.
 ///
-/// A cell whose corners stay distinct is kept. One whose faces then cover each other in pairs has become flat and goes: a
-/// hex with four parallel edges collapsed, say, or a tet with one. A hex with two parallel edges of one face collapsed
-/// becomes a prism. Anything else would break conformity. Unused vertices go; tags follow their vertices, the larger
-/// sharpness counting, and go where they are no longer on the boundary.
+/// A cell whose corners stay distinct is kept. One whose faces then cover each other in pairs has become flat and goes:
+/// a hex with four parallel edges collapsed, say, or a tet with one. A hex with two parallel edges of one face
+/// collapsed becomes a prism. Anything else would break conformity. Unused vertices go; tags follow their vertices, the
+/// larger sharpness counting, and go where they are no longer on the boundary.
 ///
 /// target  a vertex for each one, with target[target[v]] == target[v]. Merged vertices take the target's position.
 /// name    of the operation, for messages.

@@ -80,8 +80,8 @@ bool handle_flip(const VoxelSolid& solid, Index cell, bool add_handle, HandleFli
   return true;
 }
 
-/// The best flip that changes the number of handles, or none. To add one, long loops are best; to remove one, short ones.
-/// Flips may go against the fractions by `tolerance`.
+/// The best flip that changes the number of handles, or none. To add one, long loops are best; to remove one, short
+/// ones. Flips may go against the fractions by `tolerance`.
 std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& goal, bool add_handle, double tolerance,
                                       LoopLengths& loops) {
   constexpr std::size_t kLookedAt = 40;  // most promising flips whose loops are measured
@@ -91,7 +91,8 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
     flip.gain = solid.may_flip(static_cast<Index>(c)) ? goal.gain(solid, static_cast<Index>(c)) : -1;
     if (flip.gain > -tolerance && handle_flip(solid, static_cast<Index>(c), add_handle, flip)) flips.push_back(flip);
   }
-  std::stable_sort(flips.begin(), flips.end(), [](const HandleFlip& a, const HandleFlip& b) { return a.gain > b.gain; });
+  std::stable_sort(flips.begin(), flips.end(),
+                   [](const HandleFlip& a, const HandleFlip& b) { return a.gain > b.gain; });
   if (flips.size() > kLookedAt) flips.resize(kLookedAt);
   std::optional<Index> best;
   double best_score = 0;
@@ -109,7 +110,9 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
 
 void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
   using Entry = std::pair<double, Index>;
-  const auto less = [](const Entry& a, const Entry& b) { return a.first != b.first ? a.first < b.first : a.second > b.second; };
+  const auto less = [](const Entry& a, const Entry& b) {
+    return a.first != b.first ? a.first < b.first : a.second > b.second;
+  };
   std::priority_queue<Entry, std::vector<Entry>, decltype(less)> queue(less);
   std::vector<char> waiting(solid.num_cells(), 0);
   const auto offer = [&](Index c) {
@@ -208,7 +211,8 @@ void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
   std::vector<Index> previous, path, far;
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<int> steps = voxel_steps(
-        solid, [&](Index c) { return solid.filled(c); }, [&](Index c) { return goal.fractions[c] > kLeastFraction; }, &previous);
+        solid, [&](Index c) { return solid.filled(c); }, [&](Index c) { return goal.fractions[c] > kLeastFraction; },
+        &previous);
     far.clear();
     for (std::size_t c = 0; c < steps.size(); ++c)
       if (steps[c] >= kNear && !given_up[c]) far.push_back(static_cast<Index>(c));

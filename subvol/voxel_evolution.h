@@ -34,7 +34,8 @@ bool drop_surplus(VoxelSolid& solid, const VoxelGoal& goal);
 /// evolving after each. False where that is not possible. Points must be good.
 bool match_handles(VoxelSolid& solid, const VoxelGoal& goal);
 
-/// Grows towards parts of the shape that no filled cell is near: tails and fingers thinner than a cell. The topology stays.
+/// Grows towards parts of the shape that no filled cell is near: tails and fingers thinner than a cell. The topology
+/// stays.
 void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal);
 
 /// Starts a solid of the goal's topology in one of three ways; empty where it cannot be reached.

@@ -39,8 +39,8 @@ VoxelGrid box_grid(const Vec3& low, const Vec3& high, double size) {
   if (!(size > 0) || !std::isfinite(size)) throw InputError("grid: the size of a cell must be finite and above 0");
   std::array<int, 3> counts{};
   for (int a = 0; a < 3; ++a)
-    counts[a] =
-        static_cast<int>(std::clamp(std::round((high[a] - low[a]) / size), 1.0, double(std::numeric_limits<int>::max() - 1)));
+    counts[a] = static_cast<int>(
+        std::clamp(std::round((high[a] - low[a]) / size), 1.0, double(std::numeric_limits<int>::max() - 1)));
   return box_grid(low, high, counts);
 }
 

@@ -7,11 +7,12 @@
 
 namespace subvol {
 
-/// Fewest steps from one cell to a face neighbour that lead from the cells with `from` to each cell, all on the way with
-/// `through`; -1 where there is no way.
-/// previous  if given: the cell before, on one such way; kNoIndex for cells with `from` and those not reached.
+/// Fewest steps from one cell to a face neighbour that lead from the cells with `from` to each cell, all on the way
+/// with `through`; -1 where there is no way. previous  if given: the cell before, on one such way; kNoIndex for cells
+/// with `from` and those not reached.
 template <class From, class Through>
-std::vector<int> voxel_steps(const VoxelSolid& solid, From&& from, Through&& through, std::vector<Index>* previous = nullptr) {
+std::vector<int> voxel_steps(const VoxelSolid& solid, From&& from, Through&& through,
+                             std::vector<Index>* previous = nullptr) {
   std::vector<int> steps(solid.num_cells(), -1);
   if (previous) previous->assign(solid.num_cells(), kNoIndex);
   std::vector<Index> queue;

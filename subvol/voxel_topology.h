@@ -17,14 +17,15 @@ enum class VertexRule {
   pillowable  ///< and no axis has boundary faces that look both ways: some direction sees all faces from their front
 };
 
-/// By the filled ones of the eight cells around a point (bit x + 2y + 4z): whether the rule holds. None and all are good.
+/// By the filled ones of the eight cells around a point (bit x + 2y + 4z): whether the rule holds. None and all are
+/// good.
 const std::array<bool, 256>& vertex_table(VertexRule rule);
 
 /// Cells of a grid, each filled or empty, as a solid whose topology is watched.
 ///
-/// The closed filled cells make the solid. Cells on the grid's outer layer stay empty. Per lattice point the filled cells
-/// around are kept as a bit mask; where all points are good by `VertexRule::manifold` the boundary is a 2-manifold and
-/// connection through faces, edges and vertices is the same.
+/// The closed filled cells make the solid. Cells on the grid's outer layer stay empty. Per lattice point the filled
+/// cells around are kept as a bit mask; where all points are good by `VertexRule::manifold` the boundary is a
+/// 2-manifold and connection through faces, edges and vertices is the same.
 class VoxelSolid {
  public:
   /// cells  counts along each axis, >= 3.

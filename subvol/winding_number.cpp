@@ -19,7 +19,8 @@ constexpr Index kLeafSize = 8;
 // A node counts as a whole from this many of its radii on: what second moments would add is then below 0.01 in all.
 constexpr double kFarRadii = 6;
 
-/// Signed solid angle of a triangle seen from the origin:  tan(A/2) = det / (|a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|)
+/// Signed solid angle of a triangle seen from the origin:  tan(A/2) = det / (|a||b||c| + (a.b)|c| + (b.c)|a| +
+/// (c.a)|b|)
 double solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
   const double numerator = a.dot(b.cross(c));
@@ -34,7 +35,8 @@ WindingNumber::WindingNumber(const TriangleMesh& mesh) {
   for (const auto& t : mesh.triangles) {
     for (Index v : t)
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size() || !mesh.positions[v].allFinite())
-        throw InputError("winding number: a triangle names a vertex that is not there, or whose position is not finite");
+        throw InputError(
+            "winding number: a triangle names a vertex that is not there, or whose position is not finite");
     unsorted_.push_back({mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]});
   }
   std::vector<Index> order(unsorted_.size());

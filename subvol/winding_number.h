@@ -13,8 +13,9 @@ namespace subvol {
 ///   w(x) = 1/(4 pi) sum over triangles of the signed solid angle seen from x
 ///
 /// 1 inside a closed surface whose normals point outward, 0 outside, in between where there are holes; soups and
-/// overlaps are welcome. Solid angles after Van Oosterom and Strackee (1983); triangles far away count together by their
-/// area vectors and first moments, as in Barill, Dickson, Schmidt, Levin and Jacobson, "Fast winding numbers" (2018).
+/// overlaps are welcome. Solid angles after Van Oosterom and Strackee (1983); triangles far away count together by
+/// their area vectors and first moments, as in Barill, Dickson, Schmidt, Levin and Jacobson, "Fast winding numbers"
+/// (2018).
 class WindingNumber {
  public:
   /// InputError: no triangles, a vertex number out of range, a position that is not finite.

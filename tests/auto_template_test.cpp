@@ -42,7 +42,8 @@ TriangleMesh hollow_ball() {
 }
 
 TriangleMesh double_torus() {
-  return voxel_surface(7, 4, 1, [](int i, int j, int) { return !((i == 1 || i == 2 || i == 4 || i == 5) && (j == 1 || j == 2)) ; });
+  return voxel_surface(
+      7, 4, 1, [](int i, int j, int) { return !((i == 1 || i == 2 || i == 4 || i == 5) && (j == 1 || j == 2)); });
 }
 
 TriangleMesh comb() {
@@ -108,7 +109,8 @@ TEST_CASE("Solid fractions add up to the volume and agree with counting points",
     sum += f;
   }
   CHECK(sum * std::pow(0.8, 3) == Approx(solid_boundary(surface).volume).epsilon(0.02));
-  const std::vector<double> outside = solid_fractions(surface, box_grid(Vec3::Constant(20), Vec3::Constant(21), {2, 2, 2}));
+  const std::vector<double> outside =
+      solid_fractions(surface, box_grid(Vec3::Constant(20), Vec3::Constant(21), {2, 2, 2}));
   CHECK(*std::max_element(outside.begin(), outside.end()) == 0);
 }
 

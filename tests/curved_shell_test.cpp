@@ -95,14 +95,16 @@ TEST_CASE("Curved cells bend round sharp edges, valid on every side, and lower t
   for (const auto* points : {&u, &l})
     for (const Faces faces : {Faces::triangles, Faces::quads})
       for (const ShellSide side : {ShellSide::outward, ShellSide::both}) {
-        const ShellResult shell = make_shell(drawn_profile(*points, faces), {.thickness = 0.3, .side = side, .layers = 1});
+        const ShellResult shell =
+            make_shell(drawn_profile(*points, faces), {.thickness = 0.3, .side = side, .layers = 1});
         const CurvedShell curved = curve_shell(shell, {.order = points == &l ? 3 : 2, .boundary = fine_boundary});
         INFO("points " << points->size() << ", side " << static_cast<int>(side));
         check_valid(shell, curved);
         const ElementSpace& space = curved.mesh.space;
         const std::vector<int> grid_points(space.num_cells(), 5);
         const HighOrderEnergy energy(space, shell_reference(shell.layers, shell.limited), grid_points);
-        CHECK(energy.value(curved.mesh.coefficients) < 0.97 * energy.value(HighOrderMesh(space, shell.mesh).coefficients));
+        CHECK(energy.value(curved.mesh.coefficients) <
+              0.97 * energy.value(HighOrderMesh(space, shell.mesh).coefficients));
       }
 }
 

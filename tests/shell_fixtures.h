@@ -17,7 +17,8 @@ inline void add_face(PolygonMesh& mesh, std::initializer_list<Index> corners) {
 enum class Faces { triangles, quads, mixed };
 
 /// A grid of nu x nv squares, placed by a function of its lattice points; `closed`: its last column is the first.
-inline PolygonMesh grid(int nu, int nv, Faces faces, const std::function<Vec3(double, double)>& place, bool closed = false) {
+inline PolygonMesh grid(int nu, int nv, Faces faces, const std::function<Vec3(double, double)>& place,
+                        bool closed = false) {
   PolygonMesh mesh;
   const int columns = closed ? nu : nu + 1;
   for (int j = 0; j <= nv; ++j)

@@ -35,8 +35,8 @@ double volume_of(const VolumeMesh& mesh) {
 long euler_number(const VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
   std::set<Index> used(mesh.cell_vertices.begin(), mesh.cell_vertices.end());
-  return static_cast<long>(used.size()) - static_cast<long>(topology.num_edges()) + static_cast<long>(topology.num_faces()) -
-         static_cast<long>(mesh.num_cells());
+  return static_cast<long>(used.size()) - static_cast<long>(topology.num_edges()) +
+         static_cast<long>(topology.num_faces()) - static_cast<long>(mesh.num_cells());
 }
 
 /// Sound, with the Euler number and volume given.
@@ -168,7 +168,7 @@ TEST_CASE("Splitting a sheet and collapsing a part of it are inverse", "[templat
   CHECK(back.cell_vertices == lattice.cell_vertices);
   CHECK(back.positions == lattice.positions);
   CHECK(back.tags == lattice.tags);
-  CHECK(sheet_edges(lattice, MeshTopology(lattice), a, b).size() == 9);
+  CHECK(sheet_edges(MeshTopology(lattice), a, b).size() == 9);
 
   CHECK_THROWS_AS(split_sheet(lattice, a, a), InputError);
   CHECK_THROWS_AS(split_sheet(lattice, a, 10000), InputError);
@@ -181,7 +181,8 @@ TEST_CASE("Splitting a sheet and collapsing a part of it are inverse", "[templat
 
 TEST_CASE("Collapsing faces and edges keeps conformity or is refused", "[templates]") {
   const VolumeMesh lattice = test::lattice(4, 4, 2);
-  const VolumeMesh folded = collapse_face(lattice, vertex_at(lattice, Vec3(1, 1, 0)), vertex_at(lattice, Vec3(2, 2, 0)));
+  const VolumeMesh folded =
+      collapse_face(lattice, vertex_at(lattice, Vec3(1, 1, 0)), vertex_at(lattice, Vec3(2, 2, 0)));
   CHECK(folded.num_cells() == lattice.num_cells() - 2);
   check_mesh_is(folded, 1, 32);
   CHECK_THROWS_AS(collapse_face(lattice, 0, 1), InputError);
@@ -192,7 +193,8 @@ TEST_CASE("Collapsing faces and edges keeps conformity or is refused", "[templat
   const MeshTopology topology(tets);
   REQUIRE(topology.find_edge(p, q) != kNoIndex);
   const VolumeMesh fewer = collapse_edge(tets, p, q);
-  CHECK(fewer.num_cells() == tets.num_cells() - static_cast<std::size_t>(topology.num_edge_cells(topology.find_edge(p, q))));
+  CHECK(fewer.num_cells() ==
+        tets.num_cells() - static_cast<std::size_t>(topology.num_edge_cells(topology.find_edge(p, q))));
   check_mesh_is(fewer, 1, 27);
   CHECK_THROWS_AS(collapse_sheet(test::lattice(1, 1, 1), 0, 1), InputError);  // nothing would be left
 }
@@ -229,7 +231,8 @@ TEST_CASE("Hexes become tets and prisms without new vertices", "[templates]") {
   const VolumeMesh straight = tagged_lattice(3, 2, 2);
   check_mesh_is(split_into_tets(straight), 1, 12);
   for (const Vec3& along : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)}) {
-    const VolumeMesh prisms = split_into_prisms(straight, vertex_at(straight, Vec3(0, 0, 0)), vertex_at(straight, along));
+    const VolumeMesh prisms =
+        split_into_prisms(straight, vertex_at(straight, Vec3(0, 0, 0)), vertex_at(straight, along));
     CHECK(prisms.num_cells() == 24);
     check_mesh_is(prisms, 1, 12);
   }

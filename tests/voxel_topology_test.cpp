@@ -30,7 +30,9 @@ bool between(int low, int value, int high) { return low <= value && value <= hig
 /// A box of 5^3 cells, and shapes cut from it.
 bool in_box(int i, int j, int k) { return between(2, i, 6) && between(2, j, 6) && between(2, k, 6); }
 bool in_ring(int i, int j, int k) { return in_box(i, j, k) && k < 4 && !(between(3, i, 5) && between(3, j, 5)); }
-bool in_shell(int i, int j, int k) { return in_box(i, j, k) && !(between(3, i, 5) && between(3, j, 5) && between(3, k, 5)); }
+bool in_shell(int i, int j, int k) {
+  return in_box(i, j, k) && !(between(3, i, 5) && between(3, j, 5) && between(3, k, 5));
+}
 
 bool all_good(const VoxelSolid& solid) {
   for (std::size_t p = 0; p < solid.num_points(); ++p)
@@ -48,10 +50,12 @@ std::vector<double> fractions_of(const VoxelSolid& solid) {
 
 TEST_CASE("The vertex table agrees with the defects of the cells around a point", "[templates]") {
   for (unsigned mask = 1; mask < 256; ++mask) {
-    const VolumeMesh mesh = test::voxels(2, 2, 2, [&](int i, int j, int k) { return (mask >> (i + 2 * j + 4 * k) & 1) != 0; });
+    const VolumeMesh mesh =
+        test::voxels(2, 2, 2, [&](int i, int j, int k) { return (mask >> (i + 2 * j + 4 * k) & 1) != 0; });
     bool at_centre = false;
     for (const MeshDefect& defect : validate(mesh)) {
-      if (defect.kind == MeshDefect::Kind::nonmanifold_vertex) at_centre |= mesh.positions[defect.entity] == Vec3(1, 1, 1);
+      if (defect.kind == MeshDefect::Kind::nonmanifold_vertex)
+        at_centre |= mesh.positions[defect.entity] == Vec3(1, 1, 1);
       // An edge of two diagonal cells ends at the centre, as all inner edges do.
       if (defect.kind == MeshDefect::Kind::nonmanifold_edge) at_centre = true;
     }
@@ -68,7 +72,8 @@ TEST_CASE("Betti numbers of a ball, a ring and a hollow box", "[templates]") {
   CHECK(filled(VertexRule::manifold, in_box).topology() == BettiNumbers{1, 0, 0});
   CHECK(filled(VertexRule::manifold, in_ring).topology() == BettiNumbers{1, 1, 0});
   CHECK(filled(VertexRule::manifold, in_shell).topology() == BettiNumbers{1, 0, 1});
-  const VoxelSolid two = filled(VertexRule::manifold, [](int i, int j, int k) { return in_box(i, j, k) && (i == 2 || i == 6); });
+  const VoxelSolid two =
+      filled(VertexRule::manifold, [](int i, int j, int k) { return in_box(i, j, k) && (i == 2 || i == 6); });
   CHECK(two.topology() == BettiNumbers{2, 0, 0});
   CHECK(two.euler_number() == 2);
 }
@@ -123,7 +128,8 @@ TEST_CASE("Every start gives the topology asked for", "[templates]") {
     CHECK(all_good(*ring));
   }
   // One cell out of a ring of single cells parts it.
-  const std::vector<double> thin = fractions_of(filled(VertexRule::pillowable, [](int i, int j, int k) { return k == 2 && in_ring(i, j, k); }));
+  const std::vector<double> thin =
+      fractions_of(filled(VertexRule::pillowable, [](int i, int j, int k) { return k == 2 && in_ring(i, j, k); }));
   const auto parted = start_solid(VoxelStart::cut, kSize, VertexRule::pillowable, {thin, 0.5, {1, 0, 0}});
   REQUIRE(parted);
   CHECK(parted->topology() == BettiNumbers{1, 0, 0});
