@@ -4,10 +4,8 @@
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/high_order_fit_run.h"
-#include "cli/interrupt.h"
 #include "cli/loading.h"
-#include "cli/outputs.h"
-#include "cli/progress.h"
+#include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/writing.h"
 #include "fit/subdivision_fit.h"
@@ -16,15 +14,12 @@
 #include "subvol/surface_io.h"
 #include "subvol/version.h"
 
-#include <chrono>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 namespace subvol::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct FitArguments {
   RunOptions run;
@@ -47,9 +42,10 @@ Correspondence correspondence(const FitArguments& arguments) {
 }
 
 /// One fit from its files to its files.
-class FitRun {
+class FitRun : public LongRun {
  public:
-  FitRun(const FitArguments& arguments, const CLI::App& verb) : arguments_(arguments), verb_(verb) {}
+  FitRun(const FitArguments& arguments, const CLI::App& verb)
+      : LongRun(arguments.run, verb), arguments_(arguments) {}
   int run();
 
  private:
@@ -58,18 +54,10 @@ class FitRun {
   void fit();
   void write();
   void check();
-  void write_report() const;
+  Json report() const;
   void summarise() const;
-  int status() const;
-  /// Does one part and notes how long it took.
-  void timed(const char* part, void (FitRun::*work)());
-  void warn(std::size_t first = 0) const;
 
   const FitArguments& arguments_;
-  const CLI::App& verb_;
-  Clock::time_point start_ = Clock::now();
-  std::vector<Output> outputs_;
-  std::vector<std::string> warnings_;
   TriangleMesh target_;
   VolumeMesh template_mesh_;
   std::optional<TemplateChoice> choice_;  ///< where the template was made
@@ -77,52 +65,33 @@ class FitRun {
   MeshCheck mesh_check_;
   TessellatedSurface limit_;
   SurfaceDistance limit_distance_;
-  Json seconds_ = Json::object();
 };
-
-void FitRun::timed(const char* part, void (FitRun::*work)()) {
-  const auto begin = Clock::now();
-  (this->*work)();
-  seconds_[part] = std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-void FitRun::warn(std::size_t first) const {
-  if (arguments_.run.quiet) return;
-  for (std::size_t i = first; i < warnings_.size(); ++i) std::cerr << "subvol: warning: " << warnings_[i] << '\n';
-}
 
 void FitRun::load() {
   target_ = load_target(arguments_.target, warnings_);
-  warn();
+  tell_warnings();
 }
 
 void FitRun::load_template() {
-  const std::size_t before = warnings_.size();
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, arguments_.fit.crease_angle_degrees,
                                              arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   choice_ = std::move(loaded.choice);
-  warn(before);
+  tell_warnings();
   if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
 }
 
 void FitRun::fit() {
-  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
   FitOptions options = arguments_.fit;
   options.surface = arguments_.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
   options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
   options.correspondence = correspondence(arguments_);
   options.solver = solver_kind(arguments_);
-  options.progress = [&](const FitProgress& progress) {
-    teller.tell(progress);
-    return !interrupted();
-  };
-  catch_interrupt();
-  result_ = fit_subdivision_volume(target_, template_mesh_, options);
-  teller.finish();
-  const std::size_t before = warnings_.size();
-  warnings_.insert(warnings_.end(), result_.report.warnings.begin(), result_.report.warnings.end());
-  warn(before);
+  result_ = followed([&](auto progress) {
+    options.progress = progress;
+    return fit_subdivision_volume(target_, template_mesh_, options);
+  });
+  add_warnings(result_.report.warnings);
 }
 
 void FitRun::write() {
@@ -147,12 +116,9 @@ void FitRun::check() {
   limit_distance_ = surface_distance(triangles_of(limit_), target_);
 }
 
-void FitRun::write_report() const {
+Json FitRun::report() const {
   const FitReport& report = result_.report;
   const double diagonal = bounding_box_diagonal(target_);
-  Json seconds = seconds_;
-  seconds.update(seconds_json(report));
-  seconds["total"] = std::chrono::duration<double>(Clock::now() - start_).count();
   Json json{{"subvol", version()},
             {"command", "fit"},
             {"options", options_in_force(verb_)},
@@ -167,11 +133,7 @@ void FitRun::write_report() const {
   if (report.creases) json["creases"] = creases_json(*report.creases);
   json["cage"] = describe("", result_.cage);
   json["audit"] = audit_json(audit(template_mesh_));
-  json["warnings"] = warnings_;
-  json["seconds"] = std::move(seconds);
-  json["peak_memory_bytes"] = peak_memory_bytes();
-  json["outputs"] = output_names(arguments_.run);
-  cli::write_report(arguments_.run.report, json);
+  return json;
 }
 
 void FitRun::summarise() const {
@@ -181,30 +143,20 @@ void FitRun::summarise() const {
             << to_text(mesh_check_) << "limit surface to target: mean " << limit_distance_.mean() * percent << " %, max "
             << limit_distance_.max() * percent << " % of the diagonal\n";
   if (report.creases) std::cerr << to_text(*report.creases);
-  for (const auto& name : output_names(arguments_.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
-}
-
-int FitRun::status() const {
-  if (result_.report.stop_reason == StopReason::cancelled) return kInterrupted;
-  if (!mesh_check_.valid()) return kFailed;
-  return result_.report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+  tell_outputs();
 }
 
 int FitRun::run() {
-  if (arguments_.run.outputs.empty() && arguments_.run.report.empty()) {
-    throw UsageError("fit: nothing to write; give -o FILE or --report FILE");
-  }
-  outputs_ = checked_outputs(arguments_.run, true);
-  apply_threads(arguments_.run);
+  prepare(true);
   timed("read", &FitRun::load);
   timed("template", &FitRun::load_template);
   if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   timed("fit", &FitRun::fit);
   timed("write", &FitRun::write);
   timed("check", &FitRun::check);
-  if (!arguments_.run.report.empty()) write_report();
+  write_report(report(), seconds_json(result_.report));
   if (!arguments_.run.quiet) summarise();
-  return status();
+  return status(result_.report, mesh_check_.valid());
 }
 
 void add_method_options(CLI::App& verb, FitArguments& arguments) {

@@ -3,10 +3,8 @@
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/high_order_fit_run.h"
-#include "cli/interrupt.h"
 #include "cli/loading.h"
-#include "cli/outputs.h"
-#include "cli/progress.h"
+#include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/writing.h"
 #include "fit/boundary_triangles.h"
@@ -17,15 +15,12 @@
 #include "subvol/version.h"
 
 #include <algorithm>
-#include <chrono>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 namespace subvol::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct OptimizeArguments {
   RunOptions run;
@@ -36,9 +31,10 @@ struct OptimizeArguments {
 };
 
 /// One optimisation from its files to its files.
-class OptimizeRun {
+class OptimizeRun : public LongRun {
  public:
-  OptimizeRun(const OptimizeArguments& arguments, const CLI::App& verb) : arguments_(arguments), verb_(verb) {}
+  OptimizeRun(const OptimizeArguments& arguments, const CLI::App& verb)
+      : LongRun(arguments.run, verb), arguments_(arguments) {}
   int run();
 
  private:
@@ -46,60 +42,34 @@ class OptimizeRun {
   void optimize();
   void write();
   void check();
-  void write_report() const;
+  Json report() const;
   void summarise() const;
-  int status() const;
-  /// Does one part and notes how long it took.
-  void timed(const char* part, void (OptimizeRun::*work)());
-  void warn(std::size_t first = 0) const;
 
   const OptimizeArguments& arguments_;
-  const CLI::App& verb_;
-  Clock::time_point start_ = Clock::now();
-  std::vector<Output> outputs_;
-  std::vector<std::string> warnings_;
   VolumeMesh mesh_;
   std::optional<TriangleMesh> target_;
   TriangleMesh surface_;  ///< what the boundary is compared with: the target, or the boundary as it was
   QualityReport before_;
   OptimizeResult result_;
   MeshCheck mesh_check_;
-  Json seconds_ = Json::object();
 };
-
-void OptimizeRun::timed(const char* part, void (OptimizeRun::*work)()) {
-  const auto begin = Clock::now();
-  (this->*work)();
-  seconds_[part] = std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-void OptimizeRun::warn(std::size_t first) const {
-  if (arguments_.run.quiet) return;
-  for (std::size_t i = first; i < warnings_.size(); ++i) std::cerr << "subvol: warning: " << warnings_[i] << '\n';
-}
 
 void OptimizeRun::load() {
   mesh_ = load_volume(arguments_.mesh, warnings_);
   if (!arguments_.target.empty()) target_ = load_target(arguments_.target, warnings_);
   surface_ = target_ ? *target_ : refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   before_ = measure_quality(mesh_);
-  warn();
+  tell_warnings();
 }
 
 void OptimizeRun::optimize() {
-  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
   OptimizeOptions options = arguments_.optimize;
   options.sizes = arguments_.sizes == "uniform" ? CellSizes::uniform : CellSizes::local;
-  options.progress = [&](const FitProgress& progress) {
-    teller.tell(progress);
-    return !interrupted();
-  };
-  catch_interrupt();
-  result_ = optimize_mesh(mesh_, target_ ? &*target_ : nullptr, options);
-  teller.finish();
-  const std::size_t told = warnings_.size();
-  warnings_.insert(warnings_.end(), result_.report.warnings.begin(), result_.report.warnings.end());
-  warn(told);
+  result_ = followed([&](auto progress) {
+    options.progress = progress;
+    return optimize_mesh(mesh_, target_ ? &*target_ : nullptr, options);
+  });
+  add_warnings(result_.report.warnings);
 }
 
 void OptimizeRun::write() {
@@ -117,9 +87,7 @@ void OptimizeRun::check() {
                            &surface_);
 }
 
-void OptimizeRun::write_report() const {
-  Json seconds = seconds_;
-  seconds["total"] = std::chrono::duration<double>(Clock::now() - start_).count();
+Json OptimizeRun::report() const {
   Json json{{"subvol", version()},
             {"command", "optimize"},
             {"options", options_in_force(verb_)},
@@ -129,11 +97,7 @@ void OptimizeRun::write_report() const {
   json.update(check_json(mesh_check_));
   json["not_certified_cells"] =
       mesh_check_.quality ? mesh_check_.quality->certificate.not_certified : std::vector<Index>{};
-  json["warnings"] = warnings_;
-  json["seconds"] = std::move(seconds);
-  json["peak_memory_bytes"] = peak_memory_bytes();
-  json["outputs"] = output_names(arguments_.run);
-  cli::write_report(arguments_.run.report, json);
+  return json;
 }
 
 void OptimizeRun::summarise() const {
@@ -145,27 +109,18 @@ void OptimizeRun::summarise() const {
   const std::vector<Index>& left = result_.uncertified;
   for (std::size_t i = 0; i < std::min(left.size(), kMostNamed); ++i)
     std::cerr << "cell " << left[i] << " is not proved positive\n";
-  for (const auto& name : output_names(arguments_.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
-}
-
-int OptimizeRun::status() const {
-  if (result_.report.stop_reason == StopReason::cancelled) return kInterrupted;
-  if (!mesh_check_.valid()) return kFailed;
-  return result_.report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+  tell_outputs();
 }
 
 int OptimizeRun::run() {
-  if (arguments_.run.outputs.empty() && arguments_.run.report.empty())
-    throw UsageError("optimize: nothing to write; give -o FILE or --report FILE");
-  outputs_ = checked_outputs(arguments_.run, false);
-  apply_threads(arguments_.run);
+  prepare(false);
   timed("read", &OptimizeRun::load);
   timed("optimize", &OptimizeRun::optimize);
   timed("write", &OptimizeRun::write);
   timed("check", &OptimizeRun::check);
-  if (!arguments_.run.report.empty()) write_report();
+  write_report(report());
   if (!arguments_.run.quiet) summarise();
-  return status();
+  return status(result_.report, mesh_check_.valid());
 }
 
 /// Weight of the shape of curved cells. Lowering it step by step from what fits start with gets stuck at cells that are

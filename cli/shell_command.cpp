@@ -2,10 +2,8 @@
 #include "cli/check_report.h"
 #include "cli/commands.h"
 #include "cli/exit_status.h"
-#include "cli/interrupt.h"
 #include "cli/loading.h"
-#include "cli/outputs.h"
-#include "cli/progress.h"
+#include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/shell_output.h"
 #include "cli/writing.h"
@@ -25,7 +23,6 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -33,8 +30,6 @@
 
 namespace subvol::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct ShellArguments {
   RunOptions run;
@@ -68,9 +63,10 @@ bool faces_point_inward(const TriangleMesh& surface) {
 }
 
 /// One shell from its file to its files.
-class ShellRun {
+class ShellRun : public LongRun {
  public:
-  ShellRun(const ShellArguments& arguments, const CLI::App& verb) : arguments_(arguments), verb_(verb) {}
+  ShellRun(const ShellArguments& arguments, const CLI::App& verb)
+      : LongRun(arguments.run, verb), arguments_(arguments) {}
   int run();
 
  private:
@@ -81,38 +77,19 @@ class ShellRun {
   void write();
   void check();
   void check_subdivided();
-  void write_report() const;
+  Json report() const;
   void summarise() const;
-  int status() const;
-  void timed(const char* part, void (ShellRun::*work)());
-  void warn(std::size_t first = 0) const;
-
   std::vector<double> thickness_from_file() const;
   std::vector<double> thickness_from_attribute() const;
+
   const ShellArguments& arguments_;
-  const CLI::App& verb_;
-  Clock::time_point start_ = Clock::now();
-  std::vector<Output> outputs_;
-  std::vector<std::string> warnings_;
   TaggedPolygons surface_;
   double diagonal_ = 0;
   ShellResult result_;
   std::optional<CurvedShell> curved_;
   ShellFailures failures_;
   std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
-  Json seconds_ = Json::object();
 };
-
-void ShellRun::timed(const char* part, void (ShellRun::*work)()) {
-  const auto begin = Clock::now();
-  (this->*work)();
-  seconds_[part] = std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-void ShellRun::warn(std::size_t first) const {
-  if (arguments_.run.quiet) return;
-  for (std::size_t i = first; i < warnings_.size(); ++i) std::cerr << "subvol: warning: " << warnings_[i] << '\n';
-}
 
 void ShellRun::load() {
   surface_ = load_tagged_polygons(arguments_.surface, warnings_);
@@ -121,7 +98,7 @@ void ShellRun::load() {
   if (faces_point_inward(triangles))
     warnings_.push_back(arguments_.surface +
                         ": the faces of this closed surface point inward, so outward is its inside");
-  warn();
+  tell_warnings();
 }
 
 std::vector<double> ShellRun::thickness_from_file() const {
@@ -157,7 +134,6 @@ void ShellRun::require_one_per_vertex(const std::string& file, const std::vector
 }
 
 void ShellRun::grow() {
-  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
   ShellOptions options = arguments_.shell;
   if (!arguments_.thickness.empty())
     options.thickness = parse_length(arguments_.thickness, diagonal_);
@@ -170,46 +146,36 @@ void ShellRun::grow() {
   options.tags = surface_.tags;
   if (arguments_.crease_angle_degrees)
     options.tags = merge_tags(options.tags, surface_features(surface_.polygons, *arguments_.crease_angle_degrees));
-  options.progress = [&](const FitProgress& progress) {
-    teller.tell(progress);
-    return !interrupted();
-  };
-  catch_interrupt();
   try {
-    result_ = make_shell(surface_.polygons, options);
+    result_ = followed([&](auto progress) {
+      options.progress = progress;
+      return make_shell(surface_.polygons, options);
+    });
   } catch (const InputError& error) {
     throw InputError(arguments_.surface + ": " + error.what());
   }
-  teller.finish();
-  const std::size_t before = warnings_.size();
-  warnings_.insert(warnings_.end(), result_.report.warnings.begin(), result_.report.warnings.end());
-  warn(before);
+  add_warnings(result_.report.warnings);
 }
 
 // The time that the linear shell has left; none left, or a call to end: cells of the order asked for, but straight.
 void ShellRun::curve() {
   if (arguments_.order == 1) return;
   if (!result_.failures.none()) {
-    warnings_.push_back("the cells were left straight, for the shell is not valid");
-    return warn(warnings_.size() - 1);
+    return add_warnings({"the cells were left straight, for the shell is not valid"});
   }
-  ProgressTeller teller(arguments_.run.progress, arguments_.run.quiet);
   CurvedShellOptions options{.order = arguments_.order, .basis = arguments_.basis == "fourier" ? Basis::fourier : Basis::legendre,
                              .max_iterations = arguments_.shell.max_iterations};
   if (const double limit = arguments_.shell.time_limit_seconds; limit > 0)
-    options.time_limit_seconds = std::max(1e-3, limit - std::chrono::duration<double>(Clock::now() - start_).count());
-  options.progress = [&](const FitProgress& progress) {
-    teller.tell(progress);
-    return !interrupted();
-  };
+    options.time_limit_seconds = std::max(1e-3, limit - seconds());
   options.boundary = [&](const HighOrderMesh& mesh) {
     return curved_boundary(mesh, arguments_.writing.chord_percent);
   };
-  curved_ = curve_shell(result_, options);
-  teller.finish();
+  curved_ = followed([&](auto progress) {
+    options.progress = progress;
+    return curve_shell(result_, options);
+  });
   take_figures(*curved_, result_);
-  warnings_.insert(warnings_.end(), curved_->report.warnings.begin(), curved_->report.warnings.end());
-  warn(warnings_.size() - curved_->report.warnings.size());
+  add_warnings(curved_->report.warnings);
 }
 
 void ShellRun::write() {
@@ -243,17 +209,13 @@ void ShellRun::check_subdivided() {
   if (std::none_of(outputs_.begin(), outputs_.end(), [](const Output& output) { return output.cage; })) return;
   subdivided_ = certify(subdivide(result_.mesh, BoundaryRule::catmull_clark).fine);
   if (subdivided_->all_certified()) return;
-  warnings_.push_back(std::to_string(subdivided_->not_certified.size()) + " of " +
+  add_warnings({std::to_string(subdivided_->not_certified.size()) + " of " +
                       std::to_string(subdivided_->certified + subdivided_->not_certified.size()) +
-                      " cells are not certified once the control mesh is subdivided");
-  warn(warnings_.size() - 1);
+                      " cells are not certified once the control mesh is subdivided"});
 }
 
-void ShellRun::write_report() const {
+Json ShellRun::report() const {
   const FitReport& report = result_.report;
-  Json seconds = seconds_;
-  seconds.update(seconds_json(report));
-  seconds["total"] = std::chrono::duration<double>(Clock::now() - start_).count();
   Json json{{"subvol", version()},
             {"command", "shell"},
             {"options", options_in_force(verb_)},
@@ -269,15 +231,11 @@ void ShellRun::write_report() const {
             {"not_certified_cells", failures_.certificate.not_certified},
             {"boundary_self_intersections", failures_.intersecting.size()},
             {"intersecting_faces", failures_.intersecting},
-            {"mesh", curved_ ? describe("", curved_->mesh) : describe("", result_.mesh)},
-            {"warnings", warnings_},
-            {"seconds", std::move(seconds)},
-            {"peak_memory_bytes", peak_memory_bytes()},
-            {"outputs", output_names(arguments_.run)}};
+            {"mesh", curved_ ? describe("", curved_->mesh) : describe("", result_.mesh)}};
   if (subdivided_)
     json["subdivided_once"] = {{"certified_cells", subdivided_->certified},
                                {"not_certified_cells", subdivided_->not_certified.size()}};
-  cli::write_report(arguments_.run.report, json);
+  return json;
 }
 
 void ShellRun::summarise() const {
@@ -296,24 +254,15 @@ void ShellRun::summarise() const {
     std::fprintf(stderr, "  faces %d and %d meet\n", static_cast<int>(failures_.intersecting[i][0]),
                  static_cast<int>(failures_.intersecting[i][1]));
   std::fprintf(stderr, "%s\n", failures_.none() ? "valid" : "NOT VALID");
-  for (const auto& name : output_names(arguments_.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
-}
-
-int ShellRun::status() const {
-  if (result_.report.stop_reason == StopReason::cancelled) return kInterrupted;
-  if (!failures_.none()) return kFailed;
-  return result_.report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+  tell_outputs();
 }
 
 int ShellRun::run() {
-  if (arguments_.run.outputs.empty() && arguments_.run.report.empty())
-    throw UsageError("shell: nothing to write; give -o FILE or --report FILE");
   if (arguments_.thickness.empty() + arguments_.thickness_file.empty() + arguments_.thickness_attribute.empty() != 2)
     throw UsageError("shell: give one of --thickness, --thickness-file and --thickness-attribute");
   if (!arguments_.thickness.empty()) parse_length(arguments_.thickness, 1);
   if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
-  outputs_ = checked_outputs(arguments_.run, true);
-  apply_threads(arguments_.run);
+  prepare(true);
   timed("read", &ShellRun::load);
   if (arguments_.order > 1) refuse_curved(outputs_, surface_.polygons, arguments_.order);
   timed("grow", &ShellRun::grow);
@@ -321,9 +270,9 @@ int ShellRun::run() {
   timed("write", &ShellRun::write);
   timed("check", &ShellRun::check);
   timed("subdivide", &ShellRun::check_subdivided);
-  if (!arguments_.run.report.empty()) write_report();
+  write_report(report(), seconds_json(result_.report));
   if (!arguments_.run.quiet) summarise();
-  return status();
+  return status(result_.report, failures_.none());
 }
 
 void add_shell_options(CLI::App& verb, ShellArguments& arguments) {

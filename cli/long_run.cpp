@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/long_run.h"
+
+#include "cli/exit_status.h"
+#include "cli/report.h"
+
+#include <iostream>
+
+namespace subvol::cli {
+
+void LongRun::prepare(bool allow_cage) {
+  if (run_.outputs.empty() && run_.report.empty())
+    throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
+  outputs_ = checked_outputs(run_, allow_cage);
+  apply_threads(run_);
+}
+
+void LongRun::tell_warnings() {
+  for (; told_ < warnings_.size(); ++told_)
+    if (!run_.quiet) std::cerr << "subvol: warning: " << warnings_[told_] << '\n';
+}
+
+void LongRun::add_warnings(const std::vector<std::string>& warnings) {
+  warnings_.insert(warnings_.end(), warnings.begin(), warnings.end());
+  tell_warnings();
+}
+
+void LongRun::write_report(Json json, const Json& parts) const {
+  if (run_.report.empty()) return;
+  Json seconds = seconds_;
+  seconds.update(parts);
+  seconds["total"] = this->seconds();
+  json["warnings"] = warnings_;
+  json["seconds"] = std::move(seconds);
+  json["peak_memory_bytes"] = peak_memory_bytes();
+  json["outputs"] = output_names(run_);
+  cli::write_report(run_.report, json);
+}
+
+void LongRun::tell_outputs() const {
+  for (const auto& name : output_names(run_)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+}
+
+int LongRun::status(const FitReport& report, bool valid) {
+  if (report.stop_reason == StopReason::cancelled) return kInterrupted;
+  if (!valid) return kFailed;
+  return report.stop_reason == StopReason::converged ? kDone : kNotConverged;
+}
+
+}  // namespace subvol::cli

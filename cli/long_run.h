@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/interrupt.h"
+#include "cli/outputs.h"
+#include "cli/progress.h"
+#include "cli/run_options.h"
+#include "fit/fit_report.h"
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace subvol::cli {
+
+/// What the verbs that run long have in common: outputs looked at before the work, warnings told once, parts timed, a
+/// progress that Ctrl-C ends, the end of the report, and the exit status.
+class LongRun {
+ protected:
+  LongRun(const RunOptions& run, const CLI::App& verb) : run_(run), verb_(verb) {}
+
+  /// UsageError where there is nothing to write, and as `checked_outputs`. Sets the number of threads.
+  void prepare(bool allow_cage);
+  /// Tells the warnings that have not been told yet.
+  void tell_warnings();
+  void add_warnings(const std::vector<std::string>& warnings);
+
+  /// Does one part and notes how long it took.
+  template <class Run>
+  void timed(const char* part, void (Run::*work)()) {
+    const Clock::time_point begin = Clock::now();
+    (static_cast<Run*>(this)->*work)();
+    seconds_[part] = seconds_since(begin);
+  }
+  /// work(progress), the progress told as the options say and ended by Ctrl-C.
+  template <class Work>
+  auto followed(const Work& work) const {
+    ProgressTeller teller(run_.progress, run_.quiet);
+    catch_interrupt();
+    auto result = work([&](const FitProgress& progress) {
+      teller.tell(progress);
+      return !interrupted();
+    });
+    teller.finish();
+    return result;
+  }
+
+  double seconds() const { return seconds_since(start_); }
+  /// Adds what every report ends with, and writes it if one was asked for. parts: seconds of parts of the work.
+  void write_report(Json json, const Json& parts = Json::object()) const;
+  void tell_outputs() const;
+  /// An ExitStatus.
+  static int status(const FitReport& report, bool valid);
+
+  const RunOptions& run_;
+  const CLI::App& verb_;
+  std::vector<Output> outputs_;
+  std::vector<std::string> warnings_;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double seconds_since(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  Clock::time_point start_ = Clock::now();
+  std::size_t told_ = 0;
+  Json seconds_ = Json::object();
+};
+
+}  // namespace subvol::cli
