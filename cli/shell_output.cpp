@@ -45,7 +45,7 @@ std::vector<double> by_vertex(const ShellLayers& layers, const std::vector<doubl
   return values;
 }
 
-/// Makes a sheet of a shell with its mesh, number and wires; its thickness as (achieved, asked, 0) at each of its points.
+/// Fills mesh and wires of a sheet; returns its thickness as (achieved, asked, 0) at each of the mesh's vertices.
 using MakeSheet = std::function<std::vector<Vec3>(int sheet, SceneSheet& made)>;
 
 Scene scene_of(const ShellLayers& layers, const MakeSheet& make, const SurfaceSceneOptions& options) {

@@ -7,6 +7,7 @@
 #include "fit/fit_target.h"
 #include "fit/high_order_energy.h"
 #include "fit/high_order_schedule.h"
+#include "fit/option_checks.h"
 #include "fit/order_indicator.h"
 #include "fit/quadrature.h"
 #include "fit/self_intersection.h"
@@ -16,27 +17,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <tuple>
 
 namespace subvol {
 
 namespace {
 
-/// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is worth one.
+/// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is
+/// worth one.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-
-template <class... Values>
-std::string format(const char* form, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, form, values...);
-  return text;
-}
 
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw InputError(format("HighOrderFitOptions::%s must be in [%g, %g], got %g", name, low, high, value));
+    require_in_range("HighOrderFitOptions", name, value, low, high);
   };
   in_range("order", options.order, 1, kMaxOrder);
   in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
@@ -145,9 +138,9 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
 bool HighOrderFit::run_stage(const Stage& stage) {
   StageRecord record;
   const int least = std::ranges::min(mesh_.space.orders().cells);
-  record.name = (try_ > 1 ? format("try %d, ", try_) : "") +
-                (least < order_ ? format("orders %d to %d", least, order_) : format("order %d", order_)) +
-                format(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
+  record.name = (try_ > 1 ? formatted("try %d, ", try_) : "") +
+                (least < order_ ? formatted("orders %d to %d", least, order_) : formatted("order %d", order_)) +
+                formatted(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
   record.order = order_;
   record.cells = mesh_.space.num_cells();
   lambda_ = stage.lambda;
@@ -282,9 +275,9 @@ bool HighOrderFit::lower_lambda() {
 void HighOrderFit::conclude() {
   const bool missed = options_.tolerance_percent && !meets_tolerance();
   report_.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
-  report_.explanation = missed ? format("mean distance %.4g %% is above the tolerance of %.4g %%", measured_mean(),
+  report_.explanation = missed ? formatted("mean distance %.4g %% is above the tolerance of %.4g %%", measured_mean(),
                                         *options_.tolerance_percent)
-                               : format("all stages done, mean distance %.4g %%", measured_mean());
+                               : formatted("all stages done, mean distance %.4g %%", measured_mean());
 }
 
 HighOrderFitResult HighOrderFit::run() {

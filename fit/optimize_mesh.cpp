@@ -8,6 +8,7 @@
 #include "fit/fit_level.h"
 #include "fit/fit_target.h"
 #include "fit/free_nodes.h"
+#include "fit/option_checks.h"
 #include "fit/quality.h"
 #include "fit/stage_runner.h"
 #include "fit/surface_distance.h"
@@ -17,7 +18,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace subvol {
 
@@ -53,17 +53,9 @@ struct Progress {
   }
 };
 
-template <class... Values>
-std::string format(const char* form, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, form, values...);
-  return text;
-}
-
 OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   const auto in_range = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw InputError(format("OptimizeOptions::%s must be in [%g, %g], got %g", name, low, high, value));
+    require_in_range("OptimizeOptions", name, value, low, high);
   };
   in_range("crease_angle_degrees", options.crease_angle_degrees, 0, 180);
   in_range("lambda", options.lambda, 1e-9, 1e9);
@@ -190,7 +182,7 @@ void MeshOptimizer::release_features(std::span<const Index> cells) {
   const std::size_t released = before - mesh_.tags.creases.size();
   if (released > 0)
     report_.warnings.push_back(
-        format("%zu of %zu sharp edges stood against valid cells and were given up", released, before));
+        formatted("%zu of %zu sharp edges stood against valid cells and were given up", released, before));
 }
 
 void MeshOptimizer::find_sizes() {
@@ -318,7 +310,7 @@ bool MeshOptimizer::improve() {
   constexpr double kLeastLambdaShare = 1.0 / 64;
   double lambda = options_.lambda;
   Progress before;
-  if (!run_stage(format("improve, lambda %g", lambda), lambda, kFirstSteps, 0.3)) return false;
+  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstSteps, 0.3)) return false;
   for (int round = 0; round < kMaxRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
@@ -336,7 +328,7 @@ bool MeshOptimizer::improve() {
       if (minima[c] < kPoorJacobian) poor.push_back(static_cast<Index>(c));
     release_corners(poor);
     weigh_cells(minima);
-    if (!run_stage(format("round %d, lambda %g", round + 1, lambda), lambda, kSteps, 0.4 + 0.6 * round / kMaxRounds))
+    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kSteps, 0.4 + 0.6 * round / kMaxRounds))
       return false;
   }
   return true;
@@ -359,14 +351,14 @@ void MeshOptimizer::finish(bool going) {
   if (!going) return;
   if (!uncertified_.empty()) {
     report_.stop_reason = StopReason::stalled;
-    report_.explanation = format("%zu cells could not be made valid", uncertified_.size());
+    report_.explanation = formatted("%zu cells could not be made valid", uncertified_.size());
   } else if (mean_percent_ > options_.mean_tolerance_percent || max_percent_ > options_.max_tolerance_percent) {
     report_.stop_reason = StopReason::tolerance_missed;
     report_.explanation =
-        format("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%", mean_percent_,
+        formatted("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%", mean_percent_,
                max_percent_);
   } else {
-    report_.explanation = format("all cells are valid and no longer gain; boundary within %.4g %% of its surface",
+    report_.explanation = formatted("all cells are valid and no longer gain; boundary within %.4g %% of its surface",
                                  max_percent_);
   }
 }

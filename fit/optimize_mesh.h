@@ -47,8 +47,7 @@ struct OptimizeResult {
 /// and its weight becomes the reciprocal of its least scaled Jacobian.
 ///
 /// mesh    must pass `validate` but for inverted cells and unused vertices, else InputError. Vertices where its sharp
-/// edges
-///         meet (`FollowedCreases`) stay, but for those of cells that are or stay badly shaped.
+///         edges meet (`FollowedCreases`) stay, but for those of cells that are or stay badly shaped.
 /// target  what its boundary is to reproduce; null: its boundary as it is.
 /// returns the last state. Where cells are left that are not certified, they are listed, and report.stop_reason is
 ///         `stalled`; where the distances are missed it is `tolerance_missed`.

@@ -7,6 +7,7 @@
 #include "fit/fit_schedule.h"
 #include "fit/fit_target.h"
 #include "fit/followed_creases.h"
+#include "fit/option_checks.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
 #include "fit/stage_runner.h"
@@ -19,7 +20,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
@@ -28,17 +28,9 @@ namespace subvol {
 
 namespace {
 
-template <class... Values>
-std::string format(const char* form, Values... values) {
-  char text[160];
-  std::snprintf(text, sizeof text, form, values...);
-  return text;
-}
-
 void check_options(const FitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high))
-      throw InputError(format("FitOptions::%s must be in [%g, %g], got %g", name, low, high, value));
+    require_in_range("FitOptions", name, value, low, high);
   };
   in_range("levels", options.levels, 1, 6);
   in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
@@ -133,7 +125,7 @@ void SubdivisionFit::prepare_level() {
 }
 
 std::string SubdivisionFit::stage_name(const Stage& stage) const {
-  return format("level %d, lambda %g, tangential weight %g", number_, stage.lambda, stage.tangential_weight);
+  return formatted("level %d, lambda %g, tangential weight %g", number_, stage.lambda, stage.tangential_weight);
 }
 
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
@@ -147,7 +139,7 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
 /// Runs one minimisation over the current level's maps. False when the fit must end.
 bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   StageRecord record;
-  record.name = try_ == 1 ? name : format("try %d, ", try_) + name;
+  record.name = try_ == 1 ? name : formatted("try %d, ", try_) + name;
   record.level = number_;
   record.cells = level_.mesh.num_cells();
   lambda_ = stage.lambda;
@@ -186,12 +178,12 @@ bool SubdivisionFit::start_level() {
     if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
     level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
     if (t == 1) return true;
-    if (!run_stage(stage, format("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda))) return false;
+    if (!run_stage(stage, formatted("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda))) return false;
   }
   level_.nodes = blend(level_.safe_nodes, nodes, t);
   result_.report.stop_reason = StopReason::stalled;
   result_.report.explanation =
-      format("level %d could not be reached without inverting a cell (%.0f %% of the way)", number_, 100 * t);
+      formatted("level %d could not be reached without inverting a cell (%.0f %% of the way)", number_, 100 * t);
   return false;
 }
 
@@ -357,9 +349,9 @@ FitResult SubdivisionFit::run() {
     const double mean = measured_mean();
     const bool missed = options_.tolerance_percent && mean > *options_.tolerance_percent;
     report.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
-    report.explanation = missed ? format("mean distance %.4g %% is above the tolerance of %.4g %%", mean,
+    report.explanation = missed ? formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean,
                                          *options_.tolerance_percent)
-                                : format("all stages done, mean distance %.4g %%", mean);
+                                : formatted("all stages done, mean distance %.4g %%", mean);
   }
   report.seconds.assign(seconds_.begin(), seconds_.end());
   return std::move(result_);
