@@ -12,8 +12,12 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
+#include <iomanip>
 #include <map>
+#include <numeric>
 #include <random>
+#include <string>
 
 using namespace subvol;
 
@@ -50,19 +54,43 @@ TriangleMesh bumpy_sphere(int n, double bumps) {
   return mesh;
 }
 
-/// Random points of the target's triangles, then off it by a tenth of their spacing.
+/// Double of a triangle's area.
+double double_area(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
+  const Vec3 p = mesh.positions[t[0]];
+  return (mesh.positions[t[1]] - p).cross(mesh.positions[t[2]] - p).norm();
+}
+
+/// Every site goes to the centroid of its cell (one step of Lloyd's algorithm); sites without a cell stay.
+void relax(const TriangleMesh& mesh, std::vector<Vec3>& sites) {
+  std::vector<Vec3> moments(sites.size(), Vec3::Zero());
+  std::vector<double> areas(sites.size(), 0.0);
+  for (const VoronoiPiece& piece : RestrictedVoronoi(sites).compute(mesh.positions, mesh.triangles)) {
+    const auto& t = mesh.triangles[piece.triangle];
+    const double area = double_area(mesh, t);
+    for (int i = 0; i < 3; ++i) moments[piece.site] += area * piece.first_moment(i) * mesh.positions[t[i]];
+    areas[piece.site] += area * piece.share();
+  }
+  for (std::size_t i = 0; i < sites.size(); ++i)
+    if (areas[i] > 0) sites[i] = moments[i] / areas[i];
+}
+
+/// Random points of the target, uniform by area, relaxed once, then off it by a tenth of their spacing.
 std::vector<Vec3> sites_near(const TriangleMesh& mesh, std::size_t n) {
   std::mt19937 generator(1);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::normal_distribution<double> normal;
-  const double spacing = std::sqrt(12.6 / static_cast<double>(n));
+  std::vector<double> areas;
+  for (const auto& t : mesh.triangles) areas.push_back(double_area(mesh, t) / 2);
+  std::discrete_distribution<std::size_t> triangle(areas.begin(), areas.end());
   std::vector<Vec3> sites(n);
   for (Vec3& s : sites) {
-    const auto& t = mesh.triangles[generator() % mesh.triangles.size()];
+    const auto& t = mesh.triangles[triangle(generator)];
     const double a = std::sqrt(uniform(generator)), b = uniform(generator);
     s = (1 - a) * mesh.positions[t[0]] + a * (1 - b) * mesh.positions[t[1]] + a * b * mesh.positions[t[2]];
-    s += 0.1 * spacing * Vec3(normal(generator), normal(generator), normal(generator));
   }
+  relax(mesh, sites);
+  const double spacing = std::sqrt(std::accumulate(areas.begin(), areas.end(), 0.0) / static_cast<double>(n));
+  for (Vec3& s : sites) s += 0.1 * spacing * Vec3(normal(generator), normal(generator), normal(generator));
   return sites;
 }
 
@@ -98,14 +126,31 @@ std::vector<Vec3> barycentres(const TriangleMesh& mesh) {
   return result;
 }
 
+void write_case(const char* prefix, std::size_t row, const TriangleMesh& mesh, const std::vector<Vec3>& sites) {
+  const std::string stem = std::string(prefix) + std::to_string(row);
+  std::ofstream facets(stem + ".off"), points(stem + ".xyz");
+  facets << std::setprecision(17) << "OFF\n" << mesh.positions.size() << ' ' << mesh.triangles.size() << " 0\n";
+  for (const Vec3& p : mesh.positions) facets << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+  for (const auto& t : mesh.triangles) facets << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+  points << std::setprecision(17);
+  for (const Vec3& p : sites) points << p[0] << ' ' << p[1] << ' ' << p[2] << '\n';
+}
+
 }  // namespace
 
-int main() {
+/// bench_voronoi [PREFIX]: with a prefix, facets and sites of the near cases go to PREFIX<row>.off and .xyz as well,
+/// for other programs to be measured beside.
+int main(int argc, char** argv) {
   omp_set_num_threads(1);
   std::printf("{\"bench\": \"voronoi\", \"threads\": 1, \"rows\": [\n");
+  std::size_t row = 0;
   for (int n : {33, 91, 304}) {
     const TriangleMesh target = bumpy_sphere(n, 0.1);
-    for (std::size_t num_sites : {1000, 10000, 100000}) report("near", target, sites_near(target, num_sites));
+    for (std::size_t num_sites : {1000, 10000, 100000}) {
+      const std::vector<Vec3> sites = sites_near(target, num_sites);
+      if (argc > 1) write_case(argv[1], row++, target, sites);
+      report("near", target, sites);
+    }
   }
   const TriangleMesh target = bumpy_sphere(33, 0.1);
   for (int n : {16, 32}) {

@@ -16,6 +16,11 @@ struct Chains {
   std::vector<Index> head, next;
 };
 
+/// Equality of sorted corners, in registers.
+bool same_corners(const std::array<Index, 4>& a, const std::array<Index, 4>& b) {
+  return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2]) | (a[3] ^ b[3])) == 0;
+}
+
 /// Ascending, with kNoIndex last.
 std::array<Index, 4> sorted_corners(std::array<Index, 4> corners, int size) {
   const auto order = [&](int i, int j) {
@@ -79,7 +84,7 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
       for (int j = 0; j < size; ++j) corners[j] = cell[topology.faces[i][j]];
       const std::array<Index, 4> key = sorted_corners(corners, size);
       Index f = face_chains.head[key[0]];
-      while (f != kNoIndex && face_keys[f] != key) f = face_chains.next[f];
+      while (f != kNoIndex && !same_corners(face_keys[f], key)) f = face_chains.next[f];
       if (f == kNoIndex) {
         f = static_cast<Index>(face_cells_.size());
         face_vertices_.push_back(corners);

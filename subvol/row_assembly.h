@@ -86,7 +86,7 @@ void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 /// not depend on the thread count.
 template <class Fill>
 SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill) {
-  constexpr std::size_t kChunkRows = 1024, kWaveChunks = 8;
+  constexpr std::size_t kChunkRows = 256, kWaveChunks = 8;
   constexpr std::size_t kExpectedRowSize = 16;  // what is reserved and not used costs address space only
   struct Chunk {
     std::vector<Index> columns;
