@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The verbs under `template` that make a mesh by hand: grid, carve, extrude, pillow, collapse, merge, split.
+// The verbs under `template` that make a mesh by hand: grid, carve, extrude, pillow, refine, collapse, merge,
+// split.
 
 #include "cli/exit_status.h"
 #include "cli/loading.h"
@@ -12,6 +13,7 @@
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
 #include "subvol/pillow.h"
+#include "subvol/refine.h"
 #include "subvol/sheet.h"
 #include "subvol/surface_io.h"
 #include "subvol/vertex_merge.h"
@@ -34,7 +36,7 @@ struct EditArguments : TemplateRun {
   std::vector<Index> cells, vertices;
   double size = 0, margin = 5, share = 0.5, thickness = 0, growth = 1, tolerance = 1e-6;
   int layers = 1, parts = 2;
-  bool invert = false;
+  bool invert = false, thin = false;
   std::string what;
 };
 
@@ -64,19 +66,30 @@ VolumeMesh make_grid(EditArguments& arguments) {
                         : box_grid(low, high, {arguments.counts[0], arguments.counts[1], arguments.counts[2]}));
 }
 
+/// The cells that --inside, --box, --list or --thin name: one of them.
+std::vector<char> chosen_cells(EditArguments& arguments, const VolumeMesh& mesh, const std::string& choices) {
+  const int given = !arguments.inside.empty() + !arguments.box.empty() + !arguments.cells.empty() + arguments.thin;
+  if (given != 1) throw UsageError("template " + choices);
+  if (arguments.thin) return thin_cells(mesh);
+  if (!arguments.inside.empty())
+    return cells_inside(mesh, load_target(arguments.inside, arguments.warnings), arguments.share);
+  return arguments.box.empty() ? cells_listed(mesh, arguments.cells)
+                               : cells_in_box(mesh, low_corner(arguments.box), high_corner(arguments.box));
+}
+
 VolumeMesh make_carved(EditArguments& arguments) {
   const VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
-  const int given = !arguments.inside.empty() + !arguments.box.empty() + !arguments.cells.empty();
-  if (given != 1) throw UsageError("template carve: give one of --inside, --box and --list");
-  std::vector<char> chosen;
-  if (!arguments.inside.empty()) {
-    chosen = cells_inside(mesh, load_target(arguments.inside, arguments.warnings), arguments.share);
-  } else if (!arguments.box.empty()) {
-    chosen = cells_in_box(mesh, low_corner(arguments.box), high_corner(arguments.box));
-  } else {
-    chosen = cells_listed(mesh, arguments.cells);
-  }
+  const std::vector<char> chosen = chosen_cells(arguments, mesh, "carve: give one of --inside, --box and --list");
   return carve(mesh, [&](std::size_t c) { return (chosen[c] != 0) != arguments.invert; });
+}
+
+VolumeMesh make_refined(EditArguments& arguments) {
+  const VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
+  const std::vector<char> chosen =
+      chosen_cells(arguments, mesh, "refine: give one of --inside, --box, --list and --thin");
+  if (std::find(chosen.begin(), chosen.end(), 1) == chosen.end())
+    arguments.warnings.push_back("no cell is chosen: the mesh stays as it is");
+  return refine_at(mesh, vertices_of(mesh, chosen));
 }
 
 VolumeMesh make_extruded(EditArguments& arguments) {
@@ -173,16 +186,31 @@ void add_grid(CLI::App& group, Action& action) {
       ->check(number_in(0.0, 1000.0))->type_name("PERCENT")->capture_default_str();
 }
 
+/// --inside with --share, --box and --list.
+void add_choice(CLI::App& verb, EditArguments& arguments) {
+  verb.add_option("--inside", arguments.inside, "Cells that lie in this surface, by winding number")
+      ->type_name("SURFACE");
+  verb.add_option("--share", arguments.share, "By at least this share of their volume")
+      ->check(number_in(1e-6, 1.0))->type_name("SHARE")->capture_default_str();
+  add_box(verb, arguments, "Cells whose centre lies in a box");
+  add_cell_list(verb, arguments, "These cells, numbered from 0");
+}
+
 void add_carve(CLI::App& group, Action& action) {
   const auto a = std::make_shared<EditArguments>();
   CLI::App* verb = add_edit(group, action, a, "carve", "Keep some cells", make_carved);
   add_mesh(*verb, *a);
-  verb->add_option("--inside", a->inside, "Cells that lie in this surface, by winding number")->type_name("SURFACE");
-  verb->add_option("--share", a->share, "By at least this share of their volume")
-      ->check(number_in(1e-6, 1.0))->type_name("SHARE")->capture_default_str();
-  add_box(*verb, *a, "Cells whose centre lies in a box");
-  add_cell_list(*verb, *a, "These cells, numbered from 0");
+  add_choice(*verb, *a);
   verb->add_flag("--invert", a->invert, "Keep the others instead");
+}
+
+void add_refine(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb = add_edit(group, action, a, "refine", "Cut some hexes in 27, and those around so that they fit",
+                            make_refined);
+  add_mesh(*verb, *a);
+  add_choice(*verb, *a);
+  verb->add_flag("--thin", a->thin, "Cells that are all there is between two sides of the mesh");
 }
 
 void add_extrude(CLI::App& group, Action& action) {
@@ -263,6 +291,7 @@ void add_template_edits(CLI::App& group, Action& action) {
   add_carve(group, action);
   add_extrude(group, action);
   add_pillow(group, action);
+  add_refine(group, action);
   add_collapse(group, action);
   add_merge(group, action);
   add_split(group, action);

@@ -11,6 +11,7 @@
 #include "subvol/vertex_merge.h"
 #include "subvol/voxel_grid.h"
 #include "subvol/winding_number.h"
+#include "tests/mesh_checks.h"
 #include "tests/sample_meshes.h"
 #include "tests/surface_fixtures.h"
 
@@ -20,31 +21,11 @@
 #include <set>
 
 using namespace subvol;
+using test::check_mesh_is;
+using test::euler_number;
+using test::volume_of;
 
 namespace {
-
-/// Volume inside the boundary, cut into triangles.
-double volume_of(const VolumeMesh& mesh) {
-  const TriangleMesh surface = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
-  double sum = 0;
-  for (const auto& t : surface.triangles)
-    sum += surface.positions[t[0]].dot(surface.positions[t[1]].cross(surface.positions[t[2]])) / 6;
-  return sum;
-}
-
-long euler_number(const VolumeMesh& mesh) {
-  const MeshTopology topology(mesh);
-  std::set<Index> used(mesh.cell_vertices.begin(), mesh.cell_vertices.end());
-  return static_cast<long>(used.size()) - static_cast<long>(topology.num_edges()) +
-         static_cast<long>(topology.num_faces()) - static_cast<long>(mesh.num_cells());
-}
-
-/// Sound, with the Euler number and volume given.
-void check_mesh_is(const VolumeMesh& mesh, long euler, double volume) {
-  for (const MeshDefect& defect : validate(mesh)) FAIL_CHECK(defect.message);
-  CHECK(euler_number(mesh) == euler);
-  CHECK(volume_of(mesh) == Approx(volume).epsilon(1e-12));
-}
 
 Index vertex_at(const VolumeMesh& mesh, const Vec3& place) {
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
