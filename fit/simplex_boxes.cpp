@@ -33,43 +33,46 @@ SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
 void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
   modes_ = modes;
   coefficients_ = coefficients;
-  functions_.clear();
-  lasting_.setZero();
-  for (std::size_t a = 0; a < modes.size(); ++a) {
-    const SimplexModels::Function& f = simplex_.function(modes[a]);
-    functions_.push_back(&f);
-    const bool prism = kind_ == CellKind::prism;
-    const double across = f.gradient_error * (prism ? line_.bounds()[modes[a].k] : 1);
-    const double along = prism ? f.error * line_.slope_bounds()[modes[a].k] : across;
-    lasting_ += coefficients[a].cwiseAbs() * Eigen::RowVector3d(across, across, along);
-  }
+  slots_.clear();
+  for (const LocalMode& mode : modes) slots_.push_back(simplex_.slot(mode));
 }
 
 bool SimplexBoxes::is_stuck(const Box& box) {
+  if (box.halvings < simplex_.most_halvings() || box.lasting.maxCoeff() == 0) return false;
   const Mat3 mean = matrices(box).mean();
   mean_.resize(kWide);
   for (int row = 0; row < 3; ++row)
     for (int d = 0; d < 3; ++d) std::fill_n(mean_.entries(row, d), kWide, mean(row, d));
-  return lasting_.maxCoeff() > 0 && mean.determinant() > 0 &&
-         determinant_bound(mean_, lasting_ * sides(box).cwiseAbs()) == 0;
+  return mean.determinant() > 0 && determinant_bound(mean_, box.lasting * sides(box).cwiseAbs()) == 0;
 }
 
 SimplexBoxes::Box SimplexBoxes::root() const {
-  const std::size_t size = simplex_.index().size();
   Box box;
   const auto vertices = canonical_vertices(kind_);
   std::copy_n(vertices.begin(), simplex_.index().dimension() + 1, box.vertices.begin());
+  take_models(box);
+  return box;
+}
+
+void SimplexBoxes::take_models(Box& box) const {
+  const bool prism = kind_ == CellKind::prism;
+  const std::size_t size = simplex_.index().size();
+  box.models = simplex_.part(box.part, box.vertices);
+  box.lasting.setZero();
   box.control.assign(3 * num_layers_ * size, 0);
   for (std::size_t a = 0; a < modes_.size(); ++a) {
-    const double* b = functions_[a]->coefficients.data();
-    const std::size_t layer = kind_ == CellKind::prism ? modes_[a].k : 0;
+    const SimplexModels::Function& f = (*box.models)[slots_[a]];
+    const std::size_t layer = prism ? modes_[a].k : 0;
+    const double across = f.gradient_error * (prism ? line_.bounds()[layer] : 1);
+    const double along = prism ? f.error * line_.slope_bounds()[layer] : across;
+    box.lasting += coefficients_[a].cwiseAbs() * Eigen::RowVector3d(across, across, along);
+    const double* b = f.coefficients.data();
     for (std::size_t row = 0; row < 3; ++row) {
       double* out = box.control.data() + (row * num_layers_ + layer) * size;
       const double x = coefficients_[a][row];
       for (std::size_t n = 0; n < size; ++n) out[n] += x * b[n];
     }
   }
-  return box;
 }
 
 std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box) const {
@@ -92,7 +95,20 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box) const {
     return result;
   }
   result[0].vertices[b] = result[1].vertices[a] = 0.5 * (box.vertices[a] + box.vertices[b]);
+  const int halvings = box.halvings + 1;
+  const bool modelled = halvings <= simplex_.most_halvings() && halvings % simplex_.halvings_between() == 0;
+  for (std::uint32_t half = 0; half < 2; ++half) {
+    result[half].halvings = halvings;
+    if (halvings <= simplex_.most_halvings()) result[half].part = 2 * box.part + half;
+    if (modelled) take_models(result[half]);
+  }
+  if (!modelled) halve_control(box, a, b, result);
+  return result;
+}
+
+void SimplexBoxes::halve_control(const Box& box, int a, int b, std::array<Box, 2>& halves) const {
   // Where the other exponents are the same, the coefficients are those of a polynomial along the side from a to b.
+  const SimplexIndex& index = simplex_.index();
   std::array<double, 32> line;
   std::array<int, 32> at;
   const std::size_t size = index.size();
@@ -107,8 +123,8 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box) const {
     }
     for (std::size_t layer = 0; layer < 3u * num_layers_; ++layer) {
       const double* in = box.control.data() + layer * size;
-      double* low = result[0].control.data() + layer * size;
-      double* high = result[1].control.data() + layer * size;
+      double* low = halves[0].control.data() + layer * size;
+      double* high = halves[1].control.data() + layer * size;
       for (int o = 0; o <= degree; ++o) line[o] = in[at[o]];
       for (int step = 0; step <= degree; ++step) {
         low[at[step]] = line[0];
@@ -117,7 +133,6 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box) const {
       }
     }
   }
-  return result;
 }
 
 Vec3 SimplexBoxes::corner_point(const Box& box, int corner) const {
@@ -196,7 +211,7 @@ Mat3 SimplexBoxes::remainder(const Box& box) const {
   Mat3 modelling = Mat3::Zero();
   Vec3 size = Vec3::Zero();
   for (std::size_t a = 0; a < modes_.size(); ++a) {
-    const SimplexModels::Function& f = *functions_[a];
+    const SimplexModels::Function& f = (*box.models)[slots_[a]];
     const Vec3 x = coefficients_[a].cwiseAbs();
     if (!prism) {
       modelling += f.gradient_error * x * Eigen::RowVector3d::Ones();

@@ -90,8 +90,11 @@ HighOrderMesh scaled_modes(const HighOrderMesh& mesh, double factor) {
   return result;
 }
 
-/// Whether models get better as parts get smaller, so that every cell but those at the border of validity is decided.
-bool is_decided(CellKind kind, Basis basis) { return kind == CellKind::hex || basis == Basis::legendre; }
+/// Whether models get as good as one likes, so that every cell but those at the border of validity is decided. Those of
+/// high fourier orders on simplices are made for a few halvings only.
+bool is_decided(CellKind kind, Basis basis, int order) {
+  return kind == CellKind::hex || basis == Basis::legendre || order <= 4;
+}
 
 }  // namespace
 
@@ -137,10 +140,10 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
           if (result.validity == CellValidity::invalid) CHECK(twin.determinant(result.witness) < 0);
           ++(result.validity == CellValidity::valid ? valid
              : result.validity == CellValidity::invalid ? invalid : undecided);
-          if (is_decided(kind, basis)) CHECK(result.validity != CellValidity::undecided);
+          if (is_decided(kind, basis, order)) CHECK(result.validity != CellValidity::undecided);
         }
   CAPTURE(valid, invalid, undecided);
-  CHECK(undecided < (valid + invalid) / 20);
+  CHECK(undecided < (valid + invalid) / 100);
   CHECK(valid > (valid + invalid) / 4);
   CHECK(invalid > (valid + invalid) / 4);
 }
@@ -152,7 +155,7 @@ TEST_CASE("cells that come close to inversion are decided on both sides", "[high
     for (const Basis basis : kBothBases)
       for (const auto& [order, repeats] : {std::pair{2, 4}, std::pair{4, 3}, std::pair{8, 1}, std::pair{12, 1}})
         for (int repeat = 0; repeat < repeats; ++repeat) {
-          if (!is_decided(kind, basis) || (kind != CellKind::hex && order > 4)) continue;
+          if (kind != CellKind::hex && order > 4) continue;
           const HighOrderMesh mesh = curved(single_cell(kind), basis, order, 0.3, source);
           const auto certify_scaled = [&](double t) {
             return HighOrderCertifier(mesh.space, {.max_depth = 12, .max_boxes = 20000})
