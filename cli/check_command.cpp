@@ -60,7 +60,7 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Ch
 
 int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   checked_outputs(arguments.run, false);
-  apply_threads(arguments.run);
+  apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::optional<TriangleMesh> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
@@ -97,9 +97,7 @@ void add_check_command(CLI::App& app, Action& action) {
   verb->add_option("--report", arguments->run.report, "Write the JSON to a file as well")->type_name("FILE.json");
   verb->add_flag("--force", arguments->run.force, "Replace a report that exists");
   verb->add_flag("--quiet", arguments->run.quiet, "Say nothing but errors; the exit status tells");
-  verb->add_option("--threads", arguments->run.threads, "Number of threads (default: all cores)")
-      ->check(CLI::Range(1, 1024))
-      ->type_name("N");
+  add_resource_options(*verb, arguments->run);
   verb->footer(R"(Exit status 0 if the mesh is valid (every cell proved positive, no defects), 1 if it is not.
 
 Example:

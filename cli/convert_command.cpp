@@ -53,10 +53,10 @@ void convert_surface(const ConvertArguments& arguments, const std::vector<Output
 
 int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = checked_outputs(arguments.run, false);
-  apply_threads(arguments.run);
+  apply_resources(arguments.run);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.input;
-  writing.options = options_in_force(verb);
+  writing.options = options_of_result(verb);
   std::vector<std::string> warnings;
   if (is_high_order_file(arguments.input)) {
     convert_high_order(arguments, outputs, writing);

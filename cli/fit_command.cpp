@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/automatic_template.h"
 #include "cli/check_report.h"
+#include "cli/checkpointing.h"
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/high_order_fit_run.h"
@@ -61,6 +62,7 @@ class FitRun : public LongRun {
   TriangleMesh target_;
   VolumeMesh template_mesh_;
   std::optional<TemplateChoice> choice_;  ///< where the template was made
+  std::optional<Checkpointing> checkpointing_;
   FitResult result_;
   MeshCheck mesh_check_;
   TessellatedSurface limit_;
@@ -87,19 +89,29 @@ void FitRun::fit() {
   options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
   options.correspondence = correspondence(arguments_);
   options.solver = solver_kind(arguments_);
+  checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)},
+                                                    {"template", fingerprint(template_mesh_)}}));
+  options.log = checkpointing_->log();
+  options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   result_ = followed([&](auto progress) {
     options.progress = progress;
     return fit_subdivision_volume(target_, template_mesh_, options);
   });
+  checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
 }
 
 void FitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
-  writing.options = options_in_force(verb_);
+  writing.options = options_of_result(verb_);
+  const auto write = [&](bool with_limit) {
+    for (const Output& output : outputs_)
+      if (needs_limit(output) == with_limit) write_output(output, result_.cage, result_.mesh, &limit_, writing);
+  };
+  write(false);  // where little memory is left the limit surface may be what does not fit
   limit_ = tessellated_limit(result_.cage, writing);
-  for (const Output& output : outputs_) write_output(output, result_.cage, result_.mesh, &limit_, writing);
+  write(true);
 }
 
 // What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
@@ -132,6 +144,7 @@ Json FitRun::report() const {
   json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
   if (report.creases) json["creases"] = creases_json(*report.creases);
   json["cage"] = describe("", result_.cage);
+  checkpointing_->describe(json);
   json["audit"] = audit_json(audit(template_mesh_));
   return json;
 }
@@ -217,6 +230,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.correspondence = correspondence(arguments);
   fit.max_iterations = arguments.fit.max_iterations;
   fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
   return result;
 }
 
@@ -283,6 +297,7 @@ void add_fit_command(CLI::App& app, Action& action) {
                          "; cage:FILE for the control cage; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
+  add_checkpoint_options(*verb, arguments->run);
   verb->footer(R"(Example:
   subvol fit bone.off --template bone.mesh --levels 3 -o bone.glb -o cage:bone_cage.usda -o bone_fine.mesh
 

@@ -2,6 +2,7 @@
 #include "cli/high_order_fit_run.h"
 
 #include "cli/check_report.h"
+#include "cli/checkpointing.h"
 #include "cli/exit_status.h"
 #include "cli/interrupt.h"
 #include "cli/loading.h"
@@ -36,12 +37,14 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
 }
 
 /// Makes the template valid where it is not. It is what curved cells start from, so nothing is done where this fails.
-void untangle(const HighOrderFitArguments& arguments, VolumeMesh& template_mesh, std::vector<std::string>& warnings) {
+void untangle(const HighOrderFitArguments& arguments, StageLog* log, VolumeMesh& template_mesh,
+              std::vector<std::string>& warnings) {
   const std::size_t before = certify(template_mesh).not_certified.size();
   if (before == 0) return;
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   OptimizeOptions options;
   options.time_limit_seconds = arguments.fit.time_limit_seconds;
+  options.log = log;
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
     return !interrupted();
@@ -58,10 +61,11 @@ void untangle(const HighOrderFitArguments& arguments, VolumeMesh& template_mesh,
   template_mesh = std::move(result.mesh);
 }
 
-HighOrderFitResult fit(const HighOrderFitArguments& arguments, const TriangleMesh& target,
+HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, const TriangleMesh& target,
                        const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
+  options.log = log;
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
     return !interrupted();
@@ -104,7 +108,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     throw UsageError(std::string(arguments.command) + ": nothing to write; give -o FILE or --report FILE");
   const Clock::time_point start = Clock::now();
   const std::vector<Output> outputs = checked_outputs(arguments.run, false);
-  apply_threads(arguments.run);
+  apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::size_t told = 0;
   const auto tell_warnings = [&] {
@@ -120,19 +124,22 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (loaded.choice && !arguments.run.quiet) std::cerr << to_text(*loaded.choice);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   refuse_impossible(outputs, arguments, template_mesh);
-  if (arguments.untangles) untangle(arguments, template_mesh, warnings);
+  Checkpointing checkpointing(
+      arguments.run, run_identity(verb, {{"target", fingerprint(target)}, {"template", fingerprint(template_mesh)}}));
+  if (arguments.untangles) untangle(arguments, checkpointing.log(), template_mesh, warnings);
 
   const Clock::time_point fit_start = Clock::now();
-  HighOrderFitResult result = fit(arguments, target, template_mesh);
+  HighOrderFitResult result = fit(arguments, checkpointing.log(), target, template_mesh);
   const double fit_seconds = seconds_since(fit_start);
   const FitReport& report = result.report;
+  checkpointing.finish(warnings);
   warnings.insert(warnings.end(), report.warnings.begin(), report.warnings.end());
   tell_warnings();
 
   const Clock::time_point write_start = Clock::now();
   WritingOptions writing = arguments.writing;
   writing.source = arguments.target;
-  writing.options = options_in_force(verb);
+  writing.options = options_of_result(verb);
   const HighOrderFile file{std::move(result.mesh), template_mesh.references};
   for (const Output& output : outputs) write_output(output, file, writing);
   const double write_seconds = seconds_since(write_start);
@@ -144,6 +151,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     json["input"] = {{"target", describe(arguments.target, target)},
                      {"template", describe(arguments.template_mesh.path, template_mesh)}};
     if (loaded.choice) json["template"] = choice_json(*loaded.choice);
+    checkpointing.describe(json);
     json["warnings"] = warnings;
     json["seconds"] = {{"template", template_seconds},
                        {"fit", fit_seconds},

@@ -17,6 +17,7 @@ void catch_interrupt() {
   action.sa_handler = raise_flag;
   action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
 }
 
 bool interrupted() { return flag != 0; }

@@ -3,9 +3,9 @@
 
 namespace subvol::cli {
 
-/// Makes the first Ctrl-C set a flag; the second ends the program as usual.
+/// Makes the first Ctrl-C, or the first SIGTERM, set a flag; the second ends the program as usual.
 void catch_interrupt();
-/// Whether Ctrl-C was pressed.
+/// Whether one of them has come.
 bool interrupted();
 
 }  // namespace subvol::cli

@@ -12,7 +12,7 @@ void LongRun::prepare(bool allow_cage) {
   if (run_.outputs.empty() && run_.report.empty())
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
   outputs_ = checked_outputs(run_, allow_cage);
-  apply_threads(run_);
+  apply_resources(run_);
 }
 
 void LongRun::tell_warnings() {

@@ -6,9 +6,15 @@
 #include "subvol/error.h"
 #include "subvol/version.h"
 
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <new>
+
+#include <unistd.h>
 
 namespace subvol::cli {
 namespace {
@@ -26,6 +32,8 @@ Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not con
              130 interrupted (best result written).
 "subvol VERB --help" tells more.)";
 
+constexpr const char* kOutOfMemory = "out of memory";
+
 int complain(const char* what, int status) {
   std::cerr << "subvol: " << what << '\n';
   return status;
@@ -40,6 +48,22 @@ void require_known_verb(const CLI::App& app, int argc, char** argv) {
     verbs += ' ' + verb->get_name();
   }
   throw UsageError(std::string("there is no verb '") + argv[1] + "'; there are:" + verbs);
+}
+
+/// An exception that leaves a parallel loop ends the program here: in order, and with nothing half-written.
+[[noreturn]] void end_in_order() {
+  const char* what = "an error in a parallel loop";
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    what = kOutOfMemory;
+  } catch (...) {
+  }
+  // Nothing is allocated any more, nothing unwound: other threads still run.
+  (void)!write(STDERR_FILENO, "subvol: ", 8);
+  (void)!write(STDERR_FILENO, what, std::strlen(what));
+  (void)!write(STDERR_FILENO, "\n", 1);
+  std::_Exit(kFailed);
 }
 
 int run(int argc, char** argv) {
@@ -77,6 +101,8 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace subvol::cli;
+  std::set_terminate(end_in_order);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   try {
     return run(argc, argv);
   } catch (const UsageError& error) {
@@ -84,7 +110,7 @@ int main(int argc, char** argv) {
   } catch (const subvol::InputError& error) {
     return complain(error.what(), kRejected);
   } catch (const std::bad_alloc&) {
-    return complain("out of memory", kFailed);
+    return complain(kOutOfMemory, kFailed);
   } catch (const std::exception& error) {
     return complain(error.what(), kFailed);
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/check_report.h"
+#include "cli/checkpointing.h"
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/high_order_fit_run.h"
@@ -50,6 +51,7 @@ class OptimizeRun : public LongRun {
   std::optional<TriangleMesh> target_;
   TriangleMesh surface_;  ///< what the boundary is compared with: the target, or the boundary as it was
   QualityReport before_;
+  std::optional<Checkpointing> checkpointing_;
   OptimizeResult result_;
   MeshCheck mesh_check_;
 };
@@ -65,17 +67,22 @@ void OptimizeRun::load() {
 void OptimizeRun::optimize() {
   OptimizeOptions options = arguments_.optimize;
   options.sizes = arguments_.sizes == "uniform" ? CellSizes::uniform : CellSizes::local;
+  std::vector<std::pair<std::string, std::string>> inputs{{"mesh", fingerprint(mesh_)}};
+  if (target_) inputs.emplace_back("target", fingerprint(*target_));
+  checkpointing_.emplace(run_, run_identity(verb_, inputs));
+  options.log = checkpointing_->log();
   result_ = followed([&](auto progress) {
     options.progress = progress;
     return optimize_mesh(mesh_, target_ ? &*target_ : nullptr, options);
   });
+  checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
 }
 
 void OptimizeRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.mesh;
-  writing.options = options_in_force(verb_);
+  writing.options = options_of_result(verb_);
   for (const Output& output : outputs_) write_output(output, result_.mesh, writing);
 }
 
@@ -95,6 +102,7 @@ Json OptimizeRun::report() const {
   if (target_) json["input"]["target"] = describe(arguments_.target, *target_);
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
+  checkpointing_->describe(json);
   json["not_certified_cells"] =
       mesh_check_.quality ? mesh_check_.quality->certificate.not_certified : std::vector<Index>{};
   return json;
@@ -138,6 +146,7 @@ HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, cons
   fit.lambda_close = verb.count("--lambda") > 0 ? arguments.optimize.lambda : kCurvingLambda;
   fit.max_iterations = arguments.optimize.max_iterations;
   fit.time_limit_seconds = arguments.optimize.time_limit_seconds;
+  fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
   return result;
 }
 
@@ -215,6 +224,7 @@ void add_optimize_command(CLI::App& app, Action& action) {
                      "The mesh, or its surface, by extension: " + output_formats() + "; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
+  add_checkpoint_options(*verb, arguments->run);
   verb->footer(R"(Examples:
   subvol optimize tangled.mesh -o valid.mesh --report valid.json
   subvol optimize tets.mesh --order 3 --target part.off -o curved.vtu

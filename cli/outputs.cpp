@@ -77,18 +77,21 @@ std::string output_formats() {
 std::vector<Output> checked_outputs(const RunOptions& options, bool allow_cage) {
   std::vector<Output> outputs;
   std::set<fs::path> seen;
-  const auto claim = [&](const fs::path& path) {
+  const auto claim = [&](const fs::path& path, bool force) {
     if (!seen.insert(fs::absolute(path).lexically_normal()).second) {
       throw UsageError(path.string() + ": named twice as an output");
     }
-    require_free(path, options.force);
+    require_free(path, force);
   };
   for (const std::string& text : options.outputs) {
     outputs.push_back(parse_output(text));
     if (outputs.back().cage && !allow_cage) throw UsageError("-o " + text + ": there is no cage here");
-    claim(outputs.back().path);
+    claim(outputs.back().path, options.force);
   }
-  if (!options.report.empty()) claim(options.report);
+  if (!options.report.empty()) claim(options.report, options.force);
+  // Who goes on from a checkpoint may go on writing it.
+  if (!options.checkpoint.empty())
+    claim(options.checkpoint, options.force || options.checkpoint == options.resume);
   return outputs;
 }
 

@@ -20,7 +20,7 @@ struct Output {
 /// Formats that can be written, for help and messages.
 std::string output_formats();
 
-/// Reads the -o options and checks, before any work, that each could be written.
+/// Reads the -o options and checks, before any work, that each, the report and the checkpoint could be written.
 ///
 /// UsageError: an unknown extension, a file named twice, `cage:` where there is none, an existing file without --force.
 /// IoError: a folder that is not there or cannot be written to.

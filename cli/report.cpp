@@ -7,8 +7,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include <sys/resource.h>
-
 namespace subvol::cli {
 namespace {
 
@@ -84,12 +82,6 @@ Json seconds_json(const FitReport& report) {
   Json seconds = Json::object();
   for (const auto& [part, value] : report.seconds) seconds[part] = value;
   return seconds;
-}
-
-std::size_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
 }
 
 std::string json_text(const Json& report) {

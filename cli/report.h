@@ -3,6 +3,7 @@
 
 #include "cli/run_options.h"
 #include "fit/fit_report.h"
+#include "subvol/process_memory.h"
 
 #include <filesystem>
 #include <string>
@@ -17,9 +18,6 @@ Json fit_json(const FitReport& report);
 
 /// Seconds by part.
 Json seconds_json(const FitReport& report);
-
-/// Largest amount of memory this process has held.
-std::size_t peak_memory_bytes();
 
 /// JSON text of a report, with the command line if it is known. std::runtime_error, naming the entry, where a number is
 /// not finite: JSON has no word for it.

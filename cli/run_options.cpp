@@ -2,7 +2,9 @@
 #include "cli/run_options.h"
 
 #include <omp.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <charconv>
 #include <sstream>
 
@@ -15,15 +17,26 @@ Json typed(const std::string& text) {
   return value.is_number() || value.is_boolean() ? value : Json(text);
 }
 
+constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimit = std::size_t{1} << 50;
+
 }  // namespace
+
+void add_resource_options(CLI::App& verb, RunOptions& options) {
+  verb.add_option("--threads", options.threads, "Number of threads (default: all cores)")
+      ->check(CLI::Range(1, 1024))
+      ->type_name("N");
+  verb.add_option("--memory-limit", options.memory_limit,
+                  "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best result so far")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(kLeastMemoryLimit, kMostMemoryLimit))
+      ->type_name("SIZE");
+}
 
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help) {
   verb.add_option("-o,--output", options.outputs, output_help)->type_name("FILE")->allow_extra_args(false);
   verb.add_flag("--force", options.force, "Replace outputs that exist");
   verb.add_flag("--quiet", options.quiet, "Say nothing but errors");
-  verb.add_option("--threads", options.threads, "Number of threads (default: all cores)")
-      ->check(CLI::Range(1, 1024))
-      ->type_name("N");
+  add_resource_options(verb, options);
 }
 
 void add_long_run_options(CLI::App& verb, RunOptions& options) {
@@ -36,8 +49,13 @@ void add_long_run_options(CLI::App& verb, RunOptions& options) {
   verb.add_option("--seed", options.seed, "Kept in the report; nothing here draws random numbers")->type_name("N");
 }
 
-void apply_threads(const RunOptions& options) {
+void apply_resources(const RunOptions& options) {
   if (options.threads > 0) omp_set_num_threads(options.threads);
+  if (options.memory_limit == 0) return;
+  rlimit limit{};
+  getrlimit(RLIMIT_DATA, &limit);
+  limit.rlim_cur = std::min<rlim_t>(options.memory_limit, limit.rlim_max);
+  setrlimit(RLIMIT_DATA, &limit);
 }
 
 CLI::Validator number_in(double low, double high) {
@@ -68,6 +86,14 @@ Json options_in_force(const CLI::App& verb) {
     }
   }
   return all;
+}
+
+Json options_of_result(const CLI::App& verb) {
+  Json options = options_in_force(verb);
+  for (const char* name : {"force", "quiet", "threads", "memory-limit", "time-limit", "report", "progress", "config",
+                           "checkpoint", "every", "resume"})
+    options.erase(name);
+  return options;
 }
 
 }  // namespace subvol::cli

@@ -19,19 +19,28 @@ struct RunOptions {
   std::string report;                ///< empty: none
   bool force = false, quiet = false;
   int threads = 0;                   ///< 0: all cores
+  std::size_t memory_limit = 0;      ///< bytes; 0: none
   unsigned seed = 0;
   std::string progress;              ///< bar, plain, json, none; empty: by what stderr is
+  std::string checkpoint, resume;    ///< empty: none
+  double every_seconds = 60;         ///< between two writes of the checkpoint, at least
 };
 
-/// -o, --force, --quiet, --threads.
+/// --threads, --memory-limit.
+void add_resource_options(CLI::App& verb, RunOptions& options);
+/// -o, --force, --quiet, and the above.
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help);
 /// --report, --progress, --seed: for what runs long.
 void add_long_run_options(CLI::App& verb, RunOptions& options);
-/// --threads alone sets OpenMP's number of threads, here and nowhere else.
-void apply_threads(const RunOptions& options);
+/// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own limit on
+/// data: what goes beyond it fails to be allocated (`std::bad_alloc`).
+void apply_resources(const RunOptions& options);
 /// Accepts numbers from low to high, and nothing else (NaN passes CLI::Range).
 CLI::Validator number_in(double low, double high);
 /// The options of a verb that have a value, by long name: given or default.
 Json options_in_force(const CLI::App& verb);
+/// Those of them that bear on what is written: not how a run is told, limited, or kept. What files other than reports say
+/// of a run, so that they are the same bytes for any number of threads, and for a run that was resumed.
+Json options_of_result(const CLI::App& verb);
 
 }  // namespace subvol::cli

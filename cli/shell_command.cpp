@@ -181,7 +181,7 @@ void ShellRun::curve() {
 void ShellRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.surface;
-  writing.options = options_in_force(verb_);
+  writing.options = options_of_result(verb_);
   for (const Output& output : outputs_)
     curved_ ? write_shell(output, result_, *curved_, writing) : write_shell(output, result_, writing);
 }

@@ -43,7 +43,7 @@ void require_numberable(const VolumeMesh& mesh, int levels) {
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
   const std::vector<Output> outputs = checked_outputs(arguments.run, true);
-  apply_threads(arguments.run);
+  apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings);
   require_numberable(cage, arguments.levels);
@@ -57,7 +57,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
 
   WritingOptions writing = arguments.writing;
   writing.source = arguments.mesh;
-  writing.options = options_in_force(verb);
+  writing.options = options_of_result(verb);
   TessellatedSurface limit;
   if (std::any_of(outputs.begin(), outputs.end(), needs_limit)) limit = tessellated_limit(cage, writing);
   for (const Output& output : outputs) write_output(output, cage, fine, &limit, writing);

@@ -24,14 +24,14 @@ std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& ver
   if (run.run.outputs.empty() && run.run.report.empty())
     throw UsageError("template " + verb.get_name() + ": nothing to write; give -o FILE or --report FILE");
   std::vector<Output> outputs = checked_outputs(run.run, false);
-  apply_threads(run.run);
+  apply_resources(run.run);
   return outputs;
 }
 
 int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs,
                    const VolumeMesh& mesh, const Json& details) {
   WritingOptions writing = run.writing;
-  writing.options = options_in_force(verb);
+  writing.options = options_of_result(verb);
   for (const Output& output : outputs) write_output(output, mesh, writing);
   const MeshCheck check = check_mesh(mesh);
   if (!run.run.report.empty()) {

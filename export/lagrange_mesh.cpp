@@ -144,7 +144,8 @@ void evaluate(const HighOrderMesh& mesh, const std::map<LatticeKey, Lattice>& la
   for (std::size_t c = 0; c < out.num_cells(); ++c)
     groups[{mesh.space.pattern(c), out.orders[c]}].push_back(static_cast<Index>(c));
   const std::size_t num_vertices = mesh.space.num_vertices();
-  for (const auto& [key, cells] : groups) {
+  for (const auto& [key, members] : groups) {
+    const std::vector<Index>& cells = members;  // Clang before 16 takes no structured binding into a parallel region
     const PatternTable table(mesh.space, key.first, lattices.at({mesh.space.pattern_kind(key.first), key.second}).points);
 #pragma omp parallel
     {

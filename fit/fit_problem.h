@@ -45,6 +45,9 @@ struct MinimizerOptions {
   int cg_max_iterations = 200;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
+  /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled with the
+  /// step before.
+  std::function<bool()> ended;
 };
 
 enum class MinimizerStop { converged, iteration_limit, cancelled, no_step };
@@ -54,6 +57,9 @@ struct MinimizerResult {
   std::string explanation;  ///< the test that fired, with its figure
   std::vector<IterationRecord> iterations;
 };
+
+/// Ends the result as cancelled where the caller wants an end within a step.
+bool has_ended(const MinimizerOptions& options, MinimizerResult& result);
 
 /// Keeps the record of a step and tells the caller; false, with the result's stop set, when they want to end here.
 bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result);

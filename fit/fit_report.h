@@ -25,6 +25,7 @@ enum class StopReason {
   tolerance_missed, ///< all stages done, but the distance asked for was not reached
   iteration_limit,
   time_limit,
+  memory_limit,     ///< the next level, or order, would take more memory than is allowed
   cancelled,        ///< the progress callback said so; the best state so far is returned
   stalled           ///< a level could not be started or no step was possible without inverting a cell
 };

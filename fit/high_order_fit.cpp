@@ -7,6 +7,7 @@
 #include "fit/fit_target.h"
 #include "fit/high_order_energy.h"
 #include "fit/high_order_schedule.h"
+#include "fit/memory_budget.h"
 #include "fit/option_checks.h"
 #include "fit/order_indicator.h"
 #include "fit/quadrature.h"
@@ -17,6 +18,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
+#include <stdexcept>
 #include <tuple>
 
 namespace subvol {
@@ -35,6 +38,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
   return options;
 }
@@ -54,6 +58,8 @@ class HighOrderFit {
  private:
   void look_over_template();
   int sample_intervals(int order) const;
+  bool has_room(const EntityOrders& orders);
+  bool end_for_memory(const std::string& why);
   void set_orders(const EntityOrders& orders);
   FitProblem problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const;
   bool run_stage(const Stage& stage);
@@ -84,6 +90,7 @@ class HighOrderFit {
   double lambda_ = 0;        ///< of the last stage
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
+  MemoryBudget memory_;
   StageRunner runner_;
 };
 
@@ -93,7 +100,8 @@ HighOrderFit::HighOrderFit(const TriangleMesh& target, const VolumeMesh& templat
       target_(target),
       template_(checked(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress}) {
+      memory_(options.memory_limit_bytes, kMemoryOfNode),
+      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
   template_.positions = mesh_.coefficients = target_.normalisation.to_unit(std::move(template_.positions));
 }
 
@@ -113,6 +121,19 @@ int HighOrderFit::sample_intervals(int order) const {
   const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), kMostIntervals);
   const int affordable = static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)));
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
+}
+
+/// Ends the fit as it stands. std::runtime_error where nothing has been fitted yet.
+bool HighOrderFit::end_for_memory(const std::string& why) {
+  if (report_.stages.empty()) throw std::runtime_error("out of memory: " + why);
+  report_.stop_reason = StopReason::memory_limit;
+  report_.explanation = why;
+  return false;
+}
+
+bool HighOrderFit::has_room(const EntityOrders& orders) {
+  const std::size_t nodes = mesh_.space.with_orders(orders).num_nodes();
+  return memory_.allows(nodes) || end_for_memory(memory_.refusal(formatted("a mesh of %zu nodes", nodes)));
 }
 
 void HighOrderFit::set_orders(const EntityOrders& orders) {
@@ -136,6 +157,7 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
 }
 
 bool HighOrderFit::run_stage(const Stage& stage) {
+  if (!report_.stages.empty() && !runner_.in_time(formatted("order %d", order_), report_)) return false;
   StageRecord record;
   const int least = std::ranges::min(mesh_.space.orders().cells);
   record.name = (try_ > 1 ? formatted("try %d, ", try_) : "") +
@@ -183,8 +205,10 @@ void HighOrderFit::begin_try(const HighOrderTry& attempt) {
 }
 
 bool HighOrderFit::run_order(Approach approach, int order) {
+  const EntityOrders orders = EntityOrders::uniform(mesh_.space.topology(), order);
+  if (!has_room(orders)) return false;
   if (order > schedule_.last_common_order()) take_own_boxes();
-  set_orders(EntityOrders::uniform(mesh_.space.topology(), order));
+  set_orders(orders);
   for (const Stage& stage : schedule_.stages(approach, order, options_.order))
     if (!run_stage(stage)) return false;
   return true;
@@ -227,9 +251,10 @@ bool HighOrderFit::run_higher_orders() {
   return lower_lambda();
 }
 
-/// Raises the orders of what gains most. False where that is not worth its nodes.
+/// Raises the orders of what gains most. False where that is not worth its nodes, or they have no room.
 bool HighOrderFit::raise_where_it_pays() {
   const EntityOrders next = next_orders(mesh_.space.orders(), options_.order);
+  if (!has_room(next)) return false;
   const HighOrderMesh raised = mesh_.with_orders(next);
   if (raised.space.num_nodes() == mesh_.space.num_nodes()) return false;
   const BoundarySamples samples = make_boundary_samples(raised.space, sample_intervals(raised.space.max_order()));
@@ -247,7 +272,7 @@ bool HighOrderFit::run_adaptive_orders() {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
   }
-  return lower_lambda();
+  return report_.stop_reason != StopReason::memory_limit && lower_lambda();
 }
 
 /// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the surface
@@ -283,7 +308,11 @@ void HighOrderFit::conclude() {
 HighOrderFitResult HighOrderFit::run() {
   look_over_template();
   const int first = std::min(schedule_.first_orders(options_.adaptive), options_.order);
-  if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders())) conclude();
+  try {
+    if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders())) conclude();
+  } catch (const std::bad_alloc&) {
+    end_for_memory(formatted("no memory was left at order %d", order_));
+  }
   report_.seconds = {{"total", runner_.seconds()}};
   const std::size_t num_vertices = mesh_.space.num_vertices();
   std::vector<Vec3>& x = mesh_.coefficients;

@@ -21,7 +21,9 @@ struct HighOrderFitOptions {
   Correspondence correspondence = Correspondence::closest;
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
+  double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  StageLog* log = nullptr;                       ///< takes the results of minimisations from here and keeps them here; null: no
 };
 
 struct HighOrderFitResult {

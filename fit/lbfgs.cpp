@@ -111,6 +111,7 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
     Value trial;
     bool accepted = false;
     for (int k = 0; k < kMaxTrials && !accepted; ++k) {
+      if (has_ended(options, result)) return result;
       for (std::size_t i = 0; i < x.size(); ++i) trial_x[i] = x[i] + t * d[i];
       trial = objective.evaluate(trial_x, trial_gradient);
       ++record.evaluations;

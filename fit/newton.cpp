@@ -80,7 +80,7 @@ class ReducedHessian {
   std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
 };
 
-/// Solves H d = -g approximately; returns the number of iterations.
+/// Solves H d = -g approximately, or not where the caller wants an end; returns the number of iterations.
 int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient, const MinimizerOptions& options,
                         std::vector<Vec3>& d) {
   const std::size_t n = gradient.size();
@@ -92,7 +92,7 @@ int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient,
   double rz = dot(r, z);
   const double stop = options.cg_tolerance * options.cg_tolerance * rz;
   int iteration = 0;
-  while (iteration < options.cg_max_iterations && rz > stop) {
+  while (iteration < options.cg_max_iterations && rz > stop && !(options.ended && options.ended())) {
     ++iteration;
     hessian.multiply(p, hp);
     const double php = dot(p, hp);
@@ -122,13 +122,23 @@ std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vec
   return result;
 }
 
+void cancel(MinimizerResult& result) {
+  result.stop = MinimizerStop::cancelled;
+  result.explanation = "stopped by the caller";
+}
+
 }  // namespace
+
+bool has_ended(const MinimizerOptions& options, MinimizerResult& result) {
+  if (!options.ended || !options.ended()) return false;
+  cancel(result);
+  return true;
+}
 
 bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result) {
   result.iterations.push_back(record);
   if (!options.progress || options.progress(record)) return true;
-  result.stop = MinimizerStop::cancelled;
-  result.explanation = "stopped by the caller";
+  cancel(result);
   return false;
 }
 
@@ -173,6 +183,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     for (int round = 0;; ++round) {
       ReducedHessian reduced(problem, inverse_diagonal);
       record.linear_iterations += conjugate_gradients(reduced, gradient, options, d);
+      if (has_ended(options, result)) return result;
       slope = dot(gradient, d);
       if (!(slope < 0)) break;
       problem.nodes.apply(d, dy);
@@ -192,6 +203,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     std::vector<Index> blocking, trial_uncertified;
     bool accepted = false;
     for (int halving = 0; halving < kMaxHalvings && !accepted; ++halving, t *= accepted ? 1 : 0.5) {
+      if (has_ended(options, result)) return result;
       for (std::size_t i = 0; i < y.size(); ++i) y_trial[i] = y[i] + t * dy[i];
       for (std::size_t i = 0; i < z.size(); ++i) z_trial[i] = z[i] + t * dz[i];
       ++record.evaluations;

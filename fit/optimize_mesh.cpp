@@ -91,7 +91,7 @@ class MeshOptimizer {
         own_boundary_(!target),
         target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
         relief_(mesh.num_cells(), 1),
-        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress}) {
+        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
     mesh_.positions = target_.normalisation.to_unit(std::move(mesh_.positions));
   }
   OptimizeResult run(const VolumeMesh& original);
@@ -130,7 +130,7 @@ class MeshOptimizer {
   std::vector<double> weights_;     ///< of the cells; empty: equal
   std::vector<double> relief_;      ///< of the cells: share of its weight that each keeps for being beside a far place
   std::vector<Index> uncertified_;
-  double mean_percent_ = 0, max_percent_ = 0;  ///< distances as the last stage saw them
+  double mean_percent_ = 0, max_percent_ = 0;  ///< distances after the last stage, at its samples
   FitReport report_;
   StageRunner runner_;
 };
@@ -272,7 +272,10 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   const bool going =
       runner_.run(problem, {lambda, kTangentialWeight, steps}, record(name), fraction, x, report_);
   problem.apply_nodes(x, mesh_.positions);
-  if (const auto* surface = dynamic_cast<const ClosestPointEnergy*>(problem.surface.get())) {
+  if (auto* surface = dynamic_cast<ClosestPointEnergy*>(problem.surface.get())) {
+    std::vector<Vec3> samples(problem.samples.num_rows());
+    problem.apply_samples(x, samples);
+    surface->assign(samples);
     const auto [mean, max] = surface->assigned_distance();
     mean_percent_ = 100 * mean;
     max_percent_ = 100 * max;

@@ -3,6 +3,8 @@
 
 #include "fit/closest_point_energy.h"
 #include "fit/surface_energy.h"
+#include "subvol/fingerprint.h"
+
 namespace subvol {
 
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
@@ -15,9 +17,19 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
   return std::make_unique<ClosestPointEnergy>(target, sample_triangles, num_samples, tangential_weight, points);
 }
 
+namespace {
+
+std::uint64_t start_of(const FitProblem& problem, const MinimizerOptions& minimizer, std::span<const Vec3> x) {
+  Fingerprint start;
+  start.add(problem.lambda).add(minimizer.max_iterations).add(minimizer.relative_decrease);
+  start.add(problem.nodes.num_rows()).add(problem.samples.num_rows());
+  return start.add(std::span<const double>(x.empty() ? nullptr : x.front().data(), 3 * x.size())).value();
+}
+
+}  // namespace
+
 bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction,
                       std::vector<Vec3>& x, FitReport& report) const {
-  const double begin = seconds();
   record.lambda = stage.lambda;
   record.tangential_weight = stage.tangential_weight;
   record.unknowns = x.size();
@@ -26,25 +38,46 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
   int iteration = 0;
-  bool timed_out = false;
+  minimizer.ended = [this] { return is_over(); };
   minimizer.progress = [&](const IterationRecord& step) {
-    timed_out = options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds;
     const double energy = step.surface_energy + stage.lambda * step.volume_energy;
-    const bool going = !options_.progress ||
-                       options_.progress({record.name.c_str(), record.level, ++iteration, energy, fraction});
-    return going && !timed_out;
+    const bool wanted = !options_.progress ||
+                        options_.progress({record.name.c_str(), record.level, ++iteration, energy, fraction});
+    return wanted && !is_over();
   };
-  const MinimizerResult solved = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, x, minimizer)
-                                                                      : minimize_newton(problem, x, minimizer);
-  record.iterations = solved.iterations;
-  record.stop = solved.explanation;
-  record.seconds = seconds() - begin;
+  SolvedStage solved{record.name, options_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
+  const SolvedStage* known = options_.log ? options_.log->recall(solved) : nullptr;
+  if (known) solved = *known;
+  else solve(problem, minimizer, solved);
+  bool going = solved.result.stop != MinimizerStop::cancelled;
+  if (known && !solved.result.iterations.empty()) going = minimizer.progress(solved.result.iterations.back());
+  x = std::move(solved.x);
+  record.seconds = solved.seconds;
+  record.iterations = std::move(solved.result.iterations);
+  record.stop = std::move(solved.result.explanation);
   const std::string name = record.name;
   report.stages.push_back(std::move(record));
-  if (solved.stop != MinimizerStop::cancelled) return true;
-  report.stop_reason = timed_out ? StopReason::time_limit : StopReason::cancelled;
-  report.explanation = (timed_out ? "time limit reached in " : "cancelled in ") + name;
+  if (going) return true;
+  if (in_time(name, report)) {
+    report.stop_reason = StopReason::cancelled;
+    report.explanation = "cancelled in " + name;
+  }
   return false;
+}
+
+bool StageRunner::in_time(const std::string& work, FitReport& report) const {
+  if (!is_over()) return true;
+  report.stop_reason = StopReason::time_limit;
+  report.explanation = "time limit reached in " + work;
+  return false;
+}
+
+void StageRunner::solve(FitProblem& problem, const MinimizerOptions& minimizer, SolvedStage& stage) const {
+  const double begin = seconds();
+  stage.result = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, stage.x, minimizer)
+                                                      : minimize_newton(problem, stage.x, minimizer);
+  stage.seconds = seconds() - begin;
+  if (options_.log && stage.result.stop != MinimizerStop::cancelled) options_.log->add(stage);
 }
 
 }  // namespace subvol

@@ -3,6 +3,7 @@
 
 #include "fit/fit_problem.h"
 #include "fit/fit_schedule.h"
+#include "fit/stage_log.h"
 #include "fit/target_surface.h"
 
 #include <chrono>
@@ -28,19 +29,30 @@ class StageRunner {
     int max_iterations = 0;         ///< 0: the stage's own
     double time_limit_seconds = 0;  ///< 0: none
     std::function<bool(const FitProgress&)> progress;
+    StageLog* log = nullptr;        ///< null: none is kept
   };
 
   explicit StageRunner(Options options) : options_(std::move(options)) {}
 
   /// Minimises over x and appends the record, whose name, level or order, and cells are set, to the report. `fraction` is
   /// told to whoever follows the progress. False, with the report's stop reason set, when the fit must end.
+  ///
+  /// Where the log knows the result nothing is minimised: what the problem has kept of its last state (correspondences,
+  /// denser quadrature) is then not there. The same problem solved twice, or looked at afterwards, must not depend on it.
   bool run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction, std::vector<Vec3>& x,
            FitReport& report) const;
+
+  /// Asked before work that takes long. False, with the report's stop reason set, where the time is over.
+  bool in_time(const std::string& work, FitReport& report) const;
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  bool is_over() const { return options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds; }
+  void solve(FitProblem& problem, const MinimizerOptions& minimizer, SolvedStage& stage) const;
+
   Options options_;
   Clock::time_point start_ = Clock::now();
 };

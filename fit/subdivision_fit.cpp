@@ -7,6 +7,7 @@
 #include "fit/fit_schedule.h"
 #include "fit/fit_target.h"
 #include "fit/followed_creases.h"
+#include "fit/memory_budget.h"
 #include "fit/option_checks.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
@@ -22,7 +23,9 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <new>
 #include <optional>
+#include <stdexcept>
 
 namespace subvol {
 
@@ -37,6 +40,7 @@ void check_options(const FitOptions& options) {
   in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
 }
@@ -51,6 +55,9 @@ class SubdivisionFit {
   void look_over_template();
   void begin(double own_box_share);
   bool run_levels();
+  bool run_level();
+  bool has_room();
+  bool end_for_memory(const std::string& why);
   void prepare_level();
   bool start_level();
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
@@ -88,6 +95,7 @@ class SubdivisionFit {
   std::optional<double> mean_;     ///< percent, of the current state
   FitResult result_;
   std::map<std::string, double> seconds_;
+  MemoryBudget memory_;
   StageRunner runner_;
 };
 
@@ -95,7 +103,8 @@ SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& tem
     : options_((check_options(options), options)),
       target_(target),
       template_(template_mesh),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress}) {
+      memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
+      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   template_.positions = target_.normalisation.to_unit(template_.positions);
@@ -138,6 +147,7 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
 bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
+  if (!runner_.in_time(name, result_.report)) return false;
   StageRecord record;
   record.name = try_ == 1 ? name : formatted("try %d, ", try_) + name;
   record.level = number_;
@@ -276,16 +286,19 @@ bool SubdivisionFit::run_stages() {
   return !finest() || lower_lambda();
 }
 
+/// All or nothing: memory may run out here.
 void SubdivisionFit::store_result() {
-  result_.mesh = level_.mesh;
-  result_.mesh.positions = target_.normalisation.from_unit(level_.nodes.apply(unknowns_));
-  result_.cage = cage_;
-  result_.cage.positions = target_.normalisation.from_unit(unknowns_);
-  if (creases_.curves().empty()) return;
-  const TriangleMesh limit = limit_triangles();
-  CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
-  creases.farthest = target_.normalisation.from_unit({creases.farthest})[0];
-  result_.report.creases = creases;
+  FitResult stored{cage_, level_.mesh, {}};
+  stored.cage.positions = target_.normalisation.from_unit(unknowns_);
+  stored.mesh.positions = target_.normalisation.from_unit(level_.nodes.apply(unknowns_));
+  if (!creases_.curves().empty()) {
+    const TriangleMesh limit = limit_triangles();
+    CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
+    creases.farthest = target_.normalisation.from_unit({creases.farthest})[0];
+    result_.report.creases = creases;
+  }
+  result_.cage = std::move(stored.cage);
+  result_.mesh = std::move(stored.mesh);
 }
 
 /// The refined mesh becomes the next control mesh (paper: section 4.3), unless the unknowns stay where they are.
@@ -314,17 +327,40 @@ void SubdivisionFit::begin(double own_box_share) {
   from_unknowns_ = previous_nodes_ = identity_map(unknowns_.size());
 }
 
+/// Ends the fit with what has been stored. std::runtime_error where that is nothing.
+bool SubdivisionFit::end_for_memory(const std::string& why) {
+  if (result_.mesh.num_cells() == 0) throw std::runtime_error("out of memory: " + why);
+  result_.report.stop_reason = StopReason::memory_limit;
+  result_.report.explanation = why;
+  return false;
+}
+
+bool SubdivisionFit::has_room() {
+  std::size_t cells = 0;
+  for (const CellKind kind : control_.kinds) cells += static_cast<std::size_t>(cell_topology(kind).num_vertices);
+  return memory_.allows(cells) || end_for_memory(memory_.refusal(formatted("level %d of %zu cells", number_, cells)));
+}
+
+bool SubdivisionFit::run_level() {
+  prepare_level();
+  const bool going = start_level() && run_stages();
+  store_result();
+  return going;
+}
+
 /// One try at all levels, with one choice of ideal cells. False where it ended early.
 bool SubdivisionFit::run_levels() {
-  bool going = true;
-  for (number_ = 1; going; ++number_) {
-    prepare_level();
-    going = start_level() && run_stages();
-    store_result();
-    if (finest() || (going && meets_tolerance())) break;
-    if (going) next_control();
+  for (number_ = 1;; ++number_) {
+    if (!has_room() || (number_ > 1 && !runner_.in_time(formatted("level %d", number_), result_.report))) return false;
+    try {
+      if (!run_level()) return false;
+      if (finest() || meets_tolerance()) return true;
+      next_control();
+    } catch (const std::bad_alloc&) {
+      level_ = {};
+      return end_for_memory(formatted("no memory was left in level %d", number_));
+    }
   }
-  return going;
 }
 
 FitResult SubdivisionFit::run() {
@@ -365,6 +401,7 @@ const char* to_string(StopReason reason) {
     case StopReason::tolerance_missed: return "tolerance_missed";
     case StopReason::iteration_limit: return "iteration_limit";
     case StopReason::time_limit: return "time_limit";
+    case StopReason::memory_limit: return "memory_limit";
     case StopReason::cancelled: return "cancelled";
     case StopReason::stalled: return "stalled";
   }

@@ -11,6 +11,8 @@
 
 namespace subvol {
 
+class StageLog;
+
 /// What the fit is made to agree with the target.
 enum class FittedSurface {
   limit,  ///< the Catmull-Clark limit surface of the cage: what an artist's tool shows at any level (default)
@@ -40,7 +42,9 @@ struct FitOptions {
   Correspondence correspondence = Correspondence::closest;
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
+  double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  StageLog* log = nullptr;                       ///< takes the results of minimisations from here and keeps them here; null: no
 };
 
 struct FitResult {

@@ -9,6 +9,7 @@
 #include "tests/sample_meshes.h"
 #include "tests/temporary_folder.h"
 #include "tests/usda_reader.h"
+#include "tests/workplace.h"
 
 #include <catch2/catch.hpp>
 
@@ -25,77 +26,11 @@
 
 namespace fs = std::filesystem;
 using subvol::test::content_of;
+using subvol::test::Run;
 using subvol::test::TemporaryFolder;
+using subvol::test::Workplace;
 
 namespace {
-
-struct Run {
-  int status = -1;
-  std::string out, err;
-  double seconds = 0;
-};
-
-/// A folder with one sample in it, in which the program is run.
-class Workplace {
- public:
-  explicit Workplace(const subvol::samples::Sample& sample = subvol::samples::ball_sample()) {
-    folder_.file("target.off", subvol::samples::off_text(sample.target));
-    subvol::write_volume_mesh(folder_ / "template.mesh", sample.template_mesh);
-  }
-
-  pid_t start(const std::string& arguments) const {
-    std::vector<std::string> words{SUBVOL_PROGRAM};
-    std::istringstream stream(arguments);
-    for (std::string word; stream >> word;) words.push_back(word);
-    const pid_t child = fork();
-    if (child != 0) return child;
-    if (chdir(folder_.path().c_str()) != 0) _exit(99);
-    redirect("stdout.txt", STDOUT_FILENO);
-    redirect("stderr.txt", STDERR_FILENO);
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    execv(argv[0], argv.data());
-    _exit(98);
-  }
-
-  Run finish(pid_t child) const {
-    int status = 0;
-    waitpid(child, &status, 0);
-    // A shell's convention, so that a crash is no status of ours.
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), content_of(folder_ / "stdout.txt"),
-            content_of(folder_ / "stderr.txt"), 0};
-  }
-
-  Run run(const std::string& arguments) const {
-    const auto begin = std::chrono::steady_clock::now();
-    Run result = finish(start(arguments));
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return result;
-  }
-
-  fs::path operator/(const char* name) const { return folder_ / name; }
-  fs::path file(const std::string& name, const std::string& text) const { return folder_.file(name, text); }
-  bool has(const char* name) const { return fs::exists(folder_ / name); }
-  nlohmann::json json(const char* name) const { return nlohmann::json::parse(content_of(folder_ / name)); }
-
-  std::set<std::string> names() const {
-    std::set<std::string> all;
-    for (const auto& entry : fs::directory_iterator(folder_.path())) {
-      const std::string name = entry.path().filename().string();
-      if (name != "stdout.txt" && name != "stderr.txt") all.insert(name);
-    }
-    return all;
-  }
-
- private:
-  static void redirect(const char* name, int descriptor) {
-    const int file = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    dup2(file, descriptor);
-  }
-
-  TemporaryFolder folder_;
-};
 
 constexpr const char* kFit = "fit target.off --template template.mesh ";
 

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/checkpointing.h"
+
+#include "subvol/atomic_file.h"
+#include "subvol/error.h"
+#include "subvol/fingerprint.h"
+#include "subvol/version.h"
+
+#include <set>
+#include <string_view>
+
+namespace subvol::cli {
+namespace {
+
+/// Options of files that are written; inputs are told apart by what they hold.
+const std::set<std::string, std::less<>> kNeutralOptions{"chord", "unit", "up", "seed", "template", "target"};
+
+std::span<const double> numbers(const std::vector<Vec3>& points) {
+  return {points.empty() ? nullptr : points.front().data(), 3 * points.size()};
+}
+
+StageLog earlier_log(const std::string& file, const RunIdentity& identity) {
+  if (file.empty()) return {};
+  Checkpoint checkpoint = read_checkpoint(file);
+  require_same_run(checkpoint.identity, identity, file);
+  return {std::move(checkpoint.stages), file};
+}
+
+}  // namespace
+
+void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
+  const auto group = "Long runs";
+  CLI::Option* checkpoint =
+      verb.add_option("--checkpoint", options.checkpoint, "Keep in FILE what --resume needs, as minimisations end")
+          ->type_name("FILE")
+          ->group(group);
+  verb.add_option("--every", options.every_seconds, "Write the checkpoint at most so often")
+      ->check(number_in(0, 1e9))
+      ->type_name("SECONDS")
+      ->capture_default_str()
+      ->needs(checkpoint)
+      ->group(group);
+  verb.add_option("--resume", options.resume,
+                  "Go on from the checkpoint of a run of the same inputs and options, to the same result")
+      ->type_name("FILE")
+      ->group(group);
+}
+
+std::string fingerprint(const TriangleMesh& mesh) {
+  Fingerprint print;
+  print.add(numbers(mesh.positions)).add(mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles) print.add(std::span<const Index>(triangle));
+  return print.text();
+}
+
+std::string fingerprint(const VolumeMesh& mesh) {
+  Fingerprint print;
+  print.add(numbers(mesh.positions)).add(std::span(mesh.kinds)).add(std::span(mesh.cell_vertices));
+  print.add(std::span(mesh.references));
+  for (const CreaseEdge& crease : mesh.tags.creases) print.add(crease.v0).add(crease.v1).add(crease.sharpness);
+  for (const CornerVertex& corner : mesh.tags.corners) print.add(corner.vertex).add(corner.sharpness);
+  return print.text();
+}
+
+RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs) {
+  RunIdentity identity{{"version", version()}, {"verb", verb.get_name()}};
+  identity.insert(identity.end(), inputs.begin(), inputs.end());
+  const Json options = options_of_result(verb);
+  for (const auto& [name, value] : options.items())
+    if (!kNeutralOptions.contains(name)) identity.emplace_back("--" + name, value.dump());
+  return identity;
+}
+
+Checkpointing::Checkpointing(const RunOptions& run, RunIdentity identity)
+    : run_(run), identity_(std::move(identity)), log_(earlier_log(run.resume, identity_)) {
+  if (run_.checkpoint.empty()) return;
+  log_.on_add = [this] {
+    is_written_ = false;
+    if (std::chrono::duration<double>(Clock::now() - written_).count() >= run_.every_seconds) write();
+  };
+}
+
+void Checkpointing::write() {
+  try {
+    write_file_atomically(run_.checkpoint, checkpoint_bytes(identity_, log_.stages()));
+    failure_.clear();
+    is_written_ = true;
+  } catch (const IoError& error) {
+    failure_ = error.what();
+  }
+  written_ = Clock::now();
+}
+
+void Checkpointing::finish(std::vector<std::string>& warnings) {
+  if (run_.checkpoint.empty()) return;
+  if (!is_written_ || (log_.num_recalled() > 0 && run_.checkpoint != run_.resume)) write();
+  if (!failure_.empty()) warnings.push_back("the checkpoint is not up to date: " + failure_);
+}
+
+void Checkpointing::describe(Json& report) const {
+  if (run_.resume.empty()) return;
+  report["resumed_from"] = run_.resume;
+  report["recalled_stages"] = log_.num_recalled();
+}
+
+}  // namespace subvol::cli

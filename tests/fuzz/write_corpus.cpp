@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Writes small files of every format for the fuzzers to start from: FOLDER/EXTENSION/NAME.
+
+#include "export/high_order_file.h"
+#include "export/obj_writer.h"
+#include "fit/checkpoint.h"
+#include "samples/shapes.h"
+#include "subvol/atomic_file.h"
+#include "subvol/mesh_io.h"
+
+#include <cstdio>
+#include <cstring>
+#include <exception>
+
+namespace {
+
+using namespace subvol;
+namespace fs = std::filesystem;
+
+VolumeMesh small_mesh(CellKind kind) {
+  VolumeMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
+  if (kind == CellKind::hex) mesh.add_cell(kind, std::array<Index, 8>{0, 1, 2, 3, 4, 5, 6, 7});
+  if (kind == CellKind::prism) {
+    mesh.add_cell(kind, std::array<Index, 6>{0, 1, 2, 4, 5, 6});
+    mesh.add_cell(kind, std::array<Index, 6>{0, 2, 3, 4, 6, 7});
+  }
+  if (kind == CellKind::tet)
+    for (const auto& [a, b] : {std::array<Index, 2>{1, 2}, {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}})
+      mesh.add_cell(kind, std::array<Index, 4>{0, a, b, 6});
+  mesh.references.assign(mesh.num_cells(), 3);
+  mesh.tags.creases = {{0, 1, 2.5}, {1, 2, 100}};
+  mesh.tags.corners = {{0, 100}};
+  return mesh;
+}
+
+void write(const fs::path& folder, const char* name, std::string_view bytes) {
+  fs::create_directories(folder);
+  write_file_atomically(folder / name, bytes);
+}
+
+void write_volumes(const fs::path& folder) {
+  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet}) {
+    const VolumeMesh mesh = small_mesh(kind);
+    const std::string name = cell_topology(kind).name;
+    for (const char* extension : {"mesh", "vtk"}) {
+      fs::create_directories(folder / extension);
+      write_volume_mesh(folder / extension / (name + '.' + extension), mesh);
+    }
+    for (const int order : {1, 3})
+      write(folder / "vtu", (name + std::to_string(order)).c_str(),
+            vtu_text({ElementSpace(mesh, order == 1 ? Basis::fourier : Basis::legendre, order), mesh}));
+  }
+  write(folder / "vtk", "binary", std::string("# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 "
+                                              "double\n") + std::string(96, '\1') +
+                                      "\nCELLS 1 5\n" + std::string("\0\0\0\4\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\3", 20) +
+                                      "\nCELL_TYPES 1\n" + std::string("\0\0\0\n", 4) + "\n");
+  write(folder / "vtk", "offsets", "# vtk DataFile Version 5.1\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
+                                   "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY "
+                                   "vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n");
+}
+
+void write_surfaces(const fs::path& folder) {
+  const TriangleMesh tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
+  write(folder / "off", "tetrahedron", samples::off_text(tetrahedron));
+  write(folder / "off", "colours", "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
+  write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2//1 -2 -1/1\n");
+  fs::create_directories(folder / "obj");
+  write_obj(folder / "obj" / "bowl.obj", samples::bowl_surface(1));
+  write(folder / "stl", "text", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                                "endloop\nendfacet\nendsolid a\n");
+  std::string binary(84 + 2 * 50, '\0');
+  const std::uint32_t count = 2;
+  std::memcpy(binary.data() + 80, &count, sizeof count);
+  const float corners[2][9] = {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 0, 0, 0, 1, 0, 0, 0, 1}};
+  for (std::size_t t = 0; t < 2; ++t) std::memcpy(binary.data() + 84 + 50 * t + 12, corners[t], sizeof corners[t]);
+  write(folder / "stl", "binary", binary);
+  const std::string body = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty double quality\n"
+                           "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  write(folder / "ply", "text", "ply\nformat ascii 1.0\ncomment c\n" + body + "0 0 0 1\n1 0 0 2\n0 1 0 3\n3 0 1 2\n");
+  for (const bool little : {true, false}) {
+    std::string bytes = std::string("ply\nformat binary_") + (little ? "little" : "big") + "_endian 1.0\n" + body;
+    const auto put = [&](const void* value, std::size_t size) {
+      std::string raw(static_cast<const char*>(value), size);
+      bytes += little ? raw : std::string(raw.rbegin(), raw.rend());
+    };
+    for (const std::array<float, 3>& p : {std::array<float, 3>{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}) {
+      for (const float c : p) put(&c, sizeof c);
+      const double quality = 1;
+      put(&quality, sizeof quality);
+    }
+    bytes += '\3';
+    for (const int v : {0, 1, 2}) put(&v, sizeof v);
+    write(folder / "ply", little ? "little" : "big", bytes);
+  }
+}
+
+void write_checkpoints(const fs::path& folder) {
+  const SolvedStage stage{"level 1", 5, {Vec3(1, 2, 3)}, {MinimizerStop::converged, "why", {{1, 2, 1, 3, 4}}}, 0.5};
+  write(folder / "checkpoint", "one", checkpoint_bytes({{"--levels", "3"}, {"target", "ab"}}, {stage, stage}));
+  write(folder / "checkpoint", "empty", checkpoint_bytes({}, {}));
+}
+
+void write_fits(const fs::path& folder) {
+  for (const char what : {'\0', '\1', '\2'})
+    for (const char kind : {'\0', '\1', '\2'}) write(folder / "fit", std::string{'a', char('0' + what), char('0' + kind)}.c_str(),
+                                                     std::string{what, '\0', kind} + std::string(60, '\0'));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: write_corpus FOLDER\n");
+    return 2;
+  }
+  const fs::path folder = argv[1];
+  write_volumes(folder);
+  write_surfaces(folder);
+  write_checkpoints(folder);
+  write_fits(folder);
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "write_corpus: %s\n", error.what());
+  return 1;
+}

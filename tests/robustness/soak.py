@@ -1,0 +1,260 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hundreds of fits, shells and optimisations of shapes made at random; nothing may crash, hang, or claim what is not so.
+
+Usage: tests/robustness/soak.py PROGRAM [--runs N] [--seed S] [--minutes M] [--keep FOLDER]
+
+Each run is a function of its number and the seed. A finding is: an exit status that is not documented, or not one of that
+verb's; more time than the limit and a minute; an error without words; a temporary left behind; or a claim of the report that
+`subvol check` of the file written does not bear out: number of cells, certified cells, inverted cells, intersections,
+mean distance. Ends with a table; exit status 0 without findings, 1 with some. What was found is kept in FOLDER.
+"""
+import argparse
+import collections
+import json
+import math
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import cases
+
+TIME_LIMIT = 20
+DOCUMENTED = {0, 1, 3, 4}
+
+
+def grid_surface(rng, point, n, m, wrap_u, wrap_v):
+    """Vertices and quads of a map of the unit square; wrapped sides are glued."""
+    rows, columns = n if wrap_u else n + 1, m if wrap_v else m + 1
+    vertices = [point(i / n, j / m) for i in range(rows) for j in range(columns)]
+    number = lambda i, j: (i % rows) * columns + j % columns
+    faces = [[number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)] for i in range(n) for j in range(m)]
+    if rng.random() < 0.5:
+        faces = [t for a, b, c, d in faces for t in ([a, b, c], [a, c, d])]
+    return vertices, faces
+
+
+def waves(rng, strength):
+    terms = [(rng.uniform(-1, 1) * strength, rng.randint(1, 5), rng.randint(0, 5), rng.uniform(0, 6)) for _ in range(3)]
+    return lambda u, v: sum(a * math.sin(2 * math.pi * (k * u + l * v) + phase) for a, k, l, phase in terms)
+
+
+def torus(rng):
+    tube, bumps = rng.uniform(0.15, 0.6), waves(rng, rng.choice([0, 0.02, 0.05]))
+
+    def point(u, v):
+        r = tube * (1 + bumps(u, v))
+        a, b = 2 * math.pi * u, 2 * math.pi * v
+        return [(1 + r * math.cos(b)) * math.cos(a), (1 + r * math.cos(b)) * math.sin(a), r * math.sin(b)]
+    return grid_surface(rng, point, rng.randint(12, 60), rng.randint(8, 30), True, True)
+
+
+def ball(rng):
+    """A cube's surface blown up: six patches glued by position."""
+    n, power, bumps = rng.randint(3, 16), rng.choice([2, 2, 4, 8]), waves(rng, rng.choice([0, 0.03, 0.08]))
+    size = [rng.uniform(0.3, 1) for _ in range(3)]
+    vertices, numbers, faces = [], {}, []
+
+    def number(p):
+        if p not in numbers:
+            numbers[p] = len(vertices)
+            q = [2 * c / n - 1 for c in p]
+            length = sum(abs(c) ** power for c in q) ** (1 / power)
+            r = 1 + bumps(math.atan2(q[1], q[0]) / (2 * math.pi), 0)
+            vertices.append([s * r * c / length for s, c in zip(size, q)])
+        return numbers[p]
+    for axis in range(3):
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        for side in (0, n):
+            for i in range(n):
+                for j in range(n):
+                    corners = []
+                    for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                        p = [0, 0, 0]
+                        p[axis], p[a], p[b] = side, i + di, j + dj
+                        corners.append(number(tuple(p)))
+                    faces.append(corners if side else corners[::-1])
+    return vertices, [t for a, b, c, d in faces for t in ([a, b, c], [a, c, d])] if rng.random() < 0.7 else faces
+
+
+def sheet(rng):
+    bumps, bend = waves(rng, rng.choice([0, 0.05, 0.2])), rng.uniform(0, 2.5)
+
+    def point(u, v):
+        a = bend * (u - 0.5)
+        return [math.sin(a) / max(bend, 0.1), v - 0.5, (1 - math.cos(a)) / max(bend, 0.1) + bumps(u, v)]
+    return grid_surface(rng, point, rng.randint(3, 25), rng.randint(3, 25), False, False)
+
+
+def placed(rng, vertices):
+    """Another unit, another origin; sometimes a little noise."""
+    scale = 10 ** rng.uniform(-4, 4)
+    origin = [rng.choice([0, 0, 1, 100]) * rng.uniform(-1, 1) * scale for _ in range(3)]
+    noise = rng.choice([0, 0, 0, 1e-3])
+    return [[o + scale * (c + rng.gauss(0, noise)) for o, c in zip(origin, v)] for v in vertices]
+
+
+def write_off(path, surface, rng):
+    vertices, faces = placed(rng, surface[0]), surface[1]
+    lines = ["OFF", f"{len(vertices)} {len(faces)} 0"]
+    lines += [" ".join(repr(c) for c in v) for v in vertices]
+    lines += [" ".join(map(str, [len(f), *f])) for f in faces]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_block(path, rng):
+    """A block of hexes or of what they can be cut into, its inner vertices thrown about."""
+    n = [rng.randint(1, 4) for _ in range(3)]
+    mess = rng.choice([0.1, 0.4, 0.8, 2])
+    at = lambda i, j, k: (i * (n[1] + 1) + j) * (n[2] + 1) + k + 1
+    vertices, cells = [], []
+    for i in range(n[0] + 1):
+        for j in range(n[1] + 1):
+            for k in range(n[2] + 1):
+                inner = 0 < i < n[0] and 0 < j < n[1] and 0 < k < n[2]
+                vertices.append([c + (rng.uniform(-mess, mess) if inner else 0) for c in (i, j, k)])
+    for i in range(n[0]):
+        for j in range(n[1]):
+            for k in range(n[2]):
+                cells.append([at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k), at(i, j, k + 1),
+                              at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)])
+    lines = ["MeshVersionFormatted 2", "Dimension 3", "Vertices", str(len(vertices))]
+    lines += [" ".join(repr(float(c)) for c in v) + " 0" for v in vertices]
+    if rng.random() < 0.4:
+        tets = [[v[0], v[a], v[b], v[6]] for v in cells for a, b in ((1, 2), (2, 3), (3, 7), (7, 4), (4, 5), (5, 1))]
+        lines += ["Tetrahedra", str(len(tets))] + [" ".join(map(str, t)) + " 0" for t in tets]
+    else:
+        lines += ["Hexahedra", str(len(cells))] + [" ".join(map(str, c)) + " 0" for c in cells]
+    path.write_text("\n".join(lines + ["End"]) + "\n")
+
+
+def fit_words(rng, folder):
+    write_off(folder / "target.off", rng.choice([ball, ball, torus])(rng), rng)
+    words = f"fit target.off --cells {rng.choice([40, 80, 150])}"
+    if rng.random() < 0.35:
+        return words + f" --order {rng.randint(1, 4)} --basis {rng.choice(['fourier', 'legendre'])}" + \
+            rng.choice(["", " --adaptive"]) + rng.choice(["", " --tolerance 0.1"]), "out.vtu", "target.off"
+    words += f" --levels {rng.randint(1, 2)}" + rng.choice(["", "", " --cage-only", " --crease-angle 30"]) + \
+        rng.choice(["", " --surface mesh", " --boundary averaging", " --solver lbfgs", " --correspondence voronoi"]) + \
+        rng.choice(["", " --tolerance 0.05", " --lambda-close 0.0001"])
+    return words, "out.mesh", "target.off"
+
+
+def shell_words(rng, folder):
+    write_off(folder / "target.off", rng.choice([ball, torus, sheet])(rng), rng)
+    words = f"shell target.off --thickness {rng.choice(['0.1%', '2%', '20%'])} --layers {rng.randint(1, 4)}" + \
+        f" --side {rng.choice(['inward', 'outward', 'both'])}" + rng.choice(["", " --free-surface", " --straight"]) + \
+        rng.choice(["", " --growth 1.5", " --crease-angle 30"])
+    if "--straight" not in words and rng.random() < 0.25:
+        return words + " --order 2", "out.vtu", None
+    return words, "out.mesh", None
+
+
+def optimize_words(rng, folder):
+    write_block(folder / "block.mesh", rng)
+    words = "optimize block.mesh" + rng.choice(["", " --fixed-boundary", " --sizes uniform", " --crease-angle 20"]) + \
+        rng.choice(["", " --lambda 0.001", " --tolerance 0.001"])
+    return words, "out.mesh", None
+
+
+class Soak:
+    def __init__(self, program, seed, keep):
+        self.program, self.seed, self.keep = program, seed, keep
+        self.table = collections.Counter()
+        self.findings = []
+
+    def judge(self, folder, verb, words, output, target, done, seconds):
+        """What is wrong with a run that has ended."""
+        bad = []
+        status = done.returncode
+        if status not in DOCUMENTED:
+            bad.append(f"exit status {status}")
+        if seconds > TIME_LIMIT + 60:
+            bad.append(f"took {seconds:.0f} s")
+        if status in (1, 3) and not done.stderr.strip() and not (folder / "report.json").exists():
+            bad.append("failed without a word")
+        if any(folder.glob(".subvol-*")):
+            bad.append("left a temporary")
+        if not (folder / "report.json").exists():
+            if status in (0, 4):
+                bad.append("ended well without a report")
+            if (folder / output).exists() and status == 3:
+                bad.append("was refused, with an output")
+            return bad
+        report = json.loads((folder / "report.json").read_text())
+        if verb == "shell" and output.endswith(".vtu") and report.get("mesh", {}).get("min_order", 1) == 1:
+            return bad  # left straight: a .vtu of linear cells, which is not read back
+        check = subprocess.run([self.program, "check", output, "--json"] + (["--target", target] if target else []),
+                               cwd=folder, capture_output=True, text=True, env=cases.environment())
+        if check.returncode not in (0, 1):
+            return bad + [f"its output cannot be checked: {check.stderr.strip()}"]
+        found = json.loads(check.stdout)
+        if (status == 0) and not (found["quality"]["certified_cells"] == found["quality"]["cells"]
+                                  and not found["boundary_self_intersections"]):
+            bad.append("exit status 0 of a mesh that check does not find valid")
+        for name in ("cells", "certified_cells") + (() if verb == "shell" else ("inverted_cells", "min_scaled_jacobian")):
+            if found["quality"][name] != report["quality"][name]:
+                bad.append(f"{name}: {report['quality'][name]} is claimed, check finds {found['quality'][name]}")
+        if verb != "shell" and found["boundary_self_intersections"] != report["boundary_self_intersections"]:
+            bad.append("intersections differ from what is claimed")
+        if target and not math.isclose(found["distance"]["mean_percent"], report["distance"]["mean_percent"], rel_tol=1e-6):
+            bad.append("the distance differs from what is claimed")
+        return bad
+
+    def run(self, number):
+        rng = random.Random(f"{self.seed} {number}")
+        verb, make = rng.choice([("fit", fit_words), ("fit", fit_words), ("shell", shell_words), ("optimize", optimize_words)])
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            words, output, target = make(rng, folder)
+            command = [self.program, *words.split(), "--time-limit", str(TIME_LIMIT), "-o", output, "--report", "report.json",
+                       "--quiet"]
+            begin = time.monotonic()
+            try:
+                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace",
+                                      timeout=20 * TIME_LIMIT, env=cases.environment())
+                bad = self.judge(folder, verb, words, output, target, done, time.monotonic() - begin)
+                status = done.returncode
+            except subprocess.TimeoutExpired:
+                bad, status = ["did not end"], "hangs"
+            self.table[verb, status] += 1
+            said = "" if status in (0, 4, "hangs") else " | " + done.stderr.strip().split("\n")[0][:120]
+            print(f"{number:4} {status!s:5} {time.monotonic() - begin:6.1f} s  {words}{said}", flush=True)
+            for what in bad:
+                self.findings.append((number, words, what))
+                print(f"     FINDING: {what}", flush=True)
+            if bad and self.keep:
+                shutil.copytree(folder, self.keep / str(number), dirs_exist_ok=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("--runs", type=int, default=300)
+    parser.add_argument("--first", type=int, default=0, help="number of the first run")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin no run after this time")
+    parser.add_argument("--keep", type=pathlib.Path)
+    arguments = parser.parse_args()
+    soak = Soak(arguments.program.resolve(), arguments.seed, arguments.keep)
+    begin = time.monotonic()
+    for number in range(arguments.first, arguments.first + arguments.runs):
+        if time.monotonic() - begin > 60 * arguments.minutes:
+            break
+        soak.run(number)
+    statuses = sorted({status for _, status in soak.table}, key=str)
+    print("\nverb      " + "".join(f"{status!s:>8}" for status in statuses))
+    for verb in sorted({verb for verb, _ in soak.table}):
+        print(f"{verb:10}" + "".join(f"{soak.table[verb, status]:8}" for status in statuses))
+    print(f"{sum(soak.table.values())} runs, {len(soak.findings)} findings")
+    for number, words, what in soak.findings:
+        print(f"{number}: {what}: {words}")
+    return 1 if soak.findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "samples/shapes.h"
+#include "subvol/mesh_io.h"
+#include "tests/temporary_folder.h"
+
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace subvol::test {
+
+/// How the program ended.
+struct Run {
+  int status = -1;
+  std::string out, err;
+  double seconds = 0;
+};
+
+/// A folder with one sample in it, in which the program is run.
+class Workplace {
+ public:
+  explicit Workplace(const samples::Sample& sample = samples::ball_sample()) {
+    folder_.file("target.off", samples::off_text(sample.target));
+    write_volume_mesh(folder_ / "template.mesh", sample.template_mesh);
+  }
+
+  /// limit_kind, limit: of setrlimit, for the program alone; negative kind: none.
+  pid_t start(const std::string& arguments, int limit_kind = -1, rlim_t limit = 0) const {
+    std::vector<std::string> words{SUBVOL_PROGRAM};
+    std::istringstream stream(arguments);
+    for (std::string word; stream >> word;) words.push_back(word);
+    const pid_t child = fork();
+    if (child != 0) return child;
+    if (chdir(folder_.path().c_str()) != 0) _exit(99);
+    redirect("stdout.txt", STDOUT_FILENO);
+    redirect("stderr.txt", STDERR_FILENO);
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    const rlimit both{limit, limit};
+    if (limit_kind >= 0) setrlimit(static_cast<__rlimit_resource>(limit_kind), &both);
+    argv.push_back(nullptr);
+    execv(argv[0], argv.data());
+    _exit(98);
+  }
+
+  Run finish(pid_t child) const {
+    int status = 0;
+    waitpid(child, &status, 0);
+    // A shell's convention, so that a crash is no status of ours.
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), content_of(folder_ / "stdout.txt"),
+            content_of(folder_ / "stderr.txt"), 0};
+  }
+
+  Run run(const std::string& arguments, int limit_kind = -1, rlim_t limit = 0) const {
+    const auto begin = std::chrono::steady_clock::now();
+    Run result = finish(start(arguments, limit_kind, limit));
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return result;
+  }
+
+  std::filesystem::path operator/(const char* name) const { return folder_ / name; }
+  std::filesystem::path file(const std::string& name, const std::string& text) const { return folder_.file(name, text); }
+  bool has(const char* name) const { return std::filesystem::exists(folder_ / name); }
+  nlohmann::json json(const char* name) const { return nlohmann::json::parse(content_of(folder_ / name)); }
+
+  std::set<std::string> names() const {
+    std::set<std::string> all;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
+      const std::string name = entry.path().filename().string();
+      if (name != "stdout.txt" && name != "stderr.txt") all.insert(name);
+    }
+    return all;
+  }
+
+ private:
+  static void redirect(const char* name, int descriptor) {
+    const int file = open(name, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    dup2(file, descriptor);
+  }
+
+  TemporaryFolder folder_;
+};
+
+}  // namespace subvol::test
