@@ -15,6 +15,7 @@
 #include "subvol/surface_io.h"
 #include "subvol/version.h"
 
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -93,6 +94,8 @@ void FitRun::fit() {
                                                     {"template", fingerprint(template_mesh_)}}));
   options.log = checkpointing_->log();
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
+  // What is left of it: a template may have been made.
+  if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
   result_ = followed([&](auto progress) {
     options.progress = progress;
     return fit_subdivision_volume(target_, template_mesh_, options);

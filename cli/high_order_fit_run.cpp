@@ -61,11 +61,13 @@ void untangle(const HighOrderFitArguments& arguments, StageLog* log, VolumeMesh&
   template_mesh = std::move(result.mesh);
 }
 
-HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, const TriangleMesh& target,
+/// seconds: that have been used of the time limit.
+HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds, const TriangleMesh& target,
                        const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
   options.log = log;
+  if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds);
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
     return !interrupted();
@@ -129,7 +131,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (arguments.untangles) untangle(arguments, checkpointing.log(), template_mesh, warnings);
 
   const Clock::time_point fit_start = Clock::now();
-  HighOrderFitResult result = fit(arguments, checkpointing.log(), target, template_mesh);
+  HighOrderFitResult result = fit(arguments, checkpointing.log(), seconds_since(start), target, template_mesh);
   const double fit_seconds = seconds_since(fit_start);
   const FitReport& report = result.report;
   checkpointing.finish(warnings);

@@ -48,7 +48,7 @@ void check_that_it_resumes(const Run& run) {
   CHECK(same_bits(wanted, run(nullptr).first));
   const std::size_t n = whole.stages().size();
   REQUIRE(n > 1);
-  for (const std::size_t done : {std::size_t{0}, n / 3, n / 2, n - 1, n}) {
+  for (const std::size_t done : {n / 2, n - 1, n}) {
     CAPTURE(done, n);
     StageLog log = reloaded(whole, done);
     const auto [positions, told_again] = run(&log);
@@ -70,7 +70,7 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits") {
   const samples::Sample sample = samples::ball_sample();
   for (const bool cage_only : {false, true})
     check_that_it_resumes([&](StageLog* log) {
-      FitOptions options{.levels = 2, .cage_only = cage_only};
+      FitOptions options{.levels = 2, .cage_only = cage_only, .max_iterations = 2};
       options.log = log;
       FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
       result.mesh.positions.insert(result.mesh.positions.end(), result.cage.positions.begin(), result.cage.positions.end());
@@ -80,7 +80,7 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits") {
 
 TEST_CASE("A fit with stages that were undone, and with one thread or two, goes on the same way") {
   const samples::Sample sample = samples::bracket_sample();
-  FitOptions options{.levels = 2, .tolerance_percent = 1e-3};
+  FitOptions options{.levels = 2, .tolerance_percent = 1e-3, .max_iterations = 2};
   StageLog whole;
   options.log = &whole;
   omp_set_num_threads(1);
@@ -97,7 +97,7 @@ TEST_CASE("A fit of curved elements that goes on from a checkpoint ends at the s
   const samples::Sample sample = samples::ball_sample();
   for (const bool adaptive : {false, true})
     check_that_it_resumes([&](StageLog* log) {
-      HighOrderFitOptions options{.order = 3, .adaptive = adaptive, .tolerance_percent = 0.05};
+      HighOrderFitOptions options{.order = 2, .adaptive = adaptive, .tolerance_percent = 0.5, .max_iterations = 2};
       options.log = log;
       HighOrderFitResult result = fit_high_order(sample.target, sample.template_mesh, options);
       return std::pair(result.mesh.coefficients, result.report);
@@ -122,7 +122,7 @@ TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits"
 TEST_CASE("A log of another run is refused where it first differs") {
   const samples::Sample sample = samples::ball_sample();
   StageLog log;
-  FitOptions options{.levels = 1};
+  FitOptions options{.levels = 1, .max_iterations = 2};
   options.log = &log;
   fit_subdivision_volume(sample.target, sample.template_mesh, options);
   StageLog again = reloaded(log, log.stages().size());
