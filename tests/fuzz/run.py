@@ -22,7 +22,7 @@ def main():
     parser.add_argument("names", nargs="*")
     parser.add_argument("--seconds", type=int, default=10)
     parser.add_argument("--corpus", type=pathlib.Path)
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     build = arguments.build.resolve()
     fuzzers = sorted(p for p in build.rglob("fuzz_*") if p.is_file() and os.access(p, os.X_OK))
     fuzzers = [p for p in fuzzers if not arguments.names or p.name.removeprefix("fuzz_") in arguments.names]

@@ -101,7 +101,7 @@ def main():
     parser.add_argument("names", nargs="*", help="cases that can be resumed (default: fit order)")
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     random.seed(arguments.seed)
     program = arguments.program.resolve()
     names = arguments.names or ["fit", "order"]

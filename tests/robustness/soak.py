@@ -239,7 +239,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=math.inf, help="begin no run after this time")
     parser.add_argument("--keep", type=pathlib.Path)
-    arguments = parser.parse_args()
+    arguments = parser.parse_intermixed_args()
     soak = Soak(arguments.program.resolve(), arguments.seed, arguments.keep)
     begin = time.monotonic()
     for number in range(arguments.first, arguments.first + arguments.runs):
