@@ -90,7 +90,7 @@ MinimizerStop stop_of(std::uint64_t number) {
 }
 
 int count_of(double number) {
-  if (!(number >= 0 && number <= 1e9)) throw InputError("a count is out of range");
+  if (!(number >= 0 && number <= 1e9 && number == std::floor(number))) throw InputError("a count is out of range");
   return static_cast<int>(number);
 }
 

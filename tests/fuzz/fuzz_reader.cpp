@@ -49,7 +49,9 @@ void read_checkpoint_of(std::string_view bytes) {
   const std::string_view content = bytes.substr(std::min(bytes.size(), head.size() + 17));
   const std::string whole = head + subvol::Fingerprint().add(content).text() + '\n' + std::string(content);
   const subvol::Checkpoint read = subvol::parse_checkpoint(whole, name);
-  require(subvol::checkpoint_bytes(read.identity, read.stages) == whole);
+  const std::string written = subvol::checkpoint_bytes(read.identity, read.stages);
+  const subvol::Checkpoint again = subvol::parse_checkpoint(written, name);
+  require(written.size() == whole.size() && subvol::checkpoint_bytes(again.identity, again.stages) == written);
 }
 
 }  // namespace

@@ -12,9 +12,9 @@ VOLATILE_OPTIONS = {"threads", "checkpoint", "every", "resume", "force", "quiet"
 
 # Name, words of the command line, outputs. {s} is the folder of samples; the first three are quick.
 CASES = [
-    ("fit", "fit {s}/ball_target.off --template {s}/ball_template.mesh --levels 2",
+    ("fit", "fit {s}/ball_target.off --template {s}/ball_template.mesh --levels 2 --max-iterations 4",
      ["out.mesh", "out.glb", "cage:cage.mesh", "cage:cage.usda", "out.obj"]),
-    ("order", "fit {s}/ball_target.off --template {s}/ball_template.mesh --order 3", ["out.vtu", "out.glb", "out.msh"]),
+    ("order", "fit {s}/ball_target.off --template {s}/ball_template.mesh --order 2 --max-iterations 4", ["out.vtu", "out.glb", "out.msh"]),
     ("shell", "shell {s}/bowl.obj --thickness 2% --layers 2 --side both", ["out.mesh", "out.vtu", "out.glb"]),
     ("cage-only", "fit {s}/torus_target.off --template {s}/torus_template.mesh --levels 2 --cage-only",
      ["out.vtk", "cage:cage.obj", "out.gltf"]),
