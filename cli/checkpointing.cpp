@@ -6,6 +6,7 @@
 #include "subvol/fingerprint.h"
 #include "subvol/version.h"
 
+#include <new>
 #include <set>
 #include <string_view>
 
@@ -87,6 +88,8 @@ void Checkpointing::write() {
     is_written_ = true;
   } catch (const IoError& error) {
     failure_ = error.what();
+  } catch (const std::bad_alloc&) {
+    failure_ = run_.checkpoint + ": no memory was left for it";
   }
   written_ = Clock::now();
 }

@@ -50,13 +50,14 @@ TEST_CASE("A run that is killed goes on from its checkpoint to the same bytes", 
 }
 
 TEST_CASE("A run that was interrupted leaves a checkpoint and goes on", "[cli][checkpoint]") {
+  const int signal = GENERATE(SIGINT, SIGTERM);
   const Workplace place;
   const std::string words = kFit + "--levels 2 --max-iterations 3 -o out.mesh";
   REQUIRE(place.run(words).status == 0);
   const std::string wanted = content_of(place / "out.mesh");
   const pid_t child = place.start(words + " --force --checkpoint c --every 0");
   REQUIRE(appears(place / "c"));
-  kill(child, SIGINT);
+  kill(child, signal);
   const int status = place.finish(child).status;
   CHECK((status == 130 || status == 0));  // 0: it was done already
   CHECK(place.run(words + " --force --resume c").status == 0);

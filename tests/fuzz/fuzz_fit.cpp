@@ -97,7 +97,7 @@ void fit_curved(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& star
   options.basis = bytes.flag() ? Basis::legendre : Basis::fourier;
   const HighOrderFitResult result = fit_high_order(target, start, options);
   require_finite(result.mesh.coefficients);
-  if (sound) require(certify(result.mesh).all_certified());
+  if (sound) require(certify(result.mesh.space, result.mesh.coefficients).all_certified());
 }
 
 void optimize(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start) {

@@ -35,7 +35,7 @@ def main():
     failed = 0
     for fuzzer in fuzzers:
         name = fuzzer.name.removeprefix("fuzz_")
-        done = subprocess.run([fuzzer, f"-max_total_time={arguments.seconds}", "-timeout=30", "-rss_limit_mb=2048",
+        done = subprocess.run([fuzzer, f"-max_total_time={arguments.seconds}", f"-timeout={600 if name == 'fit' else 30}", "-rss_limit_mb=2048",
                                "-max_len=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/{name}-",
                                corpus / name], env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
                               errors="replace")
