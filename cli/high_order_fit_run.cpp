@@ -62,8 +62,8 @@ void untangle(const HighOrderFitArguments& arguments, StageLog* log, VolumeMesh&
 }
 
 /// seconds: that have been used of the time limit.
-HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds, const TriangleMesh& target,
-                       const VolumeMesh& template_mesh) {
+HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds,
+                       const TriangleMesh& target, const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
   options.log = log;

@@ -26,7 +26,8 @@ void add_resource_options(CLI::App& verb, RunOptions& options) {
       ->check(CLI::Range(1, 1024))
       ->type_name("N");
   verb.add_option("--memory-limit", options.memory_limit,
-                  "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best result so far")
+                  "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best\n"
+                  "result so far")
       ->transform(CLI::AsSizeValue(false))
       ->check(CLI::Range(kLeastMemoryLimit, kMostMemoryLimit))
       ->type_name("SIZE");

@@ -32,8 +32,8 @@ void add_resource_options(CLI::App& verb, RunOptions& options);
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help);
 /// --report, --progress, --seed: for what runs long.
 void add_long_run_options(CLI::App& verb, RunOptions& options);
-/// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own limit on
-/// data: what goes beyond it fails to be allocated (`std::bad_alloc`).
+/// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own limit
+/// on data: what goes beyond it fails to be allocated (`std::bad_alloc`).
 void apply_resources(const RunOptions& options);
 /// Accepts numbers from low to high, and nothing else (NaN passes CLI::Range).
 CLI::Validator number_in(double low, double high);

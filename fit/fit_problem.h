@@ -45,8 +45,8 @@ struct MinimizerOptions {
   int cg_max_iterations = 200;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
-  /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled with the
-  /// step before.
+  /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled with
+  /// the step before.
   std::function<bool()> ended;
 };
 

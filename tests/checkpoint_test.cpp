@@ -72,9 +72,10 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits") {
     check_that_it_resumes([&](StageLog* log) {
       FitOptions options{.levels = 2, .cage_only = cage_only, .max_iterations = 2};
       options.log = log;
-      FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
-      result.mesh.positions.insert(result.mesh.positions.end(), result.cage.positions.begin(), result.cage.positions.end());
-      return std::pair(result.mesh.positions, result.report);
+      const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+      std::vector<Vec3> all = result.mesh.positions;
+      all.insert(all.end(), result.cage.positions.begin(), result.cage.positions.end());
+      return std::pair(all, result.report);
     });
 }
 

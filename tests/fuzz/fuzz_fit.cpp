@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// libFuzzer target of the fits: a tiny template and target whose vertices the bytes move, and options that they choose. Whatever
-// they are, a fit returns finite positions, with every cell certified where it says it converged from a certified template,
-// or throws InputError.
+// libFuzzer target of the fits: a tiny template and target whose vertices the bytes move, and options that they choose.
+// Whatever they are, a fit returns finite positions, with every cell certified where it says it converged from a
+// certified template, or throws InputError.
 
 #include "fit/certificate.h"
 #include "fit/high_order_certificate.h"

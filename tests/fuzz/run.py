@@ -5,8 +5,8 @@
 Usage: tests/fuzz/run.py BUILD_FOLDER [--seconds S] [--corpus FOLDER] [NAME ...]
        (cmake --preset fuzz && cmake --build build/fuzz;  an hour each: --seconds 3600)
 
-Corpora are written by write_corpus into FOLDER (default: BUILD_FOLDER/corpus) and grow there; inputs that fail are kept in
-BUILD_FOLDER/findings. Exit status: 0 without findings, 1 with some, 2 no fuzzers here.
+Corpora are written by write_corpus into FOLDER (default: BUILD_FOLDER/corpus) and grow there; inputs that fail are kept
+in BUILD_FOLDER/findings. Exit status: 0 without findings, 1 with some, 2 no fuzzers here.
 """
 import argparse
 import os
@@ -35,8 +35,9 @@ def main():
     failed = 0
     for fuzzer in fuzzers:
         name = fuzzer.name.removeprefix("fuzz_")
-        done = subprocess.run([fuzzer, f"-max_total_time={arguments.seconds}", f"-timeout={600 if name == 'fit' else 30}", "-rss_limit_mb=2048",
-                               "-max_len=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/{name}-",
+        timeout = 600 if name == "fit" else 30
+        done = subprocess.run([fuzzer, f"-max_total_time={arguments.seconds}", f"-timeout={timeout}",
+                               "-rss_limit_mb=2048", "-max_len=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/{name}-",
                                corpus / name], env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
                               errors="replace")
         runs = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)

@@ -51,20 +51,23 @@ void write_volumes(const fs::path& folder) {
       write(folder / "vtu", (name + std::to_string(order)).c_str(),
             vtu_text({ElementSpace(mesh, order == 1 ? Basis::fourier : Basis::legendre, order), mesh}));
   }
-  write(folder / "vtk", "binary", std::string("# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 "
-                                              "double\n") + std::string(96, '\1') +
-                                      "\nCELLS 1 5\n" + std::string("\0\0\0\4\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\3", 20) +
-                                      "\nCELL_TYPES 1\n" + std::string("\0\0\0\n", 4) + "\n");
+  const std::string head = "# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n";
+  const std::string cell("\0\0\0\4\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\3", 20), type("\0\0\0\n", 4);
+  write(folder / "vtk", "binary",
+        head + std::string(96, '\1') + "\nCELLS 1 5\n" + cell + "\nCELL_TYPES 1\n" + type + "\n");
   write(folder / "vtk", "offsets", "# vtk DataFile Version 5.1\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
                                    "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY "
                                    "vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n");
 }
 
 void write_surfaces(const fs::path& folder) {
-  const TriangleMesh tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
+  const TriangleMesh tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                 {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
   write(folder / "off", "tetrahedron", samples::off_text(tetrahedron));
-  write(folder / "off", "colours", "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
-  write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2//1 -2 -1/1\n");
+  write(folder / "off", "colours", "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n"
+                                   "1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
+  write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+                                   "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 -2 -1/1\n");
   fs::create_directories(folder / "obj");
   write_obj(folder / "obj" / "bowl.obj", samples::bowl_surface(1));
   write(folder / "stl", "text", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
@@ -75,8 +78,8 @@ void write_surfaces(const fs::path& folder) {
   const float corners[2][9] = {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 0, 0, 0, 1, 0, 0, 0, 1}};
   for (std::size_t t = 0; t < 2; ++t) std::memcpy(binary.data() + 84 + 50 * t + 12, corners[t], sizeof corners[t]);
   write(folder / "stl", "binary", binary);
-  const std::string body = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty double quality\n"
-                           "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string body = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                           "property double quality\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
   write(folder / "ply", "text", "ply\nformat ascii 1.0\ncomment c\n" + body + "0 0 0 1\n1 0 0 2\n0 1 0 3\n3 0 1 2\n");
   for (const bool little : {true, false}) {
     std::string bytes = std::string("ply\nformat binary_") + (little ? "little" : "big") + "_endian 1.0\n" + body;
@@ -103,8 +106,10 @@ void write_checkpoints(const fs::path& folder) {
 
 void write_fits(const fs::path& folder) {
   for (const char what : {'\0', '\1', '\2'})
-    for (const char kind : {'\0', '\1', '\2'}) write(folder / "fit", std::string{'a', char('0' + what), char('0' + kind)}.c_str(),
-                                                     std::string{what, '\0', kind} + std::string(60, '\0'));
+    for (const char kind : {'\0', '\1', '\2'}) {
+      const std::string name{'a', static_cast<char>('0' + what), static_cast<char>('0' + kind)};
+      write(folder / "fit", name.c_str(), std::string{what, '\0', kind} + std::string(60, '\0'));
+    }
 }
 
 }  // namespace

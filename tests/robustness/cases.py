@@ -5,8 +5,8 @@ import os
 import pathlib
 import subprocess
 
-# What a report says of how a run went, not of what it came to: times, memory, words of the command line, and whether it was
-# resumed. Everything else in it is compared, and every other file byte by byte.
+# What a report says of how a run went, not of what it came to: times, memory, words of the command line, and whether it
+# was resumed. Everything else in it is compared, and every other file byte by byte.
 VOLATILE = {"seconds", "peak_memory_bytes", "command_line", "resumed_from", "recalled_stages"}
 VOLATILE_OPTIONS = {"threads", "checkpoint", "every", "resume", "force", "quiet"}
 
@@ -14,7 +14,8 @@ VOLATILE_OPTIONS = {"threads", "checkpoint", "every", "resume", "force", "quiet"
 CASES = [
     ("fit", "fit {s}/ball_target.off --template {s}/ball_template.mesh --levels 2 --max-iterations 4",
      ["out.mesh", "out.glb", "cage:cage.mesh", "cage:cage.usda", "out.obj"]),
-    ("order", "fit {s}/ball_target.off --template {s}/ball_template.mesh --order 2 --max-iterations 4", ["out.vtu", "out.glb", "out.msh"]),
+    ("order", "fit {s}/ball_target.off --template {s}/ball_template.mesh --order 2 --max-iterations 4",
+     ["out.vtu", "out.glb", "out.msh"]),
     ("shell", "shell {s}/bowl.obj --thickness 2% --layers 2 --side both", ["out.mesh", "out.vtu", "out.glb"]),
     ("cage-only", "fit {s}/torus_target.off --template {s}/torus_template.mesh --levels 2 --cage-only",
      ["out.vtk", "cage:cage.obj", "out.gltf"]),

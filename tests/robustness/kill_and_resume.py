@@ -86,8 +86,8 @@ class Chain:
 def undisturbed(program, case, samples):
     with tempfile.TemporaryDirectory() as folder:
         begin = time.monotonic()
-        done = subprocess.run(cases.command(program, case, samples), cwd=folder, env=cases.environment(), capture_output=True,
-                              text=True)
+        done = subprocess.run(cases.command(program, case, samples), cwd=folder, env=cases.environment(),
+                              capture_output=True, text=True)
         if done.returncode not in (0, 4):
             sys.exit(f"{case[0]}: the undisturbed run ended with {done.returncode}: {done.stderr}")
         seconds = time.monotonic() - begin

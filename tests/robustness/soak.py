@@ -5,8 +5,8 @@
 Usage: tests/robustness/soak.py PROGRAM [--runs N] [--seed S] [--minutes M] [--keep FOLDER]
 
 Each run is a function of its number and the seed. A finding is: an exit status that is not documented, or not one of that
-verb's; more time than the limit and a minute; an error without words; a temporary left behind; or a claim of the report that
-`subvol check` of the file written does not bear out: number of cells, certified cells, inverted cells, intersections,
+verb's; more time than the limit and a minute; an error without words; a temporary left behind; or a claim of the report
+that `subvol check` of the file written does not bear out: number of cells, certified cells, inverted cells, intersections,
 mean distance. Ends with a table; exit status 0 without findings, 1 with some. What was found is kept in FOLDER.
 """
 import argparse
@@ -201,18 +201,20 @@ class Soak:
                 bad.append(f"{name}: {report['quality'][name]} is claimed, check finds {found['quality'][name]}")
         if verb != "shell" and found["boundary_self_intersections"] != report["boundary_self_intersections"]:
             bad.append("intersections differ from what is claimed")
-        if target and not math.isclose(found["distance"]["mean_percent"], report["distance"]["mean_percent"], rel_tol=1e-6):
+        distances = [one["distance"]["mean_percent"] for one in (found, report)] if target else [0, 0]
+        if not math.isclose(*distances, rel_tol=1e-6):
             bad.append("the distance differs from what is claimed")
         return bad
 
     def run(self, number):
         rng = random.Random(f"{self.seed} {number}")
-        verb, make = rng.choice([("fit", fit_words), ("fit", fit_words), ("shell", shell_words), ("optimize", optimize_words)])
+        kinds = [("fit", fit_words), ("fit", fit_words), ("shell", shell_words), ("optimize", optimize_words)]
+        verb, make = rng.choice(kinds)
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             words, output, target = make(rng, folder)
-            command = [self.program, *words.split(), "--time-limit", str(TIME_LIMIT), "-o", output, "--report", "report.json",
-                       "--quiet"]
+            command = [self.program, *words.split(), "--time-limit", str(TIME_LIMIT), "-o", output, "--report",
+                       "report.json", "--quiet"]
             begin = time.monotonic()
             try:
                 done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace",
