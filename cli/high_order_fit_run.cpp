@@ -9,8 +9,8 @@
 #include "cli/outputs.h"
 #include "cli/progress.h"
 #include "cli/report.h"
+#include "fit/curve_mesh.h"
 #include "fit/mesh_check.h"
-#include "fit/optimize_mesh.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
 
@@ -39,8 +39,6 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
 /// Makes the template valid where it is not. It is what curved cells start from, so nothing is done where this fails.
 void untangle(const HighOrderFitArguments& arguments, StageLog* log, VolumeMesh& template_mesh,
               std::vector<std::string>& warnings) {
-  const std::size_t before = certify(template_mesh).not_certified.size();
-  if (before == 0) return;
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   OptimizeOptions options;
   options.time_limit_seconds = arguments.fit.time_limit_seconds;
@@ -50,15 +48,14 @@ void untangle(const HighOrderFitArguments& arguments, StageLog* log, VolumeMesh&
     return !interrupted();
   };
   catch_interrupt();
-  OptimizeResult result = optimize_mesh(template_mesh, nullptr, options);
-  teller.finish();
-  if (!result.uncertified.empty())
-    throw InputError(arguments.template_mesh.path + ": " + std::to_string(result.uncertified.size()) +
-                     " cells could not be made valid before curving, the first is cell " +
-                     std::to_string(result.uncertified[0]));
-  warnings.push_back(arguments.template_mesh.path + ": " + std::to_string(before) +
-                     " cells were not valid; they were untangled before curving");
-  template_mesh = std::move(result.mesh);
+  try {
+    const std::size_t untangled = untangle_before_fit(template_mesh, options);
+    if (untangled > 0)
+      warnings.push_back(arguments.template_mesh.path + ": " + std::to_string(untangled) +
+                         " cells were not valid; they were untangled before curving");
+  } catch (const InputError& error) {
+    throw InputError(arguments.template_mesh.path + ": " + error.what());
+  }
 }
 
 /// seconds: that have been used of the time limit.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/run_options.h"
 
+#include "cli/exit_status.h"
+
 #include <omp.h>
 #include <sys/resource.h>
 
@@ -70,6 +72,14 @@ CLI::Validator number_in(double low, double high) {
     return "must be a number in " + text + ", not " + word;
   };
   return CLI::Validator(check, "");
+}
+
+double parse_length(const std::string& option, const std::string& text, double diagonal) {
+  const bool percent = text.ends_with('%');
+  const std::string number = percent ? text.substr(0, text.size() - 1) : text;
+  const std::string error = number_in(1e-300, 1e300)(std::string(number));
+  if (!error.empty()) throw UsageError(option + ": must be a positive length, or a percentage as 2%, not " + text);
+  return std::stod(number) * (percent ? diagonal / 100 : 1);
 }
 
 Json options_in_force(const CLI::App& verb) {

@@ -37,6 +37,8 @@ void add_long_run_options(CLI::App& verb, RunOptions& options);
 void apply_resources(const RunOptions& options);
 /// Accepts numbers from low to high, and nothing else (NaN passes CLI::Range).
 CLI::Validator number_in(double low, double high);
+/// A length in the mesh's unit, or with % of a diagonal. UsageError, naming the option: neither.
+double parse_length(const std::string& option, const std::string& text, double diagonal);
 /// The options of a verb that have a value, by long name: given or default.
 Json options_in_force(const CLI::App& verb);
 /// Those of them that bear on what is written: not how a run is told, limited, or kept. What files other than reports say

@@ -42,15 +42,6 @@ struct ShellArguments {
   bool straight = false;
 };
 
-/// A length in the mesh's unit, or with % of a diagonal. UsageError: neither.
-double parse_length(const std::string& text, double diagonal) {
-  const bool percent = text.ends_with('%');
-  const std::string number = percent ? text.substr(0, text.size() - 1) : text;
-  const std::string error = number_in(1e-300, 1e300)(std::string(number));
-  if (!error.empty()) throw UsageError("--thickness: must be a positive length, or a percentage as 2%, not " + text);
-  return std::stod(number) * (percent ? diagonal / 100 : 1);
-}
-
 /// Whether a surface is closed and encloses a negative volume.
 bool faces_point_inward(const TriangleMesh& surface) {
   const TargetSurface target(surface);
@@ -136,7 +127,7 @@ void ShellRun::require_one_per_vertex(const std::string& file, const std::vector
 void ShellRun::grow() {
   ShellOptions options = arguments_.shell;
   if (!arguments_.thickness.empty())
-    options.thickness = parse_length(arguments_.thickness, diagonal_);
+    options.thickness = parse_length("--thickness", arguments_.thickness, diagonal_);
   else
     options.vertex_thickness = arguments_.thickness_file.empty() ? thickness_from_attribute() : thickness_from_file();
   options.side = arguments_.side == "both"     ? ShellSide::both
@@ -260,7 +251,7 @@ void ShellRun::summarise() const {
 int ShellRun::run() {
   if (arguments_.thickness.empty() + arguments_.thickness_file.empty() + arguments_.thickness_attribute.empty() != 2)
     throw UsageError("shell: give one of --thickness, --thickness-file and --thickness-attribute");
-  if (!arguments_.thickness.empty()) parse_length(arguments_.thickness, 1);
+  if (!arguments_.thickness.empty()) parse_length("--thickness", arguments_.thickness, 1);
   if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
   prepare(true);
   timed("read", &ShellRun::load);

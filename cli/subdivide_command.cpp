@@ -6,16 +6,13 @@
 #include "cli/report.h"
 #include "cli/writing.h"
 #include "fit/quality.h"
-#include "subvol/error.h"
 #include "subvol/features.h"
 #include "subvol/mesh_io.h"
-#include "subvol/subdivision.h"
+#include "subvol/repeated_subdivision.h"
 #include "subvol/version.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iostream>
-#include <limits>
 #include <memory>
 #include <optional>
 
@@ -30,30 +27,18 @@ struct SubdivideArguments {
   std::optional<double> crease_angle_degrees;
 };
 
-// Vertices, edges and faces are numbered with 32 bits, and a hex mesh has about three times as many faces as cells.
-void require_numberable(const VolumeMesh& mesh, int levels) {
-  const double most = static_cast<double>(std::numeric_limits<Index>::max()) / 3.5;
-  const double cells = static_cast<double>(mesh.num_cells()) * std::pow(8.0, levels);
-  if (cells > most) {
-    throw InputError("--levels " + std::to_string(levels) + " would make up to " + std::to_string(cells) +
-                     " cells; at most " + std::to_string(most) + " can be numbered");
-  }
-}
-
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
   const std::vector<Output> outputs = checked_outputs(arguments.run, true);
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings);
-  require_numberable(cage, arguments.levels);
   if (arguments.crease_angle_degrees) {
     cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
   }
   const BoundaryRule rule =
       arguments.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
-  VolumeMesh fine = cage;
-  for (int level = 0; level < arguments.levels; ++level) fine = subdivide(fine, rule).fine;
+  const VolumeMesh fine = subdivide_repeatedly(cage, arguments.levels, rule);
 
   WritingOptions writing = arguments.writing;
   writing.source = arguments.mesh;

@@ -53,13 +53,9 @@ VolumeMesh make_grid(EditArguments& arguments) {
     low = low_corner(arguments.box);
     high = high_corner(arguments.box);
   } else {
-    const TriangleMesh surface = load_target(arguments.mesh, arguments.warnings);
-    Eigen::AlignedBox3d box;
-    for (const auto& t : surface.triangles)
-      for (Index v : t) box.extend(surface.positions[v]);
-    const Vec3 margin = Vec3::Constant(arguments.margin / 100 * box.diagonal().norm());
-    low = box.min() - margin;
-    high = box.max() + margin;
+    const auto box = box_around(load_target(arguments.mesh, arguments.warnings), arguments.margin);
+    low = box[0];
+    high = box[1];
   }
   return voxel_mesh(arguments.counts.empty()
                         ? box_grid(low, high, arguments.size)

@@ -34,3 +34,10 @@ target_compile_options(subvol_defaults INTERFACE -fno-math-errno -fno-trapping-m
 if(SUBVOL_NATIVE)
   target_compile_options(subvol_defaults INTERFACE -march=native)
 endif()
+
+# Code that can be put into a shared library: ours, or the Python module. GCC is told that no other library replaces its
+# functions, so that it may inline them as ever: it is as fast as without, and gives the same bits.
+function(make_relocatable target)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>)
+endfunction()

@@ -221,7 +221,7 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const M
   if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
-  check.subdivision_audit = audit(mesh);
+  if (!has_any(check.defects, {Kind::bad_tag})) check.subdivision_audit = audit(mesh);
   if (has_any(check.defects, {Kind::not_finite})) return check;
   std::vector<Index> face_of_triangle;
   const PolygonMesh boundary = boundary_surface(mesh, topology);

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -57,6 +58,15 @@ void add_cell(VolumeMesh& mesh, const ShellLayers& layers, std::span<const Index
   mesh.add_cell(face.size() == 3 ? CellKind::prism : CellKind::hex, {corners.data(), 2 * face.size()});
 }
 
+// Vertices, faces and cells are numbered with 32 bits, and layers have about three faces per cell.
+void require_numberable(const PolygonMesh& surface, int inside, int outside) {
+  const double most = static_cast<double>(std::numeric_limits<Index>::max()) / 3.5;
+  const double cells = (static_cast<double>(inside) + outside) * static_cast<double>(surface.num_faces());
+  if (cells > most)
+    throw InputError("so many layers would make " + std::to_string(cells) + " cells; at most " + std::to_string(most) +
+                     " can be numbered");
+}
+
 }  // namespace
 
 std::vector<double> layer_shares(int num_layers, double growth) {
@@ -70,6 +80,7 @@ std::vector<double> layer_shares(int num_layers, double growth) {
 
 ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth) {
   require_faces(surface);
+  require_numberable(surface, inside, outside);
   ShellLayers layers;
   layers.topology = build_surface(surface.positions.size(), {surface.face_offsets.begin(), surface.face_offsets.end()},
                                   surface.face_vertices, {}, SurfaceKind::maybe_open);

@@ -3,6 +3,8 @@
 
 #include "subvol/error.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -42,6 +44,14 @@ VoxelGrid box_grid(const Vec3& low, const Vec3& high, double size) {
     counts[a] = static_cast<int>(
         std::clamp(std::round((high[a] - low[a]) / size), 1.0, double(std::numeric_limits<int>::max() - 1)));
   return box_grid(low, high, counts);
+}
+
+std::array<Vec3, 2> box_around(const TriangleMesh& surface, double margin_percent) {
+  Eigen::AlignedBox3d box;
+  for (const auto& t : surface.triangles)
+    for (Index v : t) box.extend(surface.positions[v]);
+  const Vec3 margin = Vec3::Constant(margin_percent / 100 * box.diagonal().norm());
+  return {box.min() - margin, box.max() + margin};
 }
 
 VolumeMesh voxel_mesh(const VoxelGrid& grid, std::span<const char> kept) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
 #include <array>
@@ -32,6 +33,9 @@ VoxelGrid box_grid(const Vec3& low, const Vec3& high, const std::array<int, 3>& 
 /// The same with cells about as large as asked: each axis is cut into equal parts, their number rounded, at least 1.
 /// size > 0.
 VoxelGrid box_grid(const Vec3& low, const Vec3& high, double size);
+
+/// Low and high corner of the box around a surface's triangles, moved outward by a share of its diagonal.
+std::array<Vec3, 2> box_around(const TriangleMesh& surface, double margin_percent);
 
 /// Hexes of the cells kept, in the grid's order, on the lattice points they use, in lattice order.
 /// kept  one entry per cell, non-zero: kept; or empty: all.

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 const fs::path kRoot = SUBVOL_SOURCE_DIR;
-const std::vector<std::string> kLayers{"subvol", "fit", "shell", "export", "cli", "samples", "bench", "tests"};
+const std::vector<std::string> kLayers{"subvol", "fit", "shell", "export", "cli", "python", "samples", "bench", "tests"};
 
 const std::map<std::string, std::set<std::string>> kMayInclude{
     {"subvol", {"subvol"}},
@@ -25,6 +25,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
     {"shell", {"subvol", "fit", "shell"}},
     {"export", {"subvol", "export"}},  // and kFitForExport
     {"cli", {"subvol", "fit", "shell", "export", "cli"}},
+    {"python", {"subvol", "fit", "shell", "export", "cli", "python"}},
     {"samples", {"subvol", "fit", "shell", "export", "samples"}},
     {"bench", {"subvol", "fit", "shell", "export", "samples", "bench"}},
     {"tests", {"subvol", "fit", "shell", "export", "cli", "samples", "tests"}},

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/check_report.h"
+#include "fit/mesh_check.h"
+#include "fit/self_intersection.h"
+#include "python/arrays.h"
+#include "python/fit_options.h"
+#include "python/module.h"
+#include "python/report.h"
+#include "python/results.h"
+
+#include <utility>
+
+namespace subvol::python {
+namespace {
+
+/// What is looked at: linear or curved cells, from memory or a file.
+struct CheckedMesh {
+  explicit CheckedMesh(const py::object& object) {
+    if (py::isinstance<CurvedMesh>(object)) {
+      curved = object.cast<std::shared_ptr<CurvedMesh>>();
+    } else if (is_path(object) && cli::is_high_order_file(path_from(object))) {
+      const std::string path = path_from(object);
+      const py::gil_scoped_release unlocked;
+      curved = std::make_shared<const CurvedMesh>(read_high_order(path));
+    } else {
+      linear = volume_from(object, "mesh", false);
+    }
+  }
+
+  std::shared_ptr<const VolumeMesh> linear;
+  std::shared_ptr<const CurvedMesh> curved;
+};
+
+py::dict check(const py::object& object, const py::object& target_object, const py::kwargs& given) {
+  Keywords keywords("check", given);
+  Work work(keywords);
+  cli::WritingOptions writing;
+  take_chord(keywords, writing);
+  keywords.finish();
+  const CheckedMesh mesh(object);
+  std::optional<TriangleMesh> target;
+  if (!target_object.is_none()) target = triangles_from(target_object, "target");
+  const TriangleMesh* against = target ? &*target : nullptr;
+  MeshCheck found = work.run("check", [&] {
+    if (mesh.linear) return check_mesh(*mesh.linear, against);
+    return check_mesh(mesh.curved->mesh, curved_boundary(mesh.curved->mesh, writing.chord_percent), against);
+  });
+  py::dict report = to_python(cli::check_json(found));
+  if (found.subdivision_audit) report["audit"] = to_python(cli::audit_json(*found.subdivision_audit));
+  if (!found.quality) return report;
+  report["not_certified_cells"] = moved(std::move(found.quality->certificate.not_certified));
+  report["cell_scaled_jacobian"] = moved(std::move(found.quality->cell_minima));
+  return report;
+}
+
+py::dict distance(const py::object& surface, const py::object& target_object, const py::kwargs& given) {
+  Keywords keywords("distance", given);
+  Work work(keywords);
+  SurfaceDistanceOptions options;
+  keywords.take("samples", options.num_samples);
+  keywords.finish();
+  const TriangleMesh ours = triangles_from(surface, "surface"), target = triangles_from(target_object, "target");
+  const SurfaceDistance found = work.run("distance", [&] { return surface_distance(ours, target, options); });
+  return to_python(cli::distance_json(found, bounding_box_diagonal(target)));
+}
+
+py::array intersections(const py::object& object) {
+  const TriangleMesh surface = triangles_from(object, "surface");
+  SelfIntersections found;
+  {
+    const py::gil_scoped_release unlocked;
+    found = self_intersections(surface);
+  }
+  std::vector<Index> pairs;
+  for (const auto& [a, b] : found.pairs) pairs.insert(pairs.end(), {a, b});
+  return py::array(moved(std::move(pairs)).attr("reshape")(-1, 2));
+}
+
+}  // namespace
+
+void add_checks(py::module_& module) {
+  module.def("check", &check, py::arg("mesh"), py::arg("target") = py::none(),
+             R"(check(mesh, target=None, *, chord=0.005, progress=None, threads=None)
+--
+
+Says what is true of a mesh: dict, with the entries of docs/cli.md and two arrays.
+
+mesh    VolumeMesh, HighOrderMesh, or the path of either; anything may be wrong with it
+target  measure the distance to it: SurfaceMesh, VolumeMesh or path
+
+valid                 sound, every cell proved to be nowhere inverted, the boundary free of self-intersections
+quality, distance, boundary_self_intersections, topology, defects, audit, ...
+cell_scaled_jacobian  least of each cell: (n,) float64
+not_certified_cells   (m,) int32)");
+  module.def("distance", &distance, py::arg("surface"), py::arg("target"),
+             R"(distance(surface, target, *, samples=50000, progress=None, threads=None)
+--
+
+Distances between two surfaces, both ways: dict, lengths and per cent of the diagonal of the target's bounding box.
+
+samples  about so many points carry each mean)");
+  module.def("self_intersections", &intersections, py::arg("surface"),
+             R"(self_intersections(surface)
+--
+
+Pairs of triangles, of surface.triangulated(), that meet in more than their common corners and edge: (n, 2) int32.)");
+}
+
+}  // namespace subvol::python

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/writing.h"
+#include "fit/basis.h"
+#include "fit/high_order_fit.h"
+#include "python/keywords.h"
+#include "subvol/subdivision.h"
+
+namespace subvol::python {
+
+// Options that several functions share.
+
+Choices<BoundaryRule> boundary_rules();
+Choices<Basis> bases();
+
+/// correspondence, lambda_close, solver, max_iterations, time_limit, of either kind of fit.
+template <class Options>
+void take_solver_options(Keywords& keywords, Options& options) {
+  keywords.take("lambda_close", options.lambda_close);
+  keywords.take("correspondence", options.correspondence,
+                {{"closest", Correspondence::closest}, {"voronoi", Correspondence::voronoi}});
+  keywords.take("solver", options.solver, {{"newton", SolverKind::newton}, {"lbfgs", SolverKind::lbfgs}});
+  keywords.take("max_iterations", options.max_iterations);
+  keywords.take("time_limit", options.time_limit_seconds);
+}
+
+/// order, basis, adaptive, tolerance, and the above.
+HighOrderFitOptions high_order_options(Keywords& keywords);
+
+void take_chord(Keywords& keywords, cli::WritingOptions& writing);
+
+}  // namespace subvol::python

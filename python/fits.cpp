@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/automatic_template.h"
+#include "cli/check_report.h"
+#include "cli/report.h"
+#include "cli/writing.h"
+#include "fit/high_order_fit.h"
+#include "fit/mesh_check.h"
+#include "fit/template_choice.h"
+#include "python/fit_options.h"
+#include "python/module.h"
+#include "python/results.h"
+#include "subvol/error.h"
+
+namespace subvol::python {
+namespace {
+
+FitOptions subdivision_options(Keywords& keywords) {
+  FitOptions options;
+  keywords.take("levels", options.levels);
+  keywords.take("tolerance", options.tolerance_percent);
+  keywords.take("surface", options.surface, {{"limit", FittedSurface::limit}, {"mesh", FittedSurface::mesh}});
+  keywords.take("boundary", options.boundary, boundary_rules());
+  keywords.take("cage_only", options.cage_only);
+  keywords.take("crease_angle", options.crease_angle_degrees);
+  keywords.take("lambda_far", options.lambda_far);
+  take_solver_options(keywords, options);
+  return options;
+}
+
+/// One fit from its arguments to its result.
+class Fit {
+ public:
+  Fit(const py::object& target, const py::object& template_mesh, const py::kwargs& given)
+      : keywords_("fit", given), work_(keywords_) {
+    read_options(!template_mesh.is_none());
+    target_ = triangles_from(target, "target");
+    template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
+  }
+  std::shared_ptr<Fitted> run() {
+    const auto result = std::make_shared<Fitted>();
+    // The template is shown by the result, whose arrays can be written: it is to be of its own.
+    result->template_mesh = std::make_shared<VolumeMesh>(*template_);
+    curved_ ? fit_curved(*result) : fit_subdivision(*result);
+    return result;
+  }
+
+ private:
+  void read_options(bool has_template) {
+    curved_ = keywords_.has("order");
+    if (has_template)
+      keywords_.refuse({"cells"}, "does not go with a template");
+    else
+      keywords_.take("cells", choice_options_.cells);
+    if (curved_) {
+      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "lambda_far"},
+                       "does not go with order");
+      high_order_ = high_order_options(keywords_);
+    } else {
+      keywords_.refuse({"order", "basis", "adaptive"}, "goes with order only");
+      subdivision_ = subdivision_options(keywords_);
+      choice_options_.crease_angle_degrees = subdivision_.crease_angle_degrees;
+    }
+    take_chord(keywords_, writing_);
+    keywords_.finish();
+  }
+
+  std::shared_ptr<const VolumeMesh> made_template() {
+    choice_options_.progress = work_.progress();
+    choice_ = work_.run("template", [&] { return choose_template(target_, choice_options_); });
+    if (choice_->cancelled) throw InputError("fit: ended before there was a template");
+    warnings_ = choice_->warnings;
+    return std::make_shared<const VolumeMesh>(choice_->mesh);
+  }
+
+  void fit_subdivision(Fitted& result) {
+    subdivision_.progress = work_.progress();
+    FitResult fit = work_.run("fit", [&] { return fit_subdivision_volume(target_, *template_, subdivision_); });
+    const MeshCheck found = work_.run("check", [&] { return check_mesh(fit.mesh, &target_); });
+    const TessellatedSurface limit = work_.run("limit", [&] { return cli::tessellated_limit(fit.cage, writing_); });
+    const SurfaceDistance distance =
+        work_.run("distance", [&] { return surface_distance(triangles_of(limit), target_); });
+    const double diagonal = bounding_box_diagonal(target_);
+    Json json = report_of(fit.report, found);
+    json["limit_surface_distance"] = cli::distance_json(distance, diagonal);
+    json["limit_surface_distance"]["chord_error_percent"] = 100 * limit.chord_error / diagonal;
+    if (fit.report.creases) json["creases"] = cli::creases_json(*fit.report.creases);
+    json["cage"] = cli::describe("", fit.cage);
+    json["audit"] = cli::audit_json(audit(*template_));
+    finish(result, json, fit.report);
+    result.cage = std::make_shared<VolumeMesh>(std::move(fit.cage));
+    result.mesh = std::make_shared<VolumeMesh>(std::move(fit.mesh));
+  }
+
+  void fit_curved(Fitted& result) {
+    high_order_.progress = work_.progress();
+    HighOrderFitResult fit = work_.run("fit", [&] { return fit_high_order(target_, *template_, high_order_); });
+    const MeshCheck found = work_.run("check", [&] {
+      return check_mesh(fit.mesh, curved_boundary(fit.mesh, writing_.chord_percent), &target_);
+    });
+    Json json = report_of(fit.report, found);
+    json["mesh"] = cli::describe("", fit.mesh);
+    finish(result, json, fit.report);
+    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{std::move(fit.mesh), template_->references});
+  }
+
+  Json report_of(const FitReport& report, const MeshCheck& found) const {
+    Json json{{"input", {{"target", cli::describe("", target_)}, {"template", cli::describe("", *template_)}}}};
+    if (choice_) json["template"] = cli::choice_json(*choice_);
+    json.update(cli::fit_json(report));
+    json.update(cli::check_json(found));
+    return json;
+  }
+
+  void finish(Fitted& result, const Json& json, const FitReport& report) {
+    warnings_.insert(warnings_.end(), report.warnings.begin(), report.warnings.end());
+    result.report = make_report("fit", json, keywords_, work_, warnings_);
+  }
+
+  Keywords keywords_;
+  Work work_;
+  bool curved_ = false;
+  FitOptions subdivision_;
+  HighOrderFitOptions high_order_;
+  TemplateChoiceOptions choice_options_;
+  cli::WritingOptions writing_;
+  TriangleMesh target_;
+  std::shared_ptr<const VolumeMesh> template_;
+  std::optional<TemplateChoice> choice_;
+  std::vector<std::string> warnings_;
+};
+
+constexpr const char* kFitHelp =
+    R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
+    boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, lambda_close=None,
+    correspondence='closest', solver='newton', max_iterations=0, time_limit=0.0, order=None, basis='fourier',
+    adaptive=False, chord=0.005, progress=None, threads=None)
+--
+
+Deforms a template until its boundary reproduces a surface: FitResult.
+
+target    SurfaceMesh, VolumeMesh (its boundary), or the path of either
+template  VolumeMesh or its path, roughly in place; None: made from the target, of about `cells` cells
+
+Without order a subdivision volume is fitted:
+levels        times the template is subdivided, 1 .. 6
+surface       what is to agree with the target: the cage's 'limit' surface, or the finest 'mesh'
+boundary      'catmull-clark' or 'averaging'
+cage_only     only the points of the template move
+crease_angle  degrees: keep edges of the target sharper than this sharp
+lambda_far    weight of the cells' shape far from the target
+
+With order, 1 .. 16, curved cells:
+basis     'fourier' or 'legendre'
+adaptive  raise orders only where it pays
+
+And with both:
+tolerance       mean distance to reach, per cent of the diagonal of the target's bounding box
+lambda_close    weight of the cells' shape in the last stage; None: 0.005, with order 0.05
+correspondence  'closest' or 'voronoi'
+solver          'newton' or 'lbfgs'
+max_iterations  per stage; 0: the schedule's own
+time_limit      seconds; 0: none
+chord           how close triangles are to the surface that is measured, per cent of its diagonal
+progress        called with a Progress at every step; returns False to end with the best result so far
+threads         for this call alone; None: as many as OpenMP gives
+
+How the fit ended is told by report["stop_reason"]. Ctrl-C raises KeyboardInterrupt.)";
+
+}  // namespace
+
+Choices<BoundaryRule> boundary_rules() {
+  return {{"catmull-clark", BoundaryRule::catmull_clark}, {"averaging", BoundaryRule::averaging}};
+}
+
+Choices<Basis> bases() { return {{"fourier", Basis::fourier}, {"legendre", Basis::legendre}}; }
+
+HighOrderFitOptions high_order_options(Keywords& keywords) {
+  HighOrderFitOptions options;
+  keywords.take("order", options.order);
+  keywords.take("basis", options.basis, bases());
+  keywords.take("adaptive", options.adaptive);
+  keywords.take("tolerance", options.tolerance_percent);
+  take_solver_options(keywords, options);
+  return options;
+}
+
+void take_chord(Keywords& keywords, cli::WritingOptions& writing) { keywords.take("chord", writing.chord_percent); }
+
+void add_fits(py::module_& module) {
+  py::class_<Reported, std::shared_ptr<Reported>>(module, "Result", "A result and its report.")
+      .def_property_readonly("report", [](const Reported& result) { return result.report; },
+                             "What was done and what is true of the result: dict, with the entries of docs/cli.md.");
+  py::class_<Fitted, Reported, std::shared_ptr<Fitted>> type(module, "FitResult", "What `fit` returns.");
+  type.def_property_readonly("template", [](const Fitted& fit) { return fit.template_mesh; },
+                             "The template: VolumeMesh.");
+  type.def_property_readonly("cage", [](const Fitted& fit) { return fit.cage; },
+                             "The control mesh whose limit surface is fitted: VolumeMesh; None of curved cells.");
+  type.def_property_readonly("mesh", &mesh_of<Fitted>,
+                             "The finest mesh, a VolumeMesh; or curved cells, a HighOrderMesh.");
+  module.def("fit", [](const py::object& target, const py::object& template_mesh, const py::kwargs& given) {
+    return Fit(target, template_mesh, given).run();
+  }, py::arg("target"), py::arg("template") = py::none(), kFitHelp);
+}
+
+}  // namespace subvol::python

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "python/keywords.h"
+
+#include "subvol/error.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace subvol::python {
+
+py::object Keywords::find(const char* name) {
+  taken_.emplace_back(name);
+  return given_.contains(name) ? py::object(given_[name]) : py::none();
+}
+
+py::object Keywords::object(const char* name) { return find(name); }
+
+void Keywords::refuse(std::initializer_list<const char*> names, const char* why) {
+  for (const char* name : names) {
+    taken_.emplace_back(name);
+    if (has(name)) throw InputError(call_ + ": " + name + ' ' + why);
+  }
+}
+
+void Keywords::finish() const {
+  std::string list;
+  for (const std::string& name : taken_) list += (list.empty() ? "" : ", ") + name;
+  for (const auto& [key, value] : given_) {
+    const auto name = key.cast<std::string>();
+    if (std::find(taken_.begin(), taken_.end(), name) == taken_.end())
+      throw py::type_error(call_ + ": there is no option '" + name + "'; there are " + list);
+  }
+}
+
+void Keywords::refuse_type(const char* name, const py::handle& value, const char* wanted) const {
+  throw py::type_error(call_ + ": " + name + " must be " + wanted + ", not " + py::repr(value).cast<std::string>());
+}
+
+void Keywords::refuse_word(const char* name, const py::handle& value, const std::vector<const char*>& words) const {
+  std::string list;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    list += std::string(i == 0 ? "" : i + 1 == words.size() ? " or " : ", ") + '\'' + words[i] + '\'';
+  throw InputError(call_ + ": " + name + " must be " + list + ", not " + py::repr(value).cast<std::string>());
+}
+
+void Keywords::read(const char* name, const py::object& given, bool& value) const {
+  // NumPy's booleans are no bools.
+  if (!py::isinstance<py::bool_>(given) && !py::hasattr(given, "dtype")) refuse_type(name, given, "True or False");
+  const int truth = PyObject_IsTrue(given.ptr());
+  if (truth < 0) throw py::error_already_set();
+  value = truth != 0;
+}
+
+long long Keywords::whole_number(const char* name, const py::object& given) const {
+  if (py::isinstance<py::bool_>(given) || !PyIndex_Check(given.ptr())) refuse_type(name, given, "a whole number");
+  const auto number = py::reinterpret_steal<py::object>(PyNumber_Index(given.ptr()));
+  if (!number) throw py::error_already_set();
+  int overflow = 0;
+  const long long value = PyLong_AsLongLongAndOverflow(number.ptr(), &overflow);
+  using Limits = std::numeric_limits<long long>;
+  return overflow == 0 ? value : overflow > 0 ? Limits::max() : Limits::min();
+}
+
+void Keywords::read(const char* name, const py::object& given, int& value) const {
+  const long long number = whole_number(name, given);
+  if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
+    throw InputError(call_ + ": " + name + " is far too large: " + py::repr(given).cast<std::string>());
+  value = static_cast<int>(number);
+}
+
+void Keywords::read(const char* name, const py::object& given, std::size_t& value) const {
+  const long long number = whole_number(name, given);
+  if (number < 0) throw InputError(call_ + ": " + name + " must not be negative, got " + std::to_string(number));
+  value = static_cast<std::size_t>(number);
+}
+
+void Keywords::read(const char* name, const py::object& given, double& value) const {
+  const bool is_number = PyIndex_Check(given.ptr()) || py::hasattr(given, "__float__");
+  if (!is_number || py::isinstance<py::bool_>(given)) refuse_type(name, given, "a number");
+  value = PyFloat_AsDouble(given.ptr());
+  if (value == -1 && PyErr_Occurred()) throw py::error_already_set();
+}
+
+void Keywords::read(const char* name, const py::object& given, std::string& value) const {
+  if (!py::isinstance<py::str>(given)) refuse_type(name, given, "a word");
+  value = given.cast<std::string>();
+}
+
+}  // namespace subvol::python

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/optimize_mesh.h"
+
+#include "cli/check_report.h"
+#include "cli/report.h"
+#include "fit/boundary_triangles.h"
+#include "fit/curve_mesh.h"
+#include "fit/mesh_check.h"
+#include "python/arrays.h"
+#include "python/fit_options.h"
+#include "python/module.h"
+#include "python/results.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+
+namespace subvol::python {
+namespace {
+
+/// One optimisation from its arguments to its result.
+class Optimization {
+ public:
+  Optimization(const py::object& mesh, const py::kwargs& given) : keywords_("optimize", given), work_(keywords_) {
+    const py::object target = keywords_.object("target");
+    curved_ = keywords_.has("order");
+    if (curved_) {
+      if (target.is_none()) throw InputError("optimize: order needs a target");
+      read_curved_options();
+    } else {
+      read_options();
+    }
+    keywords_.finish();
+    mesh_ = volume_from(mesh, "mesh");
+    if (!target.is_none()) target_ = triangles_from(target, "target");
+  }
+
+  std::shared_ptr<Optimized> run() {
+    const auto result = std::make_shared<Optimized>();
+    const QualityReport before = work_.run("quality", [&] { return measure_quality(*mesh_); });
+    json_["input"] = {{"mesh", cli::describe("", *mesh_)}, {"quality", cli::quality_json(before)}};
+    if (target_) json_["input"]["target"] = cli::describe("", *target_);
+    curved_ ? curve(*result) : optimize(*result);
+    result->report = make_report("optimize", json_, keywords_, work_, warnings_);
+    return result;
+  }
+
+ private:
+  void read_options() {
+    keywords_.refuse({"order", "basis"}, "goes with order only");
+    keywords_.take("fixed_boundary", options_.fixed_boundary);
+    keywords_.take("sizes", options_.sizes, {{"uniform", CellSizes::uniform}, {"local", CellSizes::local}});
+    keywords_.take("crease_angle", options_.crease_angle_degrees);
+    keywords_.take("tolerance", options_.mean_tolerance_percent);
+    keywords_.take("max_tolerance", options_.max_tolerance_percent);
+    keywords_.take("lambda_", options_.lambda);
+    keywords_.take("max_iterations", options_.max_iterations);
+    keywords_.take("time_limit", options_.time_limit_seconds);
+    keywords_.refuse({"chord"}, "goes with order only");
+  }
+
+  void read_curved_options() {
+    keywords_.refuse({"fixed_boundary", "sizes", "crease_angle", "max_tolerance"}, "does not go with order");
+    curving_.lambda_close = kCurvingLambda;
+    curving_.tolerance_percent = options_.mean_tolerance_percent;
+    keywords_.take("order", curving_.order);
+    keywords_.take("basis", curving_.basis, bases());
+    keywords_.take("tolerance", curving_.tolerance_percent);
+    keywords_.take("lambda_", curving_.lambda_close);
+    keywords_.take("max_iterations", curving_.max_iterations);
+    keywords_.take("time_limit", curving_.time_limit_seconds);
+    take_chord(keywords_, writing_);
+  }
+
+  void optimize(Optimized& result) {
+    options_.progress = work_.progress();
+    const TriangleMesh* target = target_ ? &*target_ : nullptr;
+    OptimizeResult found = work_.run("optimize", [&] { return optimize_mesh(*mesh_, target, options_); });
+    const MeshCheck checked = work_.run("check", [&] {
+      const TriangleMesh surface =
+          target_ ? *target_ : refined_triangles(boundary_surface(*mesh_, MeshTopology(*mesh_)));
+      return check_mesh(found.mesh, &surface);
+    });
+    add(found.report, checked);
+    result.mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));
+  }
+
+  void curve(Optimized& result) {
+    curving_.progress = work_.progress();
+    VolumeMesh start = *mesh_;
+    OptimizeOptions options;
+    options.time_limit_seconds = curving_.time_limit_seconds;
+    options.progress = curving_.progress;
+    const std::size_t untangled = work_.run("untangle", [&] { return untangle_before_fit(start, options); });
+    if (untangled > 0)
+      warnings_.push_back(std::to_string(untangled) + " cells were not valid; they were untangled before curving");
+    HighOrderFitResult found = work_.run("fit", [&] { return fit_high_order(*target_, start, curving_); });
+    const MeshCheck checked = work_.run("check", [&] {
+      return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent), &*target_);
+    });
+    add(found.report, checked);
+    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{std::move(found.mesh), mesh_->references});
+  }
+
+  void add(const FitReport& report, const MeshCheck& checked) {
+    json_.update(cli::fit_json(report));
+    json_.update(cli::check_json(checked));
+    json_["not_certified_cells"] = checked.quality ? checked.quality->certificate.not_certified : std::vector<Index>{};
+    warnings_.insert(warnings_.end(), report.warnings.begin(), report.warnings.end());
+  }
+
+  Keywords keywords_;
+  Work work_;
+  bool curved_ = false;
+  OptimizeOptions options_;
+  HighOrderFitOptions curving_;
+  cli::WritingOptions writing_;
+  std::shared_ptr<const VolumeMesh> mesh_;
+  std::optional<TriangleMesh> target_;
+  Json json_;
+  std::vector<std::string> warnings_;
+};
+
+constexpr const char* kHelp =
+    R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
+    max_tolerance=0.5, lambda_=None, order=None, basis='fourier', max_iterations=0, time_limit=0.0, chord=0.005,
+    progress=None, threads=None)
+--
+
+Untangles a mesh and improves its cells, or curves it: OptimizeResult.
+
+mesh            VolumeMesh or its path; its cells may be inverted
+target          what the boundary is to reproduce: SurfaceMesh, VolumeMesh or path; None: its boundary as it is
+fixed_boundary  boundary points stay; otherwise they slide along the surface
+sizes           ideal sizes of the cells: 'uniform', or as they are, 'local'
+crease_angle    degrees: edges of the surface sharper than this stay sharp
+tolerance       mean distance from the surface to keep within, per cent of its diagonal
+max_tolerance   the same for the largest distance
+lambda_         weight of the cells' shape; None: 0.1, with order 0.0025
+order           curve the cells to this order, 2 .. 16; needs a target, and straight cells' options do not go with it
+basis           of curved cells: 'fourier' or 'legendre'
+
+max_iterations, time_limit, chord, progress and threads as of `fit`.)";
+
+}  // namespace
+
+void add_optimize(py::module_& module) {
+  using Type = py::class_<Optimized, Reported, std::shared_ptr<Optimized>>;
+  Type type(module, "OptimizeResult", "What `optimize` returns.");
+  type.def_property_readonly("mesh", &mesh_of<Optimized>, "The mesh, a VolumeMesh; or curved cells, a HighOrderMesh.");
+  module.def("optimize", [](const py::object& mesh, const py::kwargs& given) {
+    return Optimization(mesh, given).run();
+  }, py::arg("mesh"), kHelp);
+}
+
+}  // namespace subvol::python

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "python/meshes.h"
+#include "python/report.h"
+#include "shell/curved_shell.h"
+
+#include <memory>
+#include <optional>
+
+namespace subvol::python {
+
+/// A result with the report of how it came about.
+struct Reported {
+  py::dict report;
+};
+
+/// What `fit` returns: a cage and its finest mesh, or a mesh of curved cells and no cage.
+struct Fitted : Reported {
+  std::shared_ptr<VolumeMesh> template_mesh, cage, mesh;
+  std::shared_ptr<CurvedMesh> curved;
+};
+
+/// What `optimize` returns: a mesh, or one of curved cells.
+struct Optimized : Reported {
+  std::shared_ptr<VolumeMesh> mesh;
+  std::shared_ptr<CurvedMesh> curved;
+};
+
+/// What `shell` returns.
+struct Shelled : Reported {
+  ShellResult shell;
+  std::optional<CurvedShell> curved_shell;
+  std::shared_ptr<CurvedMesh> curved;
+};
+
+/// The curved mesh of a result where there is one, else the linear one.
+template <class Result>
+py::object mesh_of(const Result& result) {
+  return result.curved ? py::cast(result.curved) : py::cast(result.mesh);
+}
+
+}  // namespace subvol::python

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/check_report.h"
+#include "cli/report.h"
+#include "cli/shell_output.h"
+#include "fit/mesh_check.h"
+#include "fit/option_checks.h"
+#include "fit/surface_distance.h"
+#include "python/arrays.h"
+#include "python/fit_options.h"
+#include "python/module.h"
+#include "python/results.h"
+#include "shell/shell.h"
+#include "subvol/boundary.h"
+#include "subvol/error.h"
+#include "subvol/features.h"
+
+#include <algorithm>
+
+namespace subvol::python {
+namespace {
+
+/// One shell from its arguments to its result.
+class Growing {
+ public:
+  Growing(const py::object& surface, const py::object& thickness, const py::kwargs& given)
+      : keywords_("shell", given), work_(keywords_) {
+    read_options();
+    surface_ = surface_from(surface, "surface");
+    diagonal_ = bounding_box_diagonal(triangulate(surface_.polygons));
+    read_thickness(thickness);
+    options_.tags = surface_.tags;
+    if (crease_angle_)
+      options_.tags = merge_tags(options_.tags, surface_features(surface_.polygons, *crease_angle_));
+  }
+
+  std::shared_ptr<Shelled> run() {
+    const auto result = std::make_shared<Shelled>();
+    options_.progress = work_.progress();
+    result->shell = work_.run("grow", [&] { return make_shell(surface_.polygons, options_); });
+    if (curved_options_.order != 1) curve(*result);
+    ShellResult& shell = result->shell;
+    result->report = make_report("shell", report_of(*result), keywords_, work_, shell.report.warnings);
+    return result;
+  }
+
+ private:
+  void read_options() {
+    bool straight = false;
+    keywords_.take("layers", options_.layers);
+    keywords_.take("growth", options_.growth);
+    keywords_.take("side", options_.side,
+                   {{"outward", ShellSide::outward}, {"inward", ShellSide::inward}, {"both", ShellSide::both}});
+    keywords_.take("free_surface", options_.free_surface);
+    keywords_.take("straight", straight);
+    keywords_.take("crease_angle", crease_angle_);
+    curved_options_.order = 1;
+    keywords_.take("order", curved_options_.order);
+    keywords_.take("basis", curved_options_.basis, bases());
+    keywords_.take("max_iterations", options_.max_iterations);
+    keywords_.take("time_limit", options_.time_limit_seconds);
+    take_chord(keywords_, writing_);
+    keywords_.finish();
+    require_in_range("shell", "order", curved_options_.order, 1, kMaxOrder);  // before the work
+    if (straight && curved_options_.order > 1) throw InputError("shell: straight and order exclude each other");
+    options_.optimize = !straight;
+    curved_options_.max_iterations = options_.max_iterations;
+  }
+
+  void read_thickness(const py::object& thickness) {
+    if (py::isinstance<py::str>(thickness)) {
+      options_.thickness = cli::parse_length("thickness", thickness.cast<std::string>(), diagonal_);
+    } else if (PyFloat_Check(thickness.ptr()) || PyLong_Check(thickness.ptr())) {
+      options_.thickness = thickness.cast<double>();
+    } else {
+      options_.vertex_thickness = values_from(thickness, "thickness");
+      if (options_.vertex_thickness.size() != surface_.polygons.positions.size())
+        throw InputError("thickness must be a length, a percentage as '2%', or have one entry for each of the " +
+                         std::to_string(surface_.polygons.positions.size()) + " points");
+    }
+  }
+
+  // The time that the linear shell has left; none left, or a call to end: cells of the order asked for, but straight.
+  void curve(Shelled& result) {
+    ShellResult& shell = result.shell;
+    if (!shell.failures.none()) {
+      shell.report.warnings.push_back("the cells were left straight, for the shell is not valid");
+      return;
+    }
+    if (options_.time_limit_seconds > 0)
+      curved_options_.time_limit_seconds = std::max(1e-3, options_.time_limit_seconds - work_.seconds());
+    curved_options_.boundary = [this](const HighOrderMesh& mesh) {
+      return curved_boundary(mesh, writing_.chord_percent);
+    };
+    curved_options_.progress = work_.progress();
+    result.curved_shell = work_.run("curve", [&] { return curve_shell(shell, curved_options_); });
+    cli::take_figures(*result.curved_shell, shell);
+    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{result.curved_shell->mesh, shell.mesh.references});
+  }
+
+  Json report_of(const Shelled& result) const {
+    const ShellResult& shell = result.shell;
+    return {{"input", {{"surface", cli::describe("", surface_.polygons)}}},
+            {"stop_reason", to_string(shell.report.stop_reason)},
+            {"explanation", shell.report.explanation},
+            {"converged", shell.report.stop_reason == StopReason::converged},
+            {"stages", cli::stages_json(shell.report)},
+            {"valid", shell.failures.none()},
+            {"thickness", cli::thickness_json(shell, diagonal_)},
+            {"surface_distance_max_percent", 100 * shell.surface_distance_max / diagonal_},
+            {"quality", cli::quality_json(shell.quality)},
+            {"not_certified_cells", shell.failures.certificate.not_certified},
+            {"boundary_self_intersections", shell.failures.intersecting.size()},
+            {"intersecting_faces", shell.failures.intersecting}};
+  }
+
+  Keywords keywords_;
+  Work work_;
+  ShellOptions options_;
+  CurvedShellOptions curved_options_;
+  cli::WritingOptions writing_;
+  std::optional<double> crease_angle_;
+  SurfaceMesh surface_;
+  double diagonal_ = 0;
+};
+
+/// The straight cells, which keep the result they are part of.
+std::shared_ptr<VolumeMesh> linear_mesh(const std::shared_ptr<Shelled>& result) {
+  return {result, &result->shell.mesh};
+}
+
+/// One number per point and side: (2, n), the inside first.
+auto by_side(std::vector<double> ShellResult::* values) {
+  return [values](const py::object& self) {
+    const ShellResult& shell = self.cast<const Shelled&>().shell;
+    return shown((shell.*values).data(), {2, static_cast<py::ssize_t>(shell.layers.num_columns())}, self);
+  };
+}
+
+constexpr const char* kHelp =
+    R"(shell(surface, thickness, *, layers=1, growth=1.0, side='outward', free_surface=False, straight=False,
+    crease_angle=None, order=1, basis='legendre', max_iterations=0, time_limit=0.0, chord=0.005, progress=None,
+    threads=None)
+--
+
+Grows layers of prisms on triangles and of hexes on quads: ShellResult.
+
+surface       SurfaceMesh, VolumeMesh (its boundary), or the path of either
+thickness     of each side: a length, '2%' of the bounding box's diagonal, or (n,) lengths, one for each point
+layers        on each side
+growth        thickness of a layer against that of the one nearer the surface
+side          'outward' where the faces' normals point, 'inward', or 'both'
+free_surface  the surface's points may slide along it for the cells' sake
+straight      straight columns, no optimisation
+crease_angle  degrees: edges of the surface sharper than this become creases as well
+order         of the cells, 1 .. 16; above 1 they are curved, but for the surface itself
+basis         of curved cells: 'legendre' or 'fourier'
+
+max_iterations, time_limit, chord, progress and threads as of `fit`.)";
+
+}  // namespace
+
+void add_shell(py::module_& module) {
+  py::class_<Shelled, Reported, std::shared_ptr<Shelled>> type(module, "ShellResult",
+      "What `shell` returns. Point s n + i of the cells is point i of the surface on sheet s, of n points and from the "
+      "innermost sheet.");
+  type.def_property_readonly("mesh", [](const std::shared_ptr<Shelled>& result) {
+    return result->curved ? py::cast(result->curved) : py::cast(linear_mesh(result));
+  }, "The layers, a VolumeMesh whose references number them from the innermost; or curved cells, a HighOrderMesh.");
+  type.def_property_readonly("linear_mesh", &linear_mesh,
+                             "The layers with straight cells, also where they were curved: VolumeMesh.");
+  type.def_property_readonly("inside_layers", [](const Shelled& result) { return result.shell.layers.inside; },
+                             "Layers on the inside: the surface itself is the sheet of this number.");
+  type.def_property_readonly("thickness", by_side(&ShellResult::achieved),
+                             "Length of the columns on the inside and the outside of each point: (2, n). A view.");
+  type.def_property_readonly("thickness_asked", by_side(&ShellResult::asked), "What was asked for: (2, n). A view.");
+  type.def_property_readonly("thickness_limited", by_side(&ShellResult::limited),
+                             "What there was room for: (2, n). A view.");
+  type.def_property_readonly("clearance", by_side(&ShellResult::clearance),
+                             "Distance of each column's end from the whole surface: (2, n). A view.");
+  module.def("shell", [](const py::object& surface, const py::object& thickness, const py::kwargs& given) {
+    return Growing(surface, thickness, given).run();
+  }, py::arg("surface"), py::arg("thickness"), kHelp);
+}
+
+}  // namespace subvol::python

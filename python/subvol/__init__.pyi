@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Types of the module; docs/python.md and the docstrings say what things are.
+from os import PathLike
+from typing import Any, Callable, Dict, Literal, Optional, Sequence, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import template as template
+
+Path = Union[str, bytes, PathLike[str]]
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+Longs = npt.NDArray[np.int64]
+Report = Dict[str, Any]
+Volume = Union["VolumeMesh", Path]
+Surface = Union["SurfaceMesh", "VolumeMesh", Path]
+Callback = Callable[["Progress"], Optional[bool]]
+BoundaryRule = Literal["catmull-clark", "averaging"]
+Basis = Literal["fourier", "legendre"]
+
+__version__: str
+__all__: Sequence[str]
+TET: int
+PRISM: int
+HEX: int
+
+class Error(Exception): ...
+class InputError(Error, ValueError): ...
+class IoError(Error, OSError): ...
+
+class Progress:
+    @property
+    def stage(self) -> str: ...
+    @property
+    def level(self) -> int: ...
+    @property
+    def iteration(self) -> int: ...
+    @property
+    def energy(self) -> float: ...
+    @property
+    def fraction(self) -> float: ...
+
+class VolumeMesh:
+    def __init__(
+        self,
+        points: npt.ArrayLike,
+        *,
+        hexes: Optional[npt.ArrayLike] = None,
+        prisms: Optional[npt.ArrayLike] = None,
+        tets: Optional[npt.ArrayLike] = None,
+        references: Optional[npt.ArrayLike] = None,
+        creases: Optional[npt.ArrayLike] = None,
+        crease_sharpness: Optional[npt.ArrayLike] = None,
+        corners: Optional[npt.ArrayLike] = None,
+        corner_sharpness: Optional[npt.ArrayLike] = None,
+    ) -> None: ...
+    @property
+    def points(self) -> Floats: ...
+    @property
+    def hexes(self) -> Ints: ...
+    @property
+    def prisms(self) -> Ints: ...
+    @property
+    def tets(self) -> Ints: ...
+    @property
+    def kinds(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def cell_points(self) -> Ints: ...
+    @property
+    def cell_offsets(self) -> Longs: ...
+    @property
+    def references(self) -> Ints: ...
+    @property
+    def creases(self) -> Ints: ...
+    @property
+    def crease_sharpness(self) -> Floats: ...
+    @property
+    def corners(self) -> Ints: ...
+    @property
+    def corner_sharpness(self) -> Floats: ...
+    def boundary(self) -> SurfaceMesh: ...
+    def copy(self) -> VolumeMesh: ...
+
+class SurfaceMesh:
+    def __init__(
+        self,
+        points: npt.ArrayLike,
+        triangles: Optional[npt.ArrayLike] = None,
+        quads: Optional[npt.ArrayLike] = None,
+        *,
+        face_points: Optional[npt.ArrayLike] = None,
+        face_offsets: Optional[npt.ArrayLike] = None,
+        creases: Optional[npt.ArrayLike] = None,
+        crease_sharpness: Optional[npt.ArrayLike] = None,
+        corners: Optional[npt.ArrayLike] = None,
+        corner_sharpness: Optional[npt.ArrayLike] = None,
+    ) -> None: ...
+    @property
+    def points(self) -> Floats: ...
+    @property
+    def triangles(self) -> Ints: ...
+    @property
+    def quads(self) -> Ints: ...
+    @property
+    def face_points(self) -> Ints: ...
+    @property
+    def face_offsets(self) -> Longs: ...
+    @property
+    def creases(self) -> Ints: ...
+    @property
+    def crease_sharpness(self) -> Floats: ...
+    @property
+    def corners(self) -> Ints: ...
+    @property
+    def corner_sharpness(self) -> Floats: ...
+    def triangulated(self) -> SurfaceMesh: ...
+    def copy(self) -> SurfaceMesh: ...
+
+class HighOrderMesh:
+    def __init__(self, mesh: Volume, order: int, *, basis: Basis = "fourier") -> None: ...
+    @property
+    def coefficients(self) -> Floats: ...
+    @property
+    def basis(self) -> Basis: ...
+    @property
+    def order(self) -> int: ...
+    @property
+    def edge_orders(self) -> Ints: ...
+    @property
+    def face_orders(self) -> Ints: ...
+    @property
+    def cell_orders(self) -> Ints: ...
+    @property
+    def references(self) -> Ints: ...
+    def point_map(self, cells: npt.ArrayLike, points: npt.ArrayLike) -> SparseMap: ...
+    def evaluate(self, cells: npt.ArrayLike, points: npt.ArrayLike) -> Floats: ...
+    def straight_sided(self) -> VolumeMesh: ...
+    def linear_cells(self, intervals: int) -> VolumeMesh: ...
+    def boundary(self, chord: float = 0.005) -> SurfaceMesh: ...
+    def copy(self) -> HighOrderMesh: ...
+
+class SparseMap:
+    @property
+    def shape(self) -> Tuple[int, int]: ...
+    @property
+    def data(self) -> Floats: ...
+    @property
+    def indices(self) -> Ints: ...
+    @property
+    def indptr(self) -> Longs: ...
+    def apply(self, points: npt.ArrayLike) -> Floats: ...
+    def apply_transposed(self, points: npt.ArrayLike) -> Floats: ...
+
+class Result:
+    @property
+    def report(self) -> Report: ...
+
+class FitResult(Result):
+    @property
+    def template(self) -> VolumeMesh: ...
+    @property
+    def cage(self) -> Optional[VolumeMesh]: ...
+    @property
+    def mesh(self) -> Any: ...  # VolumeMesh; with order HighOrderMesh
+
+class OptimizeResult(Result):
+    @property
+    def mesh(self) -> Any: ...  # VolumeMesh; with order HighOrderMesh
+
+class ShellResult(Result):
+    @property
+    def mesh(self) -> Any: ...  # VolumeMesh; with order HighOrderMesh
+    @property
+    def linear_mesh(self) -> VolumeMesh: ...
+    @property
+    def inside_layers(self) -> int: ...
+    @property
+    def thickness(self) -> Floats: ...
+    @property
+    def thickness_asked(self) -> Floats: ...
+    @property
+    def thickness_limited(self) -> Floats: ...
+    @property
+    def clearance(self) -> Floats: ...
+
+def fit(
+    target: Surface,
+    template: Optional[Volume] = None,
+    *,
+    cells: Optional[int] = None,
+    levels: int = 3,
+    tolerance: Optional[float] = None,
+    surface: Literal["limit", "mesh"] = "limit",
+    boundary: BoundaryRule = "catmull-clark",
+    cage_only: bool = False,
+    crease_angle: Optional[float] = None,
+    lambda_far: float = 1.0,
+    lambda_close: Optional[float] = None,
+    correspondence: Literal["closest", "voronoi"] = "closest",
+    solver: Literal["newton", "lbfgs"] = "newton",
+    max_iterations: int = 0,
+    time_limit: float = 0.0,
+    order: Optional[int] = None,
+    basis: Basis = "fourier",
+    adaptive: bool = False,
+    chord: float = 0.005,
+    progress: Optional[Callback] = None,
+    threads: Optional[int] = None,
+) -> FitResult: ...
+def optimize(
+    mesh: Volume,
+    *,
+    target: Optional[Surface] = None,
+    fixed_boundary: bool = False,
+    sizes: Literal["uniform", "local"] = "local",
+    crease_angle: float = 40.0,
+    tolerance: float = 0.05,
+    max_tolerance: float = 0.5,
+    lambda_: Optional[float] = None,
+    order: Optional[int] = None,
+    basis: Basis = "fourier",
+    max_iterations: int = 0,
+    time_limit: float = 0.0,
+    chord: float = 0.005,
+    progress: Optional[Callback] = None,
+    threads: Optional[int] = None,
+) -> OptimizeResult: ...
+def shell(
+    surface: Surface,
+    thickness: Union[float, str, npt.ArrayLike],
+    *,
+    layers: int = 1,
+    growth: float = 1.0,
+    side: Literal["outward", "inward", "both"] = "outward",
+    free_surface: bool = False,
+    straight: bool = False,
+    crease_angle: Optional[float] = None,
+    order: int = 1,
+    basis: Basis = "legendre",
+    max_iterations: int = 0,
+    time_limit: float = 0.0,
+    chord: float = 0.005,
+    progress: Optional[Callback] = None,
+    threads: Optional[int] = None,
+) -> ShellResult: ...
+def subdivide(
+    mesh: Volume, *, levels: int = 1, boundary: BoundaryRule = "catmull-clark", crease_angle: Optional[float] = None
+) -> VolumeMesh: ...
+def subdivision_matrix(
+    mesh: Volume, *, levels: int = 1, boundary: BoundaryRule = "catmull-clark", crease_angle: Optional[float] = None
+) -> SparseMap: ...
+def limit_matrix(mesh: Volume) -> SparseMap: ...
+def limit_surface(cage: Volume, *, chord: float = 0.005) -> SurfaceMesh: ...
+def check(
+    mesh: Union[Volume, HighOrderMesh],
+    target: Optional[Surface] = None,
+    *,
+    chord: float = 0.005,
+    progress: Optional[Callback] = None,
+    threads: Optional[int] = None,
+) -> Report: ...
+def distance(
+    surface: Surface,
+    target: Surface,
+    *,
+    samples: int = 50000,
+    progress: Optional[Callback] = None,
+    threads: Optional[int] = None,
+) -> Report: ...
+def self_intersections(surface: Surface) -> Ints: ...
+def read(path: Path, *, check: bool = True) -> Any: ...  # VolumeMesh, SurfaceMesh or HighOrderMesh
+def write(
+    path: Path,
+    what: Union[VolumeMesh, SurfaceMesh, HighOrderMesh, Result],
+    *,
+    chord: float = 0.005,
+    unit: float = 1.0,
+    up: Literal["y", "z"] = "y",
+    limit: bool = False,
+    intervals: int = 0,
+) -> None: ...

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import inspect
+import os
+import signal
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import subvol
+from common import CUBE, CUBE_POINTS, InFolder, cube
+
+BALL = ("ball_target.off", "ball_template.mesh")
+
+
+class Fits(InFolder):
+    def test_a_fit_returns_arrays_and_a_report(self):
+        fit = subvol.fit(*BALL, levels=1)
+        self.assertEqual(fit.mesh.points.shape[1], 3)
+        self.assertEqual(fit.mesh.hexes.shape, (56, 8))
+        self.assertEqual(fit.cage.hexes.shape, fit.template.hexes.shape)
+        report = fit.report
+        self.assertEqual((report["stop_reason"], report["valid"]), ("converged", True))
+        self.assertEqual(report["quality"]["certified_cells"], 56)
+        self.assertLess(report["distance"]["mean_percent"], report["initial_distance"]["mean_percent"])
+        self.assertEqual(report["stages"][0]["level"], 1)
+        self.assertEqual(subvol.check(fit.mesh, BALL[0])["distance"], report["distance"])
+        self.assertTrue(np.shares_memory(fit.mesh.points, fit.mesh.points))
+        points = fit.cage.points
+        kept = points.copy()
+        del fit
+        np.testing.assert_array_equal(points, kept)
+
+    def test_a_fit_is_the_programs_bit_by_bit(self):
+        self.run_program("fit", BALL[0], "--template", BALL[1], "--levels", "2",
+                         "-o", "a.mesh", "-o", "cage:a_cage.mesh", "-o", "a.obj")
+        fit = subvol.fit(*BALL, levels=2)
+        subvol.write("b.mesh", fit)
+        subvol.write("cage:b_cage.mesh", fit)
+        subvol.write("b.obj", fit.mesh)
+        self.assert_same_file("a.mesh", "b.mesh")
+        self.assert_same_file("a_cage.mesh", "b_cage.mesh")
+        self.assert_same_file("a.obj", "b.obj")
+        np.testing.assert_array_equal(subvol.read("a.mesh").points, fit.mesh.points)
+        from_arrays = subvol.fit(subvol.read(BALL[0]), subvol.read(BALL[1]), levels=2)
+        np.testing.assert_array_equal(from_arrays.mesh.points, fit.mesh.points)
+
+    def test_a_fit_of_curved_cells_is_the_programs_bit_by_bit(self):
+        self.run_program("fit", BALL[0], "--template", BALL[1], "--order", "2", "-o", "a.vtu")
+        fit = subvol.fit(*BALL, order=2)
+        self.assertIsNone(fit.cage)
+        self.assertEqual(fit.mesh.order, 2)
+        subvol.write("b.vtu", fit)
+        self.assert_same_file("a.vtu", "b.vtu")
+        again = subvol.read("b.vtu")
+        np.testing.assert_array_equal(again.coefficients, fit.mesh.coefficients)
+        self.assertEqual(subvol.check("b.vtu", BALL[0])["distance"], fit.report["distance"])
+
+    def test_a_template_is_made_where_none_is_given(self):
+        fit = subvol.fit(BALL[0], cells=8, levels=1)
+        self.assertEqual(fit.report["template"]["handles"], 0)
+        self.assertEqual(fit.template.hexes.shape[1], 8)
+
+    def test_the_same_bits_for_one_thread_and_two(self):
+        one, two = (subvol.fit(*BALL, levels=1, threads=n) for n in (1, 2))
+        np.testing.assert_array_equal(one.mesh.points, two.mesh.points)
+        np.testing.assert_array_equal(one.cage.points, two.cage.points)
+
+    def test_options_in_force_are_those_of_the_signature(self):
+        for function, arguments in ((subvol.fit, BALL), (subvol.optimize, (cube(),)),
+                                    (subvol.shell, (cube().boundary(), 0.1))):
+            kinds = inspect.signature(function).parameters
+            given = {"levels": 1} if function is subvol.fit else {}
+            in_force = function(*arguments, **given).report["options"]
+            for name, value in in_force.items():
+                if kinds[name].default is not None and name not in given:
+                    self.assertEqual(value, kinds[name].default, name)
+
+    def test_none_is_the_default(self):
+        options = subvol.fit(*BALL, levels=1, tolerance=None, order=None, solver=None).report["options"]
+        self.assertEqual((options["solver"], options["tolerance"]), ("newton", None))
+
+    def test_a_tolerance_that_is_missed_is_told(self):
+        report = subvol.fit(*BALL, levels=1, tolerance=1e-6).report
+        self.assertEqual((report["stop_reason"], report["converged"]), ("tolerance_missed", False))
+
+    def test_options_that_make_no_sense_are_refused(self):
+        def refused(error, text, **options):
+            with self.assertRaises(error) as caught:
+                subvol.fit(*BALL, **options)
+            self.assertIn(text, str(caught.exception))
+
+        refused(TypeError, "fit: there is no option 'level'; there are", level=2)
+        refused(TypeError, "fit: levels must be a whole number, not 'two'", levels="two")
+        refused(TypeError, "fit: levels must be a whole number, not True", levels=True)
+        refused(TypeError, "fit: levels must be a whole number, not 2.0", levels=2.0)
+        refused(TypeError, "fit: tolerance must be a number, not '1'", tolerance="1")
+        refused(TypeError, "fit: cage_only must be True or False, not 'no'", cage_only="no")
+        refused(TypeError, "progress must be callable", progress=3)
+        refused(subvol.InputError, "fit: surface must be 'limit' or 'mesh', not 'limt'", surface="limt")
+        refused(subvol.InputError, "levels must be in [1, 6]", levels=0)
+        refused(subvol.InputError, "levels is far too large", levels=10**30)
+        refused(subvol.InputError, "must be in", tolerance=float("nan"))
+        refused(subvol.InputError, "lambda_far must be in", lambda_far=-1)
+        refused(subvol.InputError, "fit: basis goes with order only", basis="legendre")
+        refused(subvol.InputError, "fit: levels does not go with order", order=2, levels=2)
+        refused(subvol.InputError, "fit: cells does not go with a template", cells=30)
+        refused(subvol.InputError, "threads must be in [1, 1024]", threads=0)
+        refused(subvol.InputError, "order must be in [1, 16]", order=17)
+        with self.assertRaisesRegex(TypeError, "target must be a SurfaceMesh, a VolumeMesh or .* a file, not int"):
+            subvol.fit(3)
+        for base in (subvol.Error, ValueError):
+            with self.assertRaises(base):
+                subvol.fit(*BALL, levels=0)
+        inside_out = subvol.VolumeMesh(CUBE_POINTS, hexes=CUBE[:, [4, 5, 6, 7, 0, 1, 2, 3]])
+        with self.assertRaises(subvol.InputError):
+            subvol.fit(BALL[0], inside_out)
+
+
+class Running(InFolder):
+    """Progress, cancelling and Ctrl-C; other threads meanwhile."""
+
+    LONG = dict(levels=4)
+
+    def setUp(self):
+        super().setUp()
+        self.target, self.template = subvol.read("torus_target.off"), subvol.read("torus_template.mesh")
+        self.handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def tearDown(self):
+        signal.signal(signal.SIGINT, self.handler)
+        super().tearDown()
+
+    def fit(self, **options):
+        return subvol.fit(self.target, self.template, **{**self.LONG, **options})
+
+    def test_progress_is_told(self):
+        told = []
+        subvol.fit(*BALL, levels=1, progress=told.append)
+        self.assertGreater(len(told), 3)
+        self.assertTrue(all(0 <= p.fraction <= 1 and p.energy > 0 and p.iteration > 0 for p in told))
+        self.assertTrue(told[0].stage.startswith("level 1"))
+
+    def test_false_ends_a_fit_with_the_best_result(self):
+        steps = []
+        fit = self.fit(progress=lambda p: steps.append(p) or len(steps) < 3)
+        self.assertEqual(len(steps), 3)
+        self.assertEqual(fit.report["stop_reason"], "cancelled")
+        self.assertEqual(len(fit.cage.hexes), 60)
+
+    def test_an_error_of_the_callback_comes_out(self):
+        calls = []
+
+        def fails(progress):
+            calls.append(progress)
+            raise KeyError("mine")
+
+        for work in (lambda: self.fit(progress=fails),
+                     lambda: subvol.fit(self.target, cells=60, progress=fails),
+                     lambda: subvol.shell(self.target, "2%", progress=fails),
+                     lambda: subvol.optimize(self.template, progress=fails),
+                     lambda: subvol.template.auto(self.target, progress=fails)):
+            calls.clear()
+            with self.assertRaisesRegex(KeyError, "mine"):
+                work()
+            self.assertEqual(len(calls), 1)
+
+    def interrupt(self, work, longest):
+        sent = []
+
+        def send():
+            sent.append(time.monotonic())
+            os.kill(os.getpid(), signal.SIGINT)
+
+        timer = threading.Timer(0.3, send)
+        timer.start()
+        try:
+            with self.assertRaises(KeyboardInterrupt):
+                work()
+                time.sleep(5)  # work that was done before: the signal is met here, too late
+                self.fail("not interrupted")
+        finally:
+            timer.cancel()
+        self.assertLess(time.monotonic() - sent[0], longest)
+
+    def test_ctrl_c_ends_a_fit_soon(self):
+        self.interrupt(self.fit, 3)
+
+    def test_ctrl_c_ends_the_search_for_a_template_soon(self):
+        self.interrupt(lambda: subvol.fit(self.target, levels=4), 3)
+
+    def test_ctrl_c_while_a_callback_runs(self):
+        self.interrupt(lambda: self.fit(progress=lambda p: time.sleep(0.05)), 3)
+
+    def test_other_threads_run_meanwhile(self):
+        ticks, done = [], threading.Event()
+
+        def tick():
+            while not done.wait(0.005):
+                ticks.append(time.monotonic())
+
+        thread = threading.Thread(target=tick)
+        thread.start()
+        begin = time.monotonic()
+        subvol.fit(*BALL, levels=2)
+        elapsed = time.monotonic() - begin
+        done.set()
+        thread.join()
+        self.assertGreater(len(ticks), min(5, elapsed / 0.05))
+
+    def test_two_fits_at_a_time(self):
+        results = [None, None]
+
+        def run(i):
+            results[i] = subvol.fit(*BALL, levels=1)
+
+        threads = [threading.Thread(target=run, args=(i,)) for i in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        np.testing.assert_array_equal(results[0].mesh.points, results[1].mesh.points)
+
+
+if __name__ == "__main__":
+    unittest.main()
