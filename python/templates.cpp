@@ -11,6 +11,7 @@
 #include "subvol/cell_split.h"
 #include "subvol/error.h"
 #include "subvol/pillow.h"
+#include "subvol/refine.h"
 #include "subvol/sheet.h"
 #include "subvol/vertex_merge.h"
 #include "subvol/voxel_grid.h"
@@ -83,28 +84,61 @@ MeshPointer make_grid(const py::object& surface, const py::kwargs& given) {
   return made([&] { return voxel_mesh(counts ? box_grid(low, high, *counts) : box_grid(low, high, *size)); });
 }
 
+/// Some cells of a mesh: in a surface, in a box, listed, or thin; one of these.
+class CellChoice {
+ public:
+  /// Takes inside, share, box and list.
+  explicit CellChoice(Keywords& keywords) : inside_(keywords.object("inside")), list_(keywords.object("list")) {
+    keywords.take("box", box_);
+    keywords.take("share", share_);
+  }
+  /// Takes thin as well.
+  void take_thin(Keywords& keywords) { keywords.take("thin", thin_); }
+
+  /// choices  what there is, for the message where not one of them is given.
+  void prepare(const VolumeMesh& mesh, const char* choices) {
+    if (!inside_.is_none() + box_.has_value() + !list_.is_none() + thin_ != 1) throw InputError(choices);
+    cells_ = indices_from(list_, "list", 0, mesh.num_cells());
+    if (!inside_.is_none()) surface_ = triangles_from(inside_, "inside");
+  }
+  /// After `prepare`; needs no lock. One entry per cell, non-zero for those chosen.
+  std::vector<char> chosen(const VolumeMesh& mesh) const {
+    if (thin_) return thin_cells(mesh);
+    if (box_) return cells_in_box(mesh, low_corner(*box_), high_corner(*box_));
+    return surface_ ? cells_inside(mesh, *surface_, share_) : cells_listed(mesh, cells_);
+  }
+
+ private:
+  py::object inside_, list_;
+  std::optional<Box> box_;
+  double share_ = 0.5;
+  bool thin_ = false;
+  std::vector<Index> cells_;
+  std::optional<TriangleMesh> surface_;
+};
+
 MeshPointer make_carved(const py::object& object, const py::kwargs& given) {
   Keywords keywords("carve", given);
-  std::optional<Box> box;
-  double share = 0.5;
+  CellChoice choice(keywords);
   bool invert = false;
-  const py::object inside = keywords.object("inside"), list = keywords.object("list");
-  keywords.take("box", box);
-  keywords.take("share", share);
   keywords.take("invert", invert);
   keywords.finish();
-  if (!inside.is_none() + box.has_value() + !list.is_none() != 1)
-    throw InputError("carve: give one of inside, box and list");
   const auto mesh = volume_from(object, "mesh");
-  const std::vector<Index> cells = indices_from(list, "list", 0, mesh->num_cells());
-  TriangleMesh surface;
-  if (!inside.is_none()) surface = triangles_from(inside, "inside");
+  choice.prepare(*mesh, "carve: give one of inside, box and list");
   return made([&] {
-    const std::vector<char> chosen = box              ? cells_in_box(*mesh, low_corner(*box), high_corner(*box))
-                                     : list.is_none() ? cells_inside(*mesh, surface, share)
-                                                      : cells_listed(*mesh, cells);
+    const std::vector<char> chosen = choice.chosen(*mesh);
     return carve(*mesh, [&](std::size_t c) { return (chosen[c] != 0) != invert; });
   });
+}
+
+MeshPointer make_refined(const py::object& object, const py::kwargs& given) {
+  Keywords keywords("refine", given);
+  CellChoice choice(keywords);
+  choice.take_thin(keywords);
+  keywords.finish();
+  const auto mesh = sound_volume_from(object, "mesh");
+  choice.prepare(*mesh, "refine: give one of inside, box, list and thin");
+  return made([&] { return refine_at(*mesh, vertices_of(*mesh, choice.chosen(*mesh))); });
 }
 
 MeshPointer make_extruded(const py::object& object, const py::kwargs& given) {
@@ -221,6 +255,12 @@ thickness  length of all layers together)");
 --
 
 Puts a layer of cells inside the boundary, or around the cells listed.)");
+  group.def("refine", &make_refined, py::arg("mesh"),
+            R"(refine(mesh, *, inside=None, share=0.5, box=None, list=None, thin=False)
+--
+
+Cuts some hexes in 27, and those around so that they fit: chosen as `carve` does, or those that are all there is between
+two sides of the mesh.)");
   group.def("collapse", &make_collapsed, py::arg("mesh"),
             R"(collapse(mesh, *, vertices, what='sheet')
 --

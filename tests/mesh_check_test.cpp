@@ -54,6 +54,16 @@ TEST_CASE("a block of cubes passes every check, with its numbers", "[mesh_check]
   CHECK(text.ends_with("\nvalid\n"));
 }
 
+TEST_CASE("a tag that is on no boundary edge is a defect, and the rest is looked at", "[mesh_check]") {
+  VolumeMesh mesh = lattice(2, 1, 1);
+  mesh.tags.creases = {{0, 9, kInfiniteSharpness}};
+  const MeshCheck check = check_mesh(mesh);
+  CHECK(has(check, MeshDefect::Kind::bad_tag));
+  CHECK(!check.valid());
+  CHECK(!check.subdivision_audit);
+  CHECK(check.volume == Approx(2));
+}
+
 TEST_CASE("a ring and a hollow block have their topology", "[mesh_check]") {
   const MeshCheck ring = check_mesh(voxels(3, 3, 1, [](int i, int j, int) { return i != 1 || j != 1; }));
   CHECK(ring.valid());

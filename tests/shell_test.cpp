@@ -78,6 +78,11 @@ double zero_of(const std::function<double(double)>& f, double low, double high) 
 
 }  // namespace
 
+TEST_CASE("more layers than can be numbered are refused at once", "[shell]") {
+  CHECK_THROWS_WITH(make_shell(plane(Faces::quads), {.thickness = 0.1, .layers = 1'000'000'000}),
+                    Catch::Contains("can be numbered"));
+}
+
 TEST_CASE("The most visible direction is the middle of the smallest cap", "[shell]") {
   const std::vector<Vec3> axes{Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
   CHECK((*most_visible_direction(axes) - Vec3(1, 1, 1).normalized()).norm() < 1e-14);

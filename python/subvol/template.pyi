@@ -41,6 +41,15 @@ def extrude(
     direction: Optional[Sequence[float]] = None,
 ) -> VolumeMesh: ...
 def pillow(mesh: Volume, *, list: Optional[npt.ArrayLike] = None) -> VolumeMesh: ...
+def refine(
+    mesh: Volume,
+    *,
+    inside: Optional[Surface] = None,
+    share: float = 0.5,
+    box: Optional[Sequence[float]] = None,
+    list: Optional[npt.ArrayLike] = None,
+    thin: bool = False,
+) -> VolumeMesh: ...
 def collapse(
     mesh: Volume, *, vertices: Sequence[int], what: Literal["sheet", "face", "edge"] = "sheet"
 ) -> VolumeMesh: ...

@@ -164,6 +164,8 @@ class Templates(InFolder):
         self.assertEqual(len(subvol.template.carve(grid, list=[0, 1]).hexes), 2)
         self.assertEqual(len(subvol.template.carve(grid, list=[0], invert=True).hexes), 5)
         self.assertEqual(len(subvol.template.carve(grid, box=(0, 0, 0, 1, 2, 1)).hexes), 2)
+        self.assertEqual(len(subvol.template.refine(grid, list=range(6)).hexes), 6 * 27)
+        self.assertEqual(len(subvol.template.refine(grid, thin=True).hexes), 6 * 27)
         inside = subvol.template.carve(subvol.template.grid("ball_target.off", size=0.4), inside="ball_target.off")
         self.assertGreater(len(inside.hexes), 8)
         self.assertGreater(len(subvol.template.pillow(grid).hexes), 6)
@@ -183,6 +185,7 @@ class Templates(InFolder):
         template = subvol.template
         for call in (lambda: template.grid(counts=(1, 1, 1)), lambda: template.grid(box=(0, 0, 0, 1, 1, 1)),
                      lambda: template.grid(box=(0, 0, 0, 1, 1, 0), size=1), lambda: template.carve(cube()),
+                     lambda: template.refine(cube()),
                      lambda: template.carve(cube(), list=[1]), lambda: template.carve(cube(), list=[0], box=range(6)),
                      lambda: template.pillow(cube(), list=[]), lambda: template.collapse(cube()),
                      lambda: template.collapse(cube(), vertices=(0, 99)), lambda: template.split(cube()),
