@@ -33,9 +33,9 @@ class Fits(InFolder):
         np.testing.assert_array_equal(points, kept)
 
     def test_a_fit_is_the_programs_bit_by_bit(self):
-        self.run_program("fit", BALL[0], "--template", BALL[1], "--levels", "2",
+        self.run_program("fit", BALL[0], "--template", BALL[1], "--levels", "1",
                          "-o", "a.mesh", "-o", "cage:a_cage.mesh", "-o", "a.obj")
-        fit = subvol.fit(*BALL, levels=2)
+        fit = subvol.fit(*BALL, levels=1)
         subvol.write("b.mesh", fit)
         subvol.write("cage:b_cage.mesh", fit)
         subvol.write("b.obj", fit.mesh)
@@ -43,7 +43,7 @@ class Fits(InFolder):
         self.assert_same_file("a_cage.mesh", "b_cage.mesh")
         self.assert_same_file("a.obj", "b.obj")
         np.testing.assert_array_equal(subvol.read("a.mesh").points, fit.mesh.points)
-        from_arrays = subvol.fit(subvol.read(BALL[0]), subvol.read(BALL[1]), levels=2)
+        from_arrays = subvol.fit(subvol.read(BALL[0]), subvol.read(BALL[1]), levels=1)
         np.testing.assert_array_equal(from_arrays.mesh.points, fit.mesh.points)
 
     def test_a_fit_of_curved_cells_is_the_programs_bit_by_bit(self):
@@ -63,7 +63,7 @@ class Fits(InFolder):
         self.assertEqual(fit.template.hexes.shape[1], 8)
 
     def test_the_same_bits_for_one_thread_and_two(self):
-        one, two = (subvol.fit(*BALL, levels=1, threads=n) for n in (1, 2))
+        one, two = (subvol.fit(*BALL, levels=1, max_iterations=5, threads=n) for n in (1, 2))
         np.testing.assert_array_equal(one.mesh.points, two.mesh.points)
         np.testing.assert_array_equal(one.cage.points, two.cage.points)
 
@@ -71,14 +71,15 @@ class Fits(InFolder):
         for function, arguments in ((subvol.fit, BALL), (subvol.optimize, (cube(),)),
                                     (subvol.shell, (cube().boundary(), 0.1))):
             kinds = inspect.signature(function).parameters
-            given = {"levels": 1} if function is subvol.fit else {}
+            given = {"levels": 1, "max_iterations": 1} if function is subvol.fit else {}
             in_force = function(*arguments, **given).report["options"]
             for name, value in in_force.items():
                 if kinds[name].default is not None and name not in given:
                     self.assertEqual(value, kinds[name].default, name)
 
     def test_none_is_the_default(self):
-        options = subvol.fit(*BALL, levels=1, tolerance=None, order=None, solver=None).report["options"]
+        given = dict(levels=1, max_iterations=1, tolerance=None, order=None, solver=None)
+        options = subvol.fit(*BALL, **given).report["options"]
         self.assertEqual((options["solver"], options["tolerance"]), ("newton", None))
 
     def test_a_tolerance_that_is_missed_is_told(self):
@@ -137,7 +138,7 @@ class Running(InFolder):
 
     def test_progress_is_told(self):
         told = []
-        subvol.fit(*BALL, levels=1, progress=told.append)
+        subvol.fit(*BALL, levels=1, max_iterations=3, progress=told.append)
         self.assertGreater(len(told), 3)
         self.assertTrue(all(0 <= p.fraction <= 1 and p.energy > 0 and p.iteration > 0 for p in told))
         self.assertTrue(told[0].stage.startswith("level 1"))
@@ -203,7 +204,7 @@ class Running(InFolder):
         thread = threading.Thread(target=tick)
         thread.start()
         begin = time.monotonic()
-        subvol.fit(*BALL, levels=2)
+        subvol.fit(*BALL, levels=1)
         elapsed = time.monotonic() - begin
         done.set()
         thread.join()
@@ -213,7 +214,7 @@ class Running(InFolder):
         results = [None, None]
 
         def run(i):
-            results[i] = subvol.fit(*BALL, levels=1)
+            results[i] = subvol.fit(*BALL, levels=1, max_iterations=3)
 
         threads = [threading.Thread(target=run, args=(i,)) for i in range(2)]
         for thread in threads:
