@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/certificate.h"
+#include "fit/curve_mesh.h"
+#include "sample_meshes.h"
+
+#include <catch2/catch.hpp>
+
+namespace subvol::test {
+
+TEST_CASE("a mesh is untangled before it is curved, and left alone where it is valid", "[optimize]") {
+  const VolumeMesh block = lattice(2, 2, 2);
+  VolumeMesh mesh = block;
+  CHECK(untangle_for_curving(mesh, 0, {}) == 0);
+  CHECK(mesh.positions == block.positions);
+  *std::find(mesh.positions.begin(), mesh.positions.end(), Vec3(1, 1, 1)) = Vec3(2.4, 1, 1);  // beyond the boundary
+  const std::size_t tangled = certify(mesh).not_certified.size();
+  REQUIRE(tangled > 0);
+  CHECK(untangle_for_curving(mesh, 0, {}) == tangled);
+  CHECK(certify(mesh).all_certified());
+}
+
+}  // namespace subvol::test
