@@ -9,7 +9,6 @@
 #include "cli/writing.h"
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
-#include "fit/target_surface.h"
 #include "shell/shell.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -19,8 +18,6 @@
 #include "subvol/surface_io.h"
 #include "subvol/text_scanner.h"
 #include "subvol/version.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cstdio>
@@ -41,17 +38,6 @@ struct ShellArguments {
   std::optional<double> crease_angle_degrees;
   bool straight = false;
 };
-
-/// Whether a surface is closed and encloses a negative volume.
-bool faces_point_inward(const TriangleMesh& surface) {
-  const TargetSurface target(surface);
-  if (target.volume_source() != VolumeSource::signed_sum) return false;
-  double volume = 0;
-  for (const auto& [a, b, c] : surface.triangles)
-    volume += (surface.positions[a] - target.centre())
-                  .dot((surface.positions[b] - target.centre()).cross(surface.positions[c] - target.centre()));
-  return volume < 0;
-}
 
 /// One shell from its file to its files.
 class ShellRun : public LongRun {
@@ -86,9 +72,7 @@ void ShellRun::load() {
   surface_ = load_tagged_polygons(arguments_.surface, warnings_);
   const TriangleMesh triangles = triangulate(surface_.polygons);
   diagonal_ = bounding_box_diagonal(triangles);
-  if (faces_point_inward(triangles))
-    warnings_.push_back(arguments_.surface +
-                        ": the faces of this closed surface point inward, so outward is its inside");
+  if (faces_point_inward(triangles)) warnings_.push_back(arguments_.surface + ": " + kFacesPointInward);
   tell_warnings();
 }
 

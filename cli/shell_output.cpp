@@ -5,8 +5,11 @@
 #include "export/cell_text.h"
 #include "export/gltf_writer.h"
 #include "export/volume_writer.h"
+#include "fit/target_surface.h"
 #include "subvol/boundary.h"
 #include "subvol/cell_topology.h"
+
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cstdio>
@@ -107,6 +110,16 @@ std::vector<VertexField> thickness_fields(const ShellResult& shell) {
 }
 
 }  // namespace
+
+bool faces_point_inward(const TriangleMesh& surface) {
+  const TargetSurface target(surface);
+  if (target.volume_source() != VolumeSource::signed_sum) return false;
+  double volume = 0;
+  for (const auto& [a, b, c] : surface.triangles)
+    volume += (surface.positions[a] - target.centre())
+                  .dot((surface.positions[b] - target.centre()).cross(surface.positions[c] - target.centre()));
+  return volume < 0;
+}
 
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {
   if (is_scene(output) && !output.cage) {

@@ -9,6 +9,11 @@
 
 namespace subvol::cli {
 
+/// Whether a surface is closed and encloses a negative volume; and what is to be said then.
+bool faces_point_inward(const TriangleMesh& surface);
+inline constexpr const char* kFacesPointInward =
+    "the faces of this closed surface point inward, so outward is its inside";
+
 /// Writes a shell: its cells with thickness at the vertices where the format has fields, its sheets as named nodes of a
 /// scene, or its boundary as polygons.
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options);

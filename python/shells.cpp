@@ -26,7 +26,9 @@ class Growing {
       : keywords_("shell", given), work_(keywords_) {
     read_options();
     surface_ = surface_from(surface, "surface");
-    diagonal_ = bounding_box_diagonal(triangulate(surface_.polygons));
+    const TriangleMesh triangles = triangulate(surface_.polygons);
+    diagonal_ = bounding_box_diagonal(triangles);
+    points_inward_ = cli::faces_point_inward(triangles);
     read_thickness(thickness);
     options_.tags = surface_.tags;
     if (crease_angle_)
@@ -38,8 +40,9 @@ class Growing {
     options_.progress = work_.progress();
     result->shell = work_.run("grow", [&] { return make_shell(surface_.polygons, options_); });
     if (curved_options_.order != 1) curve(*result);
-    ShellResult& shell = result->shell;
-    result->report = make_report("shell", report_of(*result), keywords_, work_, shell.report.warnings);
+    std::vector<std::string> warnings = result->shell.report.warnings;
+    if (points_inward_) warnings.insert(warnings.begin(), cli::kFacesPointInward);
+    result->report = make_report("shell", report_of(*result), keywords_, work_, warnings);
     return result;
   }
 
@@ -121,6 +124,7 @@ class Growing {
   std::optional<double> crease_angle_;
   SurfaceMesh surface_;
   double diagonal_ = 0;
+  bool points_inward_ = false;
 };
 
 /// The straight cells, which keep the result they are part of.

@@ -102,6 +102,13 @@ class Shells(InFolder):
         self.assertTrue(np.all(result.thickness > 0))
         self.assertTrue(np.all(result.thickness_limited <= result.thickness_asked))
 
+    def test_faces_that_point_inward_are_told(self):
+        turned = cube().boundary()
+        turned = subvol.SurfaceMesh(turned.points, quads=turned.quads[:, ::-1])
+        with self.assertWarnsRegex(UserWarning, "point inward"):
+            report = subvol.shell(turned, 0.1, straight=True).report
+        self.assertTrue(any("point inward" in warning for warning in report["warnings"]))
+
     def test_a_curved_shell(self):
         surface = cube().boundary()
         result = subvol.shell(surface, np.full(8, 0.1), order=2)
