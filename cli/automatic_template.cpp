@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/automatic_template.h"
 
+#include "cli/exit_status.h"
 #include "cli/interrupt.h"
-#include "cli/loading.h"
 #include "cli/progress.h"
 
 #include <sstream>
 
 namespace subvol::cli {
 
-LoadedTemplate load_template(const TemplateSource& source, const TriangleMesh& target,
+LoadedTemplate load_template(const TemplateSource& source, const Target& target,
                              std::optional<double> crease_angle_degrees, const RunOptions& run,
                              std::vector<std::string>& warnings) {
   if (!source.path.empty()) return {load_volume(source.path, warnings), std::nullopt};
+  if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   ProgressTeller teller(run.progress, run.quiet);
   TemplateChoiceOptions options{.cells = source.cells, .crease_angle_degrees = crease_angle_degrees};
   options.progress = [&](const FitProgress& progress) {
@@ -20,7 +21,7 @@ LoadedTemplate load_template(const TemplateSource& source, const TriangleMesh& t
     return !interrupted();
   };
   catch_interrupt();
-  TemplateChoice choice = choose_template(target, options);
+  TemplateChoice choice = choose_template(std::get<TriangleMesh>(target), options);
   teller.finish();
   warnings.insert(warnings.end(), choice.warnings.begin(), choice.warnings.end());
   VolumeMesh mesh = choice.mesh;

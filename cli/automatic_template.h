@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/loading.h"
 #include "cli/run_options.h"
 #include "fit/template_choice.h"
 
@@ -21,8 +22,8 @@ struct LoadedTemplate {
   std::optional<TemplateChoice> choice;
 };
 
-/// Reads a template, or makes one and tells how far that is.
-LoadedTemplate load_template(const TemplateSource& source, const TriangleMesh& target,
+/// Reads a template, or makes one and tells how far that is. UsageError: one is to be made from points.
+LoadedTemplate load_template(const TemplateSource& source, const Target& target,
                              std::optional<double> crease_angle_degrees, const RunOptions& run,
                              std::vector<std::string>& warnings);
 

@@ -30,17 +30,24 @@ struct Checked {
   std::optional<SubdivisionAudit> audit;  ///< of a mesh that may be subdivided
 };
 
-Checked check_linear(const CheckArguments& arguments, const TriangleMesh* target, std::vector<std::string>& warnings) {
+/// check(geometry) with a pointer to the target's, whatever it is; null where there is none.
+template <class Check>
+MeshCheck against(const std::optional<Target>& target, const Check& check) {
+  if (!target) return check(static_cast<const TriangleMesh*>(nullptr));
+  return std::visit([&](const auto& geometry) { return check(&geometry); }, *target);
+}
+
+Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
-  Checked checked{check_mesh(mesh, target), describe(arguments.mesh, mesh), std::nullopt};
+  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry); }), describe(arguments.mesh, mesh), std::nullopt};
   checked.audit = checked.check.subdivision_audit;
   return checked;
 }
 
-Checked check_high_order(const CheckArguments& arguments, const TriangleMesh* target) {
+Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target) {
   const HighOrderMesh mesh = read_high_order(arguments.mesh).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
-  return {check_mesh(mesh, boundary, target), describe(arguments.mesh, mesh), std::nullopt};
+  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry); }), describe(arguments.mesh, mesh), std::nullopt};
 }
 
 Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Checked& checked,
@@ -62,11 +69,10 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   checked_outputs(arguments.run, false);
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
-  std::optional<TriangleMesh> target;
+  std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
-  const TriangleMesh* against = target ? &*target : nullptr;
-  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, against)
-                                                             : check_linear(arguments, against, warnings);
+  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target)
+                                                             : check_linear(arguments, target, warnings);
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
   }
@@ -86,7 +92,7 @@ void add_check_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
   const auto arguments = std::make_shared<CheckArguments>();
   verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats())->required()->type_name("FILE");
-  verb->add_option("--target", arguments->target, "Measure the distance to this surface: " + surface_formats())
+  verb->add_option("--target", arguments->target, "Measure the distance to this surface, or that of these points: " + target_formats())
       ->type_name("SURFACE");
   verb->add_option("--chord", arguments->chord_percent,
                    "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")

@@ -120,6 +120,15 @@ std::string to_text(const CreaseDistance& creases) {
 Json distance_json(const SurfaceDistance& distance, double diagonal) {
   const double percent = 100 / diagonal;
   const auto& farthest = distance.extreme();
+  if (distance.one_sided)
+    return {{"one_sided", true},
+            {"mean_percent", distance.mean() * percent},
+            {"max_percent", distance.max() * percent},
+            {"mean", distance.mean()},
+            {"max", distance.max()},
+            {"mean_from_target_percent", distance.mean_b_to_a * percent},
+            {"max_from_target_percent", distance.max_b_to_a.distance * percent},
+            {"farthest", {{"from", point_json(farthest.from)}, {"to", point_json(farthest.to)}}}};
   return {{"mean_percent", distance.mean() * percent},
           {"max_percent", distance.max() * percent},
           {"mean", distance.mean()},

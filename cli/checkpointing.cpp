@@ -54,6 +54,12 @@ std::string fingerprint(const TriangleMesh& mesh) {
   return print.text();
 }
 
+std::string fingerprint(const PointCloud& cloud) { return Fingerprint().add(numbers(cloud.points)).text(); }
+
+std::string fingerprint(const Target& target) {
+  return std::visit([](const auto& surface) { return fingerprint(surface); }, target);
+}
+
 std::string fingerprint(const VolumeMesh& mesh) {
   Fingerprint print;
   print.add(numbers(mesh.positions)).add(std::span(mesh.kinds)).add(std::span(mesh.cell_vertices));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/loading.h"
 #include "cli/run_options.h"
 #include "fit/checkpoint.h"
 #include "subvol/triangle_mesh.h"
@@ -18,6 +19,8 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options);
 
 /// What tells one input from another: all that a fit reads of it.
 std::string fingerprint(const TriangleMesh& mesh);
+std::string fingerprint(const PointCloud& cloud);
+std::string fingerprint(const Target& target);
 std::string fingerprint(const VolumeMesh& mesh);
 
 /// A run by its version, verb, inputs (name and fingerprint), and those options that bear on the result of the fit.

@@ -8,6 +8,7 @@
 #include "cli/loading.h"
 #include "cli/long_run.h"
 #include "cli/report.h"
+#include "cli/untangling.h"
 #include "cli/writing.h"
 #include "fit/subdivision_fit.h"
 #include "subvol/auto_template.h"
@@ -30,6 +31,7 @@ struct FitArguments {
   std::string target;
   TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
+  std::string point_weights = "equal";
   int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
   std::string basis = "fourier";
   bool adaptive = false;
@@ -41,6 +43,10 @@ SolverKind solver_kind(const FitArguments& arguments) {
 
 Correspondence correspondence(const FitArguments& arguments) {
   return arguments.correspondence == "voronoi" ? Correspondence::voronoi : Correspondence::closest;
+}
+
+PointWeights point_weights(const FitArguments& arguments) {
+  return arguments.point_weights == "area" ? PointWeights::by_area : PointWeights::equal;
 }
 
 /// One fit from its files to its files.
@@ -60,7 +66,7 @@ class FitRun : public LongRun {
   void summarise() const;
 
   const FitArguments& arguments_;
-  TriangleMesh target_;
+  Target target_;
   VolumeMesh template_mesh_;
   std::optional<TemplateChoice> choice_;  ///< where the template was made
   std::optional<Checkpointing> checkpointing_;
@@ -72,6 +78,7 @@ class FitRun : public LongRun {
 
 void FitRun::load() {
   target_ = load_target(arguments_.target, warnings_);
+  require_fitting_options(verb_, is_cloud(target_));
   tell_warnings();
 }
 
@@ -79,6 +86,9 @@ void FitRun::load_template() {
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, arguments_.fit.crease_angle_degrees,
                                              arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
+  if (has_few_inverted_cells(template_mesh_))
+    untangle_template(arguments_.template_mesh.path, arguments_.run,
+                      {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
   choice_ = std::move(loaded.choice);
   tell_warnings();
   if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
@@ -96,9 +106,11 @@ void FitRun::fit() {
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   // What is left of it: a template may have been made.
   if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
+  options.point_weights = point_weights(arguments_);
   result_ = followed([&](auto progress) {
     options.progress = progress;
-    return fit_subdivision_volume(target_, template_mesh_, options);
+    return std::visit(
+        [&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); }, target_);
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
@@ -127,13 +139,17 @@ void FitRun::check() {
     mesh = &reread;
     break;
   }
-  mesh_check_ = check_mesh(*mesh, &target_);
-  limit_distance_ = surface_distance(triangles_of(limit_), target_);
+  std::visit(
+      [&](const auto& target) {
+        mesh_check_ = check_mesh(*mesh, &target);
+        limit_distance_ = surface_distance(triangles_of(limit_), target);
+      },
+      target_);
 }
 
 Json FitRun::report() const {
   const FitReport& report = result_.report;
-  const double diagonal = bounding_box_diagonal(target_);
+  const double diagonal = mesh_check_.target_diagonal;
   Json json{{"subvol", version()},
             {"command", "fit"},
             {"options", options_in_force(verb_)},
@@ -154,9 +170,10 @@ Json FitRun::report() const {
 
 void FitRun::summarise() const {
   const FitReport& report = result_.report;
-  const double percent = 100 / bounding_box_diagonal(target_);
+  const double percent = 100 / mesh_check_.target_diagonal;
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
-            << to_text(mesh_check_) << "limit surface to target: mean " << limit_distance_.mean() * percent << " %, max "
+            << to_text(mesh_check_)
+            << (limit_distance_.one_sided ? "points to limit surface: mean " : "limit surface to target: mean ") << limit_distance_.mean() * percent << " %, max "
             << limit_distance_.max() * percent << " % of the diagonal\n";
   if (report.creases) std::cerr << to_text(*report.creases);
   tell_outputs();
@@ -231,6 +248,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   if (verb.count("--lambda-close") > 0) fit.lambda_close = arguments.fit.lambda_close;
   fit.solver = solver_kind(arguments);
   fit.correspondence = correspondence(arguments);
+  fit.point_weights = point_weights(arguments);
   fit.max_iterations = arguments.fit.max_iterations;
   fit.time_limit_seconds = arguments.fit.time_limit_seconds;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
@@ -264,6 +282,12 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("closest|voronoi")
       ->capture_default_str()
       ->group(group);
+  verb.add_option("--point-weights", arguments.point_weights,
+                  "How much each point of a cloud counts: all alike, or by the area it stands for, where scans are uneven")
+      ->check(CLI::IsMember({"equal", "area"}))
+      ->type_name("equal|area")
+      ->capture_default_str()
+      ->group(group);
   verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N")
@@ -280,7 +304,8 @@ void add_fit_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("fit", "Deform a template until its boundary reproduces a surface");
   const auto arguments = std::make_shared<FitArguments>();
   verb->add_option("TARGET", arguments->target,
-                   "Surface to reproduce: " + surface_formats() + "; or a volume mesh, for its boundary")
+                   "Surface to reproduce: " + surface_formats() + "; a volume mesh, for its boundary; or points: " +
+                       point_cloud_formats())
       ->required()
       ->type_name("FILE");
   CLI::Option* file = verb->add_option("--template", arguments->template_mesh.path,

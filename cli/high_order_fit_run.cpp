@@ -9,7 +9,7 @@
 #include "cli/outputs.h"
 #include "cli/progress.h"
 #include "cli/report.h"
-#include "fit/curve_mesh.h"
+#include "cli/untangling.h"
 #include "fit/mesh_check.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
@@ -36,31 +36,8 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
   }
 }
 
-/// Makes the template valid where it is not. It is what curved cells start from, so nothing is done where this fails.
-void untangle(const HighOrderFitArguments& arguments, StageLog* log, VolumeMesh& template_mesh,
-              std::vector<std::string>& warnings) {
-  ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
-  OptimizeOptions options;
-  options.time_limit_seconds = arguments.fit.time_limit_seconds;
-  options.log = log;
-  options.progress = [&](const FitProgress& progress) {
-    teller.tell(progress);
-    return !interrupted();
-  };
-  catch_interrupt();
-  try {
-    const std::size_t untangled = untangle_before_fit(template_mesh, options);
-    if (untangled > 0)
-      warnings.push_back(arguments.template_mesh.path + ": " + std::to_string(untangled) +
-                         " cells were not valid; they were untangled before curving");
-  } catch (const InputError& error) {
-    throw InputError(arguments.template_mesh.path + ": " + error.what());
-  }
-}
-
 /// seconds: that have been used of the time limit.
-HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds,
-                       const TriangleMesh& target, const VolumeMesh& template_mesh) {
+HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds, const Target& target,
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
   options.log = log;
@@ -70,17 +47,19 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, do
     return !interrupted();
   };
   catch_interrupt();
-  HighOrderFitResult result = fit_high_order(target, template_mesh, options);
+  HighOrderFitResult result =
+      std::visit([&](const auto& geometry) { return fit_high_order(geometry, template_mesh, options); }, target);
   teller.finish();
   return result;
 }
 
 // What counts is what is on the disk: the first .vtu is read back and checked in place of the result in memory.
-MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const TriangleMesh& target,
+MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const Target& target,
                 double chord_percent) {
   const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& o) { return o.extension == ".vtu"; });
   const HighOrderMesh mesh = file == outputs.end() ? result : read_high_order(file->path).mesh;
-  return check_mesh(mesh, curved_boundary(mesh, chord_percent), &target);
+  const CurvedBoundary boundary = curved_boundary(mesh, chord_percent);
+  return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry); }, target);
 }
 
 Json report_json(const char* command, const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh,
@@ -114,7 +93,9 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     for (; !arguments.run.quiet && told < warnings.size(); ++told)
       std::cerr << "subvol: warning: " << warnings[told] << '\n';
   };
-  const TriangleMesh target = load_target(arguments.target, warnings);
+  const Target target = arguments.takes_points ? load_target(arguments.target, warnings)
+                                               : Target(load_surface(arguments.target, warnings));
+  require_fitting_options(verb, is_cloud(target));
   const Clock::time_point template_start = Clock::now();
   LoadedTemplate loaded = load_template(arguments.template_mesh, target, std::nullopt, arguments.run, warnings);
   const double template_seconds = seconds_since(template_start);
@@ -125,7 +106,10 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   refuse_impossible(outputs, arguments, template_mesh);
   Checkpointing checkpointing(
       arguments.run, run_identity(verb, {{"target", fingerprint(target)}, {"template", fingerprint(template_mesh)}}));
-  if (arguments.untangles) untangle(arguments, checkpointing.log(), template_mesh, warnings);
+  if (arguments.untangles || has_few_inverted_cells(template_mesh))
+    untangle_template(arguments.template_mesh.path, arguments.run,
+                      {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()}, template_mesh,
+                      warnings);
 
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result = fit(arguments, checkpointing.log(), seconds_since(start), target, template_mesh);

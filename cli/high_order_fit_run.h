@@ -20,7 +20,9 @@ struct HighOrderFitArguments {
   std::string target;
   TemplateSource template_mesh;
   const char* command = "fit";  ///< the verb, for messages and the report
-  bool untangles = false;       ///< a template with inverted cells is made valid first, over its own boundary
+  /// All cells of the template that are not proved valid are untangled before, not only where a few are inverted.
+  bool untangles = false;
+  bool takes_points = true;     ///< the target may be points
 };
 
 /// Fits curved elements from files to files; returns an ExitStatus.

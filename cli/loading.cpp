@@ -4,6 +4,7 @@
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "subvol/boundary.h"
+#include "subvol/error.h"
 #include "subvol/mesh_io.h"
 #include "subvol/mesh_topology.h"
 #include "subvol/surface_io.h"
@@ -21,7 +22,14 @@ bool is_volume_file(const std::filesystem::path& path) {
 
 bool is_high_order_file(const std::filesystem::path& path) { return lower_case(path.extension().string()) == ".vtu"; }
 
-TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (is_point_cloud_file(path)) return read_point_cloud(path, &warnings);
+  return load_surface(path, warnings);
+}
+
+TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (is_point_cloud_file(path))
+    throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; a surface is expected");
   return is_volume_file(path) ? triangulate(load_polygons(path, warnings)) : read_triangle_mesh(path, &warnings);
 }
 
@@ -59,6 +67,14 @@ Json describe(const std::string& path, const TriangleMesh& mesh) {
           {"bounding_box_diagonal", bounding_box_diagonal(mesh)}};
 }
 
+Json describe(const std::string& path, const PointCloud& cloud) {
+  return {{"path", path}, {"points", cloud.points.size()}, {"bounding_box_diagonal", bounding_box_diagonal(cloud)}};
+}
+
+Json describe(const std::string& path, const Target& target) {
+  return std::visit([&](const auto& geometry) { return describe(path, geometry); }, target);
+}
+
 Json describe(const std::string& path, const PolygonMesh& mesh) {
   return {{"path", path},
           {"vertices", mesh.positions.size()},
@@ -89,6 +105,8 @@ Json describe(const std::string& path, const HighOrderMesh& mesh) {
   json["full_order_nodes"] = orders.num_full_order_nodes;
   return json;
 }
+
+std::string target_formats() { return surface_formats() + "; points: " + point_cloud_formats(); }
 
 std::string cell_formats() { return volume_mesh_formats() + ", .vtu (high-order, as subvol writes it)"; }
 

@@ -3,11 +3,13 @@
 
 #include "cli/run_options.h"
 #include "fit/high_order_mesh.h"
+#include "subvol/point_cloud.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
 #include <filesystem>
 #include <string>
+#include <variant>
 #include <vector>
 
 namespace subvol::cli {
@@ -18,8 +20,14 @@ bool is_volume_file(const std::filesystem::path& path);
 /// Whether it is that of a high-order mesh, for `read_high_order`.
 bool is_high_order_file(const std::filesystem::path& path);
 
-/// A surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
-TriangleMesh load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
+/// What can be fitted, and compared with: a surface, or points on one.
+using Target = std::variant<TriangleMesh, PointCloud>;
+inline bool is_cloud(const Target& target) { return std::holds_alternative<PointCloud>(target); }
+
+/// Points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
+Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
+/// The same where only triangles will do: points are refused as well.
+TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
 /// A surface of polygons with tags by its own vertex numbers.
@@ -37,9 +45,14 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
 
 /// What stands under "input" in a report.
 Json describe(const std::string& path, const TriangleMesh& mesh);
+Json describe(const std::string& path, const PointCloud& cloud);
+Json describe(const std::string& path, const Target& target);
 Json describe(const std::string& path, const PolygonMesh& mesh);
 Json describe(const std::string& path, const VolumeMesh& mesh);
 Json describe(const std::string& path, const HighOrderMesh& mesh);
+
+/// What can be read as a target, for help.
+std::string target_formats();
 
 /// What can be read that holds cells, for help.
 std::string cell_formats();

@@ -59,7 +59,7 @@ class OptimizeRun : public LongRun {
 
 void OptimizeRun::load() {
   mesh_ = load_volume(arguments_.mesh, warnings_);
-  if (!arguments_.target.empty()) target_ = load_target(arguments_.target, warnings_);
+  if (!arguments_.target.empty()) target_ = load_surface(arguments_.target, warnings_);
   surface_ = target_ ? *target_ : refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   before_ = measure_quality(mesh_);
   tell_warnings();
@@ -135,7 +135,7 @@ int OptimizeRun::run() {
 /// Curving is a fit of curved elements whose template is the mesh.
 HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{
-      arguments.run, arguments.writing, {}, arguments.target, {arguments.mesh, std::nullopt}, "optimize", true};
+      arguments.run, arguments.writing, {}, arguments.target, {arguments.mesh, std::nullopt}, "optimize", true, false};
   HighOrderFitOptions& fit = result.fit;
   fit.order = arguments.order;
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;

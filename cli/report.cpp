@@ -60,6 +60,32 @@ Json stage_json(const StageRecord& stage) {
   return json;
 }
 
+Json target_json(const TargetReport& target) {
+  Json json{{"area", target.area},
+            {"volume", target.volume},
+            {"volume_source", to_string(target.volume_source)}};
+  if (target.num_points > 0) {
+    json["points"] = target.num_points;
+    return json;
+  }
+  json["open_edges"] = target.edges.open_edges;
+  json["turned_edges"] = target.edges.turned_edges;
+  json["crowded_edges"] = target.edges.crowded_edges;
+  json["closed_manifold"] = target.topology.has_value();
+  const auto betti_json = [](const BettiNumbers& numbers) -> Json {
+    return {{"components", numbers.components},
+            {"handles", numbers.handles},
+            {"cavities", numbers.cavities},
+            {"boundary_euler_number", 2 * numbers.euler_number()}};
+  };
+  if (target.topology) json["topology"] = betti_json(*target.topology);
+  if (target.template_topology) {
+    json["template_topology"] = betti_json(*target.template_topology);
+    json["same_topology"] = target.same_topology();
+  }
+  return json;
+}
+
 }  // namespace
 
 Json stages_json(const FitReport& report) {
@@ -69,13 +95,15 @@ Json stages_json(const FitReport& report) {
 }
 
 Json fit_json(const FitReport& report) {
-  return {{"stop_reason", to_string(report.stop_reason)},
+  Json json{{"stop_reason", to_string(report.stop_reason)},
           {"explanation", report.explanation},
           {"converged", report.stop_reason == StopReason::converged},
           {"stages", stages_json(report)},
           {"initial_distance",
            {{"mean_percent", report.initial_distance_mean_percent},
             {"max_percent", report.initial_distance_max_percent}}}};
+  if (report.target.area > 0) json["target"] = target_json(report.target);
+  return json;
 }
 
 Json seconds_json(const FitReport& report) {

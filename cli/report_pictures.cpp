@@ -104,7 +104,7 @@ Shown load_shown(const fs::path& path) {
   if (is_high_order_file(path)) return shown(read_high_order(path).mesh);
   if (is_volume_file(path)) return shown(load_volume(path, warnings));
   Shown result;
-  result.triangles = load_target(path, warnings);
+  result.triangles = load_surface(path, warnings);
   return result;
 }
 

@@ -52,6 +52,22 @@ void add_long_run_options(CLI::App& verb, RunOptions& options) {
   verb.add_option("--seed", options.seed, "Kept in the report; nothing here draws random numbers")->type_name("N");
 }
 
+void require_fitting_options(const CLI::App& verb, bool points) {
+  const auto given = [&](const char* name) {
+    const CLI::Option* option = verb.get_option_no_throw(name);
+    return option ? option->results() : std::vector<std::string>{};
+  };
+  if (!points) {
+    if (!given("--point-weights").empty())
+      throw UsageError("--point-weights: the target is a surface; its triangles count by their areas");
+    return;
+  }
+  if (!given("--crease-angle").empty())
+    throw UsageError("--crease-angle: the target holds points, between which no edges can be seen");
+  if (const auto kind = given("--correspondence"); !kind.empty() && kind.back() == "voronoi")
+    throw UsageError("--correspondence voronoi: the target holds points, which have no area to be cut into cells");
+}
+
 void apply_resources(const RunOptions& options) {
   if (options.threads > 0) omp_set_num_threads(options.threads);
   if (options.memory_limit == 0) return;

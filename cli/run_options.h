@@ -35,6 +35,9 @@ void add_long_run_options(CLI::App& verb, RunOptions& options);
 /// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own limit
 /// on data: what goes beyond it fails to be allocated (`std::bad_alloc`).
 void apply_resources(const RunOptions& options);
+
+/// UsageError: an option was given that means nothing for the target that there is, points or a surface.
+void require_fitting_options(const CLI::App& verb, bool points);
 /// Accepts numbers from low to high, and nothing else (NaN passes CLI::Range).
 CLI::Validator number_in(double low, double high);
 /// A length in the mesh's unit, or with % of a diagonal. UsageError, naming the option: neither.

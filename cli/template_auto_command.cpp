@@ -41,7 +41,7 @@ Json topology_json(const BettiNumbers& topology) {
 
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
-  const TriangleMesh target = load_target(arguments.target, arguments.warnings);
+  const TriangleMesh target = load_surface(arguments.target, arguments.warnings);
   arguments.writing.source = arguments.target;
   const AutoTemplateResult result = make(arguments, target);
   if (result.cancelled) return kInterrupted;

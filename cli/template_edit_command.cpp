@@ -53,7 +53,7 @@ VolumeMesh make_grid(EditArguments& arguments) {
     low = low_corner(arguments.box);
     high = high_corner(arguments.box);
   } else {
-    const auto box = box_around(load_target(arguments.mesh, arguments.warnings), arguments.margin);
+    const auto box = box_around(load_surface(arguments.mesh, arguments.warnings), arguments.margin);
     low = box[0];
     high = box[1];
   }
@@ -68,7 +68,7 @@ std::vector<char> chosen_cells(EditArguments& arguments, const VolumeMesh& mesh,
   if (given != 1) throw UsageError("template " + choices);
   if (arguments.thin) return thin_cells(mesh);
   if (!arguments.inside.empty())
-    return cells_inside(mesh, load_target(arguments.inside, arguments.warnings), arguments.share);
+    return cells_inside(mesh, load_surface(arguments.inside, arguments.warnings), arguments.share);
   return arguments.box.empty() ? cells_listed(mesh, arguments.cells)
                                : cells_in_box(mesh, low_corner(arguments.box), high_corner(arguments.box));
 }

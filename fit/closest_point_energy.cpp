@@ -27,16 +27,13 @@ ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<
                                        std::size_t num_samples, double tangential_weight, int points_per_triangle)
     : SurfaceTerm(std::move(sample_triangles), num_samples),
       target_(&target),
-      target_tree_(TriangleMesh{target.positions(), target.triangles()}),
       tau_(tangential_weight),
       scale_(1 / (2 * target.area() * target.length() * target.length())),
       points_per_triangle_(points_per_triangle) {
   if (!(tau_ >= 0 && tau_ <= 1)) throw InputError("ClosestPointEnergy: tangential_weight must be in [0, 1]");
   if (points_per_triangle != 1 && points_per_triangle != 3)
     throw InputError("ClosestPointEnergy: points_per_triangle must be 1 or 3");
-  std::vector<int> samples_of(target.triangles().size(), 0);
-  for (Index t : target.sample_triangles()) ++samples_of[t];
-  for (Index t : target.sample_triangles()) sample_areas_.push_back(target.areas()[t] / samples_of[t]);
+  if (!target.is_cloud()) target_tree_.emplace(TriangleMesh{target.positions(), target.triangles()});
 }
 
 void ClosestPointEnergy::emphasize_far(double length) {
@@ -62,12 +59,27 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
     const Index t = target_hits_[j].triangle;
     const auto& q = triangles()[t];
     target_links_[next[t]++] = {t, barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]), points[j],
-                                target_->normals()[target_->sample_triangles()[j]],
-                                emphasis(target_hits_[j].distance) * sample_areas_[j]};
+                                target_->sample_normals()[j],
+                                emphasis(target_hits_[j].distance) * target_->sample_areas()[j], tau_};
   }
 }
 
+bool ClosestPointEnergy::over_rim(const ClosestPoint::Hit& hit) const {
+  const auto& [a, b, c] = target_->triangles()[hit.triangle];
+  const std::vector<Vec3>& p = target_->positions();
+  return target_->has_rim(hit.triangle) && target_->on_rim(hit.triangle, barycentric(hit.point, p[a], p[b], p[c]));
+}
+
+double ClosestPointEnergy::share_over_rim(const Link& link, const ClosestPoint::Hit& hit,
+                                          std::span<const Vec3> samples) const {
+  const auto& [a, b, c] = triangles()[link.triangle];
+  const double far = hit.distance / (2 * target_->length()), near = std::max(0.0, 1 - far * far);
+  const double along = link.normal.dot((samples[b] - samples[a]).cross(samples[c] - samples[a]).normalized());
+  return near * near * along * along;
+}
+
 void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
+  if (!target_tree_) return;
   constexpr double kThird = 1.0 / 3, kSixth = 1.0 / 6, kTwoThirds = 2.0 / 3;
   constexpr std::array<std::array<double, 3>, 3> kThree = {
       {{kTwoThirds, kSixth, kSixth}, {kSixth, kTwoThirds, kSixth}, {kSixth, kSixth, kTwoThirds}}};
@@ -83,11 +95,16 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       const std::array<double, 3> l = n == 1 ? std::array<double, 3>{kThird, kThird, kThird} : kThree[k];
       const Vec3 x = l[0] * samples[q[0]] + l[1] * samples[q[1]] + l[2] * samples[q[2]];
       Index& hint = surface_hints_[n * t + k];
-      const ClosestPoint::Hit hit = target_tree_.closest(x, hint == kNoIndex ? before : hint);
+      const ClosestPoint::Hit hit = target_tree_->closest(x, hint == kNoIndex ? before : hint);
       hint = before = hit.triangle;
+      Link& link = surface_links_[n * t + k];
+      link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
+              emphasis(hit.distance) * triangle_area(t) / n, tau_};
       surface_distances_[n * t + k] = hit.distance;
-      surface_links_[n * t + k] = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
-                                   emphasis(hit.distance) * triangle_area(t) / n};
+      if (!over_rim(hit)) continue;
+      link.weight *= share_over_rim(link, hit, samples);
+      link.tangential = 0;
+      surface_distances_[n * t + k] = 0;
     }
   }
 }
@@ -99,14 +116,15 @@ void ClosestPointEnergy::add_link(const Link& link, const Incidence& incidence, 
   Vec3 d = -link.point;
   for (int l = 0; l < 3; ++l) d += link.barycentric[l] * assigned()[q[l]];
   const double height = link.normal.dot(d), weight = own * link.weight;
-  const Vec3 pull = ((1 - tau_) * height) * link.normal + tau_ * d;
+  const double tau = link.tangential;
+  const Vec3 pull = ((1 - tau) * height) * link.normal + tau * d;
   value += weight * pull.dot(d);
   row.gradient += 2 * weight * pull;
   for (int l = 0; l < 3; ++l) {
     const double w = 2 * weight * link.barycentric[l];
     Mat3& block = row.blocks[incidence.entries[l]];
-    block += ((1 - tau_) * w) * link.normal * link.normal.transpose();
-    block.diagonal().array() += tau_ * w;
+    block += ((1 - tau) * w) * link.normal * link.normal.transpose();
+    block.diagonal().array() += tau * w;
   }
 }
 
@@ -119,6 +137,7 @@ void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
       const auto t = static_cast<std::size_t>(incidence.triangle);
       for (std::size_t k = target_offsets_[t]; k < target_offsets_[t + 1]; ++k)
         add_link(target_links_[k], incidence, row, row.target_to_surface);
+      if (!target_tree_) continue;
       for (int k = 0; k < points_per_triangle_; ++k)
         add_link(surface_links_[points_per_triangle_ * t + k], incidence, row, row.surface_to_target);
     }
@@ -128,7 +147,7 @@ void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
 ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
   double to_surface = 0, to_target = 0, area = 0, max = 0;
   for (std::size_t j = 0; j < target_hits_.size(); ++j) {
-    to_surface += sample_areas_[j] * target_hits_[j].distance;
+    to_surface += target_->sample_areas()[j] * target_hits_[j].distance;
     max = std::max(max, target_hits_[j].distance);
   }
   for (std::size_t q = 0; q < surface_distances_.size(); ++q) {

@@ -17,6 +17,14 @@ namespace subvol {
 /// y_j, a_j   samples of the target and the area each stands for;  s(y): closest point of the triangulated surface S~
 /// x_q, b_q   quadrature points of S~'s triangles with their areas;  t(x): closest point of the target
 ///
+/// Of a point cloud nothing is known between its points, so the second sum is left out: they pull at S~, and what no point
+/// is nearest to is held by the cells alone. Where t(x_q) lies on an open edge of the target, x_q may be over a hole: it is
+/// not drawn to the rim, but only to the plane that continues the target there, with M = n n^T times
+///
+///   max(0, 1 - (d / 2L)^2)^2 (n . n_S)^2,   d = |x_q - t(x_q)|,  n_S: unit normal of S~
+///
+/// so that places that are far from the rim, or where S~ runs another way, are free.
+///
 /// Where Voronoi cells hand every point of the target to one *sample*, here it pulls at the place of S~ that is closest,
 /// between the samples: the pull is spread over the corners, and cells are left better shaped at the same distance.
 /// Frozen: the barycentric coordinates of s(y_j), the points t(x_q), normals and areas. Same bits for any thread count.
@@ -34,7 +42,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// the search starts, and the tree over S~ moves along.
   void assign(std::span<const Vec3> samples) override;
 
-  /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by area.
+  /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by area;
+  /// what lies over a rim of the target does not count.
   struct Distance {
     double mean, max;
   };
@@ -48,22 +57,24 @@ class ClosestPointEnergy final : public SurfaceTerm {
     Index triangle;
     std::array<double, 3> barycentric;
     Vec3 point, normal;
-    double weight;  ///< area, and emphasis
+    double weight;      ///< area, and emphasis
+    double tangential;  ///< tau, or less
   };
 
   void link_target(std::span<const Vec3> samples);
   void link_surface(std::span<const Vec3> samples);
+  bool over_rim(const ClosestPoint::Hit& hit) const;
+  double share_over_rim(const Link& link, const ClosestPoint::Hit& hit, std::span<const Vec3> samples) const;
   void add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const;
 
   const TargetSurface* target_;
-  ClosestPoint target_tree_;
+  std::optional<ClosestPoint> target_tree_;        ///< none for a cloud
   std::optional<ClosestPoint> surface_tree_;       ///< of S~
   std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 
   double tau_, scale_, inverse_far_ = 0;
   int points_per_triangle_;
-  std::vector<double> sample_areas_;         ///< a_j
   std::vector<Link> target_links_;           ///< by sample triangle
   std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
   std::vector<Link> surface_links_;          ///< points_per_triangle_ for each sample triangle

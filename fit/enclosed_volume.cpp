@@ -77,25 +77,46 @@ double signed_volume(std::span<const Vec3> positions, std::span<const std::array
   return std::abs(sum) / 6;
 }
 
+namespace {
+
+/// A grid around points, with so many cells along its longest side.
+template <class Points>
+Grid grid_around(const Points& points, int resolution) {
+  Vec3 low = *points.begin(), high = low;
+  for (const Vec3& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return {low, high, resolution};
+}
+
+}  // namespace
+
 double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
                       int resolution) {
   if (triangles.empty()) return 0;
-  Vec3 low = positions[triangles[0][0]], high = low;
+  std::vector<Vec3> corners;
+  corners.reserve(3 * triangles.size());
   for (const auto& t : triangles)
-    for (Index v : t) {
-      low = low.cwiseMin(positions[v]);
-      high = high.cwiseMax(positions[v]);
-    }
-  Grid grid(low, high, resolution);
+    for (Index v : t) corners.push_back(positions[v]);
+  Grid grid = grid_around(corners, resolution);
   // Samples a third of a cell apart leave no gap that the flood, which goes through faces of cells, could pass.
-  for (const auto& t : triangles) {
-    const Vec3 &a = positions[t[0]], u = positions[t[1]] - a, v = positions[t[2]] - a;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const Vec3 &a = corners[3 * t], u = corners[3 * t + 1] - a, v = corners[3 * t + 2] - a;
     const double longest = std::max({u.norm(), v.norm(), (u - v).norm()});
     const int n = static_cast<int>(std::ceil(3 * longest / grid.cell())) + 1;
     for (int i = 0; i <= n; ++i)
       for (int j = 0; j <= n - i; ++j)
         grid.mark(a + (static_cast<double>(i) / n) * u + (static_cast<double>(j) / n) * v);
   }
+  grid.flood();
+  return grid.inside_volume();
+}
+
+double flooded_volume(std::span<const Vec3> points, int resolution) {
+  if (points.empty()) return 0;
+  Grid grid = grid_around(points, resolution);
+  for (const Vec3& p : points) grid.mark(p);
   grid.flood();
   return grid.inside_volume();
 }

@@ -19,4 +19,8 @@ double signed_volume(std::span<const Vec3> positions, std::span<const std::array
 /// smaller than a cell close themselves. Relative error about area * cell / volume / 10.
 double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, int resolution);
 
+/// The same for a surface that is known by points on it. It holds back what is outside where points are denser than
+/// cells; elsewhere the result is 0.
+double flooded_volume(std::span<const Vec3> points, int resolution);
+
 }  // namespace subvol

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/crease_distance.h"
+#include "fit/target_report.h"
 #include "subvol/types.h"
 
 #include <cstddef>
@@ -59,6 +60,7 @@ struct FitReport {
   std::string explanation;                 ///< one sentence for people
   std::vector<StageRecord> stages;
   double initial_distance_mean_percent = 0, initial_distance_max_percent = 0;
+  TargetReport target;                     ///< the state it is in
   std::optional<CreaseDistance> creases;   ///< of the limit surface; where there are sharp edges to follow
   std::vector<std::string> warnings;       ///< audit: what the template's geometry cannot do, topology mismatch, ...
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/fit_target.h"
 
-#include "fit/soup_topology.h"
-#include "fit/surface_distance.h"
+#include "fit/enclosed_volume.h"
+#include "fit/target_report.h"
 #include "subvol/error.h"
 
 #include <algorithm>
@@ -17,13 +17,23 @@ TriangleMesh normalised(TriangleMesh mesh, const Normalisation& normalisation) {
   return mesh;
 }
 
+PointCloud normalised(const PointCloud& cloud, const Normalisation& normalisation) {
+  return {normalisation.to_unit(cloud.points)};
+}
+
 }  // namespace
 
 Normalisation::Normalisation(const TriangleMesh& target) {
+  centre = TargetSurface(target).centre();
   diagonal = bounding_box_diagonal(target);
   if (!(diagonal > 0) || !std::isfinite(diagonal))
     throw InputError("target: its triangles' bounding box has no extent, or coordinates are not finite");
-  centre = TargetSurface(target).centre();
+}
+
+Normalisation::Normalisation(const PointCloud& target) {
+  const TargetSurface surface(target);
+  centre = surface.centre();
+  diagonal = surface.diagonal();
 }
 
 std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
@@ -39,28 +49,36 @@ std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {
 FitTarget::FitTarget(const TriangleMesh& target)
     : normalisation(target), mesh(normalised(target, normalisation)), tree(mesh), surface(mesh) {}
 
+FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
+    : normalisation(target), surface(normalised(target, normalisation), weights) {}
+
 void FitTarget::sample(std::size_t num_samples, std::size_t least) {
   const double count = static_cast<double>(std::max(num_samples, least));
-  surface = TargetSurface(mesh, {.sample_spacing = 1.8 * std::sqrt(surface.area() / count)});
+  surface.resample(1.8 * std::sqrt(surface.area() / count));
 }
 
-double FitTarget::mean_distance(const TriangleMesh& fitted) const {
-  return surface_distance(fitted, ClosestPoint(fitted), mesh, tree, {.extremes = false}).mean();
+SurfaceDistance FitTarget::distance(const TriangleMesh& fitted, bool extremes) const {
+  const ClosestPoint fitted_tree(fitted);
+  return tree ? surface_distance(fitted, fitted_tree, mesh, *tree, {.extremes = extremes})
+              : surface_distance(fitted_tree, surface.samples());
 }
 
-double FitTarget::compare_start(const TriangleMesh& boundary, FitReport& report) const {
-  const SurfaceDistance distance = surface_distance(boundary, ClosestPoint(boundary), mesh, tree);
-  report.initial_distance_mean_percent = 100 * distance.mean();
-  report.initial_distance_max_percent = 100 * distance.max();
-  const SoupTopology wanted = soup_topology(mesh.positions, mesh.triangles);
-  const long euler_number = soup_topology(boundary.positions, boundary.triangles).euler_number;
-  if (wanted.closed_share == 1 && wanted.euler_number != euler_number)
-    report.warnings.push_back("Euler numbers differ (target " + std::to_string(wanted.euler_number) +
-                              ", template's boundary " + std::to_string(euler_number) +
-                              "): their handles or components do, and the fit cannot change those");
-  if (surface.volume_source() != VolumeSource::signed_sum)
-    report.warnings.push_back("the target is not closed or not consistently oriented; its volume is an estimate");
-  return distance.mean();
+double FitTarget::mean_distance(const TriangleMesh& fitted) const { return distance(fitted, false).mean(); }
+
+double FitTarget::compare_start(const TriangleMesh& boundary, FitReport& report) {
+  const SurfaceDistance start = distance(boundary, true);
+  report.initial_distance_mean_percent = 100 * start.mean();
+  report.initial_distance_max_percent = 100 * start.max();
+  if (surface.volume_source() == VolumeSource::isoperimetric)
+    if (const double volume = signed_volume(boundary.positions, boundary.triangles); volume > 0)
+      surface.set_volume(volume);
+  report.target = describe_target(surface, boundary);
+  const double unit = std::pow(normalisation.diagonal, 2);
+  report.target.area *= unit;
+  report.target.volume *= unit * normalisation.diagonal;
+  const std::vector<std::string> found = warnings_of(report.target);
+  report.warnings.insert(report.warnings.end(), found.begin(), found.end());
+  return start.mean();
 }
 
 }  // namespace subvol

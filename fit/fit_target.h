@@ -4,7 +4,10 @@
 #include "fit/closest_point.h"
 #include "fit/fit_report.h"
 #include "fit/fit_schedule.h"
+#include "fit/surface_distance.h"
 #include "fit/target_surface.h"
+
+#include <optional>
 
 namespace subvol {
 
@@ -15,6 +18,7 @@ struct Normalisation {
 
   /// InputError: a target without extent, or with coordinates that are not finite.
   explicit Normalisation(const TriangleMesh& target);
+  explicit Normalisation(const PointCloud& target);
   std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };
@@ -22,23 +26,28 @@ struct Normalisation {
 /// What a fit is to reproduce, in normalised coordinates: lengths are shares of the target's diagonal.
 struct FitTarget {
   Normalisation normalisation;
-  TriangleMesh mesh;
-  ClosestPoint tree;
-  TargetSurface surface;  ///< its samples are those of the last `sample`
+  TriangleMesh mesh;                 ///< no triangles: a cloud is fitted
+  std::optional<ClosestPoint> tree;  ///< of its triangles
+  TargetSurface surface;             ///< its samples are those of the last `sample`
 
   /// InputError: as Normalisation.
   explicit FitTarget(const TriangleMesh& target);
+  explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);
 
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
-  /// surface that belong to a neighbouring facet.
+  /// surface that belong to a neighbouring facet. A cloud keeps its points.
   /// least  samples that are taken in any case (triangles have one each at least).
   void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples);
 
-  /// Mean symmetric distance to another surface.
+  /// Mean symmetric distance to another surface; of a cloud, that of its points to the surface.
   double mean_distance(const TriangleMesh& fitted) const;
 
-  /// Notes how far a template's boundary is, and what no fit of it can change. Returns the mean distance.
-  double compare_start(const TriangleMesh& boundary, FitReport& report) const;
+  /// Notes how far a template's boundary is, the state of the target (`TargetReport`), and what no fit can change. Where
+  /// the target encloses nothing the boundary's volume is taken for the one wanted. Returns the mean distance.
+  double compare_start(const TriangleMesh& boundary, FitReport& report);
+
+ private:
+  SurfaceDistance distance(const TriangleMesh& fitted, bool extremes) const;
 };
 
 }  // namespace subvol

@@ -52,7 +52,7 @@ VolumeMesh checked(VolumeMesh mesh) {
 /// The high-order fit, in normalised coordinates.
 class HighOrderFit {
  public:
-  HighOrderFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
+  HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
   HighOrderFitResult run();
 
  private:
@@ -94,10 +94,9 @@ class HighOrderFit {
   StageRunner runner_;
 };
 
-HighOrderFit::HighOrderFit(const TriangleMesh& target, const VolumeMesh& template_mesh,
-                           const HighOrderFitOptions& options)
+HighOrderFit::HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options)
     : options_(checked(options)),
-      target_(target),
+      target_(std::move(target)),
       template_(checked(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
@@ -117,7 +116,7 @@ int HighOrderFit::sample_intervals(int order) const {
   constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;
   constexpr double kMostTriangles = 60000;
   const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
-  const double triangles = static_cast<double>(target_.surface.triangles().size());
+  const double triangles = 2 * static_cast<double>(target_.surface.num_details());
   const int of_target = std::min(static_cast<int>(std::ceil(std::sqrt(triangles / faces))), kMostIntervals);
   const int affordable = static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)));
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
@@ -325,7 +324,13 @@ HighOrderFitResult HighOrderFit::run() {
 
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options) {
-  return HighOrderFit(target, template_mesh, options).run();
+  return HighOrderFit(FitTarget(target), template_mesh, options).run();
+}
+
+HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,
+                                  const HighOrderFitOptions& options) {
+  require_closest(options.correspondence);
+  return HighOrderFit(FitTarget(target, options.point_weights), template_mesh, options).run();
 }
 
 }  // namespace subvol

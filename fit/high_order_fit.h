@@ -19,6 +19,7 @@ struct HighOrderFitOptions {
   double lambda_close = 0.05;                    ///< > 0
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
+  PointWeights point_weights = PointWeights::equal;  ///< of a point cloud
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
@@ -40,6 +41,10 @@ struct HighOrderFitResult {
 ///          none are guarded at their quadrature points only, and the boundary may come to intersect itself: check it.
 /// InputError: options out of range, an empty target, a template that is not sound.
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
+                                  const HighOrderFitOptions& options);
+
+/// The same to points, as `fit_subdivision_volume` does it. InputError: also Correspondence::voronoi.
+HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options);
 
 }  // namespace subvol

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <numeric>
 
 namespace subvol {
@@ -82,8 +83,27 @@ double enclosed_volume(const TriangleMesh& surface) {
   return sum / 6;
 }
 
-void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const TriangleMesh* target,
-                    const MeshCheckOptions& options, MeshCheck& check) {
+/// How the boundary's triangles are compared with a target; empty: there is none.
+using Compare = std::function<void(const TriangleMesh& boundary, MeshCheck& check)>;
+
+Compare comparison(const TriangleMesh* target, const MeshCheckOptions& options) {
+  if (!target) return {};
+  return [target, samples = options.distance_samples](const TriangleMesh& boundary, MeshCheck& check) {
+    check.target_diagonal = bounding_box_diagonal(*target);
+    check.distance = surface_distance(boundary, *target, {.num_samples = samples});
+  };
+}
+
+Compare comparison(const PointCloud* target) {
+  if (!target) return {};
+  return [target](const TriangleMesh& boundary, MeshCheck& check) {
+    check.target_diagonal = bounding_box_diagonal(*target);
+    check.distance = surface_distance(boundary, *target);
+  };
+}
+
+void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const Compare& compare,
+                    MeshCheck& check) {
   check.has_boundary_geometry = true;
   check.volume = enclosed_volume(triangles);
   const SelfIntersections found = self_intersections(triangles);
@@ -93,9 +113,7 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  if (!target) return;
-  check.target_diagonal = bounding_box_diagonal(*target);
-  check.distance = surface_distance(triangles, *target, {.num_samples = options.distance_samples});
+  if (compare) compare(triangles, check);
 }
 
 MeshCheck count_cells(const VolumeMesh& mesh) {
@@ -193,21 +211,12 @@ void append_witnesses(std::string& text, std::span<const InversionWitness> witne
 
 void append_distance(std::string& text, const MeshCheck& check) {
   const auto& extreme = check.distance->extreme();
-  append(text, "distance            mean %.6g (%.4f %%), max %.6g (%.4f %%) at (%.6g, %.6g, %.6g)\n",
-         check.distance->mean(), check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(),
+  append(text, "distance%s mean %.6g (%.4f %%), max %.6g (%.4f %%) at (%.6g, %.6g, %.6g)\n",
+         check.distance->one_sided ? " (of points)" : "           ", check.distance->mean(), check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(),
          extreme.from[0], extreme.from[1], extreme.from[2]);
 }
 
-}  // namespace
-
-bool MeshCheck::valid() const {
-  const bool sound = std::all_of(defects.begin(), defects.end(),
-                                 [](const MeshDefect& defect) { return defect.kind == Kind::unused_vertex; });
-  const bool certified = quality && quality->certificate.all_certified();
-  return sound && certified && has_boundary_geometry && intersecting_faces.empty();
-}
-
-MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const MeshCheckOptions& options) {
+MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const MeshCheckOptions& options) {
   MeshCheck check = count_cells(mesh);
   if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
   check.quality = measure_quality(mesh, options.samples_per_direction);
@@ -228,8 +237,36 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const M
   const TriangleMesh triangles = options.quad_triangles == QuadTriangles::bilinear
                                      ? refined_triangles(boundary, &face_of_triangle)
                                      : triangulate(boundary, &face_of_triangle);
-  check_boundary(triangles, face_of_triangle, target, options, check);
+  check_boundary(triangles, face_of_triangle, compare, check);
   return check;
+}
+
+MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const Compare& compare,
+                       int samples_per_direction) {
+  const VolumeMesh straight = mesh.straight_sided();
+  MeshCheck check = count_cells(straight);
+  std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
+  check.orders = order_summary(mesh.space);
+  check.quality = measure_quality(mesh, samples_per_direction);
+  HighOrderCertifier certifier(mesh.space);
+  check.witnesses = witnesses(
+      *check.quality, [&](Index c) { return certifier.certify(mesh.coefficients, c); },
+      [&](Index c, const Vec3& point) { return mesh.position(c, point); });
+  check_topology(straight, mesh.space.topology(), check);
+  check.chord_error = boundary.chord_error;
+  const auto finite = [](const Vec3& x) { return x.allFinite(); };
+  if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
+    check_boundary(boundary.triangles, boundary.faces, compare, check);
+  return check;
+}
+
+}  // namespace
+
+bool MeshCheck::valid() const {
+  const bool sound = std::all_of(defects.begin(), defects.end(),
+                                 [](const MeshDefect& defect) { return defect.kind == Kind::unused_vertex; });
+  const bool certified = quality && quality->certificate.all_certified();
+  return sound && certified && has_boundary_geometry && intersecting_faces.empty();
 }
 
 OrderSummary order_summary(const ElementSpace& space) {
@@ -250,23 +287,22 @@ OrderSummary order_summary(const ElementSpace& space) {
   return summary;
 }
 
+MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const MeshCheckOptions& options) {
+  return check_linear(mesh, comparison(target, options), options);
+}
+
+MeshCheck check_mesh(const VolumeMesh& mesh, const PointCloud* target, const MeshCheckOptions& options) {
+  return check_linear(mesh, comparison(target), options);
+}
+
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target,
                      const MeshCheckOptions& options, int samples_per_direction) {
-  const VolumeMesh straight = mesh.straight_sided();
-  MeshCheck check = count_cells(straight);
-  std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
-  check.orders = order_summary(mesh.space);
-  check.quality = measure_quality(mesh, samples_per_direction);
-  HighOrderCertifier certifier(mesh.space);
-  check.witnesses = witnesses(
-      *check.quality, [&](Index c) { return certifier.certify(mesh.coefficients, c); },
-      [&](Index c, const Vec3& point) { return mesh.position(c, point); });
-  check_topology(straight, mesh.space.topology(), check);
-  check.chord_error = boundary.chord_error;
-  const auto finite = [](const Vec3& x) { return x.allFinite(); };
-  if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
-    check_boundary(boundary.triangles, boundary.faces, target, options, check);
-  return check;
+  return check_curved(mesh, boundary, comparison(target, options), samples_per_direction);
+}
+
+MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const PointCloud* target,
+                     int samples_per_direction) {
+  return check_curved(mesh, boundary, comparison(target), samples_per_direction);
 }
 
 std::string to_text(const MeshCheck& check) {

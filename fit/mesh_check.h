@@ -94,6 +94,12 @@ struct MeshCheck {
 /// and 80 us with a target.
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {});
+/// The same against points, one-sided: distances are from the points to the boundary. target may be null.
+MeshCheck check_mesh(const VolumeMesh& mesh, const PointCloud* target, const MeshCheckOptions& options = {});
+/// Against nothing.
+inline MeshCheck check_mesh(const VolumeMesh& mesh, std::nullptr_t, const MeshCheckOptions& options) {
+  return check_mesh(mesh, static_cast<const TriangleMesh*>(nullptr), options);
+}
 
 /// The same of a curved mesh. Defects are those of the straight-sided mesh, whose cells may be inverted; there is no
 /// audit.
@@ -102,6 +108,8 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullpt
 /// samples_per_direction  as for `measure_quality` of a high-order mesh; that of `options` and its quads mean nothing.
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {}, int samples_per_direction = 0);
+MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const PointCloud* target,
+                     int samples_per_direction = 0);
 
 /// The same as a text of some lines for people, the verdict last.
 std::string to_text(const MeshCheck& check);

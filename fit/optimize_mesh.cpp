@@ -343,7 +343,7 @@ void MeshOptimizer::measure_distance() {
   if (options_.fixed_boundary) return;
   const TriangleMesh boundary = refined_triangles(boundary_surface(mesh_, topology_));
   const SurfaceDistance distance =
-      surface_distance(boundary, ClosestPoint(boundary), target_.mesh, target_.tree, {.num_samples = kSamples});
+      surface_distance(boundary, ClosestPoint(boundary), target_.mesh, *target_.tree, {.num_samples = kSamples});
   mean_percent_ = 100 * distance.mean();
   max_percent_ = 100 * distance.max();
 }

@@ -3,6 +3,7 @@
 
 #include "fit/closest_point_energy.h"
 #include "fit/surface_energy.h"
+#include "subvol/error.h"
 #include "subvol/fingerprint.h"
 
 namespace subvol {
@@ -27,6 +28,11 @@ std::uint64_t start_of(const FitProblem& problem, const MinimizerOptions& minimi
 }
 
 }  // namespace
+
+void require_closest(Correspondence correspondence) {
+  if (correspondence != Correspondence::closest)
+    throw InputError("Correspondence::voronoi: a cloud has no surface to cut into cells; points pull at the closest places");
+}
 
 bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction,
                       std::vector<Vec3>& x, FitReport& report) const {

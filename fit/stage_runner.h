@@ -20,6 +20,9 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                std::size_t num_samples, double tangential_weight,
                                                Correspondence correspondence);
 
+/// InputError unless closest points are what pulls: Voronoi cells of points have no area.
+void require_closest(Correspondence correspondence);
+
 /// Runs the minimisations of a fit one after the other, with one clock and one report.
 class StageRunner {
  public:

@@ -48,7 +48,7 @@ void check_options(const FitOptions& options) {
 /// The recursive fit, in normalised coordinates.
 class SubdivisionFit {
  public:
-  SubdivisionFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options);
+  SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options);
   FitResult run();
 
  private:
@@ -99,16 +99,17 @@ class SubdivisionFit {
   StageRunner runner_;
 };
 
-SubdivisionFit::SubdivisionFit(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options)
+SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options)
     : options_((check_options(options), options)),
-      target_(target),
+      target_(std::move(target)),
       template_(template_mesh),
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   template_.positions = target_.normalisation.to_unit(template_.positions);
-  if (options.crease_angle_degrees || !template_.tags.creases.empty())
+  const bool wants_creases = options.crease_angle_degrees || !template_.tags.creases.empty();
+  if (wants_creases && !target_.surface.is_cloud())
     template_creases_ = FollowedCreases(target_.mesh, options.crease_angle_degrees, template_);
 }
 
@@ -123,7 +124,7 @@ void SubdivisionFit::look_over_template() {
 
 void SubdivisionFit::prepare_level() {
   const double begin = runner_.seconds();
-  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.triangles().size() / 2,
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.num_details(),
                           finest());
   limit_check_.reset();
   creases_.refine(level_);
@@ -409,7 +410,14 @@ const char* to_string(StopReason reason) {
 }
 
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options) {
-  return SubdivisionFit(target, template_mesh, options).run();
+  return SubdivisionFit(FitTarget(target), template_mesh, options).run();
+}
+
+FitResult fit_subdivision_volume(const PointCloud& target, const VolumeMesh& template_mesh, const FitOptions& options) {
+  if (options.crease_angle_degrees)
+    throw InputError("FitOptions::crease_angle_degrees: points have no edges to be kept sharp");
+  require_closest(options.correspondence);
+  return SubdivisionFit(FitTarget(target, options.point_weights), template_mesh, options).run();
 }
 
 }  // namespace subvol

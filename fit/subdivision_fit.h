@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/fit_report.h"
+#include "subvol/point_cloud.h"
 #include "subvol/subdivision.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
@@ -40,6 +41,7 @@ struct FitOptions {
   std::optional<double> crease_angle_degrees;
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
+  PointWeights point_weights = PointWeights::equal;  ///< of a point cloud
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
@@ -61,5 +63,11 @@ struct FitResult {
 ///          `stalled`, or the template has cells that are not: no step makes a certified cell lose its certificate.
 /// InputError: options out of range, an empty target, a template that cannot be subdivided or that has inverted cells.
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options);
+
+/// The same to points: every one of them pulls at the nearest place of the fitted surface (inverse fitting), and all
+/// distances are from the points to the surface. Where there are no points cells alone tell where the surface runs.
+///
+/// InputError: also crease_angle_degrees, and Correspondence::voronoi, which need triangles.
+FitResult fit_subdivision_volume(const PointCloud& target, const VolumeMesh& template_mesh, const FitOptions& options);
 
 }  // namespace subvol

@@ -127,11 +127,40 @@ SurfaceDistance surface_distance(const TriangleMesh& a, const ClosestPoint& tree
                      ", expected 1 or more");
   const OneSided forth = one_sided(a, tree_a.order(), tree_b, options);
   const OneSided back = one_sided(b, tree_b.order(), tree_a, options);
-  return {forth.mean, back.mean, forth.max, back.max};
+  return {forth.mean, back.mean, forth.max, back.max, false};
 }
 
 SurfaceDistance surface_distance(const TriangleMesh& a, const TriangleMesh& b, const SurfaceDistanceOptions& options) {
   return surface_distance(a, ClosestPoint(a), b, ClosestPoint(b), options);
+}
+
+SurfaceDistance surface_distance(const ClosestPoint& tree_a, std::span<const Vec3> b) {
+  if (b.empty()) throw InputError("surface distance: there are no points");
+  std::vector<ClosestPoint::Hit> hits(b.size());
+  tree_a.closest(b, hits);
+  SurfaceDistance result;
+  result.one_sided = true;
+  result.max_b_to_a = {hits[0].distance, b[0], hits[0].point};
+  for (std::size_t j = 0; j < b.size(); ++j) {
+    result.mean_b_to_a += hits[j].distance;
+    if (hits[j].distance > result.max_b_to_a.distance) result.max_b_to_a = {hits[j].distance, b[j], hits[j].point};
+  }
+  result.mean_b_to_a /= static_cast<double>(b.size());
+  return result;
+}
+
+SurfaceDistance surface_distance(const TriangleMesh& a, const PointCloud& b) {
+  return surface_distance(ClosestPoint(a), b.points);
+}
+
+double bounding_box_diagonal(const PointCloud& cloud) {
+  if (cloud.points.empty()) return 0;
+  Vec3 low = cloud.points[0], high = low;
+  for (const Vec3& p : cloud.points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return (high - low).norm();
 }
 
 double bounding_box_diagonal(const TriangleMesh& mesh) {

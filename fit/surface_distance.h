@@ -2,8 +2,10 @@
 #pragma once
 
 #include "fit/closest_point.h"
+#include "subvol/point_cloud.h"
 
 #include <algorithm>
+#include <span>
 
 namespace subvol {
 
@@ -20,11 +22,16 @@ struct SurfaceDistance {
   };
   double mean_a_to_b = 0, mean_b_to_a = 0;
   Extreme max_a_to_b, max_b_to_a;
+  /// Whether b is known by points only: there is no way from a to what lies between them, and only the distances from b to
+  /// a are set.
+  bool one_sided = false;
 
-  /// Symmetric distances: the larger of the two one-sided ones.
+  /// Symmetric distances: the larger of the two one-sided ones, or the only one.
   double mean() const { return std::max(mean_a_to_b, mean_b_to_a); }
   double max() const { return std::max(max_a_to_b.distance, max_b_to_a.distance); }
-  const Extreme& extreme() const { return max_a_to_b.distance >= max_b_to_a.distance ? max_a_to_b : max_b_to_a; }
+  const Extreme& extreme() const {
+    return !one_sided && max_a_to_b.distance >= max_b_to_a.distance ? max_a_to_b : max_b_to_a;
+  }
 };
 
 /// Samples the distance from each surface to the other.
@@ -44,7 +51,15 @@ SurfaceDistance surface_distance(const TriangleMesh& a, const TriangleMesh& b,
 SurfaceDistance surface_distance(const TriangleMesh& a, const ClosestPoint& tree_a, const TriangleMesh& b,
                                  const ClosestPoint& tree_b, const SurfaceDistanceOptions& options = {});
 
+/// One-sided: the distances from points to a surface, all of the same weight.
+///
+/// InputError: as `ClosestPoint`; no points. Same bits for any number of threads.
+SurfaceDistance surface_distance(const TriangleMesh& a, const PointCloud& b);
+SurfaceDistance surface_distance(const ClosestPoint& tree_a, std::span<const Vec3> b);
+
 /// Length of the diagonal of the box around a surface's triangles: what percentages of distances refer to. 0 if empty.
 double bounding_box_diagonal(const TriangleMesh& mesh);
+/// Of the box around points.
+double bounding_box_diagonal(const PointCloud& cloud);
 
 }  // namespace subvol

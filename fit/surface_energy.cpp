@@ -11,6 +11,11 @@ namespace subvol {
 
 namespace {
 
+const TargetSurface& with_triangles(const TargetSurface& target) {
+  if (target.is_cloud()) throw InputError("SurfaceEnergy: Voronoi cells need a target of triangles, not of points");
+  return target;
+}
+
 double checked_weight(double tau) {
   if (!(tau >= 0 && tau <= 1)) throw InputError("SurfaceEnergy: tangential_weight must be in [0, 1]");
   return tau;
@@ -21,7 +26,7 @@ double checked_weight(double tau) {
 SurfaceEnergy::SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                              std::size_t num_samples, double tangential_weight)
     : SurfaceTerm(std::move(sample_triangles), num_samples),
-      target_(&target),
+      target_(&with_triangles(target)),
       tau_(checked_weight(tangential_weight)),
       scale_(1 / (2 * target.area() * target.length() * target.length())),
       target_sites_(target.samples()) {}
@@ -89,7 +94,7 @@ void SurfaceEnergy::add_sample_pieces(std::size_t sample, Row& row) const {
     for (std::size_t p = triangle_offsets_[incidence.triangle]; p < triangle_offsets_[incidence.triangle + 1]; ++p) {
       const VoronoiPiece& piece = sample_pieces_[p];
       const Vec3& y = target_->samples()[piece.site];
-      const Vec3& n = target_->normals()[target_->sample_triangles()[piece.site]];
+      const Vec3& n = target_->sample_normals()[piece.site];
       const Mat3 metric = (1 - tau_) * n * n.transpose() + Mat3(Vec3::Constant(tau_).asDiagonal());
       Vec3 weighted = Vec3::Zero();
       for (int l = 0; l < 3; ++l) {

@@ -31,7 +31,8 @@ namespace subvol {
 /// under similarities of both surfaces. Results have the same bits for any number of threads.
 class SurfaceEnergy final : public SurfaceTerm {
  public:
-  /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1].
+  /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1], a
+  /// target of points.
   SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                 std::size_t num_samples, double tangential_weight);
 

@@ -5,12 +5,15 @@
 #include "subvol/features.h"
 #include "subvol/mesh_topology.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <random>
 
 namespace subvol::samples {
 namespace {
@@ -203,6 +206,40 @@ PolygonMesh bowl_surface(int n) {
 }
 
 std::vector<Sample> all_samples() { return {torus_sample(), ball_sample(), bracket_sample()}; }
+
+PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, double noise) {
+  std::mt19937 generator(1);
+  // The standard says which numbers the generator gives, but not those of its distributions.
+  const auto random = [&] { return (static_cast<double>(generator()) + 0.5) / 4294967296.0; };
+  std::vector<double> ends;  // of the triangles' areas in a row
+  double area = 0;
+  for (const auto& [a, b, c] : surface.triangles) {
+    const Vec3& origin = surface.positions[a];
+    area += (surface.positions[b] - origin).cross(surface.positions[c] - origin).norm();
+    ends.push_back(area);
+  }
+  PointCloud cloud;
+  while (cloud.points.size() < count && area > 0) {
+    const auto t = static_cast<std::size_t>(std::lower_bound(ends.begin(), ends.end() - 1, area * random()) - ends.begin());
+    const auto& [a, b, c] = surface.triangles[t];
+    const double root = std::sqrt(random()), share = random();
+    Vec3 point = (1 - root) * surface.positions[a] + root * (1 - share) * surface.positions[b] +
+                 root * share * surface.positions[c];
+    for (int axis = 0; axis < 3; ++axis) point[axis] += noise * (2 * random() - 1);
+    cloud.points.push_back(point);
+  }
+  return cloud;
+}
+
+std::string xyz_text(const PointCloud& cloud) {
+  std::string text;
+  for (const Vec3& p : cloud.points) {
+    append_number(text, p.x(), ' ');
+    append_number(text, p.y(), ' ');
+    append_number(text, p.z(), '\n');
+  }
+  return text;
+}
 
 std::string off_text(const TriangleMesh& mesh) {
   std::string text =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/point_cloud.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
@@ -30,6 +31,12 @@ std::vector<Sample> all_samples();
 
 /// A rippled bowl to grow shells on: 5 n^2 quads, open at the top, outward.
 PolygonMesh bowl_surface(int n = 12);
+
+/// Points scattered evenly at random over a surface, each moved by up to `noise` along every axis: the same ones everywhere.
+PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, double noise = 0);
+
+/// Points as the text of an .xyz file.
+std::string xyz_text(const PointCloud& cloud);
 
 /// A triangle mesh as the text of an .off file.
 std::string off_text(const TriangleMesh& mesh);

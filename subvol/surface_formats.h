@@ -19,4 +19,9 @@ PolygonMesh parse_ply(const std::string& name, std::string_view bytes);
 /// One value of a vertex property per vertex; InputError where there is no such property.
 std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute);
 
+/// Whether a .ply's header announces faces. InputError: the header is malformed.
+bool ply_has_faces(const std::string& name, std::string_view bytes);
+/// Three coordinates a line. longer_lines: receives how many lines have more columns.
+std::vector<Vec3> parse_xyz(const std::string& name, std::string_view bytes, std::size_t& longer_lines);
+
 }  // namespace subvol

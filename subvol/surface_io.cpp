@@ -149,6 +149,22 @@ std::size_t drop_duplicates(TriangleMesh& mesh) {
   return keys.size() - kept;
 }
 
+/// Keeps the first of points in one place. Returns how many went.
+std::size_t drop_repeated(std::vector<Vec3>& points) {
+  const std::vector<Index> place = places(points);
+  std::vector<Index> first(points.size(), kNoIndex);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Index& known = first[static_cast<std::size_t>(place[i])];
+    if (known != kNoIndex) continue;
+    known = static_cast<Index>(i);
+    points[kept++] = points[i];
+  }
+  const std::size_t dropped = points.size() - kept;
+  points.resize(kept);
+  return dropped;
+}
+
 }  // namespace
 
 PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* warnings) {
@@ -178,6 +194,35 @@ TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* 
   return mesh;
 }
 
+bool is_point_cloud_file(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".xyz" || (extension == ".ply" && !ply_has_faces(path.string(), read_file(path)));
+}
+
+PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warnings) {
+  const std::string extension = lower_case(path.extension().string());
+  Remarks remarks(path.string(), warnings);
+  PointCloud cloud;
+  if (extension == ".xyz") {
+    std::size_t longer_lines = 0;
+    cloud.points = parse_xyz(path.string(), read_file(path), longer_lines);
+    remarks.count(longer_lines, "lines have more than three columns: the rest is skipped");
+  } else if (extension == ".ply") {
+    PolygonMesh mesh = parse_ply(path.string(), read_file(path));
+    remarks.count(mesh.num_faces(), "faces are skipped: only the points are read");
+    cloud.points = std::move(mesh.positions);
+  } else {
+    remarks.fail("unknown extension " + in_quotes(extension) + " of points, expected " + point_cloud_formats());
+  }
+  if (cloud.points.empty()) remarks.fail("no points");
+  check_extent(cloud.points, remarks);
+  remarks.count(drop_repeated(cloud.points), "points are there more than once: the first is kept");
+  if (cloud.points.size() < kLeastCloudPoints)
+    remarks.fail("only " + std::to_string(cloud.points.size()) + " points, expected at least " +
+                 std::to_string(kLeastCloudPoints));
+  return cloud;
+}
+
 std::vector<double> read_vertex_attribute(const fs::path& path, const std::string& attribute) {
   if (lower_case(path.extension().string()) != ".ply")
     throw InputError(path.string() + ": only .ply files have vertex properties");
@@ -190,5 +235,7 @@ std::string surface_formats() {
     text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
   return text;
 }
+
+std::string point_cloud_formats() { return ".xyz (text), .ply (without faces)"; }
 
 }  // namespace subvol

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/point_cloud.h"
 #include "subvol/triangle_mesh.h"
 
 #include <filesystem>
@@ -31,6 +32,20 @@ PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std
 /// triangles with the same three positions.
 TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
+/// Fewest points that a cloud may have.
+inline constexpr std::size_t kLeastCloudPoints = 10;
+
+/// Whether a file holds points without faces: .xyz, or a .ply whose header tells of no faces. InputError: a .ply that
+/// cannot be read, or with a malformed header.
+bool is_point_cloud_file(const std::filesystem::path& path);
+
+/// Reads points: .xyz (one to a line, three coordinates and whatever follows them) or .ply (`x y z` of `vertex`).
+///
+/// returns  points in the file's order. Dropped, with a warning: all but the first of points in one place; the further
+///          columns of .xyz and the faces of .ply.
+/// InputError: as `read_polygon_mesh`; fewer than kLeastCloudPoints places.
+PointCloud read_point_cloud(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
 /// Values of a vertex property of a .ply, one per vertex in the file's order.
 ///
 /// InputError: another extension; no such property; a file that `read_polygon_mesh` refuses; a value that is not finite.
@@ -38,5 +53,6 @@ std::vector<double> read_vertex_attribute(const std::filesystem::path& path, con
 
 /// Extensions the readers accept, as text for help and messages.
 std::string surface_formats();
+std::string point_cloud_formats();
 
 }  // namespace subvol

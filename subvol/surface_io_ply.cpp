@@ -60,6 +60,13 @@ class PlyParser {
     return std::move(mesh_);
   }
 
+  /// Whether the header, which is all that is read, announces faces.
+  bool has_faces() {
+    read_header();
+    return std::any_of(elements_.begin(), elements_.end(),
+                       [](const Element& element) { return element.name == "face" && element.count > 0; });
+  }
+
   /// What `parse` found of the attribute, one value per vertex that has it.
   std::vector<double> take_attribute() { return std::move(values_); }
 
@@ -221,6 +228,8 @@ class PlyParser {
 }  // namespace
 
 PolygonMesh parse_ply(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).parse(); }
+
+bool ply_has_faces(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).has_faces(); }
 
 std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute) {
   PlyParser parser(name, bytes, attribute);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// OFF and OBJ.
+// OFF, OBJ and XYZ.
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
 
@@ -143,5 +143,26 @@ PolygonMesh parse_off(const std::string& name, std::string_view bytes) {
 }
 
 PolygonMesh parse_obj(const std::string& name, std::string_view bytes) { return ObjParser(name, bytes).parse(); }
+
+std::vector<Vec3> parse_xyz(const std::string& name, std::string_view bytes, std::size_t& longer_lines) {
+  TextScanner scan(name, bytes);
+  std::vector<Vec3> points;
+  longer_lines = 0;
+  while (const auto line = scan.line()) {
+    TextScanner words(name, *line);
+    if (!words.peek()) continue;  // blank, or a comment
+    Vec3& point = points.emplace_back();
+    for (int i = 0; i < 3; ++i) {
+      const auto word = words.next();
+      const auto value = word ? parse_number(*word) : std::nullopt;
+      if (!value)
+        scan.fail("expected three coordinates (finite numbers) to a line, found " + in_quotes(word.value_or("")) + " as number " +
+                  std::to_string(i + 1));
+      point[i] = *value;
+    }
+    longer_lines += words.next().has_value();
+  }
+  return points;
+}
 
 }  // namespace subvol

@@ -4,6 +4,7 @@
 #include "export/high_order_file.h"
 #include "samples/shapes.h"
 #include "subvol/mesh_io.h"
+#include "subvol/mesh_topology.h"
 #include "tests/data.h"
 #include "tests/glb_reader.h"
 #include "tests/sample_meshes.h"
@@ -142,6 +143,88 @@ TEST_CASE("An adaptive fit goes from files to files", "[cli]") {
   const auto orders = place.json("report.json").at("orders");
   CHECK(orders.at("nodes") <= orders.at("full_order_nodes"));
   CHECK(place.run("check out.vtu --target target.off").status == 0);
+}
+
+TEST_CASE("Points are fitted and checked one way, and what makes no sense with them is refused", "[cli]") {
+  const auto sample = subvol::samples::ball_sample();
+  const Workplace place(sample);
+  place.file("points.xyz", subvol::samples::xyz_text(subvol::samples::scattered_points(sample.target, 1500)));
+  const std::string fit = "fit points.xyz --template template.mesh ";
+  Run run = place.run(fit + "--levels 1 --point-weights area -o out.mesh -o out.glb --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  CHECK(run.err.find("points to limit surface") != std::string::npos);
+  auto report = place.json("report.json");
+  CHECK(report.at("input").at("target").at("points") == 1500);
+  CHECK(report.at("target").at("points") == 1500);
+  CHECK(report.at("distance").at("one_sided") == true);
+  CHECK(report.at("limit_surface_distance").at("one_sided") == true);
+  CHECK(!report.at("distance").contains("mean_to_target_percent"));
+  CHECK(report.at("distance").at("mean_percent") == report.at("distance").at("mean_from_target_percent"));
+  CHECK(report.at("limit_surface_distance").at("mean_percent") < 1);
+
+  run = place.run("check out.mesh --target points.xyz --json");
+  CHECK(run.status == 0);
+  CHECK(nlohmann::json::parse(run.out).at("distance").at("one_sided") == true);
+  CHECK(place.run("check out.mesh --target points.xyz").out.find("of points") != std::string::npos);
+  CHECK(place.run("report report.json -o page.html").status == 0);
+
+  run = place.run(fit + "--order 2 -o out.vtu --report curved.json");
+  CHECK(run.status == 0);
+  CHECK(place.json("curved.json").at("distance").at("one_sided") == true);
+
+  const auto refused = [&](const std::string& arguments, int status, const char* reason) {
+    const Run failed = place.run(arguments);
+    INFO(arguments << '\n' << failed.err);
+    CHECK(failed.status == status);
+    CHECK(failed.err.find(reason) != std::string::npos);
+    CHECK(!place.has("no.mesh"));
+  };
+  refused("fit points.xyz -o no.mesh", 2, "--template");
+  refused(fit + "--crease-angle 40 -o no.mesh", 2, "--crease-angle");
+  refused(fit + "--correspondence voronoi -o no.mesh", 2, "voronoi");
+  refused(fit + "--order 2 --correspondence voronoi -o no.vtu", 2, "voronoi");
+  refused(std::string(kFit) + "--point-weights area -o no.mesh", 2, "--point-weights");
+  refused("optimize template.mesh --target points.xyz -o no.mesh", 3, "points without faces");
+  refused("optimize template.mesh --order 2 --target points.xyz -o no.vtu", 3, "points without faces");
+  refused("template auto points.xyz -o no.mesh", 3, "points without faces");
+}
+
+TEST_CASE("A template with a few inverted cells is untangled before a fit, a mirrored one is refused", "[cli]") {
+  auto sample = subvol::samples::torus_sample();
+  subvol::VolumeMesh& mesh = sample.template_mesh;
+  const subvol::MeshTopology topology(mesh);
+  const auto cell = mesh.cell(0);
+  for (std::size_t corner = 0; corner < 8; ++corner) {  // one inner vertex beyond the middle of one cell
+    if (topology.is_boundary_vertex(cell[corner])) continue;
+    const std::size_t opposite = corner < 4 ? 4 + (corner + 2) % 4 : (corner + 2) % 4;
+    mesh.positions[cell[corner]] += 0.75 * (mesh.positions[cell[opposite]] - mesh.positions[cell[corner]]);
+    break;
+  }
+  const Workplace place(sample);
+  const Run run = place.run(std::string(kFit) + "--levels 1 -o out.mesh");
+  INFO(run.err);
+  CHECK(run.status == 0);
+  CHECK(run.err.find("untangled") != std::string::npos);
+  CHECK(place.run("check out.mesh").status == 0);
+  for (subvol::Vec3& p : sample.template_mesh.positions) p.x() = -p.x();
+  const Workplace mirrored(sample);
+  CHECK(mirrored.run(std::string(kFit) + "--levels 1 -o out.mesh").status == 3);
+}
+
+TEST_CASE("The report tells the state of a target and whether the template can become it", "[cli]") {
+  auto sample = subvol::samples::torus_sample();
+  sample.template_mesh = subvol::samples::ball_sample().template_mesh;
+  std::swap(sample.target.triangles[5][0], sample.target.triangles[5][1]);
+  const Workplace place(sample);
+  const Run run = place.run(std::string(kFit) + "--levels 1 --max-iterations 1 -o out.mesh --report report.json");
+  CHECK(run.err.find("topology differs") != std::string::npos);
+  const auto target = place.json("report.json").at("target");
+  CHECK(target.at("turned_edges") == 3);
+  CHECK(target.at("closed_manifold") == true);
+  CHECK(target.at("same_topology") == false);
+  CHECK(target.at("topology").at("handles") == 1);
+  CHECK(target.at("volume_source") == "mended surface");
 }
 
 TEST_CASE("A fit is the same bits for one thread and for two", "[cli]") {

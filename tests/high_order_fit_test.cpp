@@ -149,7 +149,7 @@ TEST_CASE("a high-order fit refuses what it cannot do") {
   const samples::Sample sample = samples::ball_sample();
   for (int order : {0, 17, -1})
     CHECK_THROWS_AS(fit_high_order(sample.target, sample.template_mesh, of_order(order)), InputError);
-  CHECK_THROWS_AS(fit_high_order({}, sample.template_mesh, of_order(2)), InputError);
+  CHECK_THROWS_AS(fit_high_order(TriangleMesh{}, sample.template_mesh, of_order(2)), InputError);
   CHECK_THROWS_AS(fit_high_order(sample.target, {}, of_order(2)), InputError);
   HighOrderFitOptions options = of_order(2);
   options.tolerance_percent = -1;

@@ -52,12 +52,66 @@ TEST_CASE("a soup of a closed surface has the same volume, inside out or not") {
   CHECK(TargetSurface(mesh).volume() == Approx(8));
 }
 
-TEST_CASE("triangles turned over: the volume comes from flooding a grid") {
+TEST_CASE("triangles turned over: the volume is that of the surface put right") {
   TriangleMesh mesh = cube_surface(16, true);
+  const double exact = TargetSurface(mesh).volume();
   for (std::size_t t = 0; t < mesh.triangles.size(); t += 2) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
   const TargetSurface target(mesh);
+  CHECK(target.volume_source() == VolumeSource::mended);
+  CHECK(target.volume() == Approx(exact));
+}
+
+TEST_CASE("a hole is closed for the volume, wherever the surface lies") {
+  TriangleMesh mesh = cube_surface(8, false);
+  mesh.triangles.resize(mesh.triangles.size() - 40);
+  for (const Vec3& shift : {Vec3(0, 0, 0), Vec3(100, -50, 7)}) {
+    TriangleMesh moved = mesh;
+    for (Vec3& p : moved.positions) p += shift;
+    const TargetSurface target(moved);
+    CHECK(target.volume_source() == VolumeSource::mended);
+    CHECK(target.volume() == Approx(8));
+  }
+}
+
+TEST_CASE("a fin on a sphere that is turned over in parts: the volume comes from flooding a grid") {
+  TriangleMesh mesh = cube_surface(16, true);
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 2) std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
+  mesh.positions.push_back(1.05 * mesh.positions[mesh.triangles[0][0]]);
+  mesh.triangles.push_back({mesh.triangles[0][0], mesh.triangles[0][1], static_cast<Index>(mesh.positions.size() - 1)});
+  const TargetSurface target(mesh);
   CHECK(target.volume_source() == VolumeSource::flood);
-  CHECK(target.volume() == Approx(4 * std::numbers::pi / 3).epsilon(0.03));
+  CHECK(target.volume() == Approx(4 * std::numbers::pi / 3).epsilon(0.05));
+}
+
+TEST_CASE("open, crowded and turned edges are counted, and what lies on a rim is known") {
+  const TriangleMesh whole = cube_surface(2, false);
+  const auto of = [](const TriangleMesh& mesh) { return soup_topology(mesh.positions, mesh.triangles); };
+  CHECK(of(whole).open_edges + of(whole).turned_edges + of(whole).crowded_edges == 0);
+  TriangleMesh turned = whole;
+  std::swap(turned.triangles[5][0], turned.triangles[5][1]);
+  CHECK(of(turned).turned_edges == 3);
+  TriangleMesh twice = whole;
+  twice.triangles.push_back(twice.triangles[3]);
+  CHECK(of(twice).crowded_edges == 3);
+  TriangleMesh open = soup_of(whole);
+  open.triangles.erase(open.triangles.begin());
+  CHECK(of(open).open_edges == 3);
+  const TargetSurface target(open);
+  int edges = 0, corners = 0;
+  for (std::size_t t = 0; t < target.triangles().size(); ++t) {
+    const auto triangle = static_cast<Index>(t);
+    CHECK(!target.on_rim(triangle, {1. / 3, 1. / 3, 1. / 3}));
+    for (const std::array<double, 3>& at : {std::array{0.5, 0.5, 0.}, std::array{0., 0.5, 0.5}, std::array{0.5, 0., 0.5}})
+      edges += target.on_rim(triangle, at);
+    for (const std::array<double, 3>& at : {std::array{1., 0., 0.}, std::array{0., 1., 0.}, std::array{0., 0., 1.}})
+      corners += target.on_rim(triangle, at);
+  }
+  CHECK(edges == 3);
+  int expected = 0;  // corners of other triangles in the places of the one that went
+  for (std::size_t t = 1; t < whole.triangles.size(); ++t)
+    for (Index v : whole.triangles[t])
+      expected += std::find(whole.triangles[0].begin(), whole.triangles[0].end(), v) != whole.triangles[0].end();
+  CHECK(corners == expected);
 }
 
 TEST_CASE("a surface that encloses nothing still has a volume to scale by") {

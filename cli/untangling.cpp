@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/untangling.h"
+
+#include "cli/interrupt.h"
+#include "cli/progress.h"
+#include "fit/curve_mesh.h"
+#include "subvol/error.h"
+
+#include <algorithm>
+
+namespace subvol::cli {
+
+bool has_few_inverted_cells(const VolumeMesh& mesh) {
+  const std::vector<MeshDefect> defects = validate(mesh);
+  const auto inverted = std::count_if(defects.begin(), defects.end(), [](const MeshDefect& defect) {
+    return defect.kind == MeshDefect::Kind::inverted_cell;
+  });
+  return inverted > 0 && 2 * static_cast<std::size_t>(inverted) < mesh.num_cells();
+}
+
+void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
+                       std::vector<std::string>& warnings) {
+  ProgressTeller teller(run.progress, run.quiet);
+  options.progress = [&](const FitProgress& progress) {
+    teller.tell(progress);
+    return !interrupted();
+  };
+  catch_interrupt();
+  try {
+    if (const std::size_t untangled = untangle_before_fit(mesh, options); untangled > 0)
+      warnings.push_back(path + ": " + std::to_string(untangled) +
+                         " cells were not valid; they were untangled before the fit");
+  } catch (const InputError& error) {
+    throw InputError(path + ": " + error.what());
+  }
+  teller.finish();
+}
+
+}  // namespace subvol::cli
