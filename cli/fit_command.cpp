@@ -31,7 +31,7 @@ struct FitArguments {
   std::string target;
   TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
-  std::string point_weights = "equal";
+  std::string point_weights = "equal", energy = "hencky";
   int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
   std::string basis = "fourier";
   bool adaptive = false;
@@ -47,6 +47,12 @@ Correspondence correspondence(const FitArguments& arguments) {
 
 PointWeights point_weights(const FitArguments& arguments) {
   return arguments.point_weights == "area" ? PointWeights::by_area : PointWeights::equal;
+}
+
+Distortion distortion(const FitArguments& arguments) {
+  for (Distortion d : {Distortion::inverse_mean_ratio, Distortion::condition_number})
+    if (arguments.energy == to_string(d)) return d;
+  return Distortion::hencky;
 }
 
 /// One fit from its files to its files.
@@ -107,6 +113,7 @@ void FitRun::fit() {
   // What is left of it: a template may have been made.
   if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
   options.point_weights = point_weights(arguments_);
+  options.distortion = distortion(arguments_);
   result_ = followed([&](auto progress) {
     options.progress = progress;
     return std::visit(
@@ -249,6 +256,7 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.solver = solver_kind(arguments);
   fit.correspondence = correspondence(arguments);
   fit.point_weights = point_weights(arguments);
+  fit.distortion = distortion(arguments);
   fit.max_iterations = arguments.fit.max_iterations;
   fit.time_limit_seconds = arguments.fit.time_limit_seconds;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
@@ -280,6 +288,12 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
                   "What pulls at what: exact closest points both ways, or the restricted Voronoi cells of the paper")
       ->check(CLI::IsMember({"closest", "voronoi"}))
       ->type_name("closest|voronoi")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--energy", arguments.energy,
+                  "How cells' distortion is measured: hencky keeps shapes and sizes, the others shapes alone")
+      ->check(CLI::IsMember({"hencky", "inverse_mean_ratio", "condition_number"}))
+      ->type_name("hencky|inverse_mean_ratio|condition_number")
       ->capture_default_str()
       ->group(group);
   verb.add_option("--point-weights", arguments.point_weights,

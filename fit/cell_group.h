@@ -33,7 +33,7 @@ struct CellGroup {
   std::vector<Wide> to_reference;  ///< A^-1: 9 per batch, or per point of each where cells have references
   std::vector<Wide> cell_weights;                  ///< of each batch
   bool by_point = false;
-  std::vector<Wide> frozen;                        ///< kFrozen per point of every batch
+  std::vector<Wide> frozen;                        ///< `frozen_size` per point of every batch
   std::vector<Wide> mean_blocks;                   ///< 54 per batch: `add_blocks` over all points
 
   std::size_t num_points() const { return weights.size(); }

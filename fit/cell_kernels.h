@@ -56,8 +56,9 @@ inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
 }
 
 /// Adds K_ab = U Z_ab U^T for the active vertices of one point, a <= b: with w_a = V^T diag(1/h) grad N_a,
-///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi.
-inline void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
+///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi + coupling_ij w_ai w_bj.
+template <bool kCoupled>
+void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
                        const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
   constexpr int kPairs = kMaxCellVertices;
   alignas(64) double w[kPairs][3][kLanes];
@@ -81,9 +82,15 @@ inline void add_point_hessian(std::span<const ElementRule::Entry> entries, const
         const double z22 = f * (batch.stretch[2][l] * p22 + s20 * p00 + s12 * p11);
         const double c01 = f * batch.pair_cross[0][l], c12 = f * batch.pair_cross[1][l],
                      c20 = f * batch.pair_cross[2][l];
-        const double z01 = c01 * w[a][1][l] * w[b][0][l], z10 = c01 * w[a][0][l] * w[b][1][l];
-        const double z12 = c12 * w[a][2][l] * w[b][1][l], z21 = c12 * w[a][1][l] * w[b][2][l];
-        const double z20 = c20 * w[a][0][l] * w[b][2][l], z02 = c20 * w[a][2][l] * w[b][0][l];
+        double z01 = c01 * w[a][1][l] * w[b][0][l], z10 = c01 * w[a][0][l] * w[b][1][l];
+        double z12 = c12 * w[a][2][l] * w[b][1][l], z21 = c12 * w[a][1][l] * w[b][2][l];
+        double z20 = c20 * w[a][0][l] * w[b][2][l], z02 = c20 * w[a][2][l] * w[b][0][l];
+        if constexpr (kCoupled) {
+          const double k01 = f * batch.coupling[0][l], k12 = f * batch.coupling[1][l], k20 = f * batch.coupling[2][l];
+          z01 += k01 * w[a][0][l] * w[b][1][l], z10 += k01 * w[a][1][l] * w[b][0][l];
+          z12 += k12 * w[a][1][l] * w[b][2][l], z21 += k12 * w[a][2][l] * w[b][1][l];
+          z20 += k20 * w[a][2][l] * w[b][0][l], z02 += k20 * w[a][0][l] * w[b][2][l];
+        }
         const double u[9] = {batch.u[0][l], batch.u[1][l], batch.u[2][l], batch.u[3][l], batch.u[4][l],
                              batch.u[5][l], batch.u[6][l], batch.u[7][l], batch.u[8][l]};
         for (int r = 0; r < 3; ++r) {
@@ -109,18 +116,22 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
             factor[2][l] * stress[3 * r + 2][l] * entry.gradient[2];
 }
 
-/// The Hencky barrier at one point.
-struct HenckyKernel {
+/// One of the distortions at one point.
+struct DistortionKernel {
   HenckyBatch batch;
+  const DistortionKernels& kernels;
 
-  explicit HenckyKernel(double /*regularisation*/) {}
-  void evaluate_energy() { hencky_energy(batch); }
-  void evaluate_gradient() { hencky_gradient(batch); }
-  void evaluate_hessian() { hencky_hessian(batch); }
+  DistortionKernel(double /*regularisation*/, const DistortionKernels& chosen, double floor) : kernels(chosen) {
+    batch.floor = floor;
+  }
+  void evaluate_energy() { kernels.energy(batch); }
+  void evaluate_gradient() { kernels.gradient(batch); }
+  void evaluate_hessian() { kernels.hessian(batch); }
   void add_hessian(std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
                    const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
     if (reference) premultiply(reference, batch.v);
-    add_point_hessian(entries, batch, inverse_h, weight, k);
+    kernels.coupled ? add_point_hessian<true>(entries, batch, inverse_h, weight, k)
+                    : add_point_hessian<false>(entries, batch, inverse_h, weight, k);
   }
 };
 
@@ -129,7 +140,7 @@ struct RegularisedKernel {
   RegularisedBatch batch;
   double epsilon;
 
-  explicit RegularisedKernel(double regularisation) : epsilon(regularisation) {}
+  RegularisedKernel(double regularisation, const DistortionKernels&, double /*floor*/) : epsilon(regularisation) {}
   void evaluate_energy() { regularised_barrier(batch, epsilon); }
   void evaluate_gradient() { regularised_barrier(batch, epsilon); }
   void evaluate_hessian() { regularised_barrier(batch, epsilon); }

@@ -5,15 +5,17 @@
 
 namespace subvol {
 
-/// The second derivative of the Hencky energy at points of eight cells, as numbers that are kept while conjugate
-/// gradients multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), as in `hencky.h`,
-/// R being A^-1 and the three latter multiplied by the point's weight.
-inline constexpr int kFrozen = 27;
+/// The second derivative of a distortion at points of eight cells, as numbers that are kept while conjugate gradients
+/// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), and where stretches are coupled
+/// coupling (3), as in `hencky.h`, R being A^-1 and all after it multiplied by the point's weight.
+inline constexpr int frozen_size(bool coupled) { return coupled ? 30 : 27; }
+inline constexpr int kMostFrozen = frozen_size(true);
 /// Symmetric 3x3 blocks of a second derivative by pairs (0,0) (1,1) (2,2) (0,1) (1,2) (2,0) of directions.
 inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
 
 /// Writes a point's numbers. `weight` multiplies the second derivative.
-inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide& weight, Wide* frozen) {
+template <bool kCoupled>
+[[gnu::always_inline]] inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide& weight, Wide* frozen) {
   Wide v[9];
   for (int e = 0; e < 9; ++e) frozen[e] = load_wide(hencky.u[e]);
   for (int e = 0; e < 9; ++e) v[e] = load_wide(hencky.v[e]);
@@ -22,13 +24,14 @@ inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide&
     frozen[18 + i] = weight * load_wide(hencky.stretch[i]);
     frozen[21 + i] = weight * load_wide(hencky.pair_same[i]);
     frozen[24 + i] = weight * load_wide(hencky.pair_cross[i]);
+    if constexpr (kCoupled) frozen[27 + i] = weight * load_wide(hencky.coupling[i]);
   }
 }
 
 /// Makes the second derivative of one lane `factor` times as large; `more` receives the numbers of what was added.
-inline void scale_frozen(Wide* frozen, int lane, double factor, Wide* more) {
-  std::copy_n(frozen, kFrozen, more);
-  for (int k = 18; k < kFrozen; ++k) {
+inline void scale_frozen(Wide* frozen, int size, int lane, double factor, Wide* more) {
+  std::copy_n(frozen, size, more);
+  for (int k = 18; k < size; ++k) {
     more[k] = Wide{};
     more[k][lane] = (factor - 1) * frozen[k][lane];
     frozen[k][lane] *= factor;
@@ -36,8 +39,9 @@ inline void scale_frozen(Wide* frozen, int lane, double factor, Wide* more) {
 }
 
 /// A change G of the Jacobian, by canonical coordinates, becomes the change U P (R V)^T of the stress:
-///   W = U^T G R V,  P_ii = stretch_i W_ii,  P_ij = same_ij W_ij + cross_ij W_ji.
-inline void apply_frozen(const Wide* frozen, Wide* g) {
+///   W = U^T G R V,  P_ii = stretch_i W_ii + sum_{j != i} coupling_ij W_jj,  P_ij = same_ij W_ij + cross_ij W_ji.
+template <bool kCoupled>
+[[gnu::always_inline]] inline void apply_frozen(const Wide* frozen, Wide* g) {
   const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
   Wide t[9], w[9], p[9];
   product(g, rv, t);
@@ -48,13 +52,20 @@ inline void apply_frozen(const Wide* frozen, Wide* g) {
     p[3 * i + j] = same[i] * w[3 * i + j] + cross[i] * w[3 * j + i];
     p[3 * j + i] = same[i] * w[3 * j + i] + cross[i] * w[3 * i + j];
   }
+  if constexpr (kCoupled)
+    for (int i = 0; i < 3; ++i) {
+      const int j = i == 2 ? 0 : i + 1;
+      p[4 * i] += frozen[27 + i] * w[4 * j];
+      p[4 * j] += frozen[27 + i] * w[4 * i];
+    }
   product(u, p, t);
   product_with_transpose(t, rv, g);
 }
 
 /// Adds, for every pair (c, d) of canonical directions, the symmetric part of the block that couples gradients e_c,
 /// e_d.
-inline void add_blocks(const Wide* frozen, Wide* blocks) {
+template <bool kCoupled>
+[[gnu::always_inline]] inline void add_blocks(const Wide* frozen, Wide* blocks) {
   const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
   for (int pair = 0; pair < 6; ++pair) {
     const Wide *a = rv + 3 * kPairs[pair][0], *b = rv + 3 * kPairs[pair][1];
@@ -64,6 +75,10 @@ inline void add_blocks(const Wide* frozen, Wide* blocks) {
       z[4 * i] = stretch[i] * a[i] * b[i] + same[i] * a[j] * b[j] + same[l] * a[l] * b[l];
       z[3 * i + j] = cross[i] * a[j] * b[i];
       z[3 * j + i] = cross[i] * a[i] * b[j];
+      if constexpr (kCoupled) {
+        z[3 * i + j] += frozen[27 + i] * a[i] * b[j];
+        z[3 * j + i] += frozen[27 + i] * a[j] * b[i];
+      }
     }
     product(u, z, t);
     product_with_transpose(t, u, k);

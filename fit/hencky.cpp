@@ -3,6 +3,7 @@
 
 #include "fit/wide.h"
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -61,17 +62,10 @@ SUBVOL_INLINE void rotate(Wide& app, Wide& aqq, Wide& apq, Wide& arp, Wide& arq,
     }
 }
 
-/// Eigenvalues (and vectors, columns v0 v1 v2) of J^T J. Four cyclic sweeps reach rounding for any stretch ratio.
+/// Eigenvalues, on the diagonal a00 a11 a22, and vectors, columns v0 v1 v2, of a symmetric matrix with entries of at most 1.
+/// Four cyclic sweeps reach rounding.
 template <bool kVectors>
-SUBVOL_INLINE void right_singular(const Wide* j, Wide* lambda, Wide* v0, Wide* v1, Wide* v2) {
-  Wide a00 = j[0] * j[0] + j[3] * j[3] + j[6] * j[6];
-  Wide a11 = j[1] * j[1] + j[4] * j[4] + j[7] * j[7];
-  Wide a22 = j[2] * j[2] + j[5] * j[5] + j[8] * j[8];
-  const Wide trace = a00 + a11 + a22, scale = reciprocal(trace);
-  Wide a01 = scale * (j[0] * j[1] + j[3] * j[4] + j[6] * j[7]);
-  Wide a12 = scale * (j[1] * j[2] + j[4] * j[5] + j[7] * j[8]);
-  Wide a02 = scale * (j[0] * j[2] + j[3] * j[5] + j[6] * j[8]);
-  a00 *= scale, a11 *= scale, a22 *= scale;
+SUBVOL_INLINE void diagonalise(Wide& a00, Wide& a11, Wide& a22, Wide& a01, Wide& a12, Wide& a02, Wide* v0, Wide* v1, Wide* v2) {
   for (int k = 0; k < 3; ++k) {
     v0[k] = wide(k == 0);
     v1[k] = wide(k == 1);
@@ -82,9 +76,42 @@ SUBVOL_INLINE void right_singular(const Wide* j, Wide* lambda, Wide* v0, Wide* v
     rotate<kVectors>(a11, a22, a12, a01, a02, v1, v2);
     rotate<kVectors>(a00, a22, a02, a01, a12, v0, v2);
   }
+}
+
+/// Eigenvalues (and vectors, columns v0 v1 v2) of J^T J, for any stretch ratio.
+template <bool kVectors>
+SUBVOL_INLINE void right_singular(const Wide* j, Wide* lambda, Wide* v0, Wide* v1, Wide* v2) {
+  Wide a00 = j[0] * j[0] + j[3] * j[3] + j[6] * j[6];
+  Wide a11 = j[1] * j[1] + j[4] * j[4] + j[7] * j[7];
+  Wide a22 = j[2] * j[2] + j[5] * j[5] + j[8] * j[8];
+  const Wide trace = a00 + a11 + a22, scale = reciprocal(trace);
+  Wide a01 = scale * (j[0] * j[1] + j[3] * j[4] + j[6] * j[7]);
+  Wide a12 = scale * (j[1] * j[2] + j[4] * j[5] + j[7] * j[8]);
+  Wide a02 = scale * (j[0] * j[2] + j[3] * j[5] + j[6] * j[8]);
+  a00 *= scale, a11 *= scale, a22 *= scale;
+  diagonalise<kVectors>(a00, a11, a22, a01, a12, a02, v0, v1, v2);
   lambda[0] = trace * a00;
   lambda[1] = trace * a11;
   lambda[2] = trace * a22;
+}
+
+/// Raises the eigenvalues of a symmetric matrix to the floor; `coupled` are its entries (0,1), (1,2), (2,0).
+SUBVOL_INLINE void clamp_symmetric(Wide* diagonal, Wide* coupled, const Wide& floor) {
+  Wide sum = wide(1e-300);
+  for (int i = 0; i < 3; ++i) sum += absolute(diagonal[i]) + absolute(coupled[i]);
+  const Wide scale = reciprocal(sum);
+  Wide d[3], c[3], v[3][3];
+  for (int i = 0; i < 3; ++i) d[i] = scale * diagonal[i], c[i] = scale * coupled[i];
+  diagonalise<true>(d[0], d[1], d[2], c[0], c[1], c[2], v[0], v[1], v[2]);
+  for (int i = 0; i < 3; ++i) diagonal[i] = coupled[i] = Wide{};
+  for (int e = 0; e < 3; ++e) {
+    Wide value = sum * d[e];
+    value = value > floor ? value : floor;
+    for (int i = 0; i < 3; ++i) {
+      diagonal[i] += value * v[e][i] * v[e][i];
+      coupled[i] += value * v[e][i] * v[e][i == 2 ? 0 : i + 1];
+    }
+  }
 }
 
 SUBVOL_INLINE Wide determinant(const Wide* j) {
@@ -93,7 +120,93 @@ SUBVOL_INLINE Wide determinant(const Wide* j) {
 
 enum class Order { energy, gradient, hessian };
 
-template <Order kOrder>
+SUBVOL_INLINE Wide exponential(const Wide& x) {
+  Wide result;
+  for (int l = 0; l < kLanes; ++l) result[l] = std::exp(x[l]);
+  return result;
+}
+
+/// A distortion f as a function of x_i = ln s_i: its value, first derivatives, second ones of one x_i, and of x_i and x_j for
+/// (i, j) = (0,1), (1,2), (2,0).
+struct LogModel {
+  Wide value, first[3], second[3], mixed[3];
+};
+
+template <Distortion kDistortion>
+SUBVOL_INLINE LogModel log_model(const Wide* lambda, const Wide* x) {
+  LogModel f;
+  if constexpr (kDistortion == Distortion::hencky) {
+    f.value = 0.5 * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+    for (int i = 0; i < 3; ++i) f.first[i] = x[i], f.second[i] = wide(1), f.mixed[i] = Wide{};
+  } else if constexpr (kDistortion == Distortion::inverse_mean_ratio) {
+    // q_i = s_i^2 / det^(2/3),  f = mean q - 1,  dq_i/dx_j = q_i (2 delta_ij - 2/3)
+    const Wide inverse = exponential((-2.0 / 3) * (x[0] + x[1] + x[2]));
+    const Wide q[3] = {lambda[0] * inverse, lambda[1] * inverse, lambda[2] * inverse};
+    const Wide mean = (q[0] + q[1] + q[2]) * (1.0 / 3);
+    f.value = mean - 1;
+    for (int i = 0; i < 3; ++i) {
+      const int j = i == 2 ? 0 : i + 1;
+      f.first[i] = (2.0 / 3) * (q[i] - mean);
+      f.second[i] = (4.0 / 9) * (q[i] + mean);
+      f.mixed[i] = (4.0 / 9) * (mean - q[i] - q[j]);
+    }
+  } else {
+    // f = k - 1,  k = sqrt(P Q) / 3,  P = sum s^2,  Q = sum s^-2,  a_i = s_i^2 / P,  b_i = s_i^-2 / Q:
+    // d ln k / dx_i = a_i - b_i
+    const Wide inverse[3] = {reciprocal(lambda[0]), reciprocal(lambda[1]), reciprocal(lambda[2])};
+    const Wide p = lambda[0] + lambda[1] + lambda[2], q = inverse[0] + inverse[1] + inverse[2], product = p * q;
+    const Wide k = (1.0 / 3) * product * reciprocal_square_root(product), one_p = reciprocal(p), one_q = reciprocal(q);
+    Wide a[3], b[3];
+    for (int i = 0; i < 3; ++i) a[i] = lambda[i] * one_p, b[i] = inverse[i] * one_q;
+    f.value = k - 1;
+    for (int i = 0; i < 3; ++i) {
+      const int j = i == 2 ? 0 : i + 1;
+      const Wide g = a[i] - b[i], h = a[j] - b[j];
+      f.first[i] = k * g;
+      f.second[i] = k * (2 * a[i] * (1 - a[i]) + 2 * b[i] * (1 - b[i]) + g * g);
+      f.mixed[i] = k * (g * h - 2 * a[i] * a[j] - 2 * b[i] * b[j]);
+    }
+  }
+  return f;
+}
+
+/// Second derivatives by singular values, clamped. e_i = f_i / s_i,  e_ij = (f_ij - delta_ij f_i) / (s_i s_j).
+template <Distortion kDistortion>
+SUBVOL_INLINE void store_second(const LogModel& f, const Wide* lambda, const Wide* inverse_s, const Wide& on,
+                                HenckyBatch& batch) {
+  const Wide floor = wide(batch.floor);
+  Wide s[3], g[3], stretch[3], coupling[3];
+  for (int i = 0; i < 3; ++i) {
+    s[i] = lambda[i] * inverse_s[i];
+    g[i] = f.first[i] * inverse_s[i];
+    stretch[i] = (f.second[i] - f.first[i]) * inverse_s[i] * inverse_s[i];
+  }
+  for (int i = 0; i < 3; ++i) {
+    const int k = i == 2 ? 0 : i + 1;
+    const Wide sum = s[i] + s[k], difference = s[i] - s[k], inverse_sum = reciprocal(sum);
+    const WideBits close = absolute(difference) < 1e-4 * sum;
+    const Wide limit = (0.5 * (f.second[i] + f.second[k]) - f.mixed[i] - 0.5 * (f.first[i] + f.first[k])) * 4 *
+                       inverse_sum * inverse_sum;
+    Wide flip = close ? limit : (g[i] - g[k]) * reciprocal(close ? wide(1) : difference);
+    Wide twist = (g[i] + g[k]) * inverse_sum;
+    flip = flip > floor ? flip : floor;
+    twist = twist > floor ? twist : floor;
+    store(on * 0.5 * (flip + twist), batch.pair_same[i]);
+    store(on * 0.5 * (flip - twist), batch.pair_cross[i]);
+    coupling[i] = f.mixed[i] * inverse_s[i] * inverse_s[k];
+  }
+  if constexpr (kDistortion == Distortion::hencky) {
+    for (int i = 0; i < 3; ++i) store(on * (stretch[i] > floor ? stretch[i] : floor), batch.stretch[i]);
+  } else {
+    clamp_symmetric(stretch, coupling, floor);
+    for (int i = 0; i < 3; ++i) {
+      store(on * stretch[i], batch.stretch[i]);
+      store(on * coupling[i], batch.coupling[i]);
+    }
+  }
+}
+
+template <Distortion kDistortion, Order kOrder>
 SUBVOL_INLINE void evaluate(HenckyBatch& batch) {
   constexpr bool kVectors = kOrder != Order::energy;
   Wide j[9], lambda[3], v[3][3], log_s[3];
@@ -107,14 +220,14 @@ SUBVOL_INLINE void evaluate(HenckyBatch& batch) {
     lambda[i] = lambda[i] > 1e-280 ? lambda[i] : wide(1e-280);
     log_s[i] = 0.5 * log_positive(lambda[i]);
   }
-  const Wide e = 0.5 * (log_s[0] * log_s[0] + log_s[1] * log_s[1] + log_s[2] * log_s[2]);
-  store(feasible ? e : wide(std::numeric_limits<double>::infinity()), batch.energy);
+  const LogModel f = log_model<kDistortion>(lambda, log_s);
+  store(feasible ? f.value : wide(std::numeric_limits<double>::infinity()), batch.energy);
   if constexpr (kVectors) {
     const Wide on = feasible ? wide(1) : wide(0);
     Wide inverse_s[3], w[3], jv[3][3];
     for (int i = 0; i < 3; ++i) {
       inverse_s[i] = reciprocal_square_root(lambda[i]);
-      w[i] = on * log_s[i] * inverse_s[i] * inverse_s[i];
+      w[i] = on * f.first[i] * inverse_s[i] * inverse_s[i];
       for (int r = 0; r < 3; ++r) jv[i][r] = j[3 * r] * v[i][0] + j[3 * r + 1] * v[i][1] + j[3 * r + 2] * v[i][2];
     }
     for (int r = 0; r < 3; ++r)
@@ -122,41 +235,45 @@ SUBVOL_INLINE void evaluate(HenckyBatch& batch) {
         store(w[0] * jv[0][r] * v[0][c] + w[1] * jv[1][r] * v[1][c] + w[2] * jv[2][r] * v[2][c],
               batch.stress[3 * r + c]);
     if constexpr (kOrder == Order::hessian) {
-      const Wide floor = wide(kHessianFloor);
-      Wide s[3], g[3];
-      for (int i = 0; i < 3; ++i) {
+      for (int i = 0; i < 3; ++i)
         for (int r = 0; r < 3; ++r) {
           store(jv[i][r] * inverse_s[i], batch.u[3 * r + i]);
           store(v[i][r], batch.v[3 * r + i]);
         }
-        s[i] = lambda[i] * inverse_s[i];
-        g[i] = log_s[i] * inverse_s[i];
-        const Wide stretch = (1 - log_s[i]) * inverse_s[i] * inverse_s[i];
-        store(on * (stretch > floor ? stretch : floor), batch.stretch[i]);
-      }
-      for (int i = 0; i < 3; ++i) {
-        const int k = i == 2 ? 0 : i + 1;
-        const Wide sum = s[i] + s[k], difference = s[i] - s[k], inverse_sum = reciprocal(sum);
-        const WideBits close = absolute(difference) < 1e-4 * sum;
-        const Wide limit = (1 - 0.5 * (log_s[i] + log_s[k])) * 4 * inverse_sum * inverse_sum;
-        Wide flip = close ? limit : (g[i] - g[k]) * reciprocal(close ? wide(1) : difference);
-        Wide twist = (g[i] + g[k]) * inverse_sum;
-        flip = flip > floor ? flip : floor;
-        twist = twist > floor ? twist : floor;
-        store(on * 0.5 * (flip + twist), batch.pair_same[i]);
-        store(on * 0.5 * (flip - twist), batch.pair_cross[i]);
-      }
+      store_second<kDistortion>(f, lambda, inverse_s, on, batch);
     }
   }
 }
 
+template <Distortion kDistortion>
+constexpr DistortionKernels kKernels = {evaluate<kDistortion, Order::energy>, evaluate<kDistortion, Order::gradient>,
+                                        evaluate<kDistortion, Order::hessian>, kDistortion != Distortion::hencky};
+
 }  // namespace
 
-void hencky_energy(HenckyBatch& batch) { evaluate<Order::energy>(batch); }
+const char* to_string(Distortion distortion) {
+  switch (distortion) {
+    case Distortion::hencky: return "hencky";
+    case Distortion::inverse_mean_ratio: return "inverse_mean_ratio";
+    case Distortion::condition_number: return "condition_number";
+  }
+  return "unknown";
+}
 
-void hencky_gradient(HenckyBatch& batch) { evaluate<Order::gradient>(batch); }
+const DistortionKernels& kernels_of(Distortion distortion) {
+  switch (distortion) {
+    case Distortion::inverse_mean_ratio: return kKernels<Distortion::inverse_mean_ratio>;
+    case Distortion::condition_number: return kKernels<Distortion::condition_number>;
+    case Distortion::hencky: break;
+  }
+  return kKernels<Distortion::hencky>;
+}
 
-void hencky_hessian(HenckyBatch& batch) { evaluate<Order::hessian>(batch); }
+void hencky_energy(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::energy>(batch); }
+
+void hencky_gradient(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::gradient>(batch); }
+
+void hencky_hessian(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::hessian>(batch); }
 
 double hencky(const Mat3& jacobian, Mat3* stress) {
   HenckyBatch batch;

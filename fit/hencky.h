@@ -8,7 +8,17 @@ namespace subvol {
 /// Number of Jacobians that the kernels below work on at once (one SIMD register of doubles, or several narrow ones).
 inline constexpr int kLanes = 8;
 
-/// Smallest eigenvalue that the clamped Hessian of the Hencky energy is given (dimensionless).
+/// How distorted a cell is at a point: functions of the singular values s of the Jacobian J, 0 where it is ideal.
+///
+///   hencky               1/2 sum (ln s_i)^2        rigid: 0 for rotations; keeps sizes      Paper: section 3.1
+///   inverse_mean_ratio   |J|^2 / (3 det^(2/3)) - 1   conformal: 0 for similarities            Paper: figure 2
+///   condition_number     |J| |J^-1| / 3 - 1          conformal; grows faster towards inversion
+///
+/// Norms are Frobenius'. With x_i = ln s_i the two latter agree to second order: 2/3 sum (x_i - mean x)^2.
+enum class Distortion { hencky, inverse_mean_ratio, condition_number };
+const char* to_string(Distortion distortion);
+
+/// Smallest eigenvalue that the clamped second derivative of a distortion is given (dimensionless).
 inline constexpr double kHessianFloor = 0.01;
 
 /// Distortion energy of kLanes Jacobians, lane by lane, with its derivatives.
@@ -21,7 +31,8 @@ inline constexpr double kHessianFloor = 0.01;
 ///   stretch_i = (1 - ln s_i)/s_i^2,  twist_ij = (g_i + g_j)/(s_i + s_j),  flip_ij = (g_i - g_j)/(s_i - s_j),
 ///   g_i = ln s_i / s_i;
 ///
-/// each is raised to at least kHessianFloor, so that the Hessian is positive definite.
+/// each is raised to at least the floor, so that the Hessian is positive definite. Of the other distortions e_i = de/ds_i
+/// stands for g_i, and the stretches are coupled: the matrix of d2e/ds_i ds_j has its eigenvalues raised as a whole.
 ///
 /// Infeasible: det J <= 0 gives energy +infinity and zero derivatives. Never NaN for finite J.
 struct HenckyBatch {
@@ -33,9 +44,20 @@ struct HenckyBatch {
   alignas(64) double stretch[3][kLanes];     ///< clamped stretch_i
   alignas(64) double pair_same[3][kLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
   alignas(64) double pair_cross[3][kLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
+  alignas(64) double coupling[3][kLanes];    ///< of u_i v_i^T with u_j v_j^T, clamped; Hencky's has none and leaves it as it is
+  double floor = kHessianFloor;              ///< in: least eigenvalue of the second derivative; -infinity: as it is
 };
 
-/// Fills `energy`. Cost: one symmetric 3x3 eigenvalue computation per lane.
+/// What is done at a point for one distortion. Each fills what comes before it, too.
+struct DistortionKernels {
+  void (*energy)(HenckyBatch&);    ///< `energy`
+  void (*gradient)(HenckyBatch&);  ///< and `stress`
+  void (*hessian)(HenckyBatch&);   ///< everything
+  bool coupled;                    ///< whether stretches are coupled
+};
+const DistortionKernels& kernels_of(Distortion distortion);
+
+/// Hencky's. Fills `energy`. Cost: one symmetric 3x3 eigenvalue computation per lane.
 void hencky_energy(HenckyBatch& batch);
 /// Fills `energy` and `stress`.
 void hencky_gradient(HenckyBatch& batch);

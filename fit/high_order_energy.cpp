@@ -139,6 +139,11 @@ void HighOrderEnergy::find_incidences() {
   for_each_part([&](Index node, std::int64_t place) { incidences_[next[node]++] = place; });
 }
 
+void HighOrderEnergy::set_distortion(Distortion distortion, double floor) {
+  kernels_ = &kernels_of(distortion);
+  floor_ = floor;
+}
+
 std::size_t HighOrderEnergy::num_points() const {
   std::size_t total = 0;
   for (const CellGroup& group : groups_)
@@ -191,6 +196,7 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
     const CellGroup& group = groups_[g];
     const Wide cell_weight = group.cell_weights[b];
     HenckyBatch hencky;
+    hencky.floor = floor_;
     Wide sum{};
     sweep.load(b, nodes);
     sweep.template run<kBack>([&](std::size_t q, Wide* j) {
@@ -220,40 +226,52 @@ constexpr auto kNothingMore = [](std::size_t, std::size_t, std::size_t, const He
 }  // namespace
 
 double HighOrderEnergy::value(std::span<const Vec3> nodes) const {
-  return integrate<false>(nodes, hencky_energy, kNothingMore);
+  return integrate<false>(nodes, kernels_->energy, kNothingMore);
 }
 
 double HighOrderEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
-  const double energy = integrate<true>(nodes, hencky_gradient, kNothingMore);
+  const double energy = integrate<true>(nodes, kernels_->gradient, kNothingMore);
   if (std::isfinite(energy)) gather_nodes(scale * cell_share(), gradient);
   return energy;
 }
 
-double HighOrderEnergy::linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
+template <bool kCoupled>
+double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
+  constexpr int kSize = frozen_size(kCoupled);
   for (CellGroup& group : groups_) {
-    group.frozen.resize(kFrozen * group.num_points() * group.batches.size());
+    group.frozen.resize(kSize * group.num_points() * group.batches.size());
     group.mean_blocks.assign(54 * group.batches.size(), Wide{});
   }
   const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const HenckyBatch& hencky) {
     CellGroup& group = groups_[g];
-    Wide* frozen = &group.frozen[kFrozen * (b * group.num_points() + q)];
-    freeze(hencky, group.reference(b, q), scale * cell_share() * group.weights[q] * group.cell_weights[b], frozen);
-    add_blocks(frozen, &group.mean_blocks[54 * b]);
+    Wide* frozen = &group.frozen[kSize * (b * group.num_points() + q)];
+    freeze<kCoupled>(hencky, group.reference(b, q), scale * cell_share() * group.weights[q] * group.cell_weights[b], frozen);
+    add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
   };
-  const double energy = integrate<true>(nodes, hencky_hessian, keep_point);
+  const double energy = integrate<true>(nodes, kernels_->hessian, keep_point);
   gather_nodes(scale * cell_share(), gradient);
   return energy;
 }
 
-void HighOrderEnergy::multiply(std::span<const Vec3> in, std::span<Vec3> out) const {
+double HighOrderEnergy::linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
+  return kernels_->coupled ? linearize_as<true>(nodes, scale, gradient) : linearize_as<false>(nodes, scale, gradient);
+}
+
+template <bool kCoupled>
+void HighOrderEnergy::multiply_as(std::span<const Vec3> in) const {
+  constexpr int kSize = frozen_size(kCoupled);
   sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
-    const Wide* frozen = &group.frozen[kFrozen * b * group.num_points()];
+    const Wide* frozen = &group.frozen[kSize * b * group.num_points()];
     sweep.load(b, in);
-    sweep.template run<true>([&](std::size_t q, Wide* j) { apply_frozen(frozen + kFrozen * q, j); });
+    sweep.template run<true>([&](std::size_t q, Wide* j) { apply_frozen<kCoupled>(frozen + kSize * q, j); });
     keep(group, b, sweep.coefficients());
     return 0.0;
   });
+}
+
+void HighOrderEnergy::multiply(std::span<const Vec3> in, std::span<Vec3> out) const {
+  kernels_->coupled ? multiply_as<true>(in) : multiply_as<false>(in);
   std::fill(out.begin(), out.end(), Vec3::Zero());
   gather_nodes(1, out);
 }
@@ -313,14 +331,15 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
 
 bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) {
   constexpr double kStiffer = 10;
+  const auto size = static_cast<std::size_t>(frozen_size(kernels_->coupled));
   std::atomic<bool> changed{false};
   for_each_pair(nodes, direction, [&](std::size_t g, std::size_t b, std::size_t q, int l, const Mat3& j, const Mat3& d) {
     if (StepLimit::safe(j, d, t)) return;
     CellGroup& group = groups_[g];
-    Wide* frozen = &group.frozen[kFrozen * (b * group.num_points() + q)];
-    Wide more[kFrozen];
-    scale_frozen(frozen, l, kStiffer, more);
-    add_blocks(more, &group.mean_blocks[54 * b]);
+    Wide* frozen = &group.frozen[size * (b * group.num_points() + q)];
+    Wide more[kMostFrozen];
+    scale_frozen(frozen, size, l, kStiffer, more);
+    kernels_->coupled ? add_blocks<true>(more, &group.mean_blocks[54 * b]) : add_blocks<false>(more, &group.mean_blocks[54 * b]);
     changed = true;
   });
   return changed;

@@ -21,14 +21,15 @@ struct CellGroup;
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
 ///
-/// e is the Hencky energy (`hencky.h`), A_cq the derivative of the ideal cell's map: edge length 1, stretched by h_c along
+/// e is a distortion (`hencky.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge length 1, stretched by h_c along
 /// its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
 /// coefficients of edge, face and cell modes. Cells weigh equally, but those that were densified twice as much each time,
 /// up to 64 times: e grows too slowly towards inversion to keep them from it.
 ///
 /// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for n
 /// modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept as
-/// 27 numbers per point and never assembled. Same bits for any number of threads; one caller at a time, const functions
+/// 27 numbers per point (30 where
+/// stretches are coupled) and never assembled. Same bits for any number of threads; one caller at a time, const functions
 /// included, for they share a buffer.
 class HighOrderEnergy final : public VolumeTerm {
  public:
@@ -57,10 +58,16 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   /// Cells that are in the way twice as dense, and twice as heavy up to `heaviest_weight`.
   void densify(std::span<const Index> cells) override;
+  /// e, Hencky's to begin with. floor: least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
+  void set_distortion(Distortion distortion, double floor = kHessianFloor);
   /// How much heavier than others a cell may become, >= 1 (default 64); 1: all weigh equally for good.
   void set_heaviest_weight(double heaviest) { heaviest_weight_ = heaviest; }
 
  private:
+  template <bool kCoupled>
+  double linearize_as(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient);
+  template <bool kCoupled>
+  void multiply_as(std::span<const Vec3> in) const;
   void rebuild_groups();
   void fill_references(CellGroup& group) const;
   void find_incidences();
@@ -79,6 +86,8 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell, where cells have one for all their points
   CellReference reference_;
   std::vector<int> points_;
+  const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
+  double floor_ = kHessianFloor;
   double heaviest_weight_ = 64;
   std::vector<double> cell_weights_;
   std::vector<CellGroup> groups_;

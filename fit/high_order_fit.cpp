@@ -148,8 +148,9 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
   std::vector<int> points(mesh.space.num_cells());
   for (std::size_t c = 0; c < points.size(); ++c)
     points[c] = std::max(kLeastPoints, points_for_order(mesh.space.pattern_order(mesh.space.pattern(c))));
-  return {identity_map(mesh.space.num_nodes()), samples.positions,
-          std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes_, points),
+  auto volume = std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes_, points);
+  volume->set_distortion(options_.distortion);
+  return {identity_map(mesh.space.num_nodes()), samples.positions, std::move(volume),
           make_surface_term(target_.surface, samples.triangles, samples.points.size(), stage.tangential_weight,
                             options_.correspondence),
           stage.lambda};

@@ -154,9 +154,9 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   record.level = number_;
   record.cells = level_.mesh.num_cells();
   lambda_ = stage.lambda;
-  FitProblem problem(level_.nodes, level_.samples,
-                     std::make_unique<VolumeEnergy>(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_)),
-                     surface_term(stage), stage.lambda);
+  auto volume = std::make_unique<VolumeEnergy>(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_));
+  volume->set_distortion(options_.distortion);
+  FitProblem problem(level_.nodes, level_.samples, std::move(volume), surface_term(stage), stage.lambda);
   const double begin = runner_.seconds();
   const bool going = runner_.run(problem, stage, std::move(record), schedule_.fraction(number_), unknowns_, result_.report);
   seconds_["solve"] += runner_.seconds() - begin;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/fit_report.h"
+#include "fit/hencky.h"
 #include "subvol/point_cloud.h"
 #include "subvol/subdivision.h"
 #include "subvol/triangle_mesh.h"
@@ -42,6 +43,7 @@ struct FitOptions {
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< of a point cloud
+  Distortion distortion = Distortion::hencky;    ///< e of E_W
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it

@@ -180,7 +180,7 @@ template <class Kernel>
 double VolumeEnergy::value_of(std::span<const Vec3> nodes) const {
   return sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
-    Kernel kernel(epsilon_);
+    Kernel kernel(epsilon_, *kernels_, floor_);
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
@@ -201,7 +201,7 @@ double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale,
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
     alignas(64) double g[kMaxCellVertices][3][kLanes] = {}, factor[3][kLanes];
-    Kernel kernel(epsilon_);
+    Kernel kernel(epsilon_, *kernels_, floor_);
     double sum = 0;
     for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
       jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
@@ -236,7 +236,7 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
     constexpr int n_max = kMaxCellVertices;
     const BatchState state(*this, group, b, nodes);
     alignas(64) double g[n_max][3][kLanes] = {}, k[n_max * n_max][9][kLanes], factor[3][kLanes], weight[kLanes];
-    Kernel kernel(epsilon_);
+    Kernel kernel(epsilon_, *kernels_, floor_);
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int a = 0; a < n; ++a)
       for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
@@ -277,18 +277,23 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
 }
 
 double VolumeEnergy::value(std::span<const Vec3> nodes) const {
-  return epsilon_ > 0 ? value_of<RegularisedKernel>(nodes) : value_of<HenckyKernel>(nodes);
+  return epsilon_ > 0 ? value_of<RegularisedKernel>(nodes) : value_of<DistortionKernel>(nodes);
 }
 
 double VolumeEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
   return epsilon_ > 0 ? gradient_of<RegularisedKernel>(nodes, scale, gradient)
-                      : gradient_of<HenckyKernel>(nodes, scale, gradient);
+                      : gradient_of<DistortionKernel>(nodes, scale, gradient);
 }
 
 double VolumeEnergy::add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
                                  BlockSparse& hessian) const {
   return epsilon_ > 0 ? hessian_of<RegularisedKernel>(nodes, scale, gradient, hessian)
-                      : hessian_of<HenckyKernel>(nodes, scale, gradient, hessian);
+                      : hessian_of<DistortionKernel>(nodes, scale, gradient, hessian);
+}
+
+void VolumeEnergy::set_distortion(Distortion distortion, double floor) {
+  kernels_ = &kernels_of(distortion);
+  floor_ = floor;
 }
 
 void VolumeEnergy::set_regularisation(double epsilon) {

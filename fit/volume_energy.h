@@ -18,7 +18,7 @@ namespace subvol {
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
-/// e is the Hencky energy (`hencky.h`), J_cq the Jacobian of cell c at quadrature point q against its ideal cell: that of
+/// e is a distortion (`hencky.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point q against its ideal cell: that of
 /// edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a hex's is the box of edges h_c), or a
 /// reference of its own. Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
 ///
@@ -47,7 +47,9 @@ class VolumeEnergy final : public VolumeTerm {
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   void densify(std::span<const Index> cells) override;
 
-  /// epsilon  0 (the start): the Hencky barrier; > 0: the regularised one. InputError: negative, not finite.
+  /// e, Hencky's to begin with. floor: least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
+  void set_distortion(Distortion distortion, double floor = kHessianFloor);
+  /// epsilon  0 (the start): the distortion's own barrier; > 0: the regularised one. InputError: negative, not finite.
   void set_regularisation(double epsilon);
   /// w_c by one positive weight per cell, of any common scale. InputError: another number, or not positive and finite.
   void set_weights(std::span<const double> weights);
@@ -96,7 +98,8 @@ class VolumeEnergy final : public VolumeTerm {
   std::size_t num_nodes_;
   std::vector<Vec3> inverse_lengths_;
   std::vector<double> weights_;
-  double epsilon_ = 0;
+  const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
+  double epsilon_ = 0, floor_ = kHessianFloor;
   CellReference reference_;        ///< empty: ideal cells
   std::vector<int> points_;        ///< points per direction of each cell
   std::vector<int> colors_;
