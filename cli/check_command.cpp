@@ -37,9 +37,11 @@ MeshCheck against(const std::optional<Target>& target, const Check& check) {
   return std::visit([&](const auto& geometry) { return check(&geometry); }, *target);
 }
 
-Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, std::vector<std::string>& warnings) {
+Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target,
+                     std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
-  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry); }), describe(arguments.mesh, mesh), std::nullopt};
+  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry); }),
+                  describe(arguments.mesh, mesh), std::nullopt};
   checked.audit = checked.check.subdivision_audit;
   return checked;
 }
@@ -47,7 +49,8 @@ Checked check_linear(const CheckArguments& arguments, const std::optional<Target
 Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target) {
   const HighOrderMesh mesh = read_high_order(arguments.mesh).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
-  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry); }), describe(arguments.mesh, mesh), std::nullopt};
+  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry); }),
+          describe(arguments.mesh, mesh), std::nullopt};
 }
 
 Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Checked& checked,
@@ -92,7 +95,7 @@ void add_check_command(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
   const auto arguments = std::make_shared<CheckArguments>();
   verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats())->required()->type_name("FILE");
-  verb->add_option("--target", arguments->target, "Measure the distance to this surface, or that of these points: " + target_formats())
+  verb->add_option("--target", arguments->target, "Measure the distance to this surface, or of these points: " + target_formats())
       ->type_name("SURFACE");
   verb->add_option("--chord", arguments->chord_percent,
                    "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")

@@ -180,7 +180,8 @@ void FitRun::summarise() const {
   const double percent = 100 / mesh_check_.target_diagonal;
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
             << to_text(mesh_check_)
-            << (limit_distance_.one_sided ? "points to limit surface: mean " : "limit surface to target: mean ") << limit_distance_.mean() * percent << " %, max "
+            << (limit_distance_.one_sided ? "points to limit surface: mean " : "limit surface to target: mean ")
+            << limit_distance_.mean() * percent << " %, max "
             << limit_distance_.max() * percent << " % of the diagonal\n";
   if (report.creases) std::cerr << to_text(*report.creases);
   tell_outputs();

@@ -29,7 +29,8 @@ Target load_target(const std::filesystem::path& path, std::vector<std::string>& 
 
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
   if (is_point_cloud_file(path))
-    throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; a surface is expected");
+    throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; expected a " +
+                     "surface");
   return is_volume_file(path) ? triangulate(load_polygons(path, warnings)) : read_triangle_mesh(path, &warnings);
 }
 

@@ -58,9 +58,12 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   for (std::size_t j = 0; j < points.size(); ++j) {
     const Index t = target_hits_[j].triangle;
     const auto& q = triangles()[t];
-    target_links_[next[t]++] = {t, barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]), points[j],
+    target_links_[next[t]++] = {t,
+                                barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]),
+                                points[j],
                                 target_->sample_normals()[j],
-                                emphasis(target_hits_[j].distance) * target_->sample_areas()[j], tau_};
+                                emphasis(target_hits_[j].distance) * target_->sample_areas()[j],
+                                tau_};
   }
 }
 

@@ -17,9 +17,9 @@ namespace subvol {
 /// y_j, a_j   samples of the target and the area each stands for;  s(y): closest point of the triangulated surface S~
 /// x_q, b_q   quadrature points of S~'s triangles with their areas;  t(x): closest point of the target
 ///
-/// Of a point cloud nothing is known between its points, so the second sum is left out: they pull at S~, and what no point
-/// is nearest to is held by the cells alone. Where t(x_q) lies on an open edge of the target, x_q may be over a hole: it is
-/// not drawn to the rim, but only to the plane that continues the target there, with M = n n^T times
+/// Of a point cloud nothing is known between its points, so the second sum is left out: they pull at S~, and what no
+/// point is nearest to is held by the cells alone. Where t(x_q) lies on an open edge of the target, x_q may be over a
+/// hole: it is not drawn to the rim, but only to the plane that continues the target there, with M = n n^T times
 ///
 ///   max(0, 1 - (d / 2L)^2)^2 (n . n_S)^2,   d = |x_q - t(x_q)|,  n_S: unit normal of S~
 ///
@@ -42,8 +42,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// the search starts, and the tree over S~ moves along.
   void assign(std::span<const Vec3> samples) override;
 
-  /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by area;
-  /// what lies over a rim of the target does not count.
+  /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by
+  /// area; what lies over a rim of the target does not count.
   struct Distance {
     double mean, max;
   };

@@ -6,8 +6,9 @@
 namespace subvol {
 
 /// The second derivative of a distortion at points of eight cells, as numbers that are kept while conjugate gradients
-/// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), and where stretches are coupled
-/// coupling (3), as in `hencky.h`, R being A^-1 and all after it multiplied by the point's weight.
+/// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), and where stretches are
+/// coupled coupling (3), as in `hencky.h`, R being A^-1 and all after it multiplied by the point's weight. Inlined
+/// everywhere: kept in memory between its steps, a product takes several times as long.
 inline constexpr int frozen_size(bool coupled) { return coupled ? 30 : 27; }
 inline constexpr int kMostFrozen = frozen_size(true);
 /// Symmetric 3x3 blocks of a second derivative by pairs (0,0) (1,1) (2,2) (0,1) (1,2) (2,0) of directions.
@@ -15,7 +16,8 @@ inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2,
 
 /// Writes a point's numbers. `weight` multiplies the second derivative.
 template <bool kCoupled>
-[[gnu::always_inline]] inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide& weight, Wide* frozen) {
+[[gnu::always_inline]] inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide& weight,
+                                          Wide* frozen) {
   Wide v[9];
   for (int e = 0; e < 9; ++e) frozen[e] = load_wide(hencky.u[e]);
   for (int e = 0; e < 9; ++e) v[e] = load_wide(hencky.v[e]);

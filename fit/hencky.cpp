@@ -62,10 +62,11 @@ SUBVOL_INLINE void rotate(Wide& app, Wide& aqq, Wide& apq, Wide& arp, Wide& arq,
     }
 }
 
-/// Eigenvalues, on the diagonal a00 a11 a22, and vectors, columns v0 v1 v2, of a symmetric matrix with entries of at most 1.
-/// Four cyclic sweeps reach rounding.
+/// Eigenvalues, on the diagonal a00 a11 a22, and vectors, columns v0 v1 v2, of a symmetric matrix with entries of at
+/// most 1. Four cyclic sweeps reach rounding.
 template <bool kVectors>
-SUBVOL_INLINE void diagonalise(Wide& a00, Wide& a11, Wide& a22, Wide& a01, Wide& a12, Wide& a02, Wide* v0, Wide* v1, Wide* v2) {
+SUBVOL_INLINE void diagonalise(Wide& a00, Wide& a11, Wide& a22, Wide& a01, Wide& a12, Wide& a02, Wide* v0, Wide* v1,
+                               Wide* v2) {
   for (int k = 0; k < 3; ++k) {
     v0[k] = wide(k == 0);
     v1[k] = wide(k == 1);
@@ -126,8 +127,8 @@ SUBVOL_INLINE Wide exponential(const Wide& x) {
   return result;
 }
 
-/// A distortion f as a function of x_i = ln s_i: its value, first derivatives, second ones of one x_i, and of x_i and x_j for
-/// (i, j) = (0,1), (1,2), (2,0).
+/// A distortion f as a function of x_i = ln s_i: its value, first derivatives, second ones of one x_i, and of x_i and x_j
+/// for (i, j) = (0,1), (1,2), (2,0).
 struct LogModel {
   Wide value, first[3], second[3], mixed[3];
 };

@@ -44,7 +44,8 @@ struct HenckyBatch {
   alignas(64) double stretch[3][kLanes];     ///< clamped stretch_i
   alignas(64) double pair_same[3][kLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
   alignas(64) double pair_cross[3][kLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
-  alignas(64) double coupling[3][kLanes];    ///< of u_i v_i^T with u_j v_j^T, clamped; Hencky's has none and leaves it as it is
+  /// Of u_i v_i^T with u_j v_j^T, clamped; Hencky's has none and leaves it as it is.
+  alignas(64) double coupling[3][kLanes];
   double floor = kHessianFloor;              ///< in: least eigenvalue of the second derivative; -infinity: as it is
 };
 

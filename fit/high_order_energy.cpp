@@ -245,7 +245,8 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
   const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const HenckyBatch& hencky) {
     CellGroup& group = groups_[g];
     Wide* frozen = &group.frozen[kSize * (b * group.num_points() + q)];
-    freeze<kCoupled>(hencky, group.reference(b, q), scale * cell_share() * group.weights[q] * group.cell_weights[b], frozen);
+    const Wide weight = scale * cell_share() * group.weights[q] * group.cell_weights[b];
+    freeze<kCoupled>(hencky, group.reference(b, q), weight, frozen);
     add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
   };
   const double energy = integrate<true>(nodes, kernels_->hessian, keep_point);
@@ -339,7 +340,8 @@ bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3>
     Wide* frozen = &group.frozen[size * (b * group.num_points() + q)];
     Wide more[kMostFrozen];
     scale_frozen(frozen, size, l, kStiffer, more);
-    kernels_->coupled ? add_blocks<true>(more, &group.mean_blocks[54 * b]) : add_blocks<false>(more, &group.mean_blocks[54 * b]);
+    Wide* blocks = &group.mean_blocks[54 * b];
+    kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
     changed = true;
   });
   return changed;

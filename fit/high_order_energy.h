@@ -21,8 +21,8 @@ struct CellGroup;
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
 ///
-/// e is a distortion (`hencky.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge length 1, stretched by h_c along
-/// its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
+/// e is a distortion (`hencky.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge
+/// length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
 /// coefficients of edge, face and cell modes. Cells weigh equally, but those that were densified twice as much each time,
 /// up to 64 times: e grows too slowly towards inversion to keep them from it.
 ///
@@ -58,7 +58,8 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   /// Cells that are in the way twice as dense, and twice as heavy up to `heaviest_weight`.
   void densify(std::span<const Index> cells) override;
-  /// e, Hencky's to begin with. floor: least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
+  /// e, Hencky's to begin with.
+  /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
   /// How much heavier than others a cell may become, >= 1 (default 64); 1: all weigh equally for good.
   void set_heaviest_weight(double heaviest) { heaviest_weight_ = heaviest; }

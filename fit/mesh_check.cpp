@@ -212,8 +212,8 @@ void append_witnesses(std::string& text, std::span<const InversionWitness> witne
 void append_distance(std::string& text, const MeshCheck& check) {
   const auto& extreme = check.distance->extreme();
   append(text, "distance%s mean %.6g (%.4f %%), max %.6g (%.4f %%) at (%.6g, %.6g, %.6g)\n",
-         check.distance->one_sided ? " (of points)" : "           ", check.distance->mean(), check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(),
-         extreme.from[0], extreme.from[1], extreme.from[2]);
+         check.distance->one_sided ? " (of points)" : "           ", check.distance->mean(),
+         check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(), extreme.from[0], extreme.from[1], extreme.from[2]);
 }
 
 MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const MeshCheckOptions& options) {

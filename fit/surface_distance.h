@@ -22,8 +22,8 @@ struct SurfaceDistance {
   };
   double mean_a_to_b = 0, mean_b_to_a = 0;
   Extreme max_a_to_b, max_b_to_a;
-  /// Whether b is known by points only: there is no way from a to what lies between them, and only the distances from b to
-  /// a are set.
+  /// Whether b is known by points only: there is no way from a to what lies between them, and only the distances from b
+  /// to a are set.
   bool one_sided = false;
 
   /// Symmetric distances: the larger of the two one-sided ones, or the only one.

@@ -18,8 +18,8 @@ namespace subvol {
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
-/// e is a distortion (`hencky.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point q against its ideal cell: that of
-/// edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a hex's is the box of edges h_c), or a
+/// e is a distortion (`hencky.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point q
+/// against its ideal cell: that of edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a hex's is the box of edges h_c), or a
 /// reference of its own. Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
 ///
 /// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
@@ -47,7 +47,8 @@ class VolumeEnergy final : public VolumeTerm {
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   void densify(std::span<const Index> cells) override;
 
-  /// e, Hencky's to begin with. floor: least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
+  /// e, Hencky's to begin with.
+  /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
   /// epsilon  0 (the start): the distortion's own barrier; > 0: the regularised one. InputError: negative, not finite.
   void set_regularisation(double epsilon);

@@ -50,8 +50,9 @@ VolumeMesh star(int blocks) {
       for (int i = 0; i < kSide; ++i)
         for (int k = 0; k < kLayers; ++k)
           mesh.add_cell(CellKind::hex,
-                        std::array<Index, 8>{vertex(block, i, j, k), vertex(block, i + 1, j, k), vertex(block, i + 1, j + 1, k),
-                                             vertex(block, i, j + 1, k), vertex(block, i, j, k + 1),
+                        std::array<Index, 8>{vertex(block, i, j, k), vertex(block, i + 1, j, k),
+                                             vertex(block, i + 1, j + 1, k), vertex(block, i, j + 1, k),
+                                             vertex(block, i, j, k + 1),
                                              vertex(block, i + 1, j, k + 1), vertex(block, i + 1, j + 1, k + 1),
                                              vertex(block, i, j + 1, k + 1)});
   return mesh;
@@ -99,8 +100,8 @@ int main(int argc, char** argv) try {
         }
       const QualityReport quality = measure_quality(mesh);
       valid = valid && quality.inverted_cells == 0;
-      std::printf("%-7d %-19s %-42.3f %.3f, %.3f\n", blocks, to_string(distortion), inner / outer, quality.mean_scaled_jacobian,
-                  quality.min_scaled_jacobian);
+      std::printf("%-7d %-19s %-42.3f %.3f, %.3f\n", blocks, to_string(distortion), inner / outer,
+                  quality.mean_scaled_jacobian, quality.min_scaled_jacobian);
       if (blocks != 4)
         write_file_atomically(folder / ("star" + std::to_string(blocks) + "_" + to_string(distortion) + ".vtu"),
                               vtu_text(mesh));
