@@ -38,6 +38,7 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
 
 /// seconds: that have been used of the time limit.
 HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds, const Target& target,
+                       const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
   options.log = log;

@@ -54,7 +54,8 @@ FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
 
 void FitTarget::sample(std::size_t num_samples, std::size_t least) {
   const double count = static_cast<double>(std::max(num_samples, least));
-  surface.resample(1.8 * std::sqrt(surface.area() / count));
+  // A needle of next to no area would be cut up along its length without end.
+  surface.resample(std::max(1.8 * std::sqrt(surface.area() / count), 0.1 / std::sqrt(count)));
 }
 
 SurfaceDistance FitTarget::distance(const TriangleMesh& fitted, bool extremes) const {

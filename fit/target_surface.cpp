@@ -180,9 +180,9 @@ void TargetSurface::add_samples(const std::array<Vec3, 3>& corners, Index triang
       squared[k] = (corners[(k + 1) % 3] - corners[k]).squaredNorm();
       if (squared[k] > squared[longest]) longest = k;
     }
-    if (squared[longest] > spacing * spacing) {
-      const Vec3 &a = corners[longest], &b = corners[(longest + 1) % 3], &c = corners[(longest + 2) % 3];
-      const Vec3 middle = 0.5 * (a + b);
+    const Vec3 &a = corners[longest], &b = corners[(longest + 1) % 3], &c = corners[(longest + 2) % 3];
+    const Vec3 middle = 0.5 * (a + b);
+    if (squared[longest] > spacing * spacing && middle != a && middle != b) {
       add_samples({a, middle, c}, triangle, spacing);
       add_samples({middle, b, c}, triangle, spacing);
       return;

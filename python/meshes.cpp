@@ -345,7 +345,7 @@ std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, co
 TriangleMesh triangles_from(const py::object& object, const char* name) {
   if (!is_path(object)) return triangulate(surface_from(object, name).polygons);
   return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {
-    return cli::load_target(path, warnings);
+    return cli::load_surface(path, warnings);
   });
 }
 

@@ -2,6 +2,7 @@
 #include "python/report.h"
 
 #include "cli/report.h"
+#include "subvol/process_memory.h"
 #include "subvol/version.h"
 
 namespace subvol::python {
@@ -55,7 +56,7 @@ py::dict make_report(const char* command, const Json& found, const Keywords& key
   for (const auto& [part, value] : work.seconds_by_part()) seconds[py::str(part)] = value;
   seconds["total"] = work.seconds();
   report["seconds"] = seconds;
-  report["peak_memory_bytes"] = cli::peak_memory_bytes();
+  report["peak_memory_bytes"] = peak_memory_bytes();
   warn(warnings);
   return report;
 }

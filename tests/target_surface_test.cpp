@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/fit_target.h"
 #include "fit/target_surface.h"
 
 #include "fit/enclosed_volume.h"
@@ -181,4 +182,15 @@ TEST_CASE("what TargetSurface refuses") {
   TriangleMesh bad = mesh;
   bad.positions[3][1] = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(TargetSurface(bad), InputError);
+}
+
+TEST_CASE("a needle of next to no area is sampled along its length, not without end") {
+  for (const double width : {1e-6, 1e-12, 1e-25}) {
+    TriangleMesh needle{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
+                        {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
+    for (Vec3& p : needle.positions) p = p.cwiseProduct(Vec3(1, width, width));
+    FitTarget target(needle);
+    target.sample(1000, 1000);
+    CHECK(target.surface.samples().size() < 100000);
+  }
 }
