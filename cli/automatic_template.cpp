@@ -9,13 +9,12 @@
 
 namespace subvol::cli {
 
-LoadedTemplate load_template(const TemplateSource& source, const Target& target,
-                             std::optional<double> crease_angle_degrees, const RunOptions& run,
-                             std::vector<std::string>& warnings) {
+LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
+                             const RunOptions& run, std::vector<std::string>& warnings) {
   if (!source.path.empty()) return {load_volume(source.path, warnings), std::nullopt};
   if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   ProgressTeller teller(run.progress, run.quiet);
-  TemplateChoiceOptions options{.cells = source.cells, .crease_angle_degrees = crease_angle_degrees};
+  options.cells = source.cells;
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
     return !interrupted();

@@ -22,10 +22,12 @@ struct LoadedTemplate {
   std::optional<TemplateChoice> choice;
 };
 
-/// Reads a template, or makes one and tells how far that is. UsageError: one is to be made from points.
-LoadedTemplate load_template(const TemplateSource& source, const Target& target,
-                             std::optional<double> crease_angle_degrees, const RunOptions& run,
-                             std::vector<std::string>& warnings);
+/// Reads a template, or makes one and tells how far that is.
+///
+/// options  how it is made, but for the count, which is the source's.
+/// UsageError: one is to be made from points.
+LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
+                             const RunOptions& run, std::vector<std::string>& warnings);
 
 /// What a report says of the choice: the topology, every trial, and which one was taken.
 Json choice_json(const TemplateChoice& choice);

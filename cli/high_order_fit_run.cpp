@@ -98,7 +98,9 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
                                                : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
   const Clock::time_point template_start = Clock::now();
-  LoadedTemplate loaded = load_template(arguments.template_mesh, target, std::nullopt, arguments.run, warnings);
+  LoadedTemplate loaded =
+      load_template(arguments.template_mesh, target, {.order = arguments.fit.order, .basis = arguments.fit.basis},
+                    arguments.run, warnings);
   const double template_seconds = seconds_since(template_start);
   VolumeMesh& template_mesh = loaded.mesh;
   tell_warnings();

@@ -72,8 +72,9 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 /// x  feasible start (finite E), else `no_step`; receives the result.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
-/// The reference that Newton is measured against: L-BFGS (m = 10) with a weak Wolfe line search by bisection, which takes
-/// +infinity as too long a step. Correspondences are found anew after every ten steps.
+/// The reference that Newton is measured against, and the paper's algorithm 2: L-BFGS (m = 10) with a weak Wolfe line
+/// search by bisection, which takes +infinity as too long a step. Correspondences are exact at every evaluation.
+/// Converged where ten steps decrease E by less than `relative_decrease`.
 MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 }  // namespace subvol

@@ -10,40 +10,31 @@ namespace subvol {
 
 namespace {
 
-constexpr int kHistory = 10, kInnerSteps = 10, kMaxTrials = 40;
+constexpr int kHistory = 10, kWindow = 10, kMaxTrials = 40;
 constexpr double kArmijo = 1e-4, kWolfe = 0.9;
 
 struct Value {
   double surface = 0, volume = 0, energy = std::numeric_limits<double>::infinity();
 };
 
-/// E and its gradient over the unknowns, for frozen cells.
+/// E and its gradient over the unknowns. Correspondences are found anew at each evaluation: dE/dx needs no derivative of
+/// theirs, since they are the best ones where they are found.
 class Objective {
  public:
   explicit Objective(FitProblem& problem)
       : problem_(problem), nodes_(problem.nodes.num_rows()), samples_(problem.samples.num_rows()),
         node_gradient_(nodes_.size()), sample_gradient_(samples_.size()), from_samples_(problem.nodes.num_cols) {}
 
-  void assign(std::span<const Vec3> x) {
-    problem_.apply_samples(x, samples_);
-    if (problem_.surface) problem_.surface->assign(samples_);
-  }
-
   Value evaluate(std::span<const Vec3> x, std::span<Vec3> gradient) {
     problem_.apply_nodes(x, nodes_);
-    problem_.apply_samples(x, samples_);
     std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
-    std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
     Value value;
     value.volume = problem_.volume->add_gradient(nodes_, problem_.lambda, node_gradient_);
     if (!std::isfinite(value.volume)) return value;
-    if (problem_.surface) value.surface = problem_.surface->value(samples_);
+    if (problem_.surface) value.surface = evaluate_surface(x);
     value.energy = value.surface + problem_.lambda * value.volume;
     problem_.nodes_transposed.apply(node_gradient_, gradient);
-    if (!problem_.surface) return value;
-    problem_.surface->add_gradient(samples_, sample_gradient_);
-    problem_.samples_transposed.apply(sample_gradient_, from_samples_);
-    add_scaled(1, from_samples_, gradient);
+    if (problem_.surface) add_scaled(1, from_samples_, gradient);
     return value;
   }
 
@@ -53,6 +44,16 @@ class Objective {
   }
 
  private:
+  /// E_S; its gradient by the unknowns goes to from_samples_.
+  double evaluate_surface(std::span<const Vec3> x) {
+    problem_.apply_samples(x, samples_);
+    problem_.surface->assign(samples_);
+    std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
+    problem_.surface->add_gradient(samples_, sample_gradient_);
+    problem_.samples_transposed.apply(sample_gradient_, from_samples_);
+    return problem_.surface->value(samples_);
+  }
+
   FitProblem& problem_;
   std::vector<Vec3> nodes_, samples_, node_gradient_, sample_gradient_, from_samples_;
 };
@@ -87,7 +88,6 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
   Objective objective(problem);
   std::vector<Vec3> gradient(x.size()), trial_x(x.size()), trial_gradient(x.size());
   std::deque<Pair> history;
-  objective.assign(x);
   Value value = objective.evaluate(x, gradient);
   const bool guard = objective.certified(x);
   if (!std::isfinite(value.energy)) {
@@ -95,7 +95,7 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
     result.explanation = "the start has a cell that is inverted at a quadrature point";
     return result;
   }
-  double energy_at_assign = value.energy;
+  double window_start = value.energy;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     IterationRecord record;
     std::vector<Vec3> d = direction(history, gradient);
@@ -148,16 +148,13 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
     record.volume_energy = value.volume;
     record.step_length = t;
     if (!record_step(record, options, result)) return result;
-    if ((iteration + 1) % kInnerSteps == 0) {
-      if (energy_at_assign - value.energy < options.relative_decrease * value.energy) {
-        result.stop = MinimizerStop::converged;
-        result.explanation = "small relative decrease of the energy between two assignments of cells";
-        return result;
-      }
-      objective.assign(x);
-      value = objective.evaluate(x, gradient);
-      energy_at_assign = value.energy;
+    if ((iteration + 1) % kWindow != 0) continue;
+    if (window_start - value.energy < options.relative_decrease * value.energy) {
+      result.stop = MinimizerStop::converged;
+      result.explanation = "small relative decrease of the energy in ten steps";
+      return result;
     }
+    window_start = value.energy;
   }
   return result;
 }

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/template_choice.h"
 
+#include "fit/boundary_samples.h"
 #include "fit/boundary_triangles.h"
+#include "fit/high_order_fit.h"
+#include "fit/high_order_quality.h"
+#include "fit/option_checks.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
 #include "fit/subdivision_fit.h"
@@ -29,6 +33,14 @@ class Chooser {
   bool tell(const char* stage, double fraction) const {
     return !options_.progress || options_.progress({stage, 0, 0, 0, fraction});
   }
+  /// The surface that a template was fitted to after a few steps, and how well its cells are shaped.
+  struct ShortFit {
+    TriangleMesh surface;
+    double mean_scaled_jacobian;
+  };
+  std::function<bool(const FitProgress&)> trial_progress(std::function<bool()> goes_on = {});
+  ShortFit fit_subdivided(const VolumeMesh& mesh);
+  ShortFit fit_curved(const VolumeMesh& mesh);
   std::vector<AutoTemplate> candidates(std::size_t cells, bool pillow, std::size_t most);
   bool try_count(std::size_t cells);
   bool try_template(VolumeMesh mesh, bool pillowed);
@@ -56,25 +68,46 @@ bool has_thick_core(const VolumeMesh& pillowed) {
   return static_cast<double>(faces) <= kMostFacesPerCell * static_cast<double>(pillowed.num_cells() - faces);
 }
 
-/// Fits a template a little and notes how that went. False where cancelled.
-bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
-  constexpr int kMostSteps = 10;  // enough to tell templates apart; the fit itself begins anew
-  int steps = 0;
-  FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
-  options.progress = [&](const FitProgress& progress) {
+/// Tells the caller how a trial goes; ends it where they cancel or it does not go on.
+std::function<bool(const FitProgress&)> Chooser::trial_progress(std::function<bool()> goes_on) {
+  return [this, goes_on = std::move(goes_on)](const FitProgress& progress) {
     FitProgress told = progress;
     told.stage = "trying a template";
     choice_.cancelled = choice_.cancelled || (options_.progress && !options_.progress(told));
-    return !choice_.cancelled && ++steps <= kMostSteps;
+    return !choice_.cancelled && (!goes_on || goes_on());
   };
+}
+
+Chooser::ShortFit Chooser::fit_subdivided(const VolumeMesh& mesh) {
+  constexpr int kMostSteps = 10;  // enough to tell templates apart; the fit itself begins anew
+  int steps = 0;
+  FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
+  options.progress = trial_progress([&] { return ++steps <= kMostSteps; });
   const FitResult fit = fit_subdivision_volume(target_, mesh, options);
+  return {refined_triangles(boundary_surface(fit.mesh, MeshTopology(fit.mesh))),
+          measure_quality(fit.mesh).mean_scaled_jacobian};
+}
+
+Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
+  constexpr int kMostOrder = 2, kMostSteps = 6, kIntervals = 6;
+  HighOrderFitOptions options{.order = std::min(options_.order, kMostOrder), .basis = options_.basis};
+  options.max_iterations = kMostSteps;
+  options.progress = trial_progress();
+  const HighOrderMesh fitted = fit_high_order(target_, mesh, options).mesh;
+  BoundarySamples samples = make_boundary_samples(fitted.space, kIntervals);
+  return {{samples.positions.apply(fitted.coefficients), std::move(samples.triangles)},
+          measure_quality(fitted).mean_scaled_jacobian};
+}
+
+/// Fits a template a little and notes how that went. False where cancelled.
+bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
+  const auto [surface, mean_scaled_jacobian] = options_.order > 0 ? fit_curved(mesh) : fit_subdivided(mesh);
   if (choice_.cancelled) return false;
-  const TriangleMesh surface = refined_triangles(boundary_surface(fit.mesh, MeshTopology(fit.mesh)));
   const SurfaceDistance distance = surface_distance(surface, ClosestPoint(surface), target_, tree_);
   TemplateTrial trial{.cells = mesh.num_cells(), .pillowed = pillowed};
   trial.mean_percent = 100 * distance.mean() / diagonal_;
   trial.max_percent = 100 * distance.max() / diagonal_;
-  trial.mean_scaled_jacobian = measure_quality(fit.mesh).mean_scaled_jacobian;
+  trial.mean_scaled_jacobian = mean_scaled_jacobian;
   trial.self_intersections = self_intersections(surface).pairs.size();
   trial.merit = trial.max_percent / kGoodMaxPercent + trial.mean_percent / kGoodMeanPercent +
                 kShapeWeight * std::max(0.0, kGoodShape - trial.mean_scaled_jacobian) +
@@ -124,6 +157,7 @@ TemplateChoice Chooser::run() {
 }  // namespace
 
 TemplateChoice choose_template(const TriangleMesh& target, const TemplateChoiceOptions& options) {
+  require_in_range("TemplateChoiceOptions", "order", options.order, 0, kMaxOrder);
   return Chooser(target, options).run();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/basis.h"
 #include "fit/fit_report.h"
 #include "subvol/solid_topology.h"
 #include "subvol/triangle_mesh.h"
@@ -16,14 +17,16 @@ namespace subvol {
 
 struct TemplateChoiceOptions {
   std::optional<std::size_t> cells;  ///< about so many; empty: as many as the trials ask for, from kFirstCells on
-  std::optional<double> crease_angle_degrees;  ///< as `FitOptions` has it
+  std::optional<double> crease_angle_degrees;  ///< as `FitOptions` has it; not for curved elements
+  int order = 0;                 ///< of the curved elements that the template is for; 0: for a subdivision volume
+  Basis basis = Basis::fourier;  ///< of these
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
 };
 
 /// Counts that are tried where none is asked for, until one fits well.
 inline constexpr std::size_t kFirstCells = 250, kSecondCells = 600, kLastCells = 1000;
 
-/// One template that was tried, and its fit after one subdivision.
+/// One template that was tried, and its fit after one subdivision or at order 2.
 struct TemplateTrial {
   std::size_t cells = 0;
   bool pillowed = false;
@@ -45,7 +48,8 @@ struct TemplateChoice {
 /// Makes several templates from a surface (`auto_templates`) and keeps the one that fits best.
 ///
 /// Right Betti numbers alone do not make a good template: a handle may sit in the wrong place. So each candidate is
-/// fitted with one subdivision, for a limited number of steps, and judged by
+/// fitted as the result will be, with one subdivision or with elements of order 2 at most, for a limited number of steps,
+/// and judged by
 ///
 ///   max distance / 1.5 % + mean distance / 0.15 % + 5 max(0, 0.9 - mean scaled Jacobian) + 1 where the boundary meets
 ///   itself
@@ -53,7 +57,7 @@ struct TemplateChoice {
 /// A pillowed candidate is tried where its core is several cells thick: on thin parts a pillow only takes cells away.
 /// Where the best candidate's max distance is above 1.5 % the next larger count is tried.
 ///
-/// InputError: as `auto_templates`; a target whose topology no grid carries. Deterministic.
+/// InputError: as `auto_templates`; an order outside [0, kMaxOrder]; a target whose topology no grid carries. Deterministic.
 TemplateChoice choose_template(const TriangleMesh& target, const TemplateChoiceOptions& options = {});
 
 }  // namespace subvol

@@ -55,6 +55,8 @@ class Fit {
       keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "lambda_far"},
                        "does not go with order");
       high_order_ = high_order_options(keywords_);
+      choice_options_.order = high_order_.order;
+      choice_options_.basis = high_order_.basis;
     } else {
       keywords_.refuse({"order", "basis", "adaptive"}, "goes with order only");
       subdivision_ = subdivision_options(keywords_);

@@ -182,6 +182,14 @@ TEST_CASE("Of several templates the one that fits best is chosen", "[templates]"
   for (const TemplateTrial& trial : choice.trials) CHECK(trial.merit >= choice.trials[choice.chosen].merit);
   CHECK(choice.trials[choice.chosen].max_percent < 3);
   TemplateChoiceOptions options{.cells = 27};
+  options.order = -1;
+  CHECK_THROWS_AS(choose_template(test::cube_surface(4, true), options), InputError);
+  options.order = 2;
+  const TemplateChoice curved = choose_template(test::cube_surface(6, true), options);
+  REQUIRE(curved.mesh.num_cells() > 0);
+  CHECK(curved.trials.size() == choice.trials.size());
+  // Few curved cells reach what subdivided ones do not.
+  CHECK(curved.trials[curved.chosen].mean_percent < choice.trials[choice.chosen].mean_percent);
   options.progress = [](const FitProgress&) { return false; };
   CHECK(choose_template(test::cube_surface(4, true), options).cancelled);
 }
