@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 namespace subvol::test {
 
+/// Folder of the project's sources.
+std::string source_dir();
+
+/// The program that belongs to these tests; empty where it is not built.
+std::string program();
+
 /// Folder of the real inputs: the environment variable SUBVOL_DATA, or shared/data beside the source folder. Nothing where
 /// neither is there; tests then WARN("SKIPPED: ..."), which ctest counts as skipped, and return.
-inline std::optional<std::filesystem::path> data_dir() {
-  const char* variable = std::getenv("SUBVOL_DATA");
-  const std::filesystem::path folder =
-      variable && *variable ? std::filesystem::path(variable)
-                            : std::filesystem::path(SUBVOL_SOURCE_DIR) / ".." / "shared" / "data";
-  if (!std::filesystem::is_directory(folder)) return std::nullopt;
-  return folder;
-}
+std::optional<std::filesystem::path> data_dir();
 
 }  // namespace subvol::test

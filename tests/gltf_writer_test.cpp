@@ -5,6 +5,7 @@
 #include "export/export.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
+#include "tests/data.h"
 #include "tests/element_fixtures.h"
 #include "tests/glb_reader.h"
 
@@ -61,7 +62,7 @@ std::string slurp(const std::filesystem::path& path) {
 /// Exit status of the Khronos validator over files; 2 where node or the package is not there.
 int run_validator(const std::string& files) {
   if (!std::getenv("SUBVOL_NODE_MODULES") || std::system("node --version > /dev/null 2>&1") != 0) return 2;
-  const int status = std::system(("node \"" SUBVOL_SOURCE_DIR "/tests/gltf_validator.mjs\" " + files).c_str());
+  const int status = std::system(("node \"" + test::source_dir() + "/tests/gltf_validator.mjs\" " + files).c_str());
   return status == 0 ? 0 : status >> 8;
 }
 

@@ -5,6 +5,7 @@
 #include "fit/quality.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
+#include "tests/data.h"
 #include "tests/element_fixtures.h"
 #include "tests/temporary_folder.h"
 
@@ -59,7 +60,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 /// Exit status of a script under the first Python that has what it needs; 2 where none has.
 int run_python(const std::string& script, const std::filesystem::path& mesh, const std::filesystem::path& queries) {
   for (const std::string python : {"python3", "/usr/bin/python3"}) {
-    const int status = std::system((python + " \"" SUBVOL_SOURCE_DIR "/tests/" + script + "\" \"" + mesh.string() +
+    const int status = std::system((python + " \"" + test::source_dir() + "/tests/" + script + "\" \"" + mesh.string() +
                                     "\" \"" + queries.string() + "\" > \"" + queries.string() + ".out\" 2>&1")
                                        .c_str());
     const int exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 1;

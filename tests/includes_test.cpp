@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The layers only point down: docs/architecture.md, "Who may include whom".
 
+#include "tests/data.h"
+
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -16,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const fs::path kRoot = SUBVOL_SOURCE_DIR;
+const fs::path kRoot = subvol::test::source_dir();
 const std::vector<std::string> kLayers{"subvol", "fit", "shell", "export", "cli", "python", "samples", "bench", "tests"};
 
 const std::map<std::string, std::set<std::string>> kMayInclude{

@@ -3,6 +3,7 @@
 
 #include "samples/shapes.h"
 #include "subvol/mesh_io.h"
+#include "tests/data.h"
 #include "tests/temporary_folder.h"
 
 #include <nlohmann/json.hpp>
@@ -37,7 +38,7 @@ class Workplace {
 
   /// limit_kind, limit: of setrlimit, for the program alone; negative kind: none.
   pid_t start(const std::string& arguments, int limit_kind = -1, rlim_t limit = 0) const {
-    std::vector<std::string> words{SUBVOL_PROGRAM};
+    std::vector<std::string> words{program()};
     std::istringstream stream(arguments);
     for (std::string word; stream >> word;) words.push_back(word);
     const pid_t child = fork();
