@@ -58,16 +58,14 @@ void FitTarget::sample(std::size_t num_samples, std::size_t least) {
   surface.resample(std::max(1.8 * std::sqrt(surface.area() / count), 0.1 / std::sqrt(count)));
 }
 
-SurfaceDistance FitTarget::distance(const TriangleMesh& fitted, bool extremes) const {
+SurfaceDistance FitTarget::measure(const TriangleMesh& fitted, bool extremes) const {
   const ClosestPoint fitted_tree(fitted);
   return tree ? surface_distance(fitted, fitted_tree, mesh, *tree, {.extremes = extremes})
               : surface_distance(fitted_tree, surface.samples());
 }
 
-double FitTarget::mean_distance(const TriangleMesh& fitted) const { return distance(fitted, false).mean(); }
-
 double FitTarget::compare_start(const TriangleMesh& boundary, FitReport& report) {
-  const SurfaceDistance start = distance(boundary, true);
+  const SurfaceDistance start = distance(boundary);
   report.initial_distance_mean_percent = 100 * start.mean();
   report.initial_distance_max_percent = 100 * start.max();
   if (surface.volume_source() == VolumeSource::isoperimetric)

@@ -39,15 +39,16 @@ struct FitTarget {
   /// least  samples that are taken in any case (triangles have one each at least).
   void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples);
 
-  /// Mean symmetric distance to another surface; of a cloud, that of its points to the surface.
-  double mean_distance(const TriangleMesh& fitted) const;
+  /// Symmetric distances to another surface; of a cloud, those of its points to the surface.
+  SurfaceDistance distance(const TriangleMesh& fitted) const { return measure(fitted, true); }
+  double mean_distance(const TriangleMesh& fitted) const { return measure(fitted, false).mean(); }
 
   /// Notes how far a template's boundary is, the state of the target (`TargetReport`), and what no fit can change. Where
   /// the target encloses nothing the boundary's volume is taken for the one wanted. Returns the mean distance.
   double compare_start(const TriangleMesh& boundary, FitReport& report);
 
  private:
-  SurfaceDistance distance(const TriangleMesh& fitted, bool extremes) const;
+  SurfaceDistance measure(const TriangleMesh& fitted, bool extremes) const;
 };
 
 }  // namespace subvol

@@ -347,6 +347,12 @@ bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3>
   return changed;
 }
 
+void HighOrderEnergy::set_cell_weights(std::span<const double> weights) {
+  if (weights.size() != space_->num_cells()) throw InputError("HighOrderEnergy: weights must hold one entry per cell");
+  cell_weights_.assign(weights.begin(), weights.end());
+  rebuild_groups();
+}
+
 std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) const {
   return certify(*space_, nodes).not_certified;
 }
@@ -356,7 +362,7 @@ void HighOrderEnergy::densify(std::span<const Index> cells) {
   constexpr double kHeavier = 2;
   for (Index c : cells) {
     points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
-    cell_weights_[c] = std::min(heaviest_weight_, kHeavier * cell_weights_[c]);
+    cell_weights_[c] = std::max(cell_weights_[c], std::min(heaviest_weight_, kHeavier * cell_weights_[c]));
   }
   rebuild_groups();
 }

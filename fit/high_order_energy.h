@@ -23,8 +23,8 @@ struct CellGroup;
 ///
 /// e is a distortion (`hencky.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge
 /// length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
-/// coefficients of edge, face and cell modes. Cells weigh equally, but those that were densified twice as much each time,
-/// up to 64 times: e grows too slowly towards inversion to keep them from it.
+/// coefficients of edge, face and cell modes. Cells weigh equally unless weights are set, but those that were densified twice as much each
+/// time, up to 64: e grows too slowly towards inversion to keep them from it.
 ///
 /// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for n
 /// modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept as
@@ -61,6 +61,8 @@ class HighOrderEnergy final : public VolumeTerm {
   /// e, Hencky's to begin with.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
+  /// What each cell weighs, > 0, before any is densified; 1 for all to begin with. InputError: not one entry per cell.
+  void set_cell_weights(std::span<const double> weights);
   /// How much heavier than others a cell may become, >= 1 (default 64); 1: all weigh equally for good.
   void set_heaviest_weight(double heaviest) { heaviest_weight_ = heaviest; }
 

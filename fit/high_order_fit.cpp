@@ -6,6 +6,7 @@
 #include "fit/fit_level.h"
 #include "fit/fit_target.h"
 #include "fit/high_order_energy.h"
+#include "fit/high_order_quality.h"
 #include "fit/high_order_schedule.h"
 #include "fit/memory_budget.h"
 #include "fit/option_checks.h"
@@ -29,6 +30,10 @@ namespace {
 /// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is
 /// worth one.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
+/// Lifting the worst cells: those below this multiple of the least scaled Jacobian, as long as it is not good, become so
+/// much heavier each time; how much the distances may grow in all.
+constexpr int kMostLifts = 8, kLiftSteps = 8;
+constexpr double kBadShare = 1.3, kGoodScaledJacobian = 0.5, kLiftWeight = 1.5, kMostDistanceGrowth = 1.2;
 
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
@@ -56,6 +61,12 @@ class HighOrderFit {
   HighOrderFitResult run();
 
  private:
+  /// What a state is judged by where shape is weighed against distance.
+  struct Outcome {
+    double least_scaled_jacobian, mean_percent, max_percent;
+    std::size_t pairs;  ///< of faces that intersect
+    std::vector<double> cell_minima;
+  };
   void look_over_template();
   int sample_intervals(int order) const;
   bool has_room(const EntityOrders& orders);
@@ -71,8 +82,12 @@ class HighOrderFit {
   bool raise_where_it_pays();
   bool run_adaptive_orders();
   bool lower_lambda();
+  Outcome measured_outcome();
+  bool lift_worst_cells();
   bool meets_tolerance();
   TriangleMesh boundary(int intervals) const;
+  TriangleMesh measured_boundary() const;
+  double keep_mean(double distance);
   double measured_mean();
   std::size_t intersecting_pairs() const;
   void conclude();
@@ -88,6 +103,7 @@ class HighOrderFit {
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< the highest of any entity
   double lambda_ = 0;        ///< of the last stage
+  std::vector<double> cell_weights_;  ///< in E_W; empty: all 1
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
   MemoryBudget memory_;
@@ -150,6 +166,7 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
     points[c] = std::max(kLeastPoints, points_for_order(mesh.space.pattern_order(mesh.space.pattern(c))));
   auto volume = std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes_, points);
   volume->set_distortion(options_.distortion);
+  if (!cell_weights_.empty()) volume->set_cell_weights(cell_weights_);
   return {identity_map(mesh.space.num_nodes()), samples.positions, std::move(volume),
           make_surface_term(target_.surface, samples.triangles, samples.points.size(), stage.tangential_weight,
                             options_.correspondence),
@@ -163,6 +180,8 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   record.name = (try_ > 1 ? formatted("try %d, ", try_) : "") +
                 (least < order_ ? formatted("orders %d to %d", least, order_) : formatted("order %d", order_)) +
                 formatted(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
+  if (!cell_weights_.empty())
+    record.name += formatted(", worst cells up to %.3g times as heavy", std::ranges::max(cell_weights_));
   record.order = order_;
   record.cells = mesh_.space.num_cells();
   lambda_ = stage.lambda;
@@ -177,12 +196,17 @@ TriangleMesh HighOrderFit::boundary(int intervals) const {
   return {fine.positions.apply(mesh_.coefficients), std::move(fine.triangles)};
 }
 
-double HighOrderFit::measured_mean() {
-  if (!mean_) {
-    mean_ = 100 * target_.mean_distance(boundary(2 * sample_intervals(order_) + 1));
-    if (!report_.stages.empty()) report_.stages.back().mean_distance_percent = *mean_;
-  }
+/// Sampled more densely than what is fitted.
+TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sample_intervals(order_) + 1); }
+
+double HighOrderFit::keep_mean(double distance) {
+  mean_ = 100 * distance;
+  if (!report_.stages.empty()) report_.stages.back().mean_distance_percent = *mean_;
   return *mean_;
+}
+
+double HighOrderFit::measured_mean() {
+  return mean_ ? *mean_ : keep_mean(target_.mean_distance(measured_boundary()));
 }
 
 std::size_t HighOrderFit::intersecting_pairs() const { return self_intersections(boundary(sample_intervals(order_) + 1)).pairs.size(); }
@@ -217,14 +241,14 @@ bool HighOrderFit::run_order(Approach approach, int order) {
 /// The orders up to `last`, in the first way that gets near the target without folding its surface; else in the one of
 /// the tries that got nearest.
 bool HighOrderFit::run_first_orders(int last) {
-  struct Outcome {
+  struct Arrival {
     std::size_t pairs;
     double mean, distortion;
     HighOrderMesh mesh;
     std::vector<Vec3> ideal_boxes;
     Approach approach;
   };
-  std::optional<Outcome> best;
+  std::optional<Arrival> best;
   for (const HighOrderTry& attempt : schedule_.tries) {
     begin_try(attempt);
     for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
@@ -232,9 +256,9 @@ bool HighOrderFit::run_first_orders(int last) {
     if (schedule_.tries.size() == 1) return true;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
-    Outcome outcome{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_};
-    const bool better = !best || std::tuple(outcome.pairs > 0, outcome.mean) < std::tuple(best->pairs > 0, best->mean);
-    if (better) best = std::move(outcome);
+    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_};
+    const bool better = !best || std::tuple(arrival.pairs > 0, arrival.mean) < std::tuple(best->pairs > 0, best->mean);
+    if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
     if (best->pairs == 0 && fair) break;
   }
@@ -248,7 +272,7 @@ bool HighOrderFit::run_first_orders(int last) {
 bool HighOrderFit::run_higher_orders() {
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
-  return lower_lambda();
+  return lower_lambda() && lift_worst_cells();
 }
 
 /// Raises the orders of what gains most. False where that is not worth its nodes, or they have no room.
@@ -272,7 +296,7 @@ bool HighOrderFit::run_adaptive_orders() {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
   }
-  return report_.stop_reason != StopReason::memory_limit && lower_lambda();
+  return report_.stop_reason != StopReason::memory_limit && lower_lambda() && lift_worst_cells();
 }
 
 /// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the surface
@@ -293,6 +317,47 @@ bool HighOrderFit::lower_lambda() {
     }
     pairs = pairs_now;
     if (1 - measured_mean() / before < kLeastGain) break;
+  }
+  return true;
+}
+
+HighOrderFit::Outcome HighOrderFit::measured_outcome() {
+  const QualityReport quality = measure_quality(mesh_);
+  const SurfaceDistance distance = target_.distance(measured_boundary());
+  return {quality.min_scaled_jacobian, keep_mean(distance.mean()), 100 * distance.max(), intersecting_pairs(),
+          quality.cell_minima};
+}
+
+/// The last stage with more and more weight on the worst cells: E_W is a mean, to which few cells that are much worse than
+/// they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
+bool HighOrderFit::lift_worst_cells() {
+  if (options_.order < 2) return true;
+  Outcome now = measured_outcome();
+  const double most_mean = options_.tolerance_percent ? std::max(now.mean_percent, *options_.tolerance_percent)
+                                                      : kMostDistanceGrowth * now.mean_percent;
+  const double most_max = kMostDistanceGrowth * now.max_percent;
+  cell_weights_.assign(mesh_.space.num_cells(), 1.0);
+  const auto is_poor = [](double value) { return value > 0 && value < kGoodScaledJacobian; };
+  for (int round = 0; round < kMostLifts && is_poor(now.least_scaled_jacobian); ++round) {
+    const std::vector<Vec3> coefficients = mesh_.coefficients;
+    const double bad = std::min(kGoodScaledJacobian, kBadShare * now.least_scaled_jacobian);
+    for (std::size_t c = 0; c < cell_weights_.size(); ++c)
+      if (now.cell_minima[c] < bad) cell_weights_[c] *= kLiftWeight;
+    Stage stage = schedule_.final_stage(lambda_);
+    stage.max_iterations = kLiftSteps;
+    if (!run_stage(stage)) return false;
+    Outcome lifted = measured_outcome();
+    const double gain = lifted.least_scaled_jacobian / now.least_scaled_jacobian;
+    const double loss = std::max(lifted.mean_percent / now.mean_percent, lifted.max_percent / now.max_percent);
+    const bool worth_it = gain > std::max(1.0, loss) && lifted.mean_percent <= most_mean &&
+                          lifted.max_percent <= most_max && lifted.pairs <= now.pairs;
+    if (!worth_it) {
+      mesh_.coefficients = coefficients;
+      mean_ = now.mean_percent;
+      report_.stages.back().kept = false;
+      break;
+    }
+    now = std::move(lifted);
   }
   return true;
 }

@@ -6,6 +6,7 @@
 #include "fit/surface_distance.h"
 #include "sample_meshes.h"
 #include "samples/shapes.h"
+#include "subvol/auto_template.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
 #include "subvol/surface_io.h"
@@ -14,7 +15,9 @@
 #include <catch2/catch.hpp>
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 
 using namespace subvol;
@@ -106,6 +109,25 @@ TEST_CASE("an adaptive fit raises orders where the target has its detail, and me
   }
   CHECK(first == 2);
   CHECK(last > 4);
+}
+
+TEST_CASE("the worst cells of a fit are lifted where that costs little distance") {
+  // Cells of a grid have two faces on the torus, and are flat where these meet.
+  const samples::Sample torus = samples::torus_sample();
+  const AutoTemplateResult made = auto_templates(torus.target, {.cells = 40});
+  REQUIRE(!made.templates.empty());
+  const HighOrderFitResult result = fit_high_order(torus.target, made.templates.front().mesh, of_order(2));
+  const auto is_lift = [](const StageRecord& stage) { return stage.name.find("worst cells") != std::string::npos; };
+  const auto& stages = result.report.stages;
+  const auto first = std::find_if(stages.begin(), stages.end(), is_lift);
+  REQUIRE(first != stages.end());
+  CHECK(first->kept);
+  CHECK(std::all_of(first, stages.end(), is_lift));
+  double reached = 0;
+  for (auto stage = first; stage != stages.end(); ++stage)
+    if (stage->kept) reached = stage->mean_distance_percent;
+  CHECK(reached <= 1.2 * std::prev(first)->mean_distance_percent);
+  CHECK(positive(result.mesh, 9));
 }
 
 TEST_CASE("a high-order fit has the same bits for one and two threads") {
