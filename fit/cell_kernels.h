@@ -116,18 +116,20 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
             factor[2][l] * stress[3 * r + 2][l] * entry.gradient[2];
 }
 
-/// One of the distortions at one point.
+/// One of the distortions, at kAtOnce points.
 struct DistortionKernel {
-  HenckyBatch batch;
+  static constexpr int kAtOnce = 2;
+  using Batch = HenckyBatch;
+  Batch batches[kAtOnce];
   const DistortionKernels& kernels;
 
   DistortionKernel(double /*regularisation*/, const DistortionKernels& chosen, double floor) : kernels(chosen) {
-    batch.floor = floor;
+    for (Batch& batch : batches) batch.floor = floor;
   }
-  void evaluate_energy() { kernels.energy(batch); }
-  void evaluate_gradient() { kernels.gradient(batch); }
-  void evaluate_hessian() { kernels.hessian(batch); }
-  void add_hessian(std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
+  void evaluate_energy(int count) { kernels.energy(batches, count); }
+  void evaluate_gradient(int count) { kernels.gradient(batches, count); }
+  void evaluate_hessian(int count) { kernels.hessian(batches, count); }
+  void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
                    const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
     if (reference) premultiply(reference, batch.v);
     kernels.coupled ? add_point_hessian<true>(entries, batch, inverse_h, weight, k)
@@ -137,17 +139,19 @@ struct DistortionKernel {
 
 /// The regularised barrier at one point.
 struct RegularisedKernel {
-  RegularisedBatch batch;
+  static constexpr int kAtOnce = 1;
+  using Batch = RegularisedBatch;
+  Batch batches[kAtOnce];
   double epsilon;
 
   RegularisedKernel(double regularisation, const DistortionKernels&, double /*floor*/) : epsilon(regularisation) {}
-  void evaluate_energy() { regularised_barrier(batch, epsilon); }
-  void evaluate_gradient() { regularised_barrier(batch, epsilon); }
-  void evaluate_hessian() { regularised_barrier(batch, epsilon); }
+  void evaluate_energy(int /*count*/) { regularised_barrier(batches[0], epsilon); }
+  void evaluate_gradient(int /*count*/) { regularised_barrier(batches[0], epsilon); }
+  void evaluate_hessian(int /*count*/) { regularised_barrier(batches[0], epsilon); }
 
   /// K_ab = alpha w_a.w_b I + beta (J w_a (C w_b)^T + C w_a (J w_b)^T) + gamma C w_a (C w_b)^T for a <= b, with
   /// w_a = B^T diag(1/h) grad N_a, B the reference.
-  void add_hessian(std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
+  void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
                    const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
     alignas(64) double w[kMaxCellVertices][3][kLanes], jw[kMaxCellVertices][3][kLanes], cw[kMaxCellVertices][3][kLanes];
     for (std::size_t a = 0; a < entries.size(); ++a) {

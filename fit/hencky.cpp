@@ -62,38 +62,45 @@ SUBVOL_INLINE void rotate(Wide& app, Wide& aqq, Wide& apq, Wide& arp, Wide& arq,
     }
 }
 
-/// Eigenvalues, on the diagonal a00 a11 a22, and vectors, columns v0 v1 v2, of a symmetric matrix with entries of at
-/// most 1. Four cyclic sweeps reach rounding.
-template <bool kVectors>
-SUBVOL_INLINE void diagonalise(Wide& a00, Wide& a11, Wide& a22, Wide& a01, Wide& a12, Wide& a02, Wide* v0, Wide* v1,
-                               Wide* v2) {
-  for (int k = 0; k < 3; ++k) {
-    v0[k] = wide(k == 0);
-    v1[k] = wide(k == 1);
-    v2[k] = wide(k == 2);
-  }
+/// A symmetric matrix on its way to diagonal form; v: its eigenvectors, columns.
+struct Symmetric {
+  Wide diagonal[3], coupled[3];  ///< coupled: entries (0,1), (1,2), (2,0)
+  Wide v[3][3];
+};
+
+/// Eigenvalues, on the diagonals, and vectors of kMany matrices with entries of at most 1, side by side: a rotation waits
+/// for the one before, not for that of another matrix. Four cyclic sweeps reach rounding.
+template <bool kVectors, int kMany>
+SUBVOL_INLINE void diagonalise(Symmetric* m) {
+  for (int n = 0; n < kMany; ++n)
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) m[n].v[i][k] = wide(i == k);
   for (int sweep = 0; sweep < 4; ++sweep) {
-    rotate<kVectors>(a00, a11, a01, a02, a12, v0, v1);
-    rotate<kVectors>(a11, a22, a12, a01, a02, v1, v2);
-    rotate<kVectors>(a00, a22, a02, a01, a12, v0, v2);
+    for (int n = 0; n < kMany; ++n) {
+      Symmetric& a = m[n];
+      rotate<kVectors>(a.diagonal[0], a.diagonal[1], a.coupled[0], a.coupled[2], a.coupled[1], a.v[0], a.v[1]);
+    }
+    for (int n = 0; n < kMany; ++n) {
+      Symmetric& a = m[n];
+      rotate<kVectors>(a.diagonal[1], a.diagonal[2], a.coupled[1], a.coupled[0], a.coupled[2], a.v[1], a.v[2]);
+    }
+    for (int n = 0; n < kMany; ++n) {
+      Symmetric& a = m[n];
+      rotate<kVectors>(a.diagonal[0], a.diagonal[2], a.coupled[2], a.coupled[0], a.coupled[1], a.v[0], a.v[2]);
+    }
   }
 }
 
-/// Eigenvalues (and vectors, columns v0 v1 v2) of J^T J, for any stretch ratio.
-template <bool kVectors>
-SUBVOL_INLINE void right_singular(const Wide* j, Wide* lambda, Wide* v0, Wide* v1, Wide* v2) {
-  Wide a00 = j[0] * j[0] + j[3] * j[3] + j[6] * j[6];
-  Wide a11 = j[1] * j[1] + j[4] * j[4] + j[7] * j[7];
-  Wide a22 = j[2] * j[2] + j[5] * j[5] + j[8] * j[8];
-  const Wide trace = a00 + a11 + a22, scale = reciprocal(trace);
-  Wide a01 = scale * (j[0] * j[1] + j[3] * j[4] + j[6] * j[7]);
-  Wide a12 = scale * (j[1] * j[2] + j[4] * j[5] + j[7] * j[8]);
-  Wide a02 = scale * (j[0] * j[2] + j[3] * j[5] + j[6] * j[8]);
-  a00 *= scale, a11 *= scale, a22 *= scale;
-  diagonalise<kVectors>(a00, a11, a22, a01, a12, a02, v0, v1, v2);
-  lambda[0] = trace * a00;
-  lambda[1] = trace * a11;
-  lambda[2] = trace * a22;
+/// J^T J by its trace, which is returned.
+SUBVOL_INLINE Wide right_gram(const Wide* j, Symmetric& a) {
+  for (int i = 0; i < 3; ++i) {
+    const int k = i == 2 ? 0 : i + 1;
+    a.diagonal[i] = j[i] * j[i] + j[3 + i] * j[3 + i] + j[6 + i] * j[6 + i];
+    a.coupled[i] = j[i] * j[k] + j[3 + i] * j[3 + k] + j[6 + i] * j[6 + k];
+  }
+  const Wide trace = a.diagonal[0] + a.diagonal[1] + a.diagonal[2], scale = reciprocal(trace);
+  for (int i = 0; i < 3; ++i) a.diagonal[i] *= scale, a.coupled[i] *= scale;
+  return trace;
 }
 
 /// Raises the eigenvalues of a symmetric matrix to the floor; `coupled` are its entries (0,1), (1,2), (2,0).
@@ -101,12 +108,13 @@ SUBVOL_INLINE void clamp_symmetric(Wide* diagonal, Wide* coupled, const Wide& fl
   Wide sum = wide(1e-300);
   for (int i = 0; i < 3; ++i) sum += absolute(diagonal[i]) + absolute(coupled[i]);
   const Wide scale = reciprocal(sum);
-  Wide d[3], c[3], v[3][3];
-  for (int i = 0; i < 3; ++i) d[i] = scale * diagonal[i], c[i] = scale * coupled[i];
-  diagonalise<true>(d[0], d[1], d[2], c[0], c[1], c[2], v[0], v[1], v[2]);
+  Symmetric scaled;
+  for (int i = 0; i < 3; ++i) scaled.diagonal[i] = scale * diagonal[i], scaled.coupled[i] = scale * coupled[i];
+  diagonalise<true, 1>(&scaled);
+  const auto& v = scaled.v;
   for (int i = 0; i < 3; ++i) diagonal[i] = coupled[i] = Wide{};
   for (int e = 0; e < 3; ++e) {
-    Wide value = sum * d[e];
+    Wide value = sum * scaled.diagonal[e];
     value = value > floor ? value : floor;
     for (int i = 0; i < 3; ++i) {
       diagonal[i] += value * v[e][i] * v[e][i];
@@ -207,23 +215,21 @@ SUBVOL_INLINE void store_second(const LogModel& f, const Wide* lambda, const Wid
   }
 }
 
+/// Energy and derivatives from the eigenvalues and vectors of J^T J.
 template <Distortion kDistortion, Order kOrder>
-SUBVOL_INLINE void evaluate(HenckyBatch& batch) {
-  constexpr bool kVectors = kOrder != Order::energy;
-  Wide j[9], lambda[3], v[3][3], log_s[3];
-  for (int k = 0; k < 9; ++k) j[k] = load(batch.jacobian[k]);
-  // Infeasible lanes are computed as if J were the identity, so that nothing in them can overflow or trap.
-  const WideBits feasible = determinant(j) > 0;
-  for (int k = 0; k < 9; ++k) j[k] = feasible ? j[k] : wide(k % 4 == 0 ? 1.0 : 0.0);
-  right_singular<kVectors>(j, lambda, v[0], v[1], v[2]);
+SUBVOL_INLINE void evaluate_at(const Wide* j, const WideBits& feasible, const Wide& trace, const Symmetric& eigen,
+                               HenckyBatch& batch) {
+  Wide lambda[3], log_s[3];
+  const auto& v = eigen.v;
   for (int i = 0; i < 3; ++i) {
     // Rounding may leave an eigenvalue at or below zero when J is nearly singular.
+    lambda[i] = trace * eigen.diagonal[i];
     lambda[i] = lambda[i] > 1e-280 ? lambda[i] : wide(1e-280);
     log_s[i] = 0.5 * log_positive(lambda[i]);
   }
   const LogModel f = log_model<kDistortion>(lambda, log_s);
   store(feasible ? f.value : wide(std::numeric_limits<double>::infinity()), batch.energy);
-  if constexpr (kVectors) {
+  if constexpr (kOrder != Order::energy) {
     const Wide on = feasible ? wide(1) : wide(0);
     Wide inverse_s[3], w[3], jv[3][3];
     for (int i = 0; i < 3; ++i) {
@@ -244,6 +250,29 @@ SUBVOL_INLINE void evaluate(HenckyBatch& batch) {
       store_second<kDistortion>(f, lambda, inverse_s, on, batch);
     }
   }
+}
+
+template <Distortion kDistortion, Order kOrder, int kMany>
+SUBVOL_INLINE void evaluate_some(HenckyBatch* batches) {
+  Wide j[kMany][9], trace[kMany];
+  WideBits feasible[kMany];
+  Symmetric eigen[kMany];
+  for (int n = 0; n < kMany; ++n) {
+    for (int k = 0; k < 9; ++k) j[n][k] = load(batches[n].jacobian[k]);
+    // Infeasible lanes are computed as if J were the identity, so that nothing in them can overflow or trap.
+    feasible[n] = determinant(j[n]) > 0;
+    for (int k = 0; k < 9; ++k) j[n][k] = feasible[n] ? j[n][k] : wide(k % 4 == 0 ? 1.0 : 0.0);
+    trace[n] = right_gram(j[n], eigen[n]);
+  }
+  diagonalise<kOrder != Order::energy, kMany>(eigen);
+  for (int n = 0; n < kMany; ++n) evaluate_at<kDistortion, kOrder>(j[n], feasible[n], trace[n], eigen[n], batches[n]);
+}
+
+template <Distortion kDistortion, Order kOrder>
+void evaluate(HenckyBatch* batches, int count) {
+  int n = 0;
+  for (; n + 2 <= count; n += 2) evaluate_some<kDistortion, kOrder, 2>(batches + n);
+  if (n < count) evaluate_some<kDistortion, kOrder, 1>(batches + n);
 }
 
 template <Distortion kDistortion>
@@ -270,11 +299,11 @@ const DistortionKernels& kernels_of(Distortion distortion) {
   return kKernels<Distortion::hencky>;
 }
 
-void hencky_energy(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::energy>(batch); }
+void hencky_energy(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::energy>(&batch, 1); }
 
-void hencky_gradient(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::gradient>(batch); }
+void hencky_gradient(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::gradient>(&batch, 1); }
 
-void hencky_hessian(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::hessian>(batch); }
+void hencky_hessian(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::hessian>(&batch, 1); }
 
 double hencky(const Mat3& jacobian, Mat3* stress) {
   HenckyBatch batch;

@@ -49,11 +49,12 @@ struct HenckyBatch {
   double floor = kHessianFloor;              ///< in: least eigenvalue of the second derivative; -infinity: as it is
 };
 
-/// What is done at a point for one distortion. Each fills what comes before it, too.
+/// What is done at points for one distortion. Each fills what comes before it, too. Of several batches two are worked on
+/// side by side, which takes less time than one after the other; what comes out is the same but for rounding.
 struct DistortionKernels {
-  void (*energy)(HenckyBatch&);    ///< `energy`
-  void (*gradient)(HenckyBatch&);  ///< and `stress`
-  void (*hessian)(HenckyBatch&);   ///< everything
+  void (*energy)(HenckyBatch* batches, int count);    ///< `energy`
+  void (*gradient)(HenckyBatch* batches, int count);  ///< and `stress`
+  void (*hessian)(HenckyBatch* batches, int count);   ///< everything
   bool coupled;                    ///< whether stretches are coupled
 };
 const DistortionKernels& kernels_of(Distortion distortion);

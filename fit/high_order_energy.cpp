@@ -188,29 +188,33 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
               local_.data() + group.local_begin + 3 * batch * group.num_modes * kLanes);
 }
 
-/// The energy at the nodes, by kernel(hencky) at every point. With kBack, what the batches add to their modes stays in
+/// The energy at the nodes, by kernel(batches, count) at all points. With kBack, what the batches add to their modes stays in
 /// local_. Calls per_point(group number, batch, q, hencky) when a point is done.
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
     const Wide cell_weight = group.cell_weights[b];
-    HenckyBatch hencky;
-    hencky.floor = floor_;
+    HenckyBatch hencky[CellSweep::kAtOnce];
+    for (HenckyBatch& batch : hencky) batch.floor = floor_;
     Wide sum{};
     sweep.load(b, nodes);
-    sweep.template run<kBack>([&](std::size_t q, Wide* j) {
-      const Wide* reference = group.reference(b, q);
+    sweep.template run_several<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
       Wide f[9];
-      product(j, reference, f);
-      for (int e = 0; e < 9; ++e) store_wide(f[e], hencky.jacobian[e]);
-      kernel(hencky);
-      sum += group.weights[q] * load_wide(hencky.energy);
-      if constexpr (kBack) {
-        for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load_wide(hencky.stress[e]);
-        product_with_transpose(f, reference, j);
+      for (int n = 0; n < count; ++n) {
+        product(j[n], group.reference(b, first + n), f);
+        for (int e = 0; e < 9; ++e) store_wide(f[e], hencky[n].jacobian[e]);
       }
-      per_point(g, b, q, hencky);
+      kernel(hencky, count);
+      for (int n = 0; n < count; ++n) {
+        const std::size_t q = first + n;
+        sum += group.weights[q] * load_wide(hencky[n].energy);
+        if constexpr (kBack) {
+          for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load_wide(hencky[n].stress[e]);
+          product_with_transpose(f, group.reference(b, q), j[n]);
+        }
+        per_point(g, b, q, hencky[n]);
+      }
     });
     if constexpr (kBack) keep(group, b, sweep.coefficients());
     double total = 0;

@@ -176,19 +176,33 @@ struct VolumeEnergy::BatchState {
   }
 };
 
+/// Has a kernel evaluated at all points of a batch, some at a time, and calls per_point(q, kernel batch) with the results.
+template <class Kernel, class PerPoint>
+void VolumeEnergy::for_points(const Group& group, std::size_t b, const BatchState& state, Kernel& kernel,
+                              void (Kernel::*evaluate)(int), const PerPoint& per_point) const {
+  const std::size_t num_points = group.rule.num_points();
+  for (std::size_t first = 0; first < num_points; first += Kernel::kAtOnce) {
+    const int count = static_cast<int>(std::min<std::size_t>(Kernel::kAtOnce, num_points - first));
+    for (int n = 0; n < count; ++n) {
+      auto& jacobian = kernel.batches[n].jacobian;
+      jacobians(group.rule.point(first + n), state.x, state.inverse_h, jacobian);
+      if (reference_) multiply_lanes(jacobian, group.reference(b, first + n));
+    }
+    (kernel.*evaluate)(count);
+    for (int n = 0; n < count; ++n) per_point(first + n, kernel.batches[n]);
+  }
+}
+
 template <class Kernel>
 double VolumeEnergy::value_of(std::span<const Vec3> nodes) const {
   return sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);
     Kernel kernel(epsilon_, *kernels_, floor_);
     double sum = 0;
-    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
-      if (reference_) multiply_lanes(kernel.batch.jacobian, group.reference(b, q));
-      kernel.evaluate_energy();
+    for_points(group, b, state, kernel, &Kernel::evaluate_energy, [&](std::size_t q, const auto& batch) {
       for (int l = 0; l < group.active[b]; ++l)
-        sum += weights_[group.batches[b][l]] * group.rule.weights[q] * kernel.batch.energy[l];
-    }
+        sum += weights_[group.batches[b][l]] * group.rule.weights[q] * batch.energy[l];
+    });
     return sum;
   });
 }
@@ -203,18 +217,15 @@ double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale,
     alignas(64) double g[kMaxCellVertices][3][kLanes] = {}, factor[3][kLanes];
     Kernel kernel(epsilon_, *kernels_, floor_);
     double sum = 0;
-    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
-      jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
-      if (reference_) multiply_lanes(kernel.batch.jacobian, group.reference(b, q));
-      kernel.evaluate_gradient();
-      if (reference_) multiply_lanes_transposed(kernel.batch.stress, group.reference(b, q));
+    for_points(group, b, state, kernel, &Kernel::evaluate_gradient, [&](std::size_t q, auto& batch) {
+      if (reference_) multiply_lanes_transposed(batch.stress, group.reference(b, q));
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
-        if (l < group.active[b]) sum += w * kernel.batch.energy[l];
+        if (l < group.active[b]) sum += w * batch.energy[l];
       }
-      add_point_gradient(group.rule.point(q), kernel.batch.stress, factor, g);
-    }
+      add_point_gradient(group.rule.point(q), batch.stress, factor, g);
+    });
     const int n = cell_topology(group.rule.kind).num_vertices;
     for (int l = 0; l < group.active[b]; ++l) {
       const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[group.batches[b][l]];
@@ -241,21 +252,18 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
     for (int a = 0; a < n; ++a)
       for (int c = a; c < n; ++c) std::fill_n(&k[a * n_max + c][0][0], 9 * kLanes, 0.0);
     double sum = 0;
-    for (std::size_t q = 0; q < group.rule.num_points(); ++q) {
+    for_points(group, b, state, kernel, &Kernel::evaluate_hessian, [&](std::size_t q, auto& batch) {
       const double(*reference)[kLanes] = reference_ ? group.reference(b, q) : nullptr;
-      jacobians(group.rule.point(q), state.x, state.inverse_h, kernel.batch.jacobian);
-      if (reference) multiply_lanes(kernel.batch.jacobian, reference);
-      kernel.evaluate_hessian();
-      if (reference) multiply_lanes_transposed(kernel.batch.stress, reference);
+      if (reference) multiply_lanes_transposed(batch.stress, reference);
       for (int l = 0; l < kLanes; ++l) {
         const double w = weights_[group.batches[b][l]] * group.rule.weights[q];
         weight[l] = scale * w;
         for (int c = 0; c < 3; ++c) factor[c][l] = scale * w * state.inverse_h[c][l];
-        if (l < group.active[b]) sum += w * kernel.batch.energy[l];
+        if (l < group.active[b]) sum += w * batch.energy[l];
       }
-      add_point_gradient(group.rule.point(q), kernel.batch.stress, factor, g);
-      kernel.add_hessian(group.rule.point(q), reference, state.inverse_h, weight, k);
-    }
+      add_point_gradient(group.rule.point(q), batch.stress, factor, g);
+      kernel.add_hessian(batch, group.rule.point(q), reference, state.inverse_h, weight, k);
+    });
     for (int l = 0; l < group.active[b]; ++l) {
       const Index cell = group.batches[b][l];
       const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[cell];

@@ -81,6 +81,9 @@ class VolumeEnergy final : public VolumeTerm {
 
   struct BatchState;
 
+  template <class Kernel, class PerPoint>
+  void for_points(const Group& group, std::size_t b, const BatchState& state, Kernel& kernel,
+                  void (Kernel::*evaluate)(int), const PerPoint& per_point) const;
   template <class Kernel>
   double value_of(std::span<const Vec3> nodes) const;
   template <class Kernel>

@@ -16,9 +16,11 @@
 #include <Eigen/SVD>
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 using namespace subvol;
 using namespace subvol::test;
@@ -45,7 +47,7 @@ HenckyBatch evaluated(Distortion distortion, const Mat3& j, double floor = kHess
   batch.floor = floor;
   for (int e = 0; e < 9; ++e)
     for (int l = 0; l < kLanes; ++l) batch.jacobian[e][l] = j(e / 3, e % 3);
-  kernels_of(distortion).hessian(batch);
+  kernels_of(distortion).hessian(&batch, 1);
   return batch;
 }
 
@@ -157,6 +159,25 @@ TEST_CASE("Distortions are what their definitions say, 0 where cells are ideal, 
     CHECK(second_derivative(inverted, distortion != Distortion::hencky).norm() == 0);
     // Towards inversion all grow without bound.
     CHECK(evaluated(distortion, Vec3(1, 1, 1e-6).asDiagonal()).energy[0] > 50);
+  }
+}
+
+TEST_CASE("Batches of Jacobians worked on side by side give what they give alone") {
+  for (Distortion distortion : kAll) {
+    std::vector<HenckyBatch> together, alone;
+    for (const Mat3& j : test_jacobians()) alone.push_back(evaluated(distortion, j));
+    alone.push_back(evaluated(distortion, Vec3(1, 1, -1).asDiagonal()));
+    if (alone.size() % 2 == 0) alone.push_back(evaluated(distortion, Vec3(1, 2, 3).asDiagonal()));
+    for (const HenckyBatch& batch : alone) {
+      HenckyBatch& copy = together.emplace_back();
+      copy.floor = batch.floor;
+      std::copy_n(&batch.jacobian[0][0], 9 * kLanes, &copy.jacobian[0][0]);
+    }
+    kernels_of(distortion).hessian(together.data(), static_cast<int>(together.size()));
+    for (std::size_t n = 0; n < alone.size(); ++n) {
+      CHECK(together[n].energy[kLanes - 1] == Approx(alone[n].energy[0]).margin(1e-14));
+      CHECK((matrix(together[n].stress) - matrix(alone[n].stress)).norm() <= 1e-13 * (1 + matrix(alone[n].stress).norm()));
+    }
   }
 }
 
