@@ -26,6 +26,7 @@
 #include <new>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace subvol {
 
@@ -63,7 +64,8 @@ class SubdivisionFit {
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   bool run_stage(const Stage& stage, const std::string& name);
   bool run_stages();
-  bool lower_lambda();
+  bool unfold(const std::vector<Vec3>& start, std::size_t& pairs);
+  bool lower_lambda(std::size_t pairs);
   TriangleMesh limit_triangles();
   double measured_mean();
   VolumeMesh current_mesh() const;
@@ -244,11 +246,33 @@ bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
+/// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself: thin
+/// walls that meet in a soft fit stay apart in a stiffer one. Ends where that does not help.
+bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) {
+  for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= kMostUnfoldingLambda;
+       lambda *= kUnfoldingFactor) {
+    const Stage stage = schedule_.final_stage(lambda);
+    const std::vector<Vec3> before = std::exchange(unknowns_, start);
+    const double lambda_before = lambda_;
+    if (!run_stage(stage, stage_name(stage))) return false;
+    const std::size_t pairs_now = intersecting_pairs();
+    if (pairs_now >= pairs) {
+      unknowns_ = before;
+      lambda_ = lambda_before;
+      mean_.reset();
+      result_.report.stages.back().kept = false;
+      break;
+    }
+    pairs = pairs_now;
+  }
+  return true;
+}
+
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
 /// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
-/// A stage that makes the boundary intersect itself more, or without a tolerance has cost too much of the shape in all,
+/// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too much of the shape in all,
 /// is undone.
-bool SubdivisionFit::lower_lambda() {
+bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
   const auto distortion = [this] {
@@ -257,7 +281,6 @@ bool SubdivisionFit::lower_lambda() {
   };
   double mean = measured_mean(), volume = distortion();
   const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
-  std::size_t pairs = intersecting_pairs();
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
     const std::vector<Vec3> before = unknowns_;
@@ -280,11 +303,14 @@ bool SubdivisionFit::lower_lambda() {
 }
 
 bool SubdivisionFit::run_stages() {
+  const std::vector<Vec3> start = unknowns_;
   for (const Stage& stage : schedule_.stages(number_)) {
     if (!run_stage(stage, stage_name(stage))) return false;
-    if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) return true;
+    if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) break;
   }
-  return !finest() || lower_lambda();
+  if (!finest()) return true;
+  std::size_t pairs = intersecting_pairs();
+  return unfold(start, pairs) && lower_lambda(pairs);
 }
 
 /// All or nothing: memory may run out here.

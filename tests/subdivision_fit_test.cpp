@@ -149,6 +149,29 @@ TEST_CASE("L-BFGS decreases the energy as well and ends with certified cells") {
   CHECK(mesh_percent(result.mesh, sample.target) < 0.5 * result.report.initial_distance_mean_percent);
 }
 
+TEST_CASE("A fit whose boundary meets itself is tried again with stiffer cells, and kept as it was where that is no help") {
+  // Two blocks on the same place: no weight takes them apart.
+  const samples::Sample ball = samples::ball_sample();
+  VolumeMesh twice = ball.template_mesh;
+  const auto shift = static_cast<Index>(twice.num_vertices());
+  for (const Vec3& x : ball.template_mesh.positions) twice.positions.push_back(x + Vec3(0.01, 0.02, 0.03));
+  for (std::size_t c = 0; c < ball.template_mesh.num_cells(); ++c) {
+    std::vector<Index> corners;
+    for (Index v : ball.template_mesh.cell(c)) corners.push_back(v + shift);
+    twice.add_cell(ball.template_mesh.kinds[c], corners);
+  }
+  FitOptions options = quick(1);
+  options.tolerance_percent = 50;  // met at once: nothing else follows
+  const FitResult result = fit_subdivision_volume(ball.target, twice, options);
+  CHECK(result.report.stop_reason == StopReason::converged);
+  CHECK(certify(result.mesh).all_certified());
+  const auto& stages = result.report.stages;
+  REQUIRE(stages.size() >= 2);
+  CHECK(stages.back().lambda == Approx(4 * stages[stages.size() - 2].lambda));
+  const auto kept = std::find_if(stages.rbegin(), stages.rend(), [](const StageRecord& stage) { return stage.kept; });
+  CHECK((stages.back().kept || kept->lambda < stages.back().lambda));
+}
+
 TEST_CASE("A tolerance that is met ends the fit, one out of reach is said to be missed") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick();
