@@ -32,7 +32,7 @@ StageLog earlier_log(const std::string& file, const RunIdentity& identity) {
 void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
   const auto group = "Long runs";
   CLI::Option* checkpoint =
-      verb.add_option("--checkpoint", options.checkpoint, "Keep in FILE what --resume needs, as minimisations end")
+      verb.add_option("--checkpoint", options.checkpoint, "Keep in FILE what --resume needs, as the run goes on")
           ->type_name("FILE")
           ->group(group);
   verb.add_option("--every", options.every_seconds, "Write the checkpoint at most so often")

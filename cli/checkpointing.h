@@ -26,7 +26,7 @@ std::string fingerprint(const VolumeMesh& mesh);
 /// A run by its version, verb, inputs (name and fingerprint), and those options that bear on the result of the fit.
 RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs);
 
-/// Goes on from the checkpoint of an earlier run, and keeps one of this run as its minimisations end.
+/// Goes on from the checkpoint of an earlier run, and keeps one of this run as its minimisations go on.
 class Checkpointing {
  public:
   /// Reads the file of --resume. InputError: it cannot be used, or is of another run.

@@ -14,7 +14,7 @@ namespace subvol {
 
 namespace {
 
-constexpr std::string_view kFormat = "subvol checkpoint 1\n";
+constexpr std::string_view kFormat = "subvol checkpoint 2\n";
 constexpr std::size_t kFingerprintDigits = 16, kStepNumbers = 5;
 
 class Writer {
@@ -25,6 +25,10 @@ class Writer {
     raw(text.data(), text.size());
   }
   void numbers(std::span<const double> values) {
+    number(values.size());
+    raw(values.data(), values.size_bytes());
+  }
+  void indices(std::span<const Index> values) {
     number(values.size());
     raw(values.data(), values.size_bytes());
   }
@@ -55,6 +59,12 @@ class Reader {
       throw InputError("a number is not finite");
     return values;
   }
+  std::vector<Index> indices() {
+    const std::string_view raw = take(number(), sizeof(Index));
+    std::vector<Index> values(raw.size() / sizeof(Index));
+    if (!values.empty()) std::memcpy(values.data(), raw.data(), raw.size());
+    return values;
+  }
   bool at_end() const { return bytes_.empty(); }
 
  private:
@@ -81,10 +91,14 @@ void write_stage(const SolvedStage& stage, Writer& writer) {
   writer.numbers(std::span(&stage.seconds, 1));
   writer.numbers(steps);
   writer.numbers(x);
+  writer.number(static_cast<std::uint64_t>(stage.result.small_steps));
+  writer.number(stage.result.densified.size());
+  for (const std::vector<Index>& cells : stage.result.densified) writer.indices(cells);
 }
 
 MinimizerStop stop_of(std::uint64_t number) {
-  for (const MinimizerStop stop : {MinimizerStop::converged, MinimizerStop::iteration_limit, MinimizerStop::no_step})
+  for (const MinimizerStop stop : {MinimizerStop::converged, MinimizerStop::iteration_limit, MinimizerStop::no_step,
+                                   MinimizerStop::cancelled})
     if (number == static_cast<std::uint64_t>(stop)) return stop;
   throw InputError("a minimisation ends in no known way");
 }
@@ -108,6 +122,8 @@ SolvedStage read_stage(Reader& reader) {
     stage.result.iterations.push_back(
         {steps[i], steps[i + 1], steps[i + 2], count_of(steps[i + 3]), count_of(steps[i + 4])});
   for (std::size_t i = 0; i < x.size(); i += 3) stage.x.emplace_back(x[i], x[i + 1], x[i + 2]);
+  stage.result.small_steps = count_of(static_cast<double>(reader.number()));
+  for (std::uint64_t left = reader.number(); left > 0; --left) stage.result.densified.push_back(reader.indices());
   return stage;
 }
 
@@ -118,7 +134,10 @@ Checkpoint read_content(std::string_view content) {
     std::string key = reader.text(), value = reader.text();
     checkpoint.identity.emplace_back(std::move(key), std::move(value));
   }
-  for (std::uint64_t left = reader.number(); left > 0; --left) checkpoint.stages.push_back(read_stage(reader));
+  for (std::uint64_t left = reader.number(); left > 0; --left) {
+    checkpoint.stages.push_back(read_stage(reader));
+    if (left > 1 && !checkpoint.stages.back().is_over()) throw InputError("a minimisation that is not over is followed by one");
+  }
   if (!reader.at_end()) throw InputError("something follows its end");
   return checkpoint;
 }

@@ -147,6 +147,12 @@ void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
   });
 }
 
+void ClosestPointEnergy::forget() {
+  surface_tree_.reset();
+  target_hits_.clear();
+  surface_hints_.clear();
+}
+
 ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
   double to_surface = 0, to_target = 0, area = 0, max = 0;
   for (std::size_t j = 0; j < target_hits_.size(); ++j) {

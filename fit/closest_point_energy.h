@@ -41,6 +41,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// Cost: one closest-point query per target sample and per quadrature point. The answers of the call before are where
   /// the search starts, and the tree over S~ moves along.
   void assign(std::span<const Vec3> samples) override;
+  void forget() override;
 
   /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by
   /// area; what lies over a rim of the target does not count.

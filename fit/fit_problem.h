@@ -38,6 +38,16 @@ struct FitProblem {
   double lambda;                          ///< > 0
 };
 
+enum class MinimizerStop { converged, iteration_limit, cancelled, no_step };
+
+struct MinimizerResult {
+  MinimizerStop stop;
+  std::string explanation;  ///< the test that fired, with its figure
+  std::vector<IterationRecord> iterations;
+  std::vector<std::vector<Index>> densified{};  ///< cells that were given more quadrature points, in this order
+  int small_steps = 0;                          ///< how many of the last steps decreased E by next to nothing
+};
+
 struct MinimizerOptions {
   int max_iterations = 20;
   double relative_decrease = 1e-3;  ///< converged when two steps in a row decrease E by less than this share of E
@@ -48,14 +58,10 @@ struct MinimizerOptions {
   /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled with
   /// the step before.
   std::function<bool()> ended;
-};
-
-enum class MinimizerStop { converged, iteration_limit, cancelled, no_step };
-
-struct MinimizerResult {
-  MinimizerStop stop;
-  std::string explanation;  ///< the test that fired, with its figure
-  std::vector<IterationRecord> iterations;
+  /// Newton's method only: called every few steps with x and what has been done so far, which is all that it takes to go
+  /// on from there (`begun`).
+  std::function<void(std::span<const Vec3> x, const MinimizerResult& so_far)> keep;
+  const MinimizerResult* begun = nullptr;  ///< what was done to get to x, as `keep` was told; null: nothing
 };
 
 /// Ends the result as cancelled where the caller wants an end within a step.
@@ -69,7 +75,9 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 /// that stand in the way get a denser quadrature for the steps to come. Where few points would make the step shorter than a
 /// half, the Hessian is made stiffer there (`VolumeTerm::stiffen`) and the direction found again.
 ///
-/// x  feasible start (finite E), else `no_step`; receives the result.
+/// x  feasible start (finite E), else `no_step`; receives the result. With `begun`, where that was kept: it then ends at the
+///    same bits as the minimisation that was interrupted would have. The problem must be as it was at the start of that
+///    one, else InputError where a cell does not exist.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 /// The reference that Newton is measured against, and the paper's algorithm 2: L-BFGS (m = 10) with a weak Wolfe line

@@ -365,6 +365,8 @@ void HighOrderEnergy::densify(std::span<const Index> cells) {
   constexpr int kMostPoints = 33;
   constexpr double kHeavier = 2;
   for (Index c : cells) {
+    if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
+      throw InputError("HighOrderEnergy: there is no cell " + std::to_string(c));
     points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
     cell_weights_[c] = std::max(cell_weights_[c], std::min(heaviest_weight_, kHeavier * cell_weights_[c]));
   }

@@ -147,6 +147,9 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
   constexpr int kMaxHalvings = 30, kPreconditionerLife = 4, kMaxStiffenings = 5;
   constexpr double kShortStep = 0.5;
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
+  if (options.begun) result = *options.begun;
+  result.stop = MinimizerStop::iteration_limit;
+  for (const std::vector<Index>& cells : result.densified) problem.volume->densify(cells);
   const std::size_t n = x.size();
   std::vector<Vec3> y(problem.nodes.num_rows()), z(problem.samples.num_rows());
   problem.apply_nodes(x, y);
@@ -155,9 +158,15 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       dz(z.size()), y_trial(y.size()), z_trial(z.size());
   std::vector<Mat3> inverse_diagonal;
   std::vector<Index> uncertified = problem.volume->uncertified(y);
-  int small_steps = 0;
 
-  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
+  for (int iteration = static_cast<int>(result.iterations.size()); iteration < options.max_iterations; ++iteration) {
+    // Here x and the result are all that passes on, so that they are enough to go on from.
+    if (iteration > 0 && iteration % kPreconditionerLife == 0) {
+      if (problem.surface) problem.surface->forget();
+      inverse_diagonal.clear();
+      uncertified = problem.volume->uncertified(y);
+      if (options.keep) options.keep(x, result);
+    }
     IterationRecord record;
     if (problem.surface) problem.surface->assign(z);
     std::fill(node_gradient.begin(), node_gradient.end(), Vec3::Zero());
@@ -178,7 +187,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     }
 
     // The diagonal changes slowly once the first steps are done.
-    if (iteration < 2 || iteration % kPreconditionerLife == 0) inverse_diagonal.clear();
+    if (iteration < 2) inverse_diagonal.clear();
     double slope = 0, t = 0;
     for (int round = 0;; ++round) {
       ReducedHessian reduced(problem, inverse_diagonal);
@@ -216,7 +225,10 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       accepted = failed.empty();
       blocking.insert(blocking.end(), failed.begin(), failed.end());
     }
-    if (!blocking.empty()) problem.volume->densify(blocking);
+    if (!blocking.empty()) {
+      problem.volume->densify(blocking);
+      result.densified.push_back(std::move(blocking));
+    }
     if (!accepted) {
       result.stop = MinimizerStop::no_step;
       result.explanation = "no step along the search direction decreases the energy";
@@ -231,8 +243,8 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     record.step_length = t;
     if (!record_step(record, options, result)) return result;
     const double decrease = (energy - trial) / energy;
-    small_steps = decrease < options.relative_decrease ? small_steps + 1 : 0;
-    if (small_steps == 2) {
+    result.small_steps = decrease < options.relative_decrease ? result.small_steps + 1 : 0;
+    if (result.small_steps == 2) {
       result.stop = MinimizerStop::converged;
       result.explanation = describe("relative decrease of the energy %.2g in two steps running", decrease);
       return result;

@@ -10,13 +10,15 @@
 
 namespace subvol {
 
-/// What one minimisation came to.
+/// What one minimisation came to, or has come to so far.
 struct SolvedStage {
   std::string name;
   std::uint64_t start = 0;  ///< fingerprint of the state and the weights it started from
-  std::vector<Vec3> x;      ///< where it ended
-  MinimizerResult result;   ///< never `cancelled`
+  std::vector<Vec3> x;      ///< where it ended, or is
+  MinimizerResult result;   ///< `cancelled`: not over, to go on from x
   double seconds = 0;
+
+  bool is_over() const { return result.stop != MinimizerStop::cancelled; }
 };
 
 /// The minimisations of a fit, in the order they ran.
@@ -33,12 +35,13 @@ class StageLog {
   StageLog(std::vector<SolvedStage> done, std::string source)
       : stages_(std::move(done)), source_(std::move(source)), earlier_(stages_.size()) {}
 
-  /// The next stage of the earlier run, or null once all have been taken: the stage must then be solved.
+  /// The next stage of the earlier run, or null once all have been taken: the stage must then be solved. The last of them
+  /// may not be over.
   /// InputError: it did not start from here. The input or the options are others, or the program or machine is another.
   ///
   /// begun  the stage that is to be solved: its name, fingerprint and start x.
   const SolvedStage* recall(const SolvedStage& begun);
-  /// Keeps a stage that was solved.
+  /// Keeps a stage that was solved, or how far it has come: that takes the place of what was kept of it before.
   void add(SolvedStage stage);
 
   const std::vector<SolvedStage>& stages() const { return stages_; }

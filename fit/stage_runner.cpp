@@ -54,9 +54,14 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   SolvedStage solved{record.name, options_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
   const SolvedStage* known = options_.log ? options_.log->recall(solved) : nullptr;
   if (known) solved = *known;
-  else solve(problem, minimizer, solved);
-  bool going = solved.result.stop != MinimizerStop::cancelled;
-  if (known && !solved.result.iterations.empty()) going = minimizer.progress(solved.result.iterations.back());
+  bool going = true;
+  if (!known || !known->is_over()) {
+    iteration = static_cast<int>(solved.result.iterations.size());
+    solve(problem, minimizer, solved);
+    going = solved.is_over();
+  } else if (!solved.result.iterations.empty()) {
+    going = minimizer.progress(solved.result.iterations.back());
+  }
   x = std::move(solved.x);
   record.seconds = solved.seconds;
   record.iterations = std::move(solved.result.iterations);
@@ -78,12 +83,20 @@ bool StageRunner::in_time(const std::string& work, FitReport& report) const {
   return false;
 }
 
-void StageRunner::solve(FitProblem& problem, const MinimizerOptions& minimizer, SolvedStage& stage) const {
-  const double begin = seconds();
+void StageRunner::solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const {
+  const double begin = seconds() - stage.seconds;
+  const MinimizerResult begun = stage.result;
+  if (!begun.iterations.empty()) minimizer.begun = &begun;
+  if (options_.log)
+    minimizer.keep = [&](std::span<const Vec3> x, const MinimizerResult& so_far) {
+      SolvedStage kept{stage.name, stage.start, std::vector<Vec3>(x.begin(), x.end()), so_far, seconds() - begin};
+      kept.result.stop = MinimizerStop::cancelled;
+      options_.log->add(std::move(kept));
+    };
   stage.result = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, stage.x, minimizer)
                                                       : minimize_newton(problem, stage.x, minimizer);
   stage.seconds = seconds() - begin;
-  if (options_.log && stage.result.stop != MinimizerStop::cancelled) options_.log->add(stage);
+  if (options_.log && stage.is_over()) options_.log->add(stage);
 }
 
 }  // namespace subvol

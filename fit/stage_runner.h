@@ -54,7 +54,8 @@ class StageRunner {
   using Clock = std::chrono::steady_clock;
 
   bool is_over() const { return options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds; }
-  void solve(FitProblem& problem, const MinimizerOptions& minimizer, SolvedStage& stage) const;
+  /// From the stage's x, and what was done to get there, on.
+  void solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const;
 
   Options options_;
   Clock::time_point start_ = Clock::now();

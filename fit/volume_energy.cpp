@@ -90,7 +90,11 @@ void VolumeEnergy::find_pattern() {
 
 void VolumeEnergy::densify(std::span<const Index> cells) {
   constexpr int kDensePoints = 5;
-  for (Index c : cells) points_[c] = std::max(points_[c], kDensePoints);
+  for (Index c : cells) {
+    if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
+      throw InputError("VolumeEnergy: there is no cell " + std::to_string(c));
+    points_[c] = std::max(points_[c], kDensePoints);
+  }
   rebuild_groups();
 }
 

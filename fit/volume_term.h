@@ -43,6 +43,7 @@ class VolumeTerm {
   /// Cells that are not proved to be nowhere inverted, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
   /// Gives these cells more quadrature points from now on, for they invert between those they have. May weigh them more.
+  /// InputError: there is no such cell.
   virtual void densify(std::span<const Index> cells) = 0;
 };
 

@@ -61,7 +61,7 @@ void check_that_it_resumes(const Run& run) {
 
 SolvedStage small_stage() {
   return {"level 1, lambda 0.5", 77, {Vec3(1, 2, 3), Vec3(0.1, -0.2, 1e-300)},
-          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}}, 0.5};
+          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}, {{4, 5}, {}, {4}}, 1}, 0.5};
 }
 
 }  // namespace
@@ -77,6 +77,57 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits") {
       all.insert(all.end(), result.cage.positions.begin(), result.cage.positions.end());
       return std::pair(all, result.report);
     });
+}
+
+TEST_CASE("A fit that was stopped within a minimisation ends at the same bits") {
+  const samples::Sample sample = samples::ball_sample();
+  const auto run = [&](StageLog* log) {
+    FitOptions options{.levels = 2};
+    options.log = log;
+    return fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  };
+  // What a checkpoint held at each moment that a minimisation was not over.
+  std::vector<std::vector<SolvedStage>> moments;
+  StageLog whole;
+  whole.on_add = [&] {
+    if (!whole.stages().back().is_over()) moments.push_back(whole.stages());
+  };
+  const FitResult wanted = run(&whole);
+  CHECK(same_bits(wanted.mesh.positions, run(nullptr).mesh.positions));
+  REQUIRE(moments.size() > 3);
+  for (const std::size_t m : {std::size_t{0}, moments.size() / 2, moments.size() - 1}) {
+    CAPTURE(m, moments[m].back().name, moments[m].back().result.iterations.size());
+    StageLog log(parse_checkpoint(checkpoint_bytes({}, moments[m]), "file").stages, "file");
+    const FitResult result = run(&log);
+    CHECK(same_bits(result.mesh.positions, wanted.mesh.positions));
+    CHECK(told(result.report) == told(wanted.report));
+    CHECK(log.stages().size() == whole.stages().size());
+  }
+}
+
+TEST_CASE("A minimisation that was stopped after cells were densified ends at the same bits") {
+  const samples::Sample sample = samples::torus_sample();
+  const auto run = [&](StageLog* log) {
+    HighOrderFitOptions options{.order = 2, .tolerance_percent = 0.01, .max_iterations = 12};
+    options.log = log;
+    return fit_high_order(sample.target, sample.template_mesh, options);
+  };
+  std::vector<SolvedStage> moment;
+  StageLog whole;
+  whole.on_add = [&] {
+    const SolvedStage& last = whole.stages().back();
+    if (!last.is_over() && !last.result.densified.empty()) moment = whole.stages();
+  };
+  const HighOrderFitResult wanted = run(&whole);
+  REQUIRE(!moment.empty());
+  StageLog log(moment, "memory");
+  const HighOrderFitResult result = run(&log);
+  CHECK(same_bits(result.mesh.coefficients, wanted.mesh.coefficients));
+  CHECK(told(result.report) == told(wanted.report));
+
+  moment.back().result.densified[0].push_back(1 << 20);
+  StageLog wrong(moment, "memory");
+  CHECK_THROWS_WITH(run(&wrong), Catch::Contains("there is no cell 1048576"));
 }
 
 TEST_CASE("A fit with stages that were undone, and with one thread or two, goes on the same way") {
@@ -153,6 +204,8 @@ TEST_CASE("A checkpoint is read as it was written") {
   CHECK(stage.result.iterations[0].volume_energy == 0.25);
   CHECK(stage.result.iterations[0].evaluations == 3);
   CHECK(stage.seconds == 0.5);
+  CHECK(stage.result.small_steps == 1);
+  CHECK(stage.result.densified == small_stage().result.densified);
   CHECK(checkpoint_bytes(read.identity, read.stages) == bytes);
 }
 
@@ -171,10 +224,11 @@ TEST_CASE("A checkpoint that was cut off or changed anywhere is refused") {
 TEST_CASE("A checkpoint with a right fingerprint and wrong content is refused") {
   SolvedStage stage = small_stage();
   SECTION("a position that is not finite") { stage.x[0].x() = std::numeric_limits<double>::infinity(); }
-  SECTION("a minimisation that was cancelled") { stage.result.stop = MinimizerStop::cancelled; }
   SECTION("a negative time") { stage.seconds = -1; }
   SECTION("a negative count") { stage.result.iterations[0].evaluations = -1; }
-  CHECK_THROWS_WITH(parse_checkpoint(checkpoint_bytes({}, {stage}), "c"), Catch::Contains("what no run writes"));
+  SECTION("a minimisation after one that is not over") { stage.result.stop = MinimizerStop::cancelled; }
+  CHECK_THROWS_WITH(parse_checkpoint(checkpoint_bytes({}, {stage, small_stage()}), "c"),
+                    Catch::Contains("what no run writes"));
 }
 
 TEST_CASE("What differs between two runs is named") {
