@@ -61,6 +61,22 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
   return read_volume_mesh(path, {.check = check, .warnings = &warnings});
 }
 
+std::vector<double> load_thicknesses(const std::filesystem::path& path) {
+  constexpr std::string_view kBlanks = " \t";
+  const std::string bytes = read_file(path);
+  TextScanner lines(path.string(), bytes, TextScanner::Comments::none);
+  std::vector<double> thicknesses;
+  while (const auto line = lines.line()) {
+    const std::size_t begin = line->find_first_not_of(kBlanks);
+    if (begin == line->npos) continue;
+    const std::string_view word = line->substr(begin, line->find_last_not_of(kBlanks) + 1 - begin);
+    const auto value = parse_number(word);
+    if (!value || !(*value > 0)) lines.fail("expected a positive thickness, found " + in_quotes(word));
+    thicknesses.push_back(*value);
+  }
+  return thicknesses;
+}
+
 Json describe(const std::string& path, const TriangleMesh& mesh) {
   return {{"path", path},
           {"vertices", mesh.positions.size()},

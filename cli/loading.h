@@ -43,6 +43,9 @@ TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vect
 /// A volume mesh that is sound but for inverted cells and unused vertices (or, unchecked, just readable).
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true);
 
+/// Positive numbers, one a line; blank lines are passed over. InputError, with the line: anything else.
+std::vector<double> load_thicknesses(const std::filesystem::path& path);
+
 /// What stands under "input" in a report.
 Json describe(const std::string& path, const TriangleMesh& mesh);
 Json describe(const std::string& path, const PointCloud& cloud);

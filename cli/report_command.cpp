@@ -19,23 +19,11 @@ struct ReportArguments {
   bool force = false, quiet = false, no_pictures = false;
 };
 
-Json read_report(const std::string& path) {
-  Json report;
-  try {
-    report = Json::parse(read_file(path));
-  } catch (const Json::exception& error) {
-    throw InputError(path + ": expected a report in JSON: " + error.what());
-  }
-  if (!report.is_object() || !report.contains("subvol") || !report.contains("command"))
-    throw InputError(path + ": expected a report as subvol writes it, with \"subvol\" and \"command\"");
-  return report;
-}
-
 int run_report(const ReportArguments& arguments) {
   if (std::filesystem::path(arguments.output).extension() != ".html")
     throw UsageError("-o " + arguments.output + ": the extension must be .html");
   require_free(arguments.output, arguments.force);
-  const Json report = read_report(arguments.report);
+  const Json report = parse_report(read_file(arguments.report), arguments.report);
   try {
     std::vector<std::string> notes;
     std::vector<ReportPicture> pictures;

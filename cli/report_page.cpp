@@ -4,6 +4,7 @@
 #include "cli/report_plots.h"
 #include "export/color_map.h"
 #include "export/vtu_arrays.h"
+#include "subvol/error.h"
 
 #include <cmath>
 #include <cstdio>
@@ -128,7 +129,7 @@ std::string distances(const Json& report) {
   const auto add = [&](const char* name, const char* entry) {
     const Json& d = part(report, entry);
     if (d.contains("mean_percent"))
-      rows += row({name, number(d["mean_percent"].get<double>()), number(d["max_percent"].get<double>())});
+      rows += row({name, number(d.at("mean_percent").get<double>()), number(d.at("max_percent").get<double>())});
   };
   add("at the start", "initial_distance");
   add("mesh", "distance");
@@ -157,8 +158,8 @@ std::string worst_cells(const Json& report) {
   std::string rows;
   for (const Json& cell : part(report, "quality").value("worst_cells", Json::array())) {
     std::string centre;
-    for (const Json& x : cell["centre"]) centre += (centre.empty() ? "" : ", ") + number(x.get<double>());
-    rows += row({words(cell["cell"]), number(cell["scaled_jacobian"].get<double>()), centre});
+    for (const Json& x : cell.at("centre")) centre += (centre.empty() ? "" : ", ") + number(x.get<double>());
+    rows += row({words(cell.at("cell")), number(cell.at("scaled_jacobian").get<double>()), centre});
   }
   return rows.empty() ? "" : table({"cell", "scaled Jacobian", "centre"}, rows);
 }
@@ -168,7 +169,7 @@ std::string thicknesses(const Json& report) {
   for (const auto& [side, t] : part(report, "thickness").items())
     for (const char* kind : {"asked", "limited", "achieved", "clearance"})
       if (t.contains(kind))
-        rows += row({escaped(side) + ", " + kind, words(t[kind]["mean"]), words(t[kind]["min"]), words(t[kind]["max"])});
+        rows += row({escaped(side) + ", " + kind, words(t[kind].at("mean")), words(t[kind].at("min")), words(t[kind].at("max"))});
   return rows.empty() ? "" : table({"thickness", "mean", "min", "max"}, rows);
 }
 
@@ -178,7 +179,7 @@ std::string stages(const Json& report) {
   for (const Json& stage : report.value("stages", Json::array())) {
     const Json energy = stage.value("energy", Json::object());
     const auto entry = [&](const Json& from, const char* name) { return from.contains(name) ? words(from[name]) : ""; };
-    rows += row({std::to_string(++count), words(stage["name"]), entry(stage, "unknowns"), entry(stage, "iterations"),
+    rows += row({std::to_string(++count), words(stage.at("name")), entry(stage, "unknowns"), entry(stage, "iterations"),
                  entry(energy, "surface"), entry(energy, "volume"), entry(stage, "mean_distance_percent"),
                  entry(stage, "seconds"), stage.value("kept", true) ? "" : "undone"});
   }
@@ -231,6 +232,24 @@ std::string warnings(const Json& report) {
 }
 
 }  // namespace
+
+Json parse_report(std::string_view bytes, const std::string& name) {
+  constexpr int kDeepest = 20;
+  const auto shallow = [&](int depth, Json::parse_event_t, const Json&) {
+    if (depth > kDeepest) throw InputError(name + ": expected a report, found values nested more than " +
+                                           std::to_string(kDeepest) + " deep");
+    return true;
+  };
+  Json report;
+  try {
+    report = Json::parse(bytes, shallow);
+  } catch (const Json::exception& error) {
+    throw InputError(name + ": expected a report in JSON: " + error.what());
+  }
+  if (!report.is_object() || !report.contains("subvol") || !report.contains("command"))
+    throw InputError(name + ": expected a report as subvol writes it, with \"subvol\" and \"command\"");
+  return report;
+}
 
 std::string report_page(const Json& report, std::span<const ReportPicture> pictures, std::span<const std::string> notes) {
   std::string page = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"

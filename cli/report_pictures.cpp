@@ -183,7 +183,7 @@ class Painter {
     for (const auto& hit : hits) most = std::max(most, hit.distance);
     std::vector<LinearColor> colors;
     for (const auto& hit : hits) colors.push_back(quality_color(most > 0 ? std::max(1e-9, hit.distance / most) : 1e-9));
-    const Json input = report_["input"].value("target", Json::object());
+    const Json input = report_.at("input").value("target", Json::object());
     const double diagonal = input.value("bounding_box_diagonal", 0.0);
     char high[64];
     std::snprintf(high, sizeof high, diagonal > 0 ? "%.3g %%" : "%.3g", diagonal > 0 ? 100 * most / diagonal : most);

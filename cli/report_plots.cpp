@@ -45,7 +45,7 @@ std::string energy_plot(const Json& stages) {
   std::vector<std::size_t> ends;
   for (const Json& stage : stages) {
     for (const Json& step : stage.value("history", Json::array()))
-      for (std::size_t k = 0; k < kTerms.size(); ++k) energies[k].push_back(step["energy"][kTerms[k]].get<double>());
+      for (std::size_t k = 0; k < kTerms.size(); ++k) energies[k].push_back(step.at("energy").at(kTerms[k]).get<double>());
     ends.push_back(energies[0].size());
   }
   const std::size_t num_steps = energies[0].size();
@@ -90,7 +90,7 @@ std::string histogram_plot(const Json& counts) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] > 0)) continue;
     const double height = std::max(1.0, (kHeight - kBottom - kTop) * values[i] / most);
-    svg += format("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.0f</title></rect>",
+    svg += format("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
                   kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
   }
   for (int i = 0; i <= 4; ++i)

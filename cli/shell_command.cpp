@@ -16,7 +16,6 @@
 #include "subvol/mesh_io.h"
 #include "subvol/subdivision.h"
 #include "subvol/surface_io.h"
-#include "subvol/text_scanner.h"
 #include "subvol/version.h"
 
 #include <algorithm>
@@ -77,20 +76,7 @@ void ShellRun::load() {
 }
 
 std::vector<double> ShellRun::thickness_from_file() const {
-  const std::string text = read_file(arguments_.thickness_file);
-  std::vector<double> thickness;
-  std::size_t line = 1, begin = 0;
-  for (; begin < text.size(); ++line) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    std::string word = text.substr(begin, end - begin);
-    while (!word.empty() && (word.back() == '\r' || word.back() == ' ')) word.pop_back();
-    begin = end + 1;
-    if (word.empty()) continue;
-    if (!number_in(1e-300, 1e300)(word).empty())
-      throw InputError(arguments_.thickness_file + ':' + std::to_string(line) +
-                       ": expected a positive thickness, got " + word);
-    thickness.push_back(std::stod(word));
-  }
+  std::vector<double> thickness = load_thicknesses(arguments_.thickness_file);
   require_one_per_vertex(arguments_.thickness_file, thickness);
   return thickness;
 }

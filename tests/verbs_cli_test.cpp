@@ -71,6 +71,12 @@ TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property
     CHECK(asked["min"].get<double>() == Approx(0.1));
     CHECK(asked["max"].get<double>() == Approx(0.2));
   }
+  for (const char* line : {"thin", "0", "-1", "nan", "inf", "1e999", "0.1 0.2"}) {
+    place.file("wall.txt", "0.1\n" + std::string(line) + "\n0.1\n0.1\n");
+    const Run run = place.run("shell tet.ply --thickness-file wall.txt -o c.mesh");
+    CHECK(run.status == 3);
+    CHECK(run.err.find("wall.txt:2: expected a positive thickness, found '" + std::string(line) + "'") != std::string::npos);
+  }
   CHECK(place.run("shell tet.ply --thickness-attribute roof -o c.mesh").err.find("roof") != std::string::npos);
   CHECK(place.run("shell target.off --thickness-attribute wall -o c.mesh").status == 3);
   CHECK(place.run("shell tet.ply --thickness-attribute wall --thickness 1 -o c.mesh").status == 2);

@@ -19,7 +19,27 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+// GCC says it with macros, Clang with features.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define SUBVOL_IS_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define SUBVOL_IS_SANITIZED 1
+#endif
+#endif
+
 namespace subvol::test {
+
+/// Whether the address or thread sanitizer is built in: its own memory leaves no sense to a limit on memory, and all
+/// takes several times as long.
+#ifdef SUBVOL_IS_SANITIZED
+inline constexpr bool kSanitized = true;
+#else
+inline constexpr bool kSanitized = false;
+#endif
+
+/// What the program may take to refuse an input.
+inline constexpr double kQuickSeconds = kSanitized ? 60 : 5;
 
 /// How the program ended.
 struct Run {
