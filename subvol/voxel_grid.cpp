@@ -55,7 +55,7 @@ std::array<Vec3, 2> box_around(const TriangleMesh& surface, double margin_percen
 }
 
 VolumeMesh voxel_mesh(const VoxelGrid& grid, std::span<const char> kept) {
-  const auto [nx, ny, nz] = grid.cells;
+  const int nx = grid.cells[0], ny = grid.cells[1], nz = grid.cells[2];
   const Index row = nx + 1, layer = row * (ny + 1);
   const std::array<Index, 8> corner_offsets{0, 1, 1 + row, row, layer, layer + 1, layer + 1 + row, layer + row};
   std::vector<Index> number(static_cast<std::size_t>(layer) * static_cast<std::size_t>(nz + 1), kNoIndex);

@@ -9,19 +9,14 @@
 #include "fit/optimize_mesh.h"
 #include "samples/shapes.h"
 #include "subvol/error.h"
+#include "tests/fuzz/bytes_as_file.h"
 
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
 #include <cstring>
 
 using namespace subvol;
+using fuzz::require;
 
 namespace {
-
-void require(bool holds) {
-  if (!holds) std::abort();
-}
 
 /// Takes bytes from the front; zeros once there are none.
 class Bytes {

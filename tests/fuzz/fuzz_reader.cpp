@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// libFuzzer target of one reader: SUBVOL_FUZZ_EXTENSION says of which files. Whatever the bytes, the reader returns
+// libFuzzer target of one of the library's readers: kExtension says of which files. Whatever the bytes, the reader returns
 // something sound or throws InputError.
 
 #include "export/high_order_file.h"
@@ -8,25 +8,43 @@
 #include "subvol/fingerprint.h"
 #include "subvol/mesh_io.h"
 #include "subvol/surface_io.h"
+#include "tests/fuzz/bytes_as_file.h"
 
-#include <cstdint>
-#include <cstdlib>
-#include <fstream>
-#include <string_view>
-
-#include <unistd.h>
+using subvol::fuzz::kExtension;
+using subvol::fuzz::require;
 
 namespace {
 
-constexpr std::string_view kExtension = SUBVOL_FUZZ_EXTENSION;
+void require_finite(const std::vector<subvol::Vec3>& points) {
+  for (const subvol::Vec3& p : points) require(p.allFinite());
+}
 
-void require(bool holds) {
-  if (!holds) std::abort();
+void require_indices(std::span<const subvol::Index> indices, std::size_t num_vertices) {
+  for (const subvol::Index v : indices) require(v >= 0 && static_cast<std::size_t>(v) < num_vertices);
+}
+
+void read_surface(const std::filesystem::path& file) {
+  std::vector<std::string> warnings;
+  const subvol::PolygonMesh polygons = subvol::read_polygon_mesh(file, &warnings);
+  require(polygons.num_faces() > 0);
+  require_finite(polygons.positions);
+  require_indices(polygons.face_vertices, polygons.positions.size());
+  const subvol::TriangleMesh mesh = subvol::read_triangle_mesh(file, &warnings);
+  require(!mesh.triangles.empty());
+  require_finite(mesh.positions);
+  for (const auto& triangle : mesh.triangles) require_indices(triangle, mesh.positions.size());
+}
+
+void read_points(const std::filesystem::path& file) {
+  std::vector<std::string> warnings;
+  const subvol::PointCloud cloud = subvol::read_point_cloud(file, &warnings);
+  require(cloud.points.size() >= subvol::kLeastCloudPoints);
+  require_finite(cloud.points);
 }
 
 void read(const std::filesystem::path& file) {
-  std::vector<std::string> warnings;
   if (kExtension == ".mesh" || kExtension == ".vtk") {
+    std::vector<std::string> warnings;
     const subvol::VolumeMesh mesh = subvol::read_volume_mesh(file, {.warnings = &warnings});
     for (const subvol::MeshDefect& defect : validate(mesh))
       require(defect.kind == subvol::MeshDefect::Kind::inverted_cell ||
@@ -34,18 +52,17 @@ void read(const std::filesystem::path& file) {
   } else if (kExtension == ".vtu") {
     const subvol::HighOrderMesh mesh = subvol::read_high_order(file).mesh;
     require(mesh.coefficients.size() == mesh.space.num_nodes());
+  } else if (subvol::is_point_cloud_file(file)) {
+    read_points(file);
   } else {
-    const subvol::TriangleMesh mesh = subvol::read_triangle_mesh(file, &warnings);
-    require(!mesh.triangles.empty());
-    for (const auto& triangle : mesh.triangles)
-      for (const subvol::Index v : triangle) require(v >= 0 && static_cast<std::size_t>(v) < mesh.positions.size());
+    read_surface(file);
     if (kExtension == ".ply") subvol::read_vertex_attribute(file, "quality");
   }
 }
 
 /// The fingerprint is made right: it would keep everything else from being looked at.
 void read_checkpoint_of(std::string_view bytes) {
-  const std::string name = "checkpoint", head = "subvol checkpoint 1\n";
+  const std::string name = "checkpoint", head = "subvol checkpoint 2\n";
   const std::string_view content = bytes.substr(std::min(bytes.size(), head.size() + 17));
   const std::string whole = head + subvol::Fingerprint().add(content).text() + '\n' + std::string(content);
   const subvol::Checkpoint read = subvol::parse_checkpoint(whole, name);
@@ -57,16 +74,9 @@ void read_checkpoint_of(std::string_view bytes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const std::filesystem::path file = std::filesystem::temp_directory_path() /
-                                            ("subvol-fuzz-" + std::to_string(getpid()) + SUBVOL_FUZZ_EXTENSION);
-  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   try {
-    if (kExtension == ".checkpoint") {
-      read_checkpoint_of(bytes);
-    } else {
-      std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-      read(file);
-    }
+    if (kExtension == ".checkpoint") read_checkpoint_of({reinterpret_cast<const char*>(data), size});
+    else read(subvol::fuzz::as_file(data, size));
   } catch (const subvol::InputError& error) {
     require(std::string_view(error.what()).size() > 3);
   }

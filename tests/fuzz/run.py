@@ -1,19 +1,75 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs the fuzzers of a build folder, one after the other, and prints a table.
+"""Runs the fuzzers of a build folder in rotation, and prints what all runs so far have come to.
 
-Usage: tests/fuzz/run.py BUILD_FOLDER [--seconds S] [--corpus FOLDER] [NAME ...]
-       (cmake --preset fuzz && cmake --build build/fuzz;  an hour each: --seconds 3600)
+Usage: tests/fuzz/run.py BUILD_FOLDER [--seconds S] [--rounds N] [--minutes M] [--corpus FOLDER] [NAME ...]
+       (cmake --preset fuzz && cmake --build build/fuzz;  an hour each: --seconds 600 --rounds 6)
 
-Corpora are written by write_corpus into FOLDER (default: BUILD_FOLDER/corpus) and grow there; inputs that fail are kept
-in BUILD_FOLDER/findings. Exit status: 0 without findings, 1 with some, 2 no fuzzers here.
+Each round runs every fuzzer for S seconds. Corpora are written by write_corpus into FOLDER (default: BUILD_FOLDER/corpus)
+and grow there, so that a run goes on where the last one ended; FOLDER/totals.json adds up executions and seconds of
+processor time of each fuzzer over all runs. Inputs that fail are kept in BUILD_FOLDER/findings, with what was said of them.
+Exit status: 0 without findings in this run, 1 with some, 2 no fuzzers here.
 """
 import argparse
+import json
+import math
 import os
 import pathlib
 import re
+import resource
 import subprocess
 import sys
+import time
+
+# Seconds by the clock that one input may take: generous, for the machine may be busy. What takes more than ten is kept as
+# slow-unit beside the findings.
+MOST_SECONDS = {"fit": 1200}
+MOST_SECONDS_ELSE = 300
+
+
+def processor_seconds():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+class Fuzzing:
+    def __init__(self, fuzzers, corpus, findings, seconds):
+        self.fuzzers, self.corpus, self.findings, self.seconds = fuzzers, corpus, findings, seconds
+        self.file = corpus / "totals.json"
+        self.totals = json.loads(self.file.read_text()) if self.file.exists() else {}
+        self.failed = 0
+
+    def run(self, fuzzer):
+        """One fuzzer for its seconds."""
+        name = fuzzer.name.removeprefix("fuzz_")
+        used = processor_seconds()
+        done = subprocess.run([fuzzer, f"-max_total_time={self.seconds}", f"-timeout={MOST_SECONDS.get(name, MOST_SECONDS_ELSE)}",
+                               "-rss_limit_mb=2048", "-max_len=4096", "-print_final_stats=1",
+                               f"-artifact_prefix={self.findings}/{name}-", self.corpus / name],
+                              env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True, errors="replace")
+        executions = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
+        if not executions:  # it failed: the last line with a number of executions
+            executions = re.findall(r"^#(\d+)\s", done.stderr, re.MULTILINE)
+        covered = re.findall(r" cov: (\d+)", done.stderr)
+        count = int(executions.group(1) if isinstance(executions, re.Match) else executions[-1] if executions else 0)
+        total = self.totals.setdefault(name, {"executions": 0, "processor_seconds": 0, "findings": 0, "edges": 0})
+        total["executions"] += count
+        total["processor_seconds"] += processor_seconds() - used
+        total["edges"] = max(total["edges"], int(covered[-1]) if covered else 0)
+        total["findings"] += done.returncode != 0
+        self.file.write_text(json.dumps(self.totals, indent=1))
+        print(f"{name:12} {count:10} executions  {'clean' if done.returncode == 0 else 'FINDING'}", flush=True)
+        if done.returncode != 0:
+            self.failed += 1
+            (self.findings / f"{name}.log").write_text(done.stderr)
+            print("\n".join(line for line in done.stderr.splitlines()
+                            if re.search(r"ERROR|SUMMARY|runtime error|Test unit written|^\s+#[0-9] ", line)), flush=True)
+
+    def print_totals(self):
+        print(f"\n{'all runs':12} {'executions':>12} {'edges':>7} {'inputs':>7} {'minutes':>8} {'findings':>9}")
+        for name, total in sorted(self.totals.items()):
+            print(f"{name:12} {total['executions']:12} {total['edges']:7} {len(list((self.corpus / name).iterdir())):7} "
+                  f"{total['processor_seconds'] / 60:8.1f} {total['findings']:9}")
 
 
 def main():
@@ -21,6 +77,8 @@ def main():
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("names", nargs="*")
     parser.add_argument("--seconds", type=int, default=10)
+    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin nothing after this time")
     parser.add_argument("--corpus", type=pathlib.Path)
     arguments = parser.parse_intermixed_args()
     build = arguments.build.resolve()
@@ -32,24 +90,14 @@ def main():
     corpus, findings = (arguments.corpus or build / "corpus").resolve(), build / "findings"
     findings.mkdir(exist_ok=True)
     subprocess.run([next(build.rglob("write_corpus")), corpus], check=True)
-    failed = 0
-    for fuzzer in fuzzers:
-        name = fuzzer.name.removeprefix("fuzz_")
-        timeout = 600 if name == "fit" else 30
-        done = subprocess.run([fuzzer, f"-max_total_time={arguments.seconds}", f"-timeout={timeout}",
-                               "-rss_limit_mb=2048", "-max_len=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/{name}-",
-                               corpus / name], env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
-                              errors="replace")
-        runs = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
-        covered = re.findall(r" cov: (\d+)", done.stderr)
-        print(f"{name:12} {runs.group(1) if runs else '?':>10} executions  {covered[-1] if covered else '?':>6} edges  "
-              f"{len(list((corpus / name).iterdir())):6} inputs kept  {'clean' if done.returncode == 0 else 'FINDING'}",
-              flush=True)
-        if done.returncode != 0:
-            failed += 1
-            print("\n".join(line for line in done.stderr.splitlines()
-                            if re.search(r"ERROR|SUMMARY|runtime error|Test unit written|^\s+#[0-9] ", line)), flush=True)
-    return 1 if failed else 0
+    fuzzing = Fuzzing(fuzzers, corpus, findings, arguments.seconds)
+    begin = time.monotonic()
+    for fuzzer in fuzzers * arguments.rounds:
+        if time.monotonic() - begin > 60 * arguments.minutes:
+            break
+        fuzzing.run(fuzzer)
+    fuzzing.print_totals()
+    return 1 if fuzzing.failed else 0
 
 
 if __name__ == "__main__":

@@ -104,6 +104,36 @@ void write_checkpoints(const fs::path& folder) {
   write(folder / "checkpoint", "empty", checkpoint_bytes({}, {}));
 }
 
+void write_points(const fs::path& folder) {
+  std::string lines;
+  for (int i = 0; i < 12; ++i) {
+    const std::string x = std::to_string(i), square = std::to_string(i * i), third = std::to_string(i % 3);
+    lines += x + ' ' + square + ' ' + third + (i % 2 ? "\n" : "\r\n");
+  }
+  write(folder / "xyz", "plain", lines);
+  write(folder / "xyz", "columns", "# points\n" + lines + "1e3 -2.5 .5 0 0 1 255\n");
+  write(folder / "ply", "points",
+        "ply\nformat ascii 1.0\nelement vertex 12\nproperty double x\nproperty double y\nproperty double z\nend_header\n" +
+            lines);
+}
+
+void write_program_files(const fs::path& folder) {
+  write(folder / "json", "fit", R"({"subvol": "0.1", "command": "fit", "command_line": ["subvol", "a b"],
+"input": {"target": {"path": "t.off", "bounding_box_diagonal": 2}, "template": {"path": "t.mesh"}},
+"options": {"levels": 1}, "outputs": ["o.mesh", "o.glb"], "stop_reason": "converged", "explanation": "why",
+"converged": true, "stages": [{"name": "a", "unknowns": 8, "iterations": 1, "energy": {"surface": 1, "volume": 2},
+"history": [{"energy": {"surface": 1, "volume": 0.5, "total": 1.5}}], "seconds": 0.1, "kept": false}],
+"initial_distance": {"mean_percent": 1, "max_percent": 2}, "quality": {"cells": 2, "min_scaled_jacobian": 0.5,
+"histogram": [0, 1, 3], "worst_cells": [{"cell": 1, "scaled_jacobian": 0.5, "centre": [0, 1, 2]}]},
+"boundary_self_intersections": 0, "warnings": ["w"], "seconds": {"total": 1}, "peak_memory_bytes": 1000000})");
+  write(folder / "json", "shell", R"({"subvol": "0.1", "command": "shell", "valid": true, "thickness": {"inside":
+{"asked": {"mean": 1, "min": 1, "max": 1}}}, "input": {"surface": {"path": "s.obj"}}})");
+  write(folder / "toml", "flat", "levels = 2 # and\n tolerance=0.5\nforce = true\ncage-only = false\n");
+  write(folder / "toml", "tables", "[fit]\noutput = [\"a.mesh\", 'b.glb']\ntemplate = \"t.mesh\"\n[shell]\nside = \"both\"\n"
+                                   "growth = 1.5\n[check]\njson = true\n[optimize]\nlambda = 1e-3\ntime-limit = 5\n");
+  write(folder / "txt", "thickness", "0.1\n 2e-3 \r\n\n17\n");
+}
+
 void write_fits(const fs::path& folder) {
   for (const char what : {'\0', '\1', '\2'})
     for (const char kind : {'\0', '\1', '\2'}) {
@@ -122,7 +152,9 @@ int main(int argc, char** argv) try {
   const fs::path folder = argv[1];
   write_volumes(folder);
   write_surfaces(folder);
+  write_points(folder);
   write_checkpoints(folder);
+  write_program_files(folder);
   write_fits(folder);
   return 0;
 } catch (const std::exception& error) {

@@ -256,6 +256,7 @@ class Soak:
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             words, output, target = make(rng, folder)
+            words += rng.choice(["", " --max-iterations 5", " --max-iterations 5"])  # most runs are to be short
             command = [self.program, *words.split(), "--time-limit", str(self.time_limit), "-o", output, "--report",
                        "report.json", "--quiet"]
             begin = processor_seconds()
