@@ -4,6 +4,7 @@
 #include "cli/exit_status.h"
 #include "cli/loading.h"
 #include "cli/outputs.h"
+#include "cli/progress.h"
 #include "cli/report.h"
 #include "cli/writing.h"
 #include "subvol/surface_io.h"
@@ -37,19 +38,20 @@ MeshCheck against(const std::optional<Target>& target, const Check& check) {
   return std::visit([&](const auto& geometry) { return check(&geometry); }, *target);
 }
 
-Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target,
+Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, const WorkProgress& progress,
                      std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
-  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry); }),
+  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt};
   checked.audit = checked.check.subdivision_audit;
   return checked;
 }
 
-Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target) {
+Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target,
+                         const WorkProgress& progress) {
   const HighOrderMesh mesh = read_high_order(arguments.mesh).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
-  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry); }),
+  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
           describe(arguments.mesh, mesh), std::nullopt};
 }
 
@@ -69,13 +71,15 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Ch
 }
 
 int run_check(const CheckArguments& arguments, const CLI::App& verb) {
-  checked_outputs(arguments.run, false);
+  checked_outputs(arguments.run, {});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
-  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target)
-                                                             : check_linear(arguments, target, warnings);
+  ProgressTeller teller(arguments.run.progress, arguments.run.quiet || arguments.json);
+  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target, teller.work())
+                                                             : check_linear(arguments, target, teller.work(), warnings);
+  teller.finish();
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
   }

@@ -14,7 +14,9 @@ namespace subvol::cli {
 namespace {
 
 /// Options of files that are written; inputs are told apart by what they hold.
-const std::set<std::string, std::less<>> kNeutralOptions{"chord", "unit", "up", "seed", "template", "target"};
+const std::set<std::string, std::less<>> kNeutralOptions{"chord", "unit",  "up",       "cut",
+                                                           "seed",  "target", "template", "no-wireframe",
+                                                           "quantize"};
 
 std::span<const double> numbers(const std::vector<Vec3>& points) {
   return {points.empty() ? nullptr : points.front().data(), 3 * points.size()};
@@ -70,9 +72,13 @@ std::string fingerprint(const VolumeMesh& mesh) {
 }
 
 RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs) {
-  RunIdentity identity{{"version", version()}, {"verb", verb.get_name()}};
+  return run_identity(verb.get_name(), options_of_result(verb), inputs);
+}
+
+RunIdentity run_identity(const std::string& verb, const Json& options,
+                         const std::vector<std::pair<std::string, std::string>>& inputs) {
+  RunIdentity identity{{"version", version()}, {"verb", verb}};
   identity.insert(identity.end(), inputs.begin(), inputs.end());
-  const Json options = options_of_result(verb);
   for (const auto& [name, value] : options.items())
     if (!kNeutralOptions.contains(name)) identity.emplace_back("--" + name, value.dump());
   return identity;

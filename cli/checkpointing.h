@@ -25,6 +25,9 @@ std::string fingerprint(const VolumeMesh& mesh);
 
 /// A run by its version, verb, inputs (name and fingerprint), and those options that bear on the result of the fit.
 RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs);
+/// The same from the verb's name and its options.
+RunIdentity run_identity(const std::string& verb, const Json& options,
+                         const std::vector<std::pair<std::string, std::string>>& inputs);
 
 /// Goes on from the checkpoint of an earlier run, and keeps one of this run as its minimisations go on.
 class Checkpointing {

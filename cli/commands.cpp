@@ -27,7 +27,7 @@ Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not con
 
 void describe_program(CLI::App& app, Action& action) {
   app.footer(kFooter);
-  app.set_version_flag("--version", std::string("subvol ") + version());
+  app.set_version_flag("--version", std::string("subvol ") + version() + "\nwith " SUBVOL_DEPENDENCIES);
   app.require_subcommand(1);
   app.fallthrough();  // --config may stand after the verb
   app.set_config("--config", "", "Read options from FILE.toml");
@@ -42,6 +42,7 @@ void describe_program(CLI::App& app, Action& action) {
   add_check_command(app, action);
   add_convert_command(app, action);
   add_report_command(app, action);
+  add_completion_command(app, action);
 }
 
 }  // namespace subvol::cli

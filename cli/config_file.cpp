@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/config_file.h"
 
+#include "cli/exit_status.h"
+
 #include <string>
 
 namespace subvol::cli {
 
 std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const {
   std::vector<std::string> path;  // the verb, and the verb under it where it is a group
-  for (auto verbs = app_.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands())
-    path.push_back(verbs.front()->get_name());
+  const CLI::App* verb = &app_;
+  for (auto verbs = app_.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands()) {
+    verb = verbs.front();
+    path.push_back(verb->get_name());
+  }
   const auto names_a_verb = [&](const std::string& name) {
     return !app_.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == name; }).empty();
   };
@@ -17,6 +22,8 @@ std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const 
     if (item.name == "++" || item.name == "--") continue;
     if (item.parents.empty()) item.parents = path;
     if ((path.empty() || item.parents.front() != path.front()) && names_a_verb(item.parents.front())) continue;
+    if (item.parents == path && !verb->get_option_no_throw("--" + item.name))
+      throw UsageError("--config: " + verb->get_name() + " has no option '" + item.name + "'");
     kept.push_back(std::move(item));
   }
   return kept;

@@ -24,7 +24,7 @@ void convert_volume(const ConvertArguments& arguments, const std::vector<Output>
                     std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.input, warnings);
   for (const Output& output : outputs) {
-    if (arguments.limit && needs_limit(output)) {
+    if (arguments.limit && shows_surface(output)) {
       const TessellatedSurface limit = tessellated_limit(mesh, writing);
       write_output(output, mesh, mesh, &limit, writing);
     } else {
@@ -43,6 +43,7 @@ void convert_high_order(const ConvertArguments& arguments, const std::vector<Out
 void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
                      std::vector<std::string>& warnings) {
   for (const Output& output : outputs) {
+    if (output.part == Part::cutaway) throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");
     if (output.is_volume()) {
       throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
     }
@@ -52,7 +53,7 @@ void convert_surface(const ConvertArguments& arguments, const std::vector<Output
 }
 
 int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
-  const std::vector<Output> outputs = checked_outputs(arguments.run, false);
+  const std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway});
   apply_resources(arguments.run);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.input;
@@ -87,7 +88,8 @@ void add_convert_command(CLI::App& app, Action& action) {
       ->type_name("N")
       ->capture_default_str();
   add_output_options(*verb, arguments->run,
-                     "Where to, the extension choosing the format: " + output_formats() + "; may be given several times");
+                     "Where to, the extension choosing the format: " + output_formats() +
+                         "; cutaway:FILE.glb for the cells inside; may be given several times");
   verb->get_option("--output")->required();
   add_writing_options(*verb, arguments->writing);
   verb->footer(R"(Surface formats take the boundary of a volume mesh; .usda keeps it a subdivision cage with its creases.

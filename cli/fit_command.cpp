@@ -110,6 +110,7 @@ void FitRun::fit() {
   checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)},
                                                     {"template", fingerprint(template_mesh_)}}));
   options.log = checkpointing_->log();
+  options.keep_states = has_animation(outputs_);
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   // What is left of it: a template may have been made.
   if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
@@ -129,11 +130,16 @@ void FitRun::write() {
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
   const auto write = [&](bool with_limit) {
-    for (const Output& output : outputs_)
-      if (needs_limit(output) == with_limit) write_output(output, result_.cage, result_.mesh, &limit_, writing);
+    for (const Output& output : outputs_) {
+      if (shows_surface(output) != with_limit) continue;
+      if (output.part == Part::animation)
+        write_animation(output, result_.cage, result_.states, writing);
+      else
+        write_output(output, result_.cage, result_.mesh, &limit_, writing);
+    }
   };
   write(false);  // where little memory is left the limit surface may be what does not fit
-  limit_ = tessellated_limit(result_.cage, writing);
+  limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, writing, progress); });
   write(true);
 }
 
@@ -142,14 +148,14 @@ void FitRun::check() {
   VolumeMesh reread;
   const VolumeMesh* mesh = &result_.mesh;
   for (const Output& output : outputs_) {
-    if (output.cage || output.extension != ".mesh") continue;
+    if (output.part != Part::result || output.extension != ".mesh") continue;
     reread = read_volume_mesh(output.path, {.check = false});
     mesh = &reread;
     break;
   }
   std::visit(
       [&](const auto& target) {
-        mesh_check_ = check_mesh(*mesh, &target);
+        mesh_check_ = watched([&](auto progress) { return check_mesh(*mesh, &target, {.progress = progress}); });
         limit_distance_ = surface_distance(triangles_of(limit_), target);
       },
       target_);
@@ -189,7 +195,7 @@ void FitRun::summarise() const {
 }
 
 int FitRun::run() {
-  prepare(true);
+  prepare({Part::cage, Part::cutaway, Part::animation});
   timed("read", &FitRun::load);
   timed("template", &FitRun::load_template);
   if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
@@ -338,7 +344,8 @@ void add_fit_command(CLI::App& app, Action& action) {
   add_high_order_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "Finest mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control cage; may be given several times");
+                         "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb\n"
+                         "for the fit as it went; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   add_checkpoint_options(*verb, arguments->run);

@@ -37,11 +37,12 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
 }
 
 /// seconds: that have been used of the time limit.
-HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, double seconds, const Target& target,
-                       const VolumeMesh& template_mesh) {
+HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bool keep_states, double seconds,
+                       const Target& target, const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   HighOrderFitOptions options = arguments.fit;
   options.log = log;
+  options.keep_states = keep_states;
   if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds);
   options.progress = [&](const FitProgress& progress) {
     teller.tell(progress);
@@ -56,11 +57,12 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, do
 
 // What counts is what is on the disk: the first .vtu is read back and checked in place of the result in memory.
 MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const Target& target,
-                double chord_percent) {
+                double chord_percent, const RunOptions& run) {
+  ProgressTeller teller(run.progress, run.quiet);
   const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& o) { return o.extension == ".vtu"; });
   const HighOrderMesh mesh = file == outputs.end() ? result : read_high_order(file->path).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, chord_percent);
-  return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry); }, target);
+  return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, {.progress = teller.work()}); }, target);
 }
 
 Json report_json(const char* command, const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh,
@@ -86,7 +88,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (arguments.run.outputs.empty() && arguments.run.report.empty())
     throw UsageError(std::string(arguments.command) + ": nothing to write; give -o FILE or --report FILE");
   const Clock::time_point start = Clock::now();
-  const std::vector<Output> outputs = checked_outputs(arguments.run, false);
+  const std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::animation});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::size_t told = 0;
@@ -115,7 +117,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
                       warnings);
 
   const Clock::time_point fit_start = Clock::now();
-  HighOrderFitResult result = fit(arguments, checkpointing.log(), seconds_since(start), target, template_mesh);
+  HighOrderFitResult result = fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start),
+                                  target, template_mesh);
   const double fit_seconds = seconds_since(fit_start);
   const FitReport& report = result.report;
   checkpointing.finish(warnings);
@@ -127,11 +130,16 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   writing.source = arguments.target;
   writing.options = options_of_result(verb);
   const HighOrderFile file{std::move(result.mesh), template_mesh.references};
-  for (const Output& output : outputs) write_output(output, file, writing);
+  for (const Output& output : outputs) {
+    if (output.part == Part::animation)
+      write_animation(output, file.mesh, result.states, writing);
+    else
+      write_output(output, file, writing);
+  }
   const double write_seconds = seconds_since(write_start);
 
   const Clock::time_point check_start = Clock::now();
-  const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent);
+  const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent, arguments.run);
   if (!arguments.run.report.empty()) {
     Json json = report_json(arguments.command, verb, report, file.mesh, mesh_check);
     json["input"] = {{"target", describe(arguments.target, target)},

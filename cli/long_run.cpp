@@ -8,10 +8,10 @@
 
 namespace subvol::cli {
 
-void LongRun::prepare(bool allow_cage) {
+void LongRun::prepare(const std::vector<Part>& parts) {
   if (run_.outputs.empty() && run_.report.empty())
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
-  outputs_ = checked_outputs(run_, allow_cage);
+  outputs_ = checked_outputs(run_, parts);
   apply_resources(run_);
 }
 

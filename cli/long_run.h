@@ -20,7 +20,7 @@ class LongRun {
   LongRun(const RunOptions& run, const CLI::App& verb) : run_(run), verb_(verb) {}
 
   /// UsageError where there is nothing to write, and as `checked_outputs`. Sets the number of threads.
-  void prepare(bool allow_cage);
+  void prepare(const std::vector<Part>& parts);
   /// Tells the warnings that have not been told yet.
   void tell_warnings();
   void add_warnings(const std::vector<std::string>& warnings);
@@ -43,6 +43,13 @@ class LongRun {
     });
     teller.finish();
     return result;
+  }
+
+  /// work(progress) of a part after the solve: told as the options say, never ended.
+  template <class Work>
+  auto watched(const Work& work) const {
+    ProgressTeller teller(run_.progress, run_.quiet);
+    return work(teller.work());
   }
 
   double seconds() const { return seconds_since(start_); }

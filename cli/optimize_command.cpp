@@ -91,8 +91,8 @@ void OptimizeRun::write() {
 void OptimizeRun::check() {
   const auto is_mesh = [](const Output& output) { return output.extension == ".mesh"; };
   const auto file = std::find_if(outputs_.begin(), outputs_.end(), is_mesh);
-  mesh_check_ = check_mesh(file == outputs_.end() ? result_.mesh : read_volume_mesh(file->path, {.check = false}),
-                           &surface_);
+  const VolumeMesh mesh = file == outputs_.end() ? result_.mesh : read_volume_mesh(file->path, {.check = false});
+  mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &surface_, {.progress = progress}); });
 }
 
 Json OptimizeRun::report() const {
@@ -122,7 +122,7 @@ void OptimizeRun::summarise() const {
 }
 
 int OptimizeRun::run() {
-  prepare(false);
+  prepare({Part::cutaway});
   timed("read", &OptimizeRun::load);
   timed("optimize", &OptimizeRun::optimize);
   timed("write", &OptimizeRun::write);
@@ -218,7 +218,8 @@ void add_optimize_command(CLI::App& app, Action& action) {
       ->type_name("FILE");
   add_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
-                     "The mesh, or its surface, by extension: " + output_formats() + "; may be given several times");
+                     "The mesh, or its surface, by extension: " + output_formats() +
+                         "; cutaway:FILE.glb for the cells inside; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   add_checkpoint_options(*verb, arguments->run);

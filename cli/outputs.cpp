@@ -11,6 +11,8 @@
 #include <cstring>
 #include <set>
 #include <string_view>
+#include <tuple>
+#include <utility>
 
 #include <stdlib.h>
 #include <unistd.h>
@@ -20,25 +22,37 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kCagePrefix = "cage:";
+/// By Part: what stands before the file, behind a colon.
+constexpr std::array<std::string_view, 4> kPartNames{"", "cage", "cutaway", "animation"};
 constexpr std::array<std::string_view, 4> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh"};
 constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
+constexpr std::array<std::string_view, 2> kSceneExtensions{".glb", ".gltf"};
 
 template <std::size_t N>
 bool contains(const std::array<std::string_view, N>& list, std::string_view item) {
   return std::find(list.begin(), list.end(), item) != list.end();
 }
 
+/// The part that a text begins with, and the file behind it.
+std::pair<Part, std::string> part_and_file(const std::string& text) {
+  for (std::size_t part = 1; part < kPartNames.size(); ++part) {
+    const std::string prefix = std::string(kPartNames[part]) + ':';
+    if (text.starts_with(prefix)) return {static_cast<Part>(part), text.substr(prefix.size())};
+  }
+  return {Part::result, text};
+}
+
 Output parse_output(const std::string& text) {
   Output output;
-  output.cage = text.starts_with(kCagePrefix);
-  output.path = output.cage ? text.substr(kCagePrefix.size()) : text;
+  std::tie(output.part, output.path) = part_and_file(text);
   output.extension = output.path.extension().string();
   std::transform(output.extension.begin(), output.extension.end(), output.extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (!contains(kVolumeExtensions, output.extension) && !contains(kSurfaceExtensions, output.extension)) {
     throw UsageError("-o " + text + ": the extension must be one of " + output_formats());
   }
+  if ((output.part == Part::cutaway || output.part == Part::animation) && !output.is_scene())
+    throw UsageError("-o " + text + ": this part is a scene; the extension must be .glb or .gltf");
   return output;
 }
 
@@ -66,6 +80,7 @@ void require_free(const fs::path& file, bool force) {
 }
 
 bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }
+bool Output::is_scene() const { return contains(kSceneExtensions, extension); }
 
 std::string output_formats() {
   std::string list;
@@ -74,7 +89,7 @@ std::string output_formats() {
   return list;
 }
 
-std::vector<Output> checked_outputs(const RunOptions& options, bool allow_cage) {
+std::vector<Output> checked_outputs(const RunOptions& options, const std::vector<Part>& parts) {
   std::vector<Output> outputs;
   std::set<fs::path> seen;
   const auto claim = [&](const fs::path& path, bool force) {
@@ -85,7 +100,9 @@ std::vector<Output> checked_outputs(const RunOptions& options, bool allow_cage) 
   };
   for (const std::string& text : options.outputs) {
     outputs.push_back(parse_output(text));
-    if (outputs.back().cage && !allow_cage) throw UsageError("-o " + text + ": there is no cage here");
+    const Part part = outputs.back().part;
+    if (part != Part::result && std::find(parts.begin(), parts.end(), part) == parts.end())
+      throw UsageError("-o " + text + ": there is no " + std::string(kPartNames[static_cast<std::size_t>(part)]) + " here");
     claim(outputs.back().path, options.force);
   }
   if (!options.report.empty()) claim(options.report, options.force);
@@ -98,7 +115,7 @@ std::vector<Output> checked_outputs(const RunOptions& options, bool allow_cage) 
 Json output_names(const RunOptions& options) {
   Json names = Json::array();
   for (const std::string& text : options.outputs) {
-    names.push_back(text.starts_with(kCagePrefix) ? text.substr(kCagePrefix.size()) : text);
+    names.push_back(part_and_file(text).second);
   }
   return names;
 }

@@ -9,12 +9,21 @@
 
 namespace subvol::cli {
 
+/// What of a result goes to a file: `FILE`, or `PART:FILE`.
+enum class Part {
+  result,    ///< the finest mesh, or its surface
+  cage,      ///< the control mesh
+  cutaway,   ///< a scene of the cells inside
+  animation  ///< a scene of the surface as the fit went
+};
+
 /// One -o: what to write, and where.
 struct Output {
-  bool cage = false;            ///< `cage:FILE`: the control mesh instead of the finest mesh
+  Part part = Part::result;
   std::filesystem::path path;
   std::string extension;        ///< lower case, with its dot
   bool is_volume() const;       ///< a format that holds cells
+  bool is_scene() const;        ///< a format that holds scenes
 };
 
 /// Formats that can be written, for help and messages.
@@ -22,9 +31,10 @@ std::string output_formats();
 
 /// Reads the -o options and checks, before any work, that each, the report and the checkpoint could be written.
 ///
-/// UsageError: an unknown extension, a file named twice, `cage:` where there is none, an existing file without --force.
-/// IoError: a folder that is not there or cannot be written to.
-std::vector<Output> checked_outputs(const RunOptions& options, bool allow_cage);
+/// parts  that there are besides the result.
+/// UsageError: an unknown extension, a file named twice, a part that there is not or that needs another format, an
+/// existing file without --force. IoError: a folder that is not there or cannot be written to.
+std::vector<Output> checked_outputs(const RunOptions& options, const std::vector<Part>& parts);
 
 /// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: no place to write.
 void require_free(const std::filesystem::path& file, bool force);

@@ -2,6 +2,7 @@
 #include "cli/progress.h"
 
 #include "cli/run_options.h"
+#include "fit/option_checks.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -14,7 +15,8 @@ namespace {
 
 using Kind = ProgressTeller::Kind;
 constexpr int kBarWidth = 30;
-constexpr std::chrono::seconds kPlainInterval{10};
+constexpr std::chrono::seconds kPlainInterval{10}, kWorkInterval{1};
+constexpr double kTellingShare = 0.05;
 constexpr std::chrono::milliseconds kBarInterval{100};
 
 Kind kind_of(const std::string& name, bool quiet) {
@@ -31,6 +33,13 @@ std::string level_text(const FitProgress& progress) {
   return progress.level > 0 ? "level " + std::to_string(progress.level) + "  " : "";
 }
 
+/// A time that is only a guess, in few digits.
+std::string left_text(double seconds) {
+  if (seconds < 0) return "";
+  if (seconds < 90) return formatted("  %.0f s left", seconds);
+  return seconds < 5400 ? formatted("  %.0f min left", seconds / 60) : formatted("  %.1f h left", seconds / 3600);
+}
+
 }  // namespace
 
 ProgressTeller::ProgressTeller(const std::string& name, bool quiet)
@@ -40,11 +49,22 @@ ProgressTeller::~ProgressTeller() { finish(); }
 
 void ProgressTeller::tell(const FitProgress& progress) {
   switch (kind_) {
-    case Kind::bar: return draw_bar(progress);
+    case Kind::bar:
+      return draw_bar(share_done(progress), level_text(progress) + formatted("%.40s", progress.stage) + "  step " +
+                                                std::to_string(progress.iteration));
     case Kind::plain: return write_line(progress);
     case Kind::json: return write_json(progress);
     case Kind::none: return;
   }
+}
+
+void ProgressTeller::tell_work(const char* part, double share) {
+  if (kind_ == Kind::bar) return draw_bar(share, part);
+  if (kind_ == Kind::json) std::cout << Json{{"part", part}, {"share", share}, {"seconds", seconds()}}.dump() << std::endl;
+  const auto now = Clock::now();
+  if (kind_ != Kind::plain || now - last_ < kWorkInterval) return;
+  last_ = now;
+  std::fprintf(stderr, "%3.0f%%  %6.1f s  %s\n", 100 * share, seconds(), part);
 }
 
 void ProgressTeller::finish() {
@@ -52,16 +72,24 @@ void ProgressTeller::finish() {
   bar_shown_ = false;
 }
 
-void ProgressTeller::draw_bar(const FitProgress& progress) {
+double ProgressTeller::seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+double ProgressTeller::seconds_left(double share) {
+  if (share != last_share_) total_seconds_ = share < kTellingShare ? 0 : seconds() / share;
+  last_share_ = share;
+  return total_seconds_ - seconds();
+}
+
+void ProgressTeller::draw_bar(double share, const std::string& words) {
   const auto now = Clock::now();
   if (bar_shown_ && now - last_ < kBarInterval) return;
   last_ = now;
   bar_shown_ = true;
-  const int filled = static_cast<int>(share_done(progress) * kBarWidth);
+  const int filled = static_cast<int>(share * kBarWidth);
   const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
                           std::string(static_cast<std::size_t>(kBarWidth - filled), '.');
-  std::fprintf(stderr, "\r\033[K[%s] %3.0f%%  %s%.40s  step %d", bar.c_str(), 100 * share_done(progress),
-               level_text(progress).c_str(), progress.stage, progress.iteration);
+  std::fprintf(stderr, "\r\033[K[%s] %3.0f%%%s  %s", bar.c_str(), 100 * share, left_text(seconds_left(share)).c_str(),
+               words.c_str());
   std::fflush(stderr);
 }
 
@@ -72,15 +100,17 @@ void ProgressTeller::write_line(const FitProgress& progress) {
   last_ = now;
   last_stage_ = progress.stage;
   last_level_ = progress.level;
-  std::fprintf(stderr, "%3.0f%%  %6.1f s  %s%s  step %d  energy %.4g\n", 100 * share_done(progress),
-               std::chrono::duration<double>(now - start_).count(), level_text(progress).c_str(), progress.stage,
-               progress.iteration, progress.energy);
+  const double share = share_done(progress);
+  std::fprintf(stderr, "%3.0f%%  %6.1f s%s  %s%s  step %d  energy %.4g\n", 100 * share, seconds(),
+               left_text(seconds_left(share)).c_str(), level_text(progress).c_str(), progress.stage, progress.iteration,
+               progress.energy);
 }
 
 void ProgressTeller::write_json(const FitProgress& progress) {
-  const Json line{{"stage", progress.stage},     {"level", progress.level},
-                  {"iteration", progress.iteration}, {"energy", progress.energy},
-                  {"fraction", share_done(progress)}, {"seconds", std::chrono::duration<double>(Clock::now() - start_).count()}};
+  Json line{{"stage", progress.stage},         {"level", progress.level},
+            {"iteration", progress.iteration}, {"energy", progress.energy},
+            {"fraction", share_done(progress)}, {"seconds", seconds()}};
+  if (const double left = seconds_left(share_done(progress)); left >= 0) line["seconds_left"] = left;
   std::cout << line.dump() << std::endl;
 }
 

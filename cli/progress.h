@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/fit_report.h"
+#include "subvol/work_progress.h"
 
 #include <chrono>
 #include <string>
@@ -20,19 +21,29 @@ class ProgressTeller {
   ProgressTeller& operator=(const ProgressTeller&) = delete;
 
   void tell(const FitProgress& progress);
+  /// Work after the solve: on a bar, in a line once a second has passed, and to scripts as "part" and "share".
+  void tell_work(const char* part, double share);
+  WorkProgress work() {
+    return [this](const char* part, double share) { return tell_work(part, share), true; };
+  }
   /// Leaves the bar's line, before other words are said.
   void finish();
 
  private:
-  void draw_bar(const FitProgress& progress);
+  void draw_bar(double share, const std::string& words);
   void write_line(const FitProgress& progress);
   void write_json(const FitProgress& progress);
+
+  double seconds() const;
+  /// Guessed from when the share done last rose; negative where too little is done to tell, or the guess was too low.
+  double seconds_left(double share);
 
   using Clock = std::chrono::steady_clock;
   Kind kind_;
   Clock::time_point start_, last_;
   std::string last_stage_;
   int last_level_ = -1;
+  double last_share_ = 0, total_seconds_ = 0;  ///< what the whole was guessed to take when the share was reached
   bool bar_shown_ = false;
 };
 

@@ -167,7 +167,7 @@ void ShellRun::check() {
 
 // Who asks for a control mesh will subdivide it: valid cells may turn inverted then.
 void ShellRun::check_subdivided() {
-  if (std::none_of(outputs_.begin(), outputs_.end(), [](const Output& output) { return output.cage; })) return;
+  if (std::none_of(outputs_.begin(), outputs_.end(), [](const Output& output) { return output.part == Part::cage; })) return;
   subdivided_ = certify(subdivide(result_.mesh, BoundaryRule::catmull_clark).fine);
   if (subdivided_->all_certified()) return;
   add_warnings({std::to_string(subdivided_->not_certified.size()) + " of " +
@@ -223,7 +223,7 @@ int ShellRun::run() {
     throw UsageError("shell: give one of --thickness, --thickness-file and --thickness-attribute");
   if (!arguments_.thickness.empty()) parse_length("--thickness", arguments_.thickness, 1);
   if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
-  prepare(true);
+  prepare({Part::cage, Part::cutaway});
   timed("read", &ShellRun::load);
   if (arguments_.order > 1) refuse_curved(outputs_, surface_.polygons, arguments_.order);
   timed("grow", &ShellRun::grow);
@@ -296,7 +296,8 @@ void add_shell_command(CLI::App& app, Action& action) {
   add_shell_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "The layers, or their sheets, by extension: " + output_formats() +
-                         "; cage:FILE for the layers as a control mesh with creases; may be given several times");
+                         "; cage:FILE for the layers as a control mesh with creases, cutaway:FILE.glb for the cells\n"
+                         "inside; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   verb->footer(R"(Example:

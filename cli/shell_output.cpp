@@ -122,7 +122,7 @@ bool faces_point_inward(const TriangleMesh& surface) {
 }
 
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {
-  if (is_scene(output) && !output.cage) {
+  if (shows_surface(output)) {
     write_gltf(output.path, scene_of(shell, scene_options(output, options)));
   } else if (output.extension == ".vtu" || output.extension == ".msh") {
     write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell));
@@ -133,8 +133,8 @@ void write_shell(const Output& output, const ShellResult& shell, const WritingOp
 
 void write_shell(const Output& output, const ShellResult& shell, const CurvedShell& curved,
                  const WritingOptions& options) {
-  if (output.cage) return write_output(output, shell.mesh, options);
-  if (is_scene(output)) return write_gltf(output.path, scene_of(shell, curved, scene_options(output, options)));
+  if (output.part == Part::cage) return write_output(output, shell.mesh, options);
+  if (shows_surface(output)) return write_gltf(output.path, scene_of(shell, curved, scene_options(output, options)));
   if (output.extension == ".vtu" || output.extension == ".msh") {
     const std::vector<VertexField> fields = thickness_fields(shell);
     return write_volume(output.path, curved.mesh,
@@ -160,7 +160,7 @@ void take_figures(const CurvedShell& curved, ShellResult& shell) {
 
 void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surface, int order) {
   for (const Output& output : outputs) {
-    if (output.cage) continue;
+    if (output.part == Part::cage) continue;
     if (output.extension == ".usda")
       throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or cage:" +
                        output.path.string());

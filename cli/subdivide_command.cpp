@@ -29,7 +29,7 @@ struct SubdivideArguments {
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
-  const std::vector<Output> outputs = checked_outputs(arguments.run, true);
+  const std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings);
@@ -44,7 +44,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.source = arguments.mesh;
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
-  if (std::any_of(outputs.begin(), outputs.end(), needs_limit)) limit = tessellated_limit(cage, writing);
+  if (std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
   for (const Output& output : outputs) write_output(output, cage, fine, &limit, writing);
 
   const QualityReport quality = measure_quality(fine);
@@ -93,7 +93,8 @@ void add_subdivide_command(CLI::App& app, Action& action) {
       ->type_name("DEGREES");
   add_output_options(*verb, arguments->run,
                      "Refined mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control mesh; may be given several times");
+                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given several\n"
+                         "times");
   add_writing_options(*verb, arguments->writing);
   verb->add_option("--report", arguments->run.report, "Write what was done")->type_name("FILE.json");
   verb->footer(R"(Example:

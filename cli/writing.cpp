@@ -3,6 +3,7 @@
 
 #include "cli/exit_status.h"
 #include "cli/loading.h"
+#include "export/animation.h"
 #include "export/export.h"
 #include "export/gltf_writer.h"
 #include "export/obj_writer.h"
@@ -11,6 +12,8 @@
 #include "fit/high_order_quality.h"
 #include "fit/quality.h"
 #include "subvol/mesh_io.h"
+
+#include <algorithm>
 
 namespace subvol::cli {
 namespace {
@@ -50,17 +53,27 @@ PolygonMesh polygons_of(const CurvedBoundary& boundary) {
 
 }  // namespace
 
+std::string parse_cut(const std::string& text, CutPlane& cut) {
+  const std::string error = "must be x, y or z, or with a share between 0 and 1 as x:0.3, not " + text;
+  if (text.empty() || text[0] < 'x' || text[0] > 'z' || (text.size() > 1 && text[1] != ':')) return error;
+  cut.axis = text[0] - 'x';
+  if (text.size() == 1) return {};
+  if (!number_in(1e-9, 1 - 1e-9)(text.substr(2)).empty()) return error;
+  cut.share = std::stod(text.substr(2));
+  return {};
+}
+
 SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options) {
   SurfaceSceneOptions scene{.name = output.path.stem().string(),
                             .max_chord_percent = options.chord_percent,
+                            .wireframe = !options.no_wireframe,
+                            .quantize = options.quantize,
                             .metres_per_unit = options.metres_per_unit,
                             .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
                             .source = options.source.filename().string()};
   for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
   return scene;
 }
-
-bool is_scene(const Output& output) { return output.extension == ".glb" || output.extension == ".gltf"; }
 
 void add_writing_options(CLI::App& verb, WritingOptions& options) {
   const auto group = "Surfaces for DCC tools";
@@ -80,21 +93,38 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->type_name("y|z")
       ->capture_default_str()
       ->group(group);
+  verb.add_option_function<std::string>(
+          "--cut",
+          [&options](const std::string& text) {
+            if (const std::string error = parse_cut(text, options.cut); !error.empty())
+              throw CLI::ValidationError("--cut", error);
+          },
+          "Where cutaway:FILE cuts: the axis the plane stands across, and where along it (default: the axis along\n"
+          "which the mesh is shortest, halfway)")
+      ->type_name("x|y|z[:SHARE]")
+      ->group(group);
+  verb.add_flag("--no-wireframe", options.no_wireframe, "Leave the edges of the cells out of .glb and .gltf")->group(group);
+  verb.add_flag("--quantize", options.quantize,
+                "Small .glb and .gltf: positions in 16 bits, normals in 8 (KHR_mesh_quantization)")
+      ->group(group);
 }
 
-bool needs_limit(const Output& output) { return !output.cage && is_scene(output); }
+bool shows_surface(const Output& output) { return output.part == Part::result && output.is_scene(); }
 
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
                   const WritingOptions& options) {
-  if (output.cage) return write_output(output, cage, options);
-  if (!is_scene(output)) return write_output(output, mesh, options);
+  if (output.part == Part::cage) return write_output(output, cage, options);
+  if (!shows_surface(output)) return write_output(output, mesh, options);
   const std::vector<double> quality = patch_quality(cage, *limit, measure_quality(mesh).cell_minima);
   write_gltf(output.path, surface_scene(*limit, quality, scene_options(output, options)));
 }
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
   if (output.is_volume()) return write_cells(output, mesh);
-  if (is_scene(output)) return write_gltf(output.path, boundary_scene(mesh, scene_options(output, options)));
+  if (output.part == Part::cutaway)
+    return write_gltf(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
+                                                 scene_options(output, options)));
+  if (output.is_scene()) return write_gltf(output.path, boundary_scene(mesh, scene_options(output, options)));
   const TaggedPolygons boundary = tagged_polygons(mesh);
   write_polygons(output, boundary.polygons, boundary.tags, options);
 }
@@ -107,19 +137,36 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
     return write_obj(output.path, polygons_of(curved_boundary(mesh, options.chord_percent)));
   const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
   const std::vector<double> minima = is_linear ? std::vector<double>{} : measure_quality(mesh).cell_minima;
-  if (is_scene(output)) return write_gltf(output.path, surface_scene(mesh, minima, scene_options(output, options)));
+  if (output.part == Part::cutaway)
+    return write_gltf(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
+  if (output.is_scene()) return write_gltf(output.path, surface_scene(mesh, minima, scene_options(output, options)));
   write_volume(output.path, mesh,
                {.cell_minima = minima, .references = file.references, .linear_intervals = options.linear_intervals});
 }
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
-  if (is_scene(output)) return write_gltf(output.path, polygon_scene(surface, {}, scene_options(output, options)));
+  if (output.is_scene()) return write_gltf(output.path, polygon_scene(surface, {}, scene_options(output, options)));
   write_polygons(output, surface, {}, options);
 }
 
-TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options) {
-  return tessellate(cage, chord_length(cage, {.max_chord_percent = options.chord_percent}));
+void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
+                     const WritingOptions& options) {
+  write_gltf(output.path, animation_scene(cage, states, scene_options(output, options)));
+}
+
+void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
+                     const WritingOptions& options) {
+  write_gltf(output.path, animation_scene(mesh, states, scene_options(output, options)));
+}
+
+bool has_animation(std::span<const Output> outputs) {
+  return std::any_of(outputs.begin(), outputs.end(), [](const Output& o) { return o.part == Part::animation; });
+}
+
+TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options,
+                                     const WorkProgress& progress) {
+  return tessellate(cage, chord_length(cage, {.max_chord_percent = options.chord_percent}), kMostQuads, progress);
 }
 
 }  // namespace subvol::cli

@@ -2,13 +2,16 @@
 #pragma once
 
 #include "cli/outputs.h"
+#include "export/cutaway.h"
 #include "export/export.h"
 #include "export/high_order_file.h"
 #include "export/tessellate.h"
+#include "subvol/fit_state.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
 
 #include <filesystem>
+#include <span>
 #include <string>
 
 namespace subvol::cli {
@@ -20,26 +23,39 @@ struct WritingOptions {
   std::string up_axis = "y";
   std::filesystem::path source;   ///< file the result was made from, kept in the file
   Json options = Json::object();  ///< options in force, kept in the file
+  CutPlane cut{};                 ///< of cutaways
+  bool no_wireframe = false;      ///< scenes without the cells' edges
+  bool quantize = false;          ///< scenes in small whole numbers
   int linear_intervals = 0;       ///< of a curved cell's edges in .mesh and .vtk; 0: its mesh's largest order
 };
 
-/// --chord, --unit, --up.
+/// --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
+
+/// Reads where a cutaway is cut: x, y or z, also with a place between 0 and 1 as "z:0.3". Returns what is wrong, or nothing.
+std::string parse_cut(const std::string& text, CutPlane& cut);
 
 /// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
 /// coloured by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is asked
-/// for where a scene is to be written (`needs_limit`) and may be null elsewhere.
+/// for where a scene of it is to be written (`shows_surface`) and may be null elsewhere.
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
                   const WritingOptions& options);
-bool needs_limit(const Output& output);
-bool is_scene(const Output& output);
+/// Whether the output is a scene of the result's surface.
+bool shows_surface(const Output& output);
 
-/// Writes one mesh as it stands: its cells, or the flat faces of its boundary (.usda: as a subdivision cage).
+/// Writes one mesh as it stands: its cells, the flat faces of its boundary (.usda: as a subdivision cage), or a cutaway.
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);
 
 /// Writes a high-order mesh: curved cells (.vtu, .msh), many linear ones (.mesh, .vtk), its curved boundary coloured by
-/// quality (.glb, .gltf) or as quads (.obj). UsageError: .usda, which holds subdivision cages.
+/// quality (.glb, .gltf) or as quads (.obj), a cutaway. UsageError: .usda, which holds subdivision cages.
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options);
+
+/// Writes a fit as it went: a scene of its surface, from the template on.
+void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
+                     const WritingOptions& options);
+void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
+                     const WritingOptions& options);
+bool has_animation(std::span<const Output> outputs);
 
 /// What a scene written to this output says of itself.
 SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options);
@@ -48,6 +64,7 @@ SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& op
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options);
 
 /// The limit surface of a cage as it is written to .glb.
-TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options);
+TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options,
+                                     const WorkProgress& progress = {});
 
 }  // namespace subvol::cli

@@ -81,7 +81,8 @@ Scene make_scene(ScenePrimitive surface, const Segments& wires, const SurfaceSce
   Scene scene{.name = options.name,
               .metres_per_unit = options.metres_per_unit,
               .up_axis = options.up_axis,
-              .options = options.options};
+              .options = options.options,
+              .quantize = options.quantize};
   const Eigen::AlignedBox3d box = bounding_box(surface.positions);
   if (!box.isEmpty()) scene.origin = box.center();
   if (!options.source.empty()) scene.extras.emplace_back("source", options.source);
@@ -222,7 +223,8 @@ Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_
   Scene scene{.name = options.name,
               .metres_per_unit = options.metres_per_unit,
               .up_axis = options.up_axis,
-              .options = options.options};
+              .options = options.options,
+              .quantize = options.quantize};
   Eigen::AlignedBox3d box;
   ScenePrimitive wires = wire_primitive({}, {});
   for (const SceneSheet& sheet : sheets) {

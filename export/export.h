@@ -21,6 +21,7 @@ struct SurfaceSceneOptions {
   double max_chord_percent = 0.005;     ///< chord error of a curved surface, per cent of its bounding box's diagonal, > 0
   double crease_angle_degrees = 30;     ///< faces that meet at more are not shaded smoothly, [0, 180]
   bool wireframe = true;                ///< a second node with the cells' edges as lines
+  bool quantize = false;                ///< a smaller file: `Scene::quantize`
   double metres_per_unit = 1;           ///< > 0
   UpAxis up_axis = UpAxis::y;
   std::string source{};                 ///< file the result was made from; goes into the extras

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <sstream>
 
 namespace subvol {
@@ -41,6 +42,13 @@ bool is_attribute_name(const std::string& name) {
          });
 }
 
+/// Where the coordinates of a file are: position = origin + unit coordinate.
+struct Placement {
+  Vec3 origin;
+  double unit = 1;
+  bool quantize = false;  ///< coordinates are within -1 .. 1, and so written as small whole numbers
+};
+
 /// Appends typed arrays to one buffer, each behind a bufferView and an accessor of its own.
 class BufferWriter {
  public:
@@ -60,6 +68,23 @@ class BufferWriter {
     if (with_bounds) set_bounds(accessor, values, width);
     model_.accessors.push_back(std::move(accessor));
     return static_cast<int>(model_.accessors.size()) - 1;
+  }
+
+  /// Triples of numbers in [-1, 1] as whole numbers of a type, each triple padded to four.
+  template <class Int>
+  int add_quantized(const std::vector<float>& values, int component_type, const std::string& name, bool with_bounds) {
+    std::vector<Int> whole, padded;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      whole.push_back(static_cast<Int>(std::lround(values[i] * std::numeric_limits<Int>::max())));
+      padded.push_back(whole.back());
+      if (i % 3 == 2) padded.push_back(0);
+    }
+    const int number = add(padded, 4, component_type, TINYGLTF_TARGET_ARRAY_BUFFER, name, false, true);
+    gltf::Accessor& accessor = model_.accessors.back();
+    accessor.type = TINYGLTF_TYPE_VEC3;
+    if (with_bounds) set_bounds(accessor, whole, 3);
+    model_.bufferViews[accessor.bufferView].byteStride = 4 * sizeof(Int);
+    return number;
   }
 
  private:
@@ -93,18 +118,19 @@ class BufferWriter {
   gltf::Model& model_;
 };
 
-std::vector<float> relative_positions(const ScenePrimitive& primitive, const Vec3& origin, const Complaint& refuse) {
+std::vector<float> relative_positions(const std::vector<Vec3>& positions, const Placement& place,
+                                      const Complaint& refuse) {
   std::vector<float> values;
-  values.reserve(3 * primitive.positions.size());
-  for (const Vec3& position : primitive.positions)
-    for (const double x : Vec3(position - origin)) values.push_back(to_float(x, "positions", refuse));
+  values.reserve(3 * positions.size());
+  for (const Vec3& position : positions)
+    for (const double x : Vec3((position - place.origin) / place.unit)) values.push_back(to_float(x, "positions", refuse));
   return values;
 }
 
-std::vector<float> unit_normals(const ScenePrimitive& primitive, const Complaint& refuse) {
+std::vector<float> unit_normals(const std::vector<Vec3>& normals, const Complaint& refuse) {
   std::vector<float> values;
-  values.reserve(3 * primitive.normals.size());
-  for (const Vec3& normal : primitive.normals) {
+  values.reserve(3 * normals.size());
+  for (const Vec3& normal : normals) {
     if (!(std::abs(normal.norm() - 1) <= kUnitNormalTolerance)) refuse("normals", "expected length 1");
     for (const double x : normal) values.push_back(static_cast<float>(x));
   }
@@ -169,17 +195,54 @@ int add_material(gltf::Model& model, const SceneNode& node, const Complaint& ref
   return static_cast<int>(model.materials.size()) - 1;
 }
 
+/// What takes `from` to `to`, number by number.
+std::vector<float> differences(std::vector<float> to, const std::vector<float>& from) {
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] -= from[i];
+  return to;
+}
+
+/// Adds the shapes of a node as morph targets of its primitive.
+void add_shapes(gltf::Mesh& mesh, BufferWriter& buffer, const SceneNode& node, const Placement& place,
+                const Complaint& refuse) {
+  constexpr int kTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
+  const ScenePrimitive& rest = node.primitive;
+  if (rest.topology != ScenePrimitive::Topology::triangles) refuse("shapes", "expected none of lines");
+  const std::vector<float> positions = relative_positions(rest.positions, place, refuse);
+  const std::vector<float> normals = unit_normals(rest.normals, refuse);
+  gltf::Value::Array names;
+  for (const SceneShape& shape : node.shapes) {
+    if (shape.positions.size() != rest.positions.size() || shape.normals.size() != rest.normals.size())
+      refuse("shape \"" + shape.name + "\"", "expected as many positions and normals as the primitive has");
+    std::map<std::string, int> target;
+    target["POSITION"] = buffer.add(differences(relative_positions(shape.positions, place, refuse), positions), 3,
+                                    kFloat, kTarget, shape.name + " positions", true);
+    if (!normals.empty())
+      target["NORMAL"] =
+          buffer.add(differences(unit_normals(shape.normals, refuse), normals), 3, kFloat, kTarget, shape.name + " normals");
+    mesh.primitives[0].targets.push_back(std::move(target));
+    names.emplace_back(shape.name);
+  }
+  mesh.weights.assign(node.shapes.size(), 0);
+  mesh.extras = gltf::Value(gltf::Value::Object{{"targetNames", gltf::Value(std::move(names))}});
+}
+
 /// Adds mesh, material and node; returns the node's number.
-int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, const Vec3& origin) {
+int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, const Placement& place) {
   const Complaint refuse{node.name};
   const ScenePrimitive& source = node.primitive;
   check_sizes(source, refuse);
   constexpr int kTarget = TINYGLTF_TARGET_ARRAY_BUFFER, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
   gltf::Primitive primitive;
+  const std::vector<float> positions = relative_positions(source.positions, place, refuse);
   primitive.attributes["POSITION"] =
-      buffer.add(relative_positions(source, origin, refuse), 3, kFloat, kTarget, "positions", true);
-  if (!source.normals.empty())
-    primitive.attributes["NORMAL"] = buffer.add(unit_normals(source, refuse), 3, kFloat, kTarget, "normals");
+      place.quantize ? buffer.add_quantized<std::int16_t>(positions, TINYGLTF_COMPONENT_TYPE_SHORT, "positions", true)
+                     : buffer.add(positions, 3, kFloat, kTarget, "positions", true);
+  if (!source.normals.empty()) {
+    const std::vector<float> normals = unit_normals(source.normals, refuse);
+    primitive.attributes["NORMAL"] =
+        place.quantize ? buffer.add_quantized<std::int8_t>(normals, TINYGLTF_COMPONENT_TYPE_BYTE, "normals", false)
+                       : buffer.add(normals, 3, kFloat, kTarget, "normals");
+  }
   if (!source.colors.empty())
     primitive.attributes["COLOR_0"] = buffer.add(color_words(source, refuse), 4,
                                                  TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kTarget, "colors", false, true);
@@ -194,12 +257,37 @@ int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, co
   gltf::Mesh mesh;
   mesh.name = node.name;
   mesh.primitives.push_back(std::move(primitive));
+  if (!node.shapes.empty()) add_shapes(mesh, buffer, node, place, refuse);
   model.meshes.push_back(std::move(mesh));
   gltf::Node out;
   out.name = node.name;
   out.mesh = static_cast<int>(model.meshes.size()) - 1;
+  if (place.quantize) out.scale = {place.unit, place.unit, place.unit};
   model.nodes.push_back(std::move(out));
   return static_cast<int>(model.nodes.size()) - 1;
+}
+
+/// Plays the shapes of a node one after the other, then the primitive itself: weight k is 1 at time k.
+void add_animation(gltf::Model& model, BufferWriter& buffer, int node, std::size_t num_shapes, double seconds_per_shape) {
+  std::vector<float> times, weights;
+  for (std::size_t step = 0; step <= num_shapes; ++step) {
+    times.push_back(static_cast<float>(static_cast<double>(step) * seconds_per_shape));
+    for (std::size_t shape = 0; shape < num_shapes; ++shape) weights.push_back(step == shape ? 1.0F : 0.0F);
+  }
+  constexpr int kNoTarget = 0, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;
+  gltf::AnimationSampler sampler;
+  sampler.input = buffer.add(times, 1, kFloat, kNoTarget, "times", true);
+  sampler.output = buffer.add(weights, 1, kFloat, kNoTarget, "weights");
+  sampler.interpolation = "LINEAR";
+  gltf::AnimationChannel channel;
+  channel.sampler = 0;
+  channel.target_node = node;
+  channel.target_path = "weights";
+  gltf::Animation animation;
+  animation.name = "shapes";
+  animation.samplers.push_back(std::move(sampler));
+  animation.channels.push_back(std::move(channel));
+  model.animations.push_back(std::move(animation));
 }
 
 gltf::Value to_value(const std::string& key, const SceneValue& value) {
@@ -244,19 +332,39 @@ gltf::Node root_node(const Scene& scene, std::vector<int> children) {
   return root;
 }
 
+Placement placement(const Scene& scene) {
+  Placement place{scene.origin};
+  if (!scene.quantize) return place;
+  double extent = 0;
+  for (const SceneNode& node : scene.nodes)
+    for (const Vec3& p : node.primitive.positions) extent = std::max(extent, (p - scene.origin).cwiseAbs().maxCoeff());
+  // Positions that are not finite are refused by name where they are written.
+  place.quantize = extent > 0 && std::isfinite(extent);
+  if (place.quantize) place.unit = extent;
+  return place;
+}
+
 gltf::Model model_of(const Scene& scene) {
   if (scene.nodes.empty()) throw InputError("scene: expected at least one node");
   if (!(scene.metres_per_unit > 0) || !std::isfinite(scene.metres_per_unit))
     throw InputError("scene: metres_per_unit: expected a positive number");
   if (!(scene.metres_per_unit * scene.origin).allFinite()) throw InputError("scene: origin: expected finite numbers");
+  if (!(scene.seconds_per_shape > 0) || !std::isfinite(scene.seconds_per_shape))
+    throw InputError("scene: seconds_per_shape: expected a positive number");
   gltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = std::string("subvol ") + version();
   model.asset.extras = extras(scene);
   model.nodes.emplace_back();
+  const Placement place = placement(scene);
+  if (place.quantize) model.extensionsUsed = model.extensionsRequired = {"KHR_mesh_quantization"};
   BufferWriter buffer(model);
   std::vector<int> children;
-  for (const SceneNode& node : scene.nodes) children.push_back(add_node(model, buffer, node, scene.origin));
+  for (const SceneNode& node : scene.nodes) {
+    children.push_back(add_node(model, buffer, node, place));
+    if (!node.shapes.empty())
+      add_animation(model, buffer, children.back(), node.shapes.size(), scene.seconds_per_shape);
+  }
   model.nodes[0] = root_node(scene, std::move(children));
   gltf::Scene root;
   root.name = scene.name;

@@ -78,15 +78,23 @@ ShadedPolygons shade_polygons(const PolygonMesh& mesh, double crease_angle_degre
       if (group[i] == i) {
         shaded.corner_vertices[corners[i].entry] = static_cast<Index>(shaded.positions.size());
         shaded.positions.push_back(mesh.positions[v]);
-        shaded.normals.push_back(Vec3::Zero());
       } else {
         shaded.corner_vertices[corners[i].entry] = shaded.corner_vertices[corners[group[i]].entry];
       }
-      shaded.normals[shaded.corner_vertices[corners[i].entry]] += areas[corners[i].face];
     }
   }
-  for (Vec3& normal : shaded.normals) normal = normal.norm() > 0 ? Vec3(normal.stableNormalized()) : Vec3::UnitZ();
+  shaded.normals = shaded_normals(mesh, shaded.corner_vertices, shaded.positions.size());
   return shaded;
+}
+
+std::vector<Vec3> shaded_normals(const PolygonMesh& mesh, const std::vector<Index>& corner_vertices,
+                                 std::size_t num_vertices) {
+  const std::vector<Vec3> areas = area_vectors(mesh);
+  std::vector<Vec3> normals(num_vertices, Vec3::Zero());
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
+    for (std::size_t k = mesh.face_offsets[f]; k < mesh.face_offsets[f + 1]; ++k) normals[corner_vertices[k]] += areas[f];
+  for (Vec3& normal : normals) normal = normal.norm() > 0 ? Vec3(normal.stableNormalized()) : Vec3::UnitZ();
+  return normals;
 }
 
 }  // namespace subvol

@@ -21,4 +21,11 @@ struct ShadedPolygons {
 /// than three corners, with indices out of range or positions that are not finite; an angle out of range.
 ShadedPolygons shade_polygons(const PolygonMesh& mesh, double crease_angle_degrees = 30);
 
+/// The normals of polygons that have moved, one for each vertex that `corner_vertices` names: faces that were shaded
+/// together still are.
+///
+/// corner_vertices, num_vertices  of a ShadedPolygons of the same polygons elsewhere.
+std::vector<Vec3> shaded_normals(const PolygonMesh& mesh, const std::vector<Index>& corner_vertices,
+                                 std::size_t num_vertices);
+
 }  // namespace subvol

@@ -32,10 +32,18 @@ struct ScenePrimitive {
   LinearColor material_color{1, 1, 1, 1};  ///< multiplies `colors`
 };
 
+/// Another shape of the same vertices, that a drawing passes through when it is played ("shape key", "morph target").
+struct SceneShape {
+  std::string name;
+  std::vector<Vec3> positions;  ///< world positions, one per vertex
+  std::vector<Vec3> normals{};  ///< unit, one per vertex; or empty
+};
+
 /// A named drawing below the root.
 struct SceneNode {
   std::string name;
   ScenePrimitive primitive;
+  std::vector<SceneShape> shapes{};  ///< played in this order, then the primitive itself; of triangles only
 };
 
 /// A remark for people and scripts that travels with the file.
@@ -57,6 +65,8 @@ struct Scene {
   UpAxis up_axis = UpAxis::y;     ///< default: axes are taken over as they are; z: the root turns -90 degrees about x
   SceneValues extras{};           ///< source, colour map, ...; unit, up_axis and version are added by the writer
   SceneValues options{};          ///< the options in force, written as extras.options
+  double seconds_per_shape = 0.5; ///< how long it takes from one shape to the next, > 0
+  bool quantize = false;          ///< positions in 16 bits, normals in 8 (KHR_mesh_quantization); shapes stay as they are
 };
 
 }  // namespace subvol

@@ -177,11 +177,13 @@ void StripCuts::halve(Index strip, std::span<const char> chosen) {
   }
 }
 
-CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads) {
+CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads,
+                     const WorkProgress& progress) {
   CutResult result{StripCuts(patches), 0};
   StripCuts& cuts = result.cuts;
   std::vector<PatchState> states(patches.num_patches());
   std::vector<char> changed(cuts.num_strips(), 1);
+  double share = 0;  // each round takes about half of what is left
   while (std::any_of(changed.begin(), changed.end(), [](char c) { return c != 0; })) {
     patches.prepare(depth_of(cuts) + std::countr_zero(static_cast<unsigned>(kCellSteps)));
 #pragma omp parallel for schedule(dynamic, 64)
@@ -189,6 +191,8 @@ CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t 
       const auto& [u, v] = cuts.strips(static_cast<Index>(p));
       if (changed[u] || changed[v]) states[p] = PatchJudge(patches, cuts, static_cast<Index>(p)).judge(max_chord_error);
     }
+    share = (1 + share) / 2;
+    if (!goes_on(progress, "tessellation", share)) break;
     const Demand demand = total_demand(cuts, states);
     changed = halve_above(affordable_threshold(demand, cuts, states.size(), max_chord_error, max_quads), demand, cuts);
   }

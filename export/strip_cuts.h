@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/patch_surface.h"
+#include "subvol/work_progress.h"
 
 #include <array>
 #include <span>
@@ -38,7 +39,8 @@ struct CutResult {
   double chord_error;  ///< reached
 };
 
-/// max_quads  and depth: as `tessellate`. `patches` is made ready as deep as needed.
-CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads);
+/// max_quads, progress and depth: as `tessellate`. `patches` is made ready as deep as needed.
+CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads,
+                     const WorkProgress& progress = {});
 
 }  // namespace subvol

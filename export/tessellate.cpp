@@ -173,9 +173,10 @@ void finish_normals(TessellatedSurface& surface) {
 
 }  // namespace
 
-TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads) {
+TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads,
+                              const WorkProgress& progress) {
   if (!(max_chord_error > 0)) throw InputError("tessellate: max_chord_error: expected a positive length");
-  const CutResult result = cut_strips(patches, max_chord_error, max_quads);
+  const CutResult result = cut_strips(patches, max_chord_error, max_quads, progress);
   TessellatedSurface surface;
   surface.chord_error = result.chord_error;
   Assembler assembler(patches, result.cuts, surface);
@@ -188,9 +189,10 @@ TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std
   return surface;
 }
 
-TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads) {
+TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads,
+                              const WorkProgress& progress) {
   LimitPatches patches(cage);
-  return tessellate(patches, max_chord_error, max_quads);
+  return tessellate(patches, max_chord_error, max_quads, progress);
 }
 
 TriangleMesh triangles_of(const TessellatedSurface& surface) {

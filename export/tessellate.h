@@ -4,12 +4,15 @@
 #include "subvol/patch_surface.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
+#include "subvol/work_progress.h"
 
 #include <array>
 #include <cstddef>
 #include <vector>
 
 namespace subvol {
+
+inline constexpr std::size_t kMostQuads = 4'000'000;  ///< of a tessellation, unless asked otherwise
 
 /// A quarter of a boundary face (a third of a triangle): the part next to one of its corners.
 ///
@@ -45,15 +48,19 @@ struct TessellatedSurface {
 /// max_quads        intervals are halved only while there are not more quads than this, the worst first; `chord_error`
 ///                  then is above `max_chord_error`. One quad per patch is always made. No interval is halved more than
 ///                  12 times.
+/// progress         told "tessellation" in every round of halving; where it ends the rounds, `chord_error` tells how
+///                  far they came.
 ///
 /// Normals part across creases of infinite sharpness only; elsewhere a vertex has the mean one of its patches. Where
 /// the tangents are parallel (the one face at an untagged boundary vertex, say) it is the mean one of the quads around.
 /// InputError: max_chord_error not positive. The same bits for any number of threads. Cost of a limit surface: about 2
 /// microseconds per quad.
-TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads = 4'000'000);
+TessellatedSurface tessellate(PatchSurface& patches, double max_chord_error, std::size_t max_quads = kMostQuads,
+                              const WorkProgress& progress = {});
 
 /// The same of the Catmull-Clark limit surface of a control cage. InputError also for what `LimitPatches` refuses.
-TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads = 4'000'000);
+TessellatedSurface tessellate(const VolumeMesh& cage, double max_chord_error, std::size_t max_quads = kMostQuads,
+                              const WorkProgress& progress = {});
 
 /// The triangles alone, two for each quad. Vertices along hard creases are there once for each side.
 TriangleMesh triangles_of(const TessellatedSurface& surface);

@@ -85,6 +85,8 @@ class HighOrderFit {
   Outcome measured_outcome();
   bool lift_worst_cells();
   bool meets_tolerance();
+  void keep_state();
+  std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
   TriangleMesh boundary(int intervals) const;
   TriangleMesh measured_boundary() const;
   double keep_mean(double distance);
@@ -99,6 +101,7 @@ class HighOrderFit {
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
   BoundarySamples samples_;
+  std::vector<FitState> states_;  ///< of the current try, in the current orders
   int try_ = 0;              ///< tries begun
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< the highest of any entity
@@ -152,6 +155,8 @@ bool HighOrderFit::has_room(const EntityOrders& orders) {
 }
 
 void HighOrderFit::set_orders(const EntityOrders& orders) {
+  for (FitState& state : states_)
+    state.positions = HighOrderMesh(mesh_.space, std::move(state.positions)).with_orders(orders).coefficients;
   mesh_ = mesh_.with_orders(orders);
   order_ = mesh_.space.max_order();
   samples_ = make_boundary_samples(mesh_.space, sample_intervals(order_));
@@ -173,6 +178,12 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
           stage.lambda};
 }
 
+/// Keeps where the mesh is, under the name of what it came from.
+void HighOrderFit::keep_state() {
+  if (!options_.keep_states) return;
+  states_.push_back({states_.empty() ? "template" : report_.stages.back().name, mesh_.coefficients});
+}
+
 bool HighOrderFit::run_stage(const Stage& stage) {
   if (!report_.stages.empty() && !runner_.in_time(formatted("order %d", order_), report_)) return false;
   StageRecord record;
@@ -184,6 +195,7 @@ bool HighOrderFit::run_stage(const Stage& stage) {
     record.name += formatted(", worst cells up to %.3g times as heavy", std::ranges::max(cell_weights_));
   record.order = order_;
   record.cells = mesh_.space.num_cells();
+  keep_state();
   lambda_ = stage.lambda;
   mean_.reset();
   FitProblem stage_problem = problem(mesh_, samples_, stage);
@@ -224,6 +236,7 @@ void HighOrderFit::take_own_boxes() {
 void HighOrderFit::begin_try(const HighOrderTry& attempt) {
   ++try_;
   approach_ = attempt.approach;
+  states_.clear();
   mesh_ = HighOrderMesh(mesh_.space.with_orders(EntityOrders::uniform(mesh_.space.topology(), 1)), template_);
   ideal_boxes_ = ideal_boxes(template_, template_.positions, target_.surface.volume(), attempt.own_box_share);
 }
@@ -247,6 +260,7 @@ bool HighOrderFit::run_first_orders(int last) {
     HighOrderMesh mesh;
     std::vector<Vec3> ideal_boxes;
     Approach approach;
+    std::vector<FitState> states;
   };
   std::optional<Arrival> best;
   for (const HighOrderTry& attempt : schedule_.tries) {
@@ -256,7 +270,7 @@ bool HighOrderFit::run_first_orders(int last) {
     if (schedule_.tries.size() == 1) return true;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
-    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_};
+    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_, states_};
     const bool better = !best || std::tuple(arrival.pairs > 0, arrival.mean) < std::tuple(best->pairs > 0, best->mean);
     if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
@@ -265,6 +279,7 @@ bool HighOrderFit::run_first_orders(int last) {
   mesh_ = std::move(best->mesh);
   ideal_boxes_ = std::move(best->ideal_boxes);
   approach_ = best->approach;
+  states_ = std::move(best->states);
   set_orders(EntityOrders(mesh_.space.orders()));
   return true;
 }
@@ -311,6 +326,7 @@ bool HighOrderFit::lower_lambda() {
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now > pairs) {
       mesh_.coefficients = coefficients;
+      if (!states_.empty()) states_.pop_back();
       mean_ = before;
       report_.stages.back().kept = false;
       break;
@@ -353,6 +369,7 @@ bool HighOrderFit::lift_worst_cells() {
                           lifted.max_percent <= most_max && lifted.pairs <= now.pairs;
     if (!worth_it) {
       mesh_.coefficients = coefficients;
+      if (!states_.empty()) states_.pop_back();
       mean_ = now.mean_percent;
       report_.stages.back().kept = false;
       break;
@@ -370,6 +387,14 @@ void HighOrderFit::conclude() {
                                : formatted("all stages done, mean distance %.4g %%", measured_mean());
 }
 
+std::vector<Vec3> HighOrderFit::in_target_units(std::vector<Vec3> coefficients) const {
+  const std::size_t num_vertices = mesh_.space.num_vertices();
+  for (std::size_t i = 0; i < coefficients.size(); ++i)
+    coefficients[i] = target_.normalisation.diagonal * coefficients[i] +
+                      (i < num_vertices ? target_.normalisation.centre : Vec3(0, 0, 0));
+  return coefficients;
+}
+
 HighOrderFitResult HighOrderFit::run() {
   look_over_template();
   const int first = std::min(schedule_.first_orders(options_.adaptive), options_.order);
@@ -379,11 +404,9 @@ HighOrderFitResult HighOrderFit::run() {
     end_for_memory(formatted("no memory was left at order %d", order_));
   }
   report_.seconds = {{"total", runner_.seconds()}};
-  const std::size_t num_vertices = mesh_.space.num_vertices();
-  std::vector<Vec3>& x = mesh_.coefficients;
-  for (std::size_t i = 0; i < x.size(); ++i)
-    x[i] = target_.normalisation.diagonal * x[i] + (i < num_vertices ? target_.normalisation.centre : Vec3(0, 0, 0));
-  return {std::move(mesh_), std::move(report_)};
+  mesh_.coefficients = in_target_units(std::move(mesh_.coefficients));
+  for (FitState& state : states_) state.positions = in_target_units(std::move(state.positions));
+  return {std::move(mesh_), std::move(report_), std::move(states_)};
 }
 
 }  // namespace

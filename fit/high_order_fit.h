@@ -26,11 +26,14 @@ struct HighOrderFitOptions {
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
   StageLog* log = nullptr;                       ///< takes the results of minimisations from here and keeps them here; null: no
+  bool keep_states = false;                      ///< fills HighOrderFitResult::states
 };
 
 struct HighOrderFitResult {
   HighOrderMesh mesh;
   FitReport report;
+  /// The coefficients before each minimisation, as far as kept, from the template on; if asked for.
+  std::vector<FitState> states;
 };
 
 /// Fits curved elements: the template at order 1, then orders raised step by step (paper: Algorithm 1), of all edges, faces

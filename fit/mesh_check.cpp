@@ -103,7 +103,8 @@ Compare comparison(const PointCloud* target) {
 }
 
 void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const Compare& compare,
-                    MeshCheck& check) {
+                    const WorkProgress& progress, MeshCheck& check) {
+  if (!goes_on(progress, "self-intersections", 0.3)) return;
   check.has_boundary_geometry = true;
   check.volume = enclosed_volume(triangles);
   const SelfIntersections found = self_intersections(triangles);
@@ -113,7 +114,7 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  if (compare) compare(triangles, check);
+  if (compare && goes_on(progress, "distance", 0.6)) compare(triangles, check);
 }
 
 MeshCheck count_cells(const VolumeMesh& mesh) {
@@ -219,6 +220,7 @@ void append_distance(std::string& text, const MeshCheck& check) {
 MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const MeshCheckOptions& options) {
   MeshCheck check = count_cells(mesh);
   if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
+  if (!goes_on(options.progress, "quality", 0)) return check;
   check.quality = measure_quality(mesh, options.samples_per_direction);
   check.witnesses = witnesses(
       *check.quality,
@@ -228,6 +230,7 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
       },
       [&](Index c, const Vec3& point) { return single_cell(mesh, c).position(0, point); });
   if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
+  if (!goes_on(options.progress, "topology", 0.2)) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
   if (!has_any(check.defects, {Kind::bad_tag})) check.subdivision_audit = audit(mesh);
@@ -237,16 +240,17 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   const TriangleMesh triangles = options.quad_triangles == QuadTriangles::bilinear
                                      ? refined_triangles(boundary, &face_of_triangle)
                                      : triangulate(boundary, &face_of_triangle);
-  check_boundary(triangles, face_of_triangle, compare, check);
+  check_boundary(triangles, face_of_triangle, compare, options.progress, check);
   return check;
 }
 
 MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const Compare& compare,
-                       int samples_per_direction) {
+                       const WorkProgress& progress, int samples_per_direction) {
   const VolumeMesh straight = mesh.straight_sided();
   MeshCheck check = count_cells(straight);
   std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
   check.orders = order_summary(mesh.space);
+  if (!goes_on(progress, "quality", 0)) return check;
   check.quality = measure_quality(mesh, samples_per_direction);
   HighOrderCertifier certifier(mesh.space);
   check.witnesses = witnesses(
@@ -256,7 +260,7 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
   check.chord_error = boundary.chord_error;
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
   if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
-    check_boundary(boundary.triangles, boundary.faces, compare, check);
+    check_boundary(boundary.triangles, boundary.faces, compare, progress, check);
   return check;
 }
 
@@ -297,12 +301,12 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const PointCloud* target, const Mes
 
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target,
                      const MeshCheckOptions& options, int samples_per_direction) {
-  return check_curved(mesh, boundary, comparison(target, options), samples_per_direction);
+  return check_curved(mesh, boundary, comparison(target, options), options.progress, samples_per_direction);
 }
 
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const PointCloud* target,
-                     int samples_per_direction) {
-  return check_curved(mesh, boundary, comparison(target), samples_per_direction);
+                     const MeshCheckOptions& options, int samples_per_direction) {
+  return check_curved(mesh, boundary, comparison(target), options.progress, samples_per_direction);
 }
 
 std::string to_text(const MeshCheck& check) {

@@ -8,6 +8,7 @@
 #include "subvol/audit.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
+#include "subvol/work_progress.h"
 
 #include <array>
 #include <cstddef>
@@ -27,6 +28,7 @@ struct MeshCheckOptions {
   int samples_per_direction = 5;   ///< of the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
   int distance_samples = 50000;    ///< `SurfaceDistanceOptions::num_samples`
+  WorkProgress progress{};         ///< told "quality", "topology", "self-intersections" and "distance" before each
 };
 
 /// How fine the cells of a high-order mesh are.
@@ -89,6 +91,7 @@ struct MeshCheck {
 /// Looks at everything: defects, topology, quality, certificate, self-intersection, distance.
 ///
 /// target   what the boundary should be, or null.
+/// Where the progress ends it, what has not been looked at is as if defects ruled it out: it is then not valid.
 /// InputError: options out of range; a target that `ClosestPoint` refuses. Never for what is wrong with the mesh.
 /// Deterministic for any number of threads. Cost on one core: per hex about 2 us, per boundary quad 50 us without
 /// and 80 us with a target.
@@ -109,7 +112,7 @@ inline MeshCheck check_mesh(const VolumeMesh& mesh, std::nullptr_t, const MeshCh
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {}, int samples_per_direction = 0);
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const PointCloud* target,
-                     int samples_per_direction = 0);
+                     const MeshCheckOptions& options = {}, int samples_per_direction = 0);
 
 /// The same as a text of some lines for people, the verdict last.
 std::string to_text(const MeshCheck& check);

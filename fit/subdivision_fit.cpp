@@ -72,6 +72,7 @@ class SubdivisionFit {
   double mean_scaled_jacobian() const;
   std::size_t intersecting_pairs() const;
   bool meets_tolerance();
+  void keep_state();
   void store_result();
   void next_control();
   std::string stage_name(const Stage& stage) const;
@@ -86,6 +87,7 @@ class SubdivisionFit {
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
+  std::vector<FitState> states_;   ///< of the current try, by the numbers of the unknowns
   int try_ = 0;                    ///< tries begun, each with other ideal cells
   double own_box_share_ = 0;       ///< of the current try
   std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
@@ -148,6 +150,12 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
   return term;
 }
 
+/// Keeps where the cage is, under the name of what it came from.
+void SubdivisionFit::keep_state() {
+  if (!options_.keep_states) return;
+  states_.push_back({states_.empty() ? "template" : result_.report.stages.back().name, unknowns_});
+}
+
 /// Runs one minimisation over the current level's maps. False when the fit must end.
 bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   if (!runner_.in_time(name, result_.report)) return false;
@@ -155,6 +163,7 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   record.name = try_ == 1 ? name : formatted("try %d, ", try_) + name;
   record.level = number_;
   record.cells = level_.mesh.num_cells();
+  keep_state();
   lambda_ = stage.lambda;
   auto volume = std::make_unique<VolumeEnergy>(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_));
   volume->set_distortion(options_.distortion);
@@ -255,6 +264,7 @@ bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) 
     const std::vector<Vec3> before = std::exchange(unknowns_, start);
     const double lambda_before = lambda_;
     if (!run_stage(stage, stage_name(stage))) return false;
+    if (!states_.empty()) states_.pop_back();  // the start, which is there already
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now >= pairs) {
       unknowns_ = before;
@@ -290,6 +300,7 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
       unknowns_ = before;
+      if (!states_.empty()) states_.pop_back();
       mean_ = mean;
       result_.report.stages.back().kept = false;
       break;
@@ -315,9 +326,10 @@ bool SubdivisionFit::run_stages() {
 
 /// All or nothing: memory may run out here.
 void SubdivisionFit::store_result() {
-  FitResult stored{cage_, level_.mesh, {}};
+  FitResult stored{cage_, level_.mesh, {}, states_};
   stored.cage.positions = target_.normalisation.from_unit(unknowns_);
   stored.mesh.positions = target_.normalisation.from_unit(level_.nodes.apply(unknowns_));
+  for (FitState& state : stored.states) state.positions = target_.normalisation.from_unit(std::move(state.positions));
   if (!creases_.curves().empty()) {
     const TriangleMesh limit = limit_triangles();
     CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
@@ -326,6 +338,7 @@ void SubdivisionFit::store_result() {
   }
   result_.cage = std::move(stored.cage);
   result_.mesh = std::move(stored.mesh);
+  result_.states = std::move(stored.states);
 }
 
 /// The refined mesh becomes the next control mesh (paper: section 4.3), unless the unknowns stay where they are.
@@ -338,6 +351,7 @@ void SubdivisionFit::next_control() {
     return;
   }
   unknowns_ = level_.refine.apply(unknowns_);
+  for (FitState& state : states_) state.positions = level_.refine.apply(state.positions);
   control_.positions = unknowns_;
   cage_ = control_;
   from_unknowns_ = identity_map(unknowns_.size());
@@ -351,6 +365,7 @@ void SubdivisionFit::begin(double own_box_share) {
   control_ = cage_ = template_;
   creases_ = template_creases_;
   unknowns_ = control_.positions;
+  states_.clear();
   from_unknowns_ = previous_nodes_ = identity_map(unknowns_.size());
 }
 

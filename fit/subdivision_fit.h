@@ -3,6 +3,7 @@
 
 #include "fit/fit_report.h"
 #include "fit/hencky.h"
+#include "subvol/fit_state.h"
 #include "subvol/point_cloud.h"
 #include "subvol/subdivision.h"
 #include "subvol/triangle_mesh.h"
@@ -10,6 +11,7 @@
 
 #include <functional>
 #include <optional>
+#include <vector>
 
 namespace subvol {
 
@@ -49,12 +51,15 @@ struct FitOptions {
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
   StageLog* log = nullptr;                       ///< takes the results of minimisations from here and keeps them here; null: no
+  bool keep_states = false;                      ///< fills FitResult::states
 };
 
 struct FitResult {
   VolumeMesh cage;   ///< the last control mesh with its tags: its limit surface is the fitted surface
   VolumeMesh mesh;   ///< the finest finite element mesh (boundary at limit positions for FittedSurface::limit)
   FitReport report;
+  /// Where the cage was before each minimisation, as far as kept, from the template on; if asked for.
+  std::vector<FitState> states;
 };
 
 /// Fits a subdivision volume recursively (paper: section 4.3).

@@ -38,6 +38,11 @@ struct Writing {
     take_chord(keywords, options);
     keywords.take("unit", options.metres_per_unit);
     keywords.take("up", options.up_axis, {{"y", std::string("y")}, {"z", std::string("z")}});
+    take_cut(keywords);
+    bool wireframe = true;
+    keywords.take("wireframe", wireframe);
+    options.no_wireframe = !wireframe;
+    keywords.take("quantize", options.quantize);
     keywords.take("limit", limit);
     keywords.take("intervals", options.linear_intervals);
     keywords.finish();
@@ -45,29 +50,48 @@ struct Writing {
     file.force = true;
   }
   /// InputError, IoError: the file cannot be written.
-  cli::Output output(bool allow_cage) const { return cli::checked_outputs(file, allow_cage).front(); }
+  cli::Output output(const std::vector<cli::Part>& parts) const { return cli::checked_outputs(file, parts).front(); }
 
   cli::RunOptions file;
   cli::WritingOptions options;
   bool limit = false;
+
+ private:
+  void take_cut(Keywords& keywords) {
+    std::optional<std::string> cut;
+    keywords.take("cut", cut);
+    if (!cut) return;
+    if (const std::string error = cli::parse_cut(*cut, options.cut); !error.empty()) throw InputError("cut: " + error);
+  }
 };
 
 void write_volume_mesh(const Writing& writing, const VolumeMesh& mesh) {
-  const cli::Output output = writing.output(false);
-  if (!writing.limit || !cli::needs_limit(output)) return cli::write_output(output, mesh, writing.options);
+  const cli::Output output = writing.output({cli::Part::cutaway});
+  if (!writing.limit || !cli::shows_surface(output)) return cli::write_output(output, mesh, writing.options);
   const TessellatedSurface limit = cli::tessellated_limit(mesh, writing.options);
   cli::write_output(output, mesh, mesh, &limit, writing.options);
 }
 
-void write_fit(const Writing& writing, const VolumeMesh& cage, const VolumeMesh& mesh) {
-  const cli::Output output = writing.output(true);
+void write_curved(const Writing& writing, const CurvedMesh& curved) {
+  cli::write_output(writing.output({cli::Part::cutaway}), curved, writing.options);
+}
+
+void write_fit(const Writing& writing, const Fitted& fit) {
+  std::vector<cli::Part> parts{cli::Part::cutaway};
+  if (!fit.curved) parts.push_back(cli::Part::cage);
+  if (!fit.states.empty()) parts.push_back(cli::Part::animation);
+  const cli::Output output = writing.output(parts);
+  if (output.part == cli::Part::animation)
+    return fit.curved ? cli::write_animation(output, fit.curved->mesh, fit.states, writing.options)
+                      : cli::write_animation(output, *fit.cage, fit.states, writing.options);
+  if (fit.curved) return cli::write_output(output, *fit.curved, writing.options);
   TessellatedSurface limit;
-  if (cli::needs_limit(output)) limit = cli::tessellated_limit(cage, writing.options);
-  cli::write_output(output, cage, mesh, &limit, writing.options);
+  if (cli::shows_surface(output)) limit = cli::tessellated_limit(*fit.cage, writing.options);
+  cli::write_output(output, *fit.cage, *fit.mesh, &limit, writing.options);
 }
 
 void write_shell(const Writing& writing, const Shelled& result) {
-  const cli::Output output = writing.output(true);
+  const cli::Output output = writing.output({cli::Part::cage, cli::Part::cutaway});
   if (result.curved_shell)
     cli::write_shell(output, result.shell, *result.curved_shell, writing.options);
   else
@@ -90,20 +114,15 @@ void write(const py::object& path, const py::object& object, const py::kwargs& g
     const py::dict report = object.cast<const Reported&>().report;
     writing.options.options = to_json(py::dict(report["options"]));
   }
-  const auto write_curved = [&](const CurvedMesh& curved) {
-    cli::write_output(writing.output(false), curved, writing.options);
-  };
   const bool done =
       written<VolumeMesh>(object, [&](const VolumeMesh& mesh) { write_volume_mesh(writing, mesh); }) ||
-      written<CurvedMesh>(object, write_curved) ||
+      written<CurvedMesh>(object, [&](const CurvedMesh& curved) { write_curved(writing, curved); }) ||
       written<SurfaceMesh>(object, [&](const SurfaceMesh& surface) {
-        cli::write_output(writing.output(false), surface.polygons, writing.options);
+        cli::write_output(writing.output({}), surface.polygons, writing.options);
       }) ||
-      written<Fitted>(object, [&](const Fitted& fit) {
-        fit.curved ? write_curved(*fit.curved) : write_fit(writing, *fit.cage, *fit.mesh);
-      }) ||
+      written<Fitted>(object, [&](const Fitted& fit) { write_fit(writing, fit); }) ||
       written<Optimized>(object, [&](const Optimized& result) {
-        result.curved ? write_curved(*result.curved) : write_volume_mesh(writing, *result.mesh);
+        result.curved ? write_curved(writing, *result.curved) : write_volume_mesh(writing, *result.mesh);
       }) ||
       written<Shelled>(object, [&](const Shelled& shell) { write_shell(writing, shell); });
   if (!done)
@@ -123,16 +142,21 @@ SurfaceMesh (.off, .obj, .stl, .ply).
 
 check  refuse volume meshes that are not sound, but for inverted cells and unused points)");
   module.def("write", &write, py::arg("path"), py::arg("what"),
-             R"(write(path, what, *, chord=0.005, unit=1.0, up='y', limit=False, intervals=0)
+             R"(write(path, what, *, chord=0.005, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True, quantize=False)
 --
 
 Writes a mesh or a result; the extension chooses the format: .mesh .vtk .vtu .msh .glb .gltf .obj .usda. A file of that
 name is replaced, once the new one is whole.
 
 what       VolumeMesh, HighOrderMesh, SurfaceMesh, FitResult (its finest mesh; in a scene the limit surface, coloured by
-           the quality of the cells; 'cage:FILE' is the cage), OptimizeResult, ShellResult (in a scene its sheets)
+           the quality of the cells; 'cage:FILE' is the cage, 'animation:FILE.glb' the fit as it went where its states
+           were kept), OptimizeResult, ShellResult (in a scene its sheets); 'cutaway:FILE.glb' shows the cells inside
 chord      how close triangles are to a curved surface, per cent of its bounding box's diagonal
 unit, up   metres a unit has, and the mesh's upward axis, 'y' or 'z': for .glb, .gltf and .usda
+cut        where a cutaway is cut: the axis 'x', 'y' or 'z' that the plane stands across, also with a place between 0
+           and 1 as 'z:0.3'; None: across the mesh's shortest extent, halfway
+wireframe  scenes show the edges of the cells
+quantize   scenes in 16 and 8 bits (KHR_mesh_quantization)
 limit      a VolumeMesh is a control mesh: scenes show its limit surface
 intervals  of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order)");
 }

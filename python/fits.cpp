@@ -6,6 +6,8 @@
 #include "fit/high_order_fit.h"
 #include "fit/mesh_check.h"
 #include "fit/template_choice.h"
+#include "python/arrays.h"
+#include "python/checkpoints.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
@@ -13,6 +15,16 @@
 
 namespace subvol::python {
 namespace {
+
+/// What fits of either kind take, and curving does not.
+template <class Options>
+void take_fit_options(Keywords& keywords, Options& options) {
+  keywords.take("energy", options.distortion,
+                {{"hencky", Distortion::hencky},
+                 {"inverse_mean_ratio", Distortion::inverse_mean_ratio},
+                 {"condition_number", Distortion::condition_number}});
+  keywords.take("keep_states", options.keep_states);
+}
 
 FitOptions subdivision_options(Keywords& keywords) {
   FitOptions options;
@@ -24,6 +36,7 @@ FitOptions subdivision_options(Keywords& keywords) {
   keywords.take("crease_angle", options.crease_angle_degrees);
   keywords.take("lambda_far", options.lambda_far);
   take_solver_options(keywords, options);
+  take_fit_options(keywords, options);
   return options;
 }
 
@@ -31,10 +44,12 @@ FitOptions subdivision_options(Keywords& keywords) {
 class Fit {
  public:
   Fit(const py::object& target, const py::object& template_mesh, const py::kwargs& given)
-      : keywords_("fit", given), work_(keywords_) {
+      : keywords_("fit", given), work_(keywords_), checkpoints_(keywords_) {
     read_options(!template_mesh.is_none());
     target_ = triangles_from(target, "target");
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
+    checkpoints_.begin("fit", keywords_,
+                       {{"target", cli::fingerprint(target_)}, {"template", cli::fingerprint(*template_)}});
   }
   std::shared_ptr<Fitted> run() {
     const auto result = std::make_shared<Fitted>();
@@ -55,6 +70,7 @@ class Fit {
       keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "lambda_far"},
                        "does not go with order");
       high_order_ = high_order_options(keywords_);
+      take_fit_options(keywords_, high_order_);
       choice_options_.order = high_order_.order;
       choice_options_.basis = high_order_.basis;
     } else {
@@ -76,7 +92,10 @@ class Fit {
 
   void fit_subdivision(Fitted& result) {
     subdivision_.progress = work_.progress();
-    FitResult fit = work_.run("fit", [&] { return fit_subdivision_volume(target_, *template_, subdivision_); });
+    FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
+      subdivision_.log = log;
+      return fit_subdivision_volume(target_, *template_, subdivision_);
+    });
     const MeshCheck found = work_.run("check", [&] { return check_mesh(fit.mesh, &target_); });
     const TessellatedSurface limit = work_.run("limit", [&] { return cli::tessellated_limit(fit.cage, writing_); });
     const SurfaceDistance distance =
@@ -89,19 +108,24 @@ class Fit {
     json["cage"] = cli::describe("", fit.cage);
     json["audit"] = cli::audit_json(audit(*template_));
     finish(result, json, fit.report);
+    result.states = std::move(fit.states);
     result.cage = std::make_shared<VolumeMesh>(std::move(fit.cage));
     result.mesh = std::make_shared<VolumeMesh>(std::move(fit.mesh));
   }
 
   void fit_curved(Fitted& result) {
     high_order_.progress = work_.progress();
-    HighOrderFitResult fit = work_.run("fit", [&] { return fit_high_order(target_, *template_, high_order_); });
+    HighOrderFitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
+      high_order_.log = log;
+      return fit_high_order(target_, *template_, high_order_);
+    });
     const MeshCheck found = work_.run("check", [&] {
       return check_mesh(fit.mesh, curved_boundary(fit.mesh, writing_.chord_percent), &target_);
     });
     Json json = report_of(fit.report, found);
     json["mesh"] = cli::describe("", fit.mesh);
     finish(result, json, fit.report);
+    result.states = std::move(fit.states);
     result.curved = std::make_shared<CurvedMesh>(CurvedMesh{std::move(fit.mesh), template_->references});
   }
 
@@ -110,6 +134,7 @@ class Fit {
     if (choice_) json["template"] = cli::choice_json(*choice_);
     json.update(cli::fit_json(report));
     json.update(cli::check_json(found));
+    checkpoints_.describe(json);
     return json;
   }
 
@@ -120,6 +145,7 @@ class Fit {
 
   Keywords keywords_;
   Work work_;
+  Checkpoints checkpoints_;
   bool curved_ = false;
   FitOptions subdivision_;
   HighOrderFitOptions high_order_;
@@ -134,8 +160,9 @@ class Fit {
 constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
     boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, lambda_close=None,
-    correspondence='closest', solver='newton', max_iterations=0, time_limit=0.0, order=None, basis='fourier',
-    adaptive=False, chord=0.005, progress=None, threads=None)
+    correspondence='closest', solver='newton', energy='hencky', max_iterations=0, time_limit=0.0, order=None,
+    basis='fourier', adaptive=False, keep_states=False, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None,
+    threads=None)
 --
 
 Deforms a template until its boundary reproduces a surface: FitResult.
@@ -160,8 +187,13 @@ tolerance       mean distance to reach, per cent of the diagonal of the target's
 lambda_close    weight of the cells' shape in the last stage; None: 0.005, with order 0.05
 correspondence  'closest' or 'voronoi'
 solver          'newton' or 'lbfgs'
+energy          how cells' distortion is measured: 'hencky', 'inverse_mean_ratio' or 'condition_number'
+keep_states     fills states of the result, which write("animation:FILE.glb", ...) shows
 max_iterations  per stage; 0: the schedule's own
 time_limit      seconds; 0: none
+checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimisations end, and however
+                the call ends
+resume          checkpoint of an earlier call with the same target, template and options: goes on where that ended
 chord           how close triangles are to the surface that is measured, per cent of its diagonal
 progress        called with a Progress at every step; returns False to end with the best result so far
 threads         for this call alone; None: as many as OpenMP gives
@@ -199,6 +231,16 @@ void add_fits(py::module_& module) {
                              "The control mesh whose limit surface is fitted: VolumeMesh; None of curved cells.");
   type.def_property_readonly("mesh", &mesh_of<Fitted>,
                              "The finest mesh, a VolumeMesh; or curved cells, a HighOrderMesh.");
+  type.def_property_readonly(
+      "states",
+      [](const py::object& self) {
+        py::list states;
+        for (const FitState& state : self.cast<Fitted&>().states)
+          states.append(py::make_tuple(state.name, shown_points(state.positions, self)));
+        return states;
+      },
+      "Where the cage's points, or the coefficients of curved cells, were before each minimisation, if kept: list of\n"
+      "(name, array).");
   module.def("fit", [](const py::object& target, const py::object& template_mesh, const py::kwargs& given) {
     return Fit(target, template_mesh, given).run();
   }, py::arg("target"), py::arg("template") = py::none(), kFitHelp);

@@ -7,6 +7,7 @@
 #include "fit/curve_mesh.h"
 #include "fit/mesh_check.h"
 #include "python/arrays.h"
+#include "python/checkpoints.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
@@ -19,7 +20,8 @@ namespace {
 /// One optimisation from its arguments to its result.
 class Optimization {
  public:
-  Optimization(const py::object& mesh, const py::kwargs& given) : keywords_("optimize", given), work_(keywords_) {
+  Optimization(const py::object& mesh, const py::kwargs& given)
+      : keywords_("optimize", given), work_(keywords_), checkpoints_(keywords_) {
     const py::object target = keywords_.object("target");
     curved_ = keywords_.has("order");
     if (curved_) {
@@ -31,6 +33,9 @@ class Optimization {
     keywords_.finish();
     mesh_ = volume_from(mesh, "mesh");
     if (!target.is_none()) target_ = triangles_from(target, "target");
+    std::vector<std::pair<std::string, std::string>> inputs{{"mesh", cli::fingerprint(*mesh_)}};
+    if (target_) inputs.emplace_back("target", cli::fingerprint(*target_));
+    checkpoints_.begin("optimize", keywords_, inputs);
   }
 
   std::shared_ptr<Optimized> run() {
@@ -73,7 +78,10 @@ class Optimization {
   void optimize(Optimized& result) {
     options_.progress = work_.progress();
     const TriangleMesh* target = target_ ? &*target_ : nullptr;
-    OptimizeResult found = work_.run("optimize", [&] { return optimize_mesh(*mesh_, target, options_); });
+    OptimizeResult found = checkpoints_.run(work_, "optimize", warnings_, [&](StageLog* log) {
+      options_.log = log;
+      return optimize_mesh(*mesh_, target, options_);
+    });
     const MeshCheck checked = work_.run("check", [&] {
       const TriangleMesh surface =
           target_ ? *target_ : refined_triangles(boundary_surface(*mesh_, MeshTopology(*mesh_)));
@@ -89,10 +97,16 @@ class Optimization {
     OptimizeOptions options;
     options.time_limit_seconds = curving_.time_limit_seconds;
     options.progress = curving_.progress;
-    const std::size_t untangled = work_.run("untangle", [&] { return untangle_before_fit(start, options); });
+    const std::size_t untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
+      options.log = log;
+      return untangle_before_fit(start, options);
+    });
     if (untangled > 0)
       warnings_.push_back(std::to_string(untangled) + " cells were not valid; they were untangled before curving");
-    HighOrderFitResult found = work_.run("fit", [&] { return fit_high_order(*target_, start, curving_); });
+    HighOrderFitResult found = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
+      curving_.log = log;
+      return fit_high_order(*target_, start, curving_);
+    });
     const MeshCheck checked = work_.run("check", [&] {
       return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent), &*target_);
     });
@@ -103,12 +117,14 @@ class Optimization {
   void add(const FitReport& report, const MeshCheck& checked) {
     json_.update(cli::fit_json(report));
     json_.update(cli::check_json(checked));
+    checkpoints_.describe(json_);
     json_["not_certified_cells"] = checked.quality ? checked.quality->certificate.not_certified : std::vector<Index>{};
     warnings_.insert(warnings_.end(), report.warnings.begin(), report.warnings.end());
   }
 
   Keywords keywords_;
   Work work_;
+  Checkpoints checkpoints_;
   bool curved_ = false;
   OptimizeOptions options_;
   HighOrderFitOptions curving_;
@@ -121,8 +137,8 @@ class Optimization {
 
 constexpr const char* kHelp =
     R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
-    max_tolerance=0.5, lambda_=None, order=None, basis='fourier', max_iterations=0, time_limit=0.0, chord=0.005,
-    progress=None, threads=None)
+    max_tolerance=0.5, lambda_=None, order=None, basis='fourier', max_iterations=0, time_limit=0.0, checkpoint=None,
+    every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Untangles a mesh and improves its cells, or curves it: OptimizeResult.
@@ -138,7 +154,7 @@ lambda_         weight of the cells' shape; None: 0.1, with order 0.0025
 order           curve the cells to this order, 2 .. 16; needs a target, and straight cells' options do not go with it
 basis           of curved cells: 'fourier' or 'legendre'
 
-max_iterations, time_limit, chord, progress and threads as of `fit`.)";
+max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
 
 }  // namespace
 

@@ -4,9 +4,11 @@
 #include "python/meshes.h"
 #include "python/report.h"
 #include "shell/curved_shell.h"
+#include "subvol/fit_state.h"
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace subvol::python {
 
@@ -19,6 +21,7 @@ struct Reported {
 struct Fitted : Reported {
   std::shared_ptr<VolumeMesh> template_mesh, cage, mesh;
   std::shared_ptr<CurvedMesh> curved;
+  std::vector<FitState> states;
 };
 
 /// What `optimize` returns: a mesh, or one of curved cells.

@@ -4,6 +4,7 @@
 #include "subvol/boundary.h"
 #include "subvol/features.h"
 #include "subvol/mesh_topology.h"
+#include "subvol/repeated_subdivision.h"
 
 #include <Eigen/Geometry>
 
@@ -142,6 +143,9 @@ std::vector<Lattice> bracket_cubes(int n) {
   return cubes;
 }
 
+// The standard says which numbers the generator gives, but not those of its distributions.
+double uniform(std::mt19937& generator) { return (static_cast<double>(generator()) + 0.5) / 4294967296.0; }
+
 // The foot is bowed and the upright leans and widens a little.
 Vec3 bend_bracket(const Vec3& p) {
   return {p.x() + 0.06 * p.z() * p.z() * (1 - p.x() / 3), (p.y() - 1) * (1 - 0.05 * p.z()),
@@ -207,10 +211,20 @@ PolygonMesh bowl_surface(int n) {
 
 std::vector<Sample> all_samples() { return {torus_sample(), ball_sample(), bracket_sample()}; }
 
+VolumeMesh tangled_ball() {
+  constexpr double kThrow = 0.07;  // along every axis; half an edge or so
+  VolumeMesh mesh = subdivide_repeatedly(ball_sample().template_mesh, 2);
+  const MeshTopology topology(mesh);
+  std::mt19937 generator(2);
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+    if (!topology.is_boundary_vertex(static_cast<Index>(v)))
+      for (double& x : mesh.positions[v]) x += kThrow * (2 * uniform(generator) - 1);
+  return mesh;
+}
+
 PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, double noise) {
   std::mt19937 generator(1);
-  // The standard says which numbers the generator gives, but not those of its distributions.
-  const auto random = [&] { return (static_cast<double>(generator()) + 0.5) / 4294967296.0; };
+  const auto random = [&] { return uniform(generator); };
   std::vector<double> ends;  // of the triangles' areas in a row
   double area = 0;
   for (const auto& [a, b, c] : surface.triangles) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes every sample as NAME_target.off and NAME_template.mesh, torus_points.xyz, and bowl.obj to grow shells on.
+// Writes every sample as NAME_target.off and NAME_template.mesh, torus_points.xyz, bowl.obj to grow shells on,
+// and tangled.mesh to repair.
 
 #include "export/obj_writer.h"
 #include "samples/shapes.h"
@@ -23,6 +24,7 @@ int main(int argc, char** argv) try {
   }
   const auto points = subvol::samples::scattered_points(subvol::samples::torus_sample().target, 5000, 0.005);
   subvol::write_file_atomically(folder / "torus_points.xyz", subvol::samples::xyz_text(points));
+  subvol::write_volume_mesh(folder / "tangled.mesh", subvol::samples::tangled_ball());
   subvol::write_obj(folder / "bowl.obj", subvol::samples::bowl_surface());
   return 0;
 } catch (const std::exception& error) {

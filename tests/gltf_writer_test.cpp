@@ -5,15 +5,16 @@
 #include "export/export.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
-#include "tests/data.h"
 #include "tests/element_fixtures.h"
 #include "tests/glb_reader.h"
+#include "tests/gltf_validator.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <cmath>
-#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -57,13 +58,6 @@ std::string slurp(const std::filesystem::path& path) {
   std::ostringstream out;
   out << in.rdbuf();
   return out.str();
-}
-
-/// Exit status of the Khronos validator over files; 2 where node or the package is not there.
-int run_validator(const std::string& files) {
-  if (!std::getenv("SUBVOL_NODE_MODULES") || std::system("node --version > /dev/null 2>&1") != 0) return 2;
-  const int status = std::system(("node \"" + test::source_dir() + "/tests/gltf_validator.mjs\" " + files).c_str());
-  return status == 0 ? 0 : status >> 8;
 }
 
 }  // namespace
@@ -229,11 +223,76 @@ TEST_CASE("the Khronos validator has nothing to say about the files") {
   for (std::size_t i = mesh.space.num_vertices(); i < mesh.coefficients.size(); ++i)
     mesh.coefficients[i] = 0.1 * source.vector();
   write_gltf(curved, surface_scene(mesh, std::vector<double>{0.1, 0.4, 0.7, 1}, {.max_chord_percent = 0.1}));
-  const int status = run_validator("\"" + glb.string() + "\" \"" + text.string() + "\" \"" + turned.string() + "\" \"" +
-                                   curved.string() + "\"");
-  if (status == 2) {
-    WARN("SKIPPED: needs node and the npm package gltf-validator under SUBVOL_NODE_MODULES");
-    return;
+  check_with_validator({glb, text, turned, curved});
+}
+
+TEST_CASE("shapes become morph targets that an animation goes through to the scene itself") {
+  Scene scene = two_quads(Vec3(0.5, 0.25, -2));
+  const ScenePrimitive& surface = scene.nodes[0].primitive;
+  for (const double lift : {2.0, 1.0}) {
+    SceneShape shape{"lifted by " + std::to_string(static_cast<int>(lift)), surface.positions, surface.normals};
+    for (Vec3& p : shape.positions) p.z() += lift;
+    scene.nodes[0].shapes.push_back(std::move(shape));
   }
-  CHECK(status == 0);
+  scene.nodes[0].shapes[0].normals.assign(6, Vec3::UnitX());
+  scene.seconds_per_shape = 0.25;
+  const GlbFile file(gltf_bytes(scene, GltfContainer::glb));
+  const auto targets = file.primitive("surface").at("targets");
+  REQUIRE(targets.size() == 2);
+  const auto rise = file.numbers<float>(targets[0].at("POSITION"));
+  for (std::size_t i = 0; i < rise.size(); ++i) CHECK(rise[i] == (i % 3 == 2 ? 2.0F : 0.0F));
+  const auto turn = file.numbers<float>(targets[0].at("NORMAL"));
+  for (std::size_t i = 0; i < turn.size(); ++i) CHECK(turn[i] == (i % 3 == 2 ? -1.0F : i % 3 == 0 ? 1.0F : 0.0F));
+  CHECK(!file.primitive("wireframe").contains("targets"));
+  const auto& mesh = file.json["meshes"][0];
+  CHECK(mesh["extras"]["targetNames"] == nlohmann::json({"lifted by 2", "lifted by 1"}));
+  CHECK(mesh["weights"] == nlohmann::json({0.0, 0.0}));
+  REQUIRE(file.json["animations"].size() == 1);
+  const auto& sampler = file.json["animations"][0]["samplers"][0];
+  CHECK(file.numbers<float>(sampler["input"]) == std::vector<float>{0, 0.25, 0.5});
+  CHECK(file.numbers<float>(sampler["output"]) == std::vector<float>{1, 0, 0, 1, 0, 0});
+  CHECK(file.json["animations"][0]["channels"][0]["target"]["path"] == "weights");
+
+  const auto path = scratch("shapes.glb");
+  write_gltf(path, scene);
+  check_with_validator({path});
+
+  const auto refused = [&](auto spoil) {
+    Scene bad = scene;
+    spoil(bad);
+    CHECK_THROWS_AS(gltf_bytes(bad, GltfContainer::glb), InputError);
+  };
+  refused([](Scene& s) { s.nodes[0].shapes[1].positions.pop_back(); });
+  refused([](Scene& s) { s.nodes[0].shapes[1].normals.clear(); });
+  refused([](Scene& s) { s.nodes[1].shapes = {{"line", s.nodes[1].primitive.positions}}; });
+  refused([](Scene& s) { s.seconds_per_shape = 0; });
+}
+
+TEST_CASE("a quantized scene is within half a step of the scene, in fewer bytes") {
+  Scene scene = two_quads();
+  scene.origin.x() += 0.5;
+  const std::string exact = gltf_bytes(scene, GltfContainer::glb);
+  scene.quantize = true;
+  const std::string bytes = gltf_bytes(scene, GltfContainer::glb);
+  CHECK(bytes.size() < exact.size() + 400);  // what the JSON grows by
+  const GlbFile file(bytes);
+  CHECK(file.json["extensionsRequired"] == nlohmann::json({"KHR_mesh_quantization"}));
+  CHECK(file.binary.size() < GlbFile(exact).binary.size());
+  const auto& accessor = file.json["accessors"][file.primitive("surface")["attributes"]["POSITION"].get<int>()];
+  const auto& view = file.json["bufferViews"][accessor["bufferView"].get<int>()];
+  CHECK(accessor["componentType"] == 5122);
+  CHECK(accessor["normalized"] == true);
+  REQUIRE(view["byteStride"] == 8);
+  const double unit = file.json.at("nodes").at(1).at("scale").at(0);
+  CHECK(unit == Approx(1.5));
+  const ScenePrimitive& surface = scene.nodes[0].primitive;
+  for (std::size_t v = 0; v < surface.positions.size(); ++v) {
+    std::array<std::int16_t, 3> q;
+    std::memcpy(q.data(), file.binary.data() + view.value("byteOffset", std::size_t{0}) + 8 * v, sizeof q);
+    const Vec3 found = unit / 32767 * Vec3(q[0], q[1], q[2]);
+    CHECK((found - (surface.positions[v] - scene.origin)).cwiseAbs().maxCoeff() <= 0.5 * unit / 32767 * (1 + 1e-6));
+  }
+  const auto path = scratch("quantized.glb");
+  write_gltf(path, scene);
+  check_with_validator({path});
 }

@@ -35,7 +35,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
 // Results of a fit may be shown, its energies and solver not.
 const std::set<std::string> kFitForExport{"fit/quality.h", "fit/certificate.h", "fit/element_space.h",
                                           "fit/high_order_mesh.h", "fit/pattern_table.h",
-                                          "fit/high_order_quality.h", "fit/curved_boundary.h"};
+                                          "fit/high_order_quality.h", "fit/curved_boundary.h",
+                                          "fit/boundary_samples.h"};
 
 struct Source {
   std::string path, layer;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Types of the module; docs/python.md and the docstrings say what things are.
 from os import PathLike
-from typing import Any, Callable, Dict, Literal, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -163,6 +163,8 @@ class FitResult(Result):
     def cage(self) -> Optional[VolumeMesh]: ...
     @property
     def mesh(self) -> Any: ...  # VolumeMesh; with order HighOrderMesh
+    @property
+    def states(self) -> List[Tuple[str, Floats]]: ...
 
 class OptimizeResult(Result):
     @property
@@ -199,11 +201,16 @@ def fit(
     lambda_close: Optional[float] = None,
     correspondence: Literal["closest", "voronoi"] = "closest",
     solver: Literal["newton", "lbfgs"] = "newton",
+    energy: Literal["hencky", "inverse_mean_ratio", "condition_number"] = "hencky",
     max_iterations: int = 0,
     time_limit: float = 0.0,
     order: Optional[int] = None,
     basis: Basis = "fourier",
     adaptive: bool = False,
+    keep_states: bool = False,
+    checkpoint: Optional[Path] = None,
+    every: float = 60.0,
+    resume: Optional[Path] = None,
     chord: float = 0.005,
     progress: Optional[Callback] = None,
     threads: Optional[int] = None,
@@ -222,6 +229,9 @@ def optimize(
     basis: Basis = "fourier",
     max_iterations: int = 0,
     time_limit: float = 0.0,
+    checkpoint: Optional[Path] = None,
+    every: float = 60.0,
+    resume: Optional[Path] = None,
     chord: float = 0.005,
     progress: Optional[Callback] = None,
     threads: Optional[int] = None,
@@ -279,4 +289,7 @@ def write(
     up: Literal["y", "z"] = "y",
     limit: bool = False,
     intervals: int = 0,
+    cut: Optional[str] = None,
+    wireframe: bool = True,
+    quantize: bool = False,
 ) -> None: ...

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/checkpointing.h"
+#include "python/keywords.h"
+#include "python/work.h"
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace subvol::python {
+
+/// The checkpoint of one call: `checkpoint`, `every` and `resume`, which mean what they do for the program.
+class Checkpoints {
+ public:
+  /// Takes the options.
+  explicit Checkpoints(Keywords& keywords);
+
+  /// Looks at the file of an earlier run. InputError: it is none, or of another call. Before `run`.
+  ///
+  /// call    the function's name.
+  /// inputs  names and fingerprints of what is read.
+  void begin(const std::string& call, const Keywords& keywords,
+             const std::vector<std::pair<std::string, std::string>>& inputs);
+
+  /// work.run(part, [] { return function(log); }), and the checkpoint is on the disk however that ends.
+  template <class Function>
+  auto run(Work& work, const char* part, std::vector<std::string>& warnings, const Function& function) {
+    try {
+      auto result = work.run(part, [&] { return function(checkpointing_->log()); });
+      checkpointing_->finish(warnings);
+      return result;
+    } catch (...) {
+      checkpointing_->finish(warnings);
+      throw;
+    }
+  }
+
+  void describe(cli::Json& report) const { checkpointing_->describe(report); }
+
+ private:
+  cli::RunOptions files_;
+  std::optional<cli::Checkpointing> checkpointing_;
+};
+
+}  // namespace subvol::python
