@@ -32,7 +32,7 @@ std::vector<Sample> all_samples();
 /// A rippled bowl to grow shells on: 5 n^2 quads, open at the top, outward.
 PolygonMesh bowl_surface(int n = 12);
 
-/// A ball of 448 hexes, the vertices inside thrown about: some two in five cells are inverted. The same one everywhere.
+/// A ball of 448 hexes, the vertices inside thrown about: four in five cells are inverted. The same one everywhere.
 VolumeMesh tangled_ball();
 
 /// Points scattered evenly at random over a surface, each moved by up to `noise` along every axis: the same ones everywhere.
