@@ -119,6 +119,60 @@ class Fits(InFolder):
             subvol.fit(BALL[0], inside_out)
 
 
+class States(InFolder):
+    """Checkpoints, and states on the way."""
+
+    def test_a_call_goes_on_where_an_earlier_one_ended(self):
+        whole = subvol.fit(*BALL, levels=2)
+        part = subvol.fit(*BALL, levels=2, checkpoint="ball.checkpoint", progress=lambda p: p.level < 2)
+        self.assertEqual(part.report["stop_reason"], "cancelled")
+        resumed = subvol.fit(*BALL, levels=2, resume="ball.checkpoint", threads=1)
+        self.assertEqual(resumed.report["resumed_from"], "ball.checkpoint")
+        self.assertGreater(resumed.report["recalled_stages"], 0)
+        np.testing.assert_array_equal(resumed.cage.points, whole.cage.points)
+        with self.assertRaisesRegex(subvol.InputError, "levels"):
+            subvol.fit(*BALL, levels=1, resume="ball.checkpoint")
+        with self.assertRaisesRegex(subvol.InputError, "no such file"):
+            subvol.fit(*BALL, levels=1, resume="none.checkpoint")
+
+    def test_a_checkpoint_is_there_after_an_error_of_the_callback(self):
+        def fails(progress):
+            if progress.level == 2:
+                raise KeyError("mine")
+
+        with self.assertRaises(KeyError):
+            subvol.fit(*BALL, levels=2, checkpoint="ball.checkpoint", progress=fails)
+        self.assertGreater(subvol.fit(*BALL, levels=2, resume="ball.checkpoint").report["recalled_stages"], 0)
+
+    def test_an_optimisation_goes_on(self):
+        options = dict(target=BALL[0], order=2, max_iterations=5)
+        whole = subvol.optimize(BALL[1], **options, checkpoint="curve.checkpoint")
+        resumed = subvol.optimize(BALL[1], **options, resume="curve.checkpoint")
+        self.assertGreater(resumed.report["recalled_stages"], 0)
+        np.testing.assert_array_equal(resumed.mesh.coefficients, whole.mesh.coefficients)
+
+    def test_states_lead_from_the_template_to_the_result(self):
+        fit = subvol.fit(*BALL, levels=1, keep_states=True)
+        self.assertEqual(fit.states[0][0], "template")
+        np.testing.assert_allclose(fit.states[0][1], fit.template.points, atol=1e-12)
+        self.assertEqual(len(fit.states), len(fit.report["stages"]))
+        subvol.write("animation:ball.glb", fit)
+        subvol.write("cutaway:inside.glb", fit, cut="z:0.3")
+        without = subvol.fit(*BALL, levels=1)
+        self.assertEqual(without.states, [])
+        with self.assertRaisesRegex(subvol.Error, "no animation"):
+            subvol.write("animation:none.glb", without)
+        with self.assertRaisesRegex(subvol.InputError, "cut"):
+            subvol.write("cutaway:none.glb", fit, cut="w")
+
+    def test_the_energy_is_the_programs(self):
+        fit = subvol.fit(*BALL, levels=1, energy="inverse_mean_ratio")
+        subvol.write("python.mesh", fit)
+        self.run_program("fit", *BALL[:1], "--template", BALL[1], "--levels", "1", "--energy", "inverse_mean_ratio", "-o",
+                         "program.mesh")
+        self.assert_same_file("python.mesh", "program.mesh")
+
+
 class Running(InFolder):
     """Progress, cancelling and Ctrl-C; other threads meanwhile."""
 

@@ -2,6 +2,7 @@
 """The stubs name what there is, with the same arguments and defaults."""
 
 import ast
+import importlib.metadata
 import inspect
 import os
 import unittest
@@ -78,6 +79,13 @@ class Stubs(unittest.TestCase):
         for module in (subvol, subvol.template):
             for name in module.__all__:
                 self.assertTrue(getattr(module, name).__doc__, name)
+
+    def test_tools_know_the_package(self):
+        package = importlib.metadata.distribution("subvol")
+        self.assertEqual(package.version, subvol.__version__)
+        self.assertTrue(package.files)
+        for file in package.files:
+            self.assertTrue(os.path.exists(file.locate()), file)
 
     def test_it_says_that_it_has_types(self):
         self.assertTrue(os.path.exists(os.path.join(PACKAGE, "py.typed")))
