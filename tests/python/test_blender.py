@@ -36,7 +36,17 @@ class Cages(InFolder):
                                        crease_sharpness=[1, 2, 3, 10], corners=[7], corner_sharpness=[1.5])
         dart = subvol.VolumeMesh(CUBE_POINTS, hexes=CUBE, creases=[[0, 1], [1, 2], [1, 5]])
         return {"dart": dart, "torus": torus, "bracket": bracket, "fitted": fitted, "half_sharp": half_sharp,
-                "tets": subvol.template.split(torus, into="tets")}
+                "tets": subvol.template.split(torus, into="tets"), **self.real_cages()}
+
+    def real_cages(self):
+        """Fitted to real surfaces, one smooth and one with creases; none where the folder of real inputs is not there."""
+        folder = os.environ.get("SUBVOL_DATA") or os.path.join(SOURCE, "..", "shared", "data")
+        if not os.path.isdir(folder):
+            print("SKIPPED: the real cages; no folder with real data")
+            return {}
+        fit = lambda name, **options: subvol.fit(os.path.join(folder, "fit", name, "target.off"),
+                                                 os.path.join(folder, "fit", name, "template.mesh"), levels=1, **options).cage
+        return {"hanger139": fit("hanger139"), "cad_fandisk49": fit("cad_fandisk49", crease_angle=40)}
 
     def test_the_modifier_makes_our_limit_surface(self):
         cages = self.cages()
