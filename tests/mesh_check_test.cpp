@@ -11,7 +11,10 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <limits>
+#include <string>
+#include <vector>
 
 using namespace subvol;
 using subvol::test::lattice;
@@ -176,6 +179,30 @@ TEST_CASE("refined triangles of a tet are four to a face", "[boundary_triangles]
   CHECK(triangles.positions.size() == 10);
   CHECK(check_mesh(mesh).volume == Approx(1 / 6.0));
   CHECK(check_mesh(mesh).valid());
+}
+
+TEST_CASE("a check tells its parts in their order and ends where it is told to", "[mesh_check]") {
+  const VolumeMesh mesh = lattice(2, 2, 2);
+  const TriangleMesh target = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
+  const std::vector<std::string> all{"quality", "topology", "self-intersections", "distance"};
+  for (std::size_t end = 0; end <= all.size(); ++end) {
+    std::vector<std::string> told;
+    double last = -1;
+    const auto progress = [&](const char* part, double share) {
+      CHECK(share > last);
+      last = share;
+      told.push_back(part);
+      return told.size() <= end;
+    };
+    const MeshCheck check = check_mesh(mesh, &target, {.progress = progress});
+    CHECK(told == std::vector<std::string>(all.begin(), all.begin() + std::min(end + 1, all.size())));
+    CHECK(check.quality.has_value() == (end >= 1));
+    CHECK(check.has_topology == (end >= 2));
+    CHECK(check.has_boundary_geometry == (end >= 3));
+    CHECK(check.distance.has_value() == (end >= 4));
+    CHECK(check.valid() == (end >= 3));
+    CHECK(last < 1);
+  }
 }
 
 TEST_CASE("checks of published templates agree with what is known of them", "[mesh_check][data]") {

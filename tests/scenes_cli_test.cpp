@@ -10,6 +10,8 @@
 #include <catch2/catch.hpp>
 
 #include <cstdlib>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -89,6 +91,30 @@ TEST_CASE("Parts that there are not are refused before any work", "[cli]") {
     CHECK(!run.err.empty());
   }
   CHECK(!place.has("a.glb"));
+}
+
+TEST_CASE("Scripts are told of every step, of the time left, and of the work after the solve", "[cli]") {
+  const Workplace place;
+  const Run run = place.run(std::string(kFit) + "--levels 2 --max-iterations 2 -o out.glb --progress json");
+  std::istringstream lines(run.out);
+  std::size_t steps = 0, with_time = 0;
+  std::set<std::string> parts;
+  for (std::string line; std::getline(lines, line);) {
+    const auto told = nlohmann::json::parse(line);
+    CHECK(told.at("seconds") >= 0);
+    if (told.contains("part")) {
+      CHECK((told.at("share") >= 0 && told.at("share") <= 1));
+      parts.insert(told.at("part"));
+      continue;
+    }
+    ++steps;
+    if (!told.contains("seconds_left")) continue;
+    ++with_time;
+    CHECK(told.at("seconds_left") >= 0);
+  }
+  CHECK(steps > 5);
+  CHECK(with_time > 0);
+  CHECK(parts == std::set<std::string>{"tessellation", "quality", "topology", "self-intersections", "distance"});
 }
 
 TEST_CASE("The version names what the program was made with", "[cli]") {

@@ -229,6 +229,30 @@ TEST_CASE("a bound on the quads is kept, and the error reached is told") {
   CHECK(dense_chord_error(bumpy(), surface, 5) <= surface.chord_error);
 }
 
+TEST_CASE("a tessellation tells its rounds and ends with what it has") {
+  double last = 0;
+  int rounds = 0;
+  const auto progress = [&](int most) {
+    return [&, most](const char* part, double share) {
+      CHECK(part == std::string("tessellation"));
+      CHECK(share >= last);
+      last = share;
+      return ++rounds < most;
+    };
+  };
+  const double chord = 0.003;
+  const TessellatedSurface whole = tessellate(bumpy(), chord, kMostQuads, progress(1000));
+  CHECK(rounds > 1);
+  CHECK(last <= 1);
+  CHECK(whole.positions == tessellate(bumpy(), chord).positions);
+  rounds = 0;
+  last = 0;
+  const TessellatedSurface part = tessellate(bumpy(), chord, kMostQuads, progress(1));
+  CHECK(part.quads.size() < whole.quads.size());
+  CHECK(part.chord_error > chord);
+  CHECK(dense_chord_error(bumpy(), part, 5) <= part.chord_error);
+}
+
 TEST_CASE("a chord error that is not positive is refused") {
   for (const double bound : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
     CHECK_THROWS_AS(tessellate(lattice(1, 1, 1), bound), InputError);
