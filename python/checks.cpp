@@ -9,6 +9,7 @@
 #include "python/results.h"
 
 #include <utility>
+#include <variant>
 
 namespace subvol::python {
 namespace {
@@ -38,12 +39,16 @@ py::dict check(const py::object& object, const py::object& target_object, const 
   take_chord(keywords, writing);
   keywords.finish();
   const CheckedMesh mesh(object);
-  std::optional<TriangleMesh> target;
-  if (!target_object.is_none()) target = triangles_from(target_object, "target");
-  const TriangleMesh* against = target ? &*target : nullptr;
+  std::optional<cli::Target> target;
+  if (!target_object.is_none()) target = target_from(target_object, "target");
+  const auto check_against = [&](auto against) {
+    const MeshCheckOptions options{.progress = work.parts()};
+    if (mesh.linear) return check_mesh(*mesh.linear, against, options);
+    return check_mesh(mesh.curved->mesh, curved_boundary(mesh.curved->mesh, writing.chord_percent), against, options);
+  };
   MeshCheck found = work.run("check", [&] {
-    if (mesh.linear) return check_mesh(*mesh.linear, against);
-    return check_mesh(mesh.curved->mesh, curved_boundary(mesh.curved->mesh, writing.chord_percent), against);
+    if (!target) return check_against(static_cast<const TriangleMesh*>(nullptr));
+    return std::visit([&](const auto& geometry) { return check_against(&geometry); }, *target);
   });
   py::dict report = to_python(cli::check_json(found));
   if (found.subdivision_audit) report["audit"] = to_python(cli::audit_json(*found.subdivision_audit));
@@ -85,8 +90,9 @@ void add_checks(py::module_& module) {
 
 Says what is true of a mesh: dict, with the entries of docs/cli.md and two arrays.
 
-mesh    VolumeMesh, HighOrderMesh, or the path of either; anything may be wrong with it
-target  measure the distance to it: SurfaceMesh, VolumeMesh or path
+mesh      VolumeMesh, HighOrderMesh, or the path of either; anything may be wrong with it
+target    measure the distance to it: SurfaceMesh, VolumeMesh, points as an (n, 3) array, or path
+progress  called with a Progress before each part (stage and fraction); returns False to end there
 
 valid                 sound, every cell proved to be nowhere inverted, the boundary free of self-intersections
 quality, distance, boundary_self_intersections, topology, defects, audit, ...

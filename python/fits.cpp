@@ -23,6 +23,8 @@ void take_fit_options(Keywords& keywords, Options& options) {
                 {{"hencky", Distortion::hencky},
                  {"inverse_mean_ratio", Distortion::inverse_mean_ratio},
                  {"condition_number", Distortion::condition_number}});
+  keywords.take("point_weights", options.point_weights,
+                {{"equal", PointWeights::equal}, {"area", PointWeights::by_area}});
   keywords.take("keep_states", options.keep_states);
 }
 
@@ -46,7 +48,8 @@ class Fit {
   Fit(const py::object& target, const py::object& template_mesh, const py::kwargs& given)
       : keywords_("fit", given), work_(keywords_), checkpoints_(keywords_) {
     read_options(!template_mesh.is_none());
-    target_ = triangles_from(target, "target");
+    target_ = target_from(target, "target");
+    refuse_for_points(template_mesh.is_none());
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     checkpoints_.begin("fit", keywords_,
                        {{"target", cli::fingerprint(target_)}, {"template", cli::fingerprint(*template_)}});
@@ -82,9 +85,16 @@ class Fit {
     keywords_.finish();
   }
 
+  void refuse_for_points(bool has_no_template) {
+    if (!cli::is_cloud(target_))
+      return keywords_.refuse({"point_weights"}, "does not go with a surface, whose triangles count by their areas");
+    keywords_.refuse({"crease_angle"}, "does not go with points, between which no edges can be seen");
+    if (has_no_template) throw InputError("fit: points do not tell what they enclose: give a template");
+  }
+
   std::shared_ptr<const VolumeMesh> made_template() {
     choice_options_.progress = work_.progress();
-    choice_ = work_.run("template", [&] { return choose_template(target_, choice_options_); });
+    choice_ = work_.run("template", [&] { return choose_template(std::get<TriangleMesh>(target_), choice_options_); });
     if (choice_->cancelled) throw InputError("fit: ended before there was a template");
     warnings_ = choice_->warnings;
     return std::make_shared<const VolumeMesh>(choice_->mesh);
@@ -94,13 +104,17 @@ class Fit {
     subdivision_.progress = work_.progress();
     FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       subdivision_.log = log;
-      return fit_subdivision_volume(target_, *template_, subdivision_);
+      return std::visit([&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); }, target_);
     });
-    const MeshCheck found = work_.run("check", [&] { return check_mesh(fit.mesh, &target_); });
+    const MeshCheck found = work_.run("check", [&] {
+      return std::visit([&](const auto& target) { return check_mesh(fit.mesh, &target); }, target_);
+    });
     const TessellatedSurface limit = work_.run("limit", [&] { return cli::tessellated_limit(fit.cage, writing_); });
     const SurfaceDistance distance =
-        work_.run("distance", [&] { return surface_distance(triangles_of(limit), target_); });
-    const double diagonal = bounding_box_diagonal(target_);
+        work_.run("distance", [&] {
+          return std::visit([&](const auto& target) { return surface_distance(triangles_of(limit), target); }, target_);
+        });
+    const double diagonal = found.target_diagonal;
     Json json = report_of(fit.report, found);
     json["limit_surface_distance"] = cli::distance_json(distance, diagonal);
     json["limit_surface_distance"]["chord_error_percent"] = 100 * limit.chord_error / diagonal;
@@ -117,10 +131,11 @@ class Fit {
     high_order_.progress = work_.progress();
     HighOrderFitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       high_order_.log = log;
-      return fit_high_order(target_, *template_, high_order_);
+      return std::visit([&](const auto& target) { return fit_high_order(target, *template_, high_order_); }, target_);
     });
     const MeshCheck found = work_.run("check", [&] {
-      return check_mesh(fit.mesh, curved_boundary(fit.mesh, writing_.chord_percent), &target_);
+      const CurvedBoundary boundary = curved_boundary(fit.mesh, writing_.chord_percent);
+      return std::visit([&](const auto& target) { return check_mesh(fit.mesh, boundary, &target); }, target_);
     });
     Json json = report_of(fit.report, found);
     json["mesh"] = cli::describe("", fit.mesh);
@@ -151,7 +166,7 @@ class Fit {
   HighOrderFitOptions high_order_;
   TemplateChoiceOptions choice_options_;
   cli::WritingOptions writing_;
-  TriangleMesh target_;
+  cli::Target target_;
   std::shared_ptr<const VolumeMesh> template_;
   std::optional<TemplateChoice> choice_;
   std::vector<std::string> warnings_;
@@ -160,14 +175,14 @@ class Fit {
 constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
     boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, lambda_close=None,
-    correspondence='closest', solver='newton', energy='hencky', max_iterations=0, time_limit=0.0, order=None,
-    basis='fourier', adaptive=False, keep_states=False, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None,
+    correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
+    time_limit=0.0, order=None, basis='fourier', adaptive=False, keep_states=False, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None,
     threads=None)
 --
 
 Deforms a template until its boundary reproduces a surface: FitResult.
 
-target    SurfaceMesh, VolumeMesh (its boundary), or the path of either
+target    SurfaceMesh, VolumeMesh (its boundary), points as an (n, 3) array, or the path of any; points need a template
 template  VolumeMesh or its path, roughly in place; None: made from the target, of about `cells` cells
 
 Without order a subdivision volume is fitted:
@@ -188,6 +203,7 @@ lambda_close    weight of the cells' shape in the last stage; None: 0.005, with 
 correspondence  'closest' or 'voronoi'
 solver          'newton' or 'lbfgs'
 energy          how cells' distortion is measured: 'hencky', 'inverse_mean_ratio' or 'condition_number'
+point_weights   of points: all count alike, 'equal', or by the area they stand for, 'area'
 keep_states     fills states of the result, which write("animation:FILE.glb", ...) shows
 max_iterations  per stage; 0: the schedule's own
 time_limit      seconds; 0: none

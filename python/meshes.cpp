@@ -7,6 +7,7 @@
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/features.h"
+#include "subvol/sound_points.h"
 #include "subvol/surface_io.h"
 #include "subvol/template_edit.h"
 
@@ -347,6 +348,20 @@ TriangleMesh triangles_from(const py::object& object, const char* name) {
   return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {
     return cli::load_surface(path, warnings);
   });
+}
+
+cli::Target target_from(const py::object& object, const char* name) {
+  if (is_path(object))
+    return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {
+      return cli::load_target(path, warnings);
+    });
+  const bool is_mesh = py::isinstance<SurfaceMesh>(object) || py::isinstance<VolumeMesh>(object);
+  if (is_mesh || !(py::isinstance<py::sequence>(object) || py::hasattr(object, "__array__")))
+    return triangles_from(object, name);
+  std::vector<std::string> warnings;
+  PointCloud cloud = sound_points(points_from(object, name), name, &warnings);
+  warn(warnings);
+  return cloud;
 }
 
 SurfaceMesh surface_from(const py::object& object, const char* name) {

@@ -32,5 +32,7 @@ std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, co
 /// A surface, or the boundary of a volume mesh: as triangles; as polygons with tags. InputError: points not finite.
 TriangleMesh triangles_from(const py::object& object, const char* name);
 SurfaceMesh surface_from(const py::object& object, const char* name);
+/// The same, or points: an (n, 3) array, or the path of a file of them. InputError also as `sound_points`.
+cli::Target target_from(const py::object& object, const char* name);
 
 }  // namespace subvol::python

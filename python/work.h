@@ -3,6 +3,7 @@
 
 #include "fit/fit_report.h"
 #include "python/keywords.h"
+#include "subvol/work_progress.h"
 
 #include <pybind11/pybind11.h>
 
@@ -53,6 +54,10 @@ class Work {
   /// For the library's options. Called by whatever thread called the library.
   std::function<bool(const FitProgress&)> progress() {
     return [this](const FitProgress& told) { return tell(told); };
+  }
+  /// The same for work that tells its parts: stage and fraction, no energy.
+  WorkProgress parts() {
+    return [this](const char* part, double share) { return tell({part, 0, 0, 0, share}); };
   }
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   const std::vector<std::pair<std::string, double>>& seconds_by_part() const { return seconds_; }

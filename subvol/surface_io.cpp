@@ -3,6 +3,7 @@
 
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/sound_points.h"
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
 
@@ -214,13 +215,18 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
   } else {
     remarks.fail("unknown extension " + in_quotes(extension) + " of points, expected " + point_cloud_formats());
   }
-  if (cloud.points.empty()) remarks.fail("no points");
-  check_extent(cloud.points, remarks);
-  remarks.count(drop_repeated(cloud.points), "points are there more than once: the first is kept");
-  if (cloud.points.size() < kLeastCloudPoints)
-    remarks.fail("only " + std::to_string(cloud.points.size()) + " points, expected at least " +
+  return sound_points(std::move(cloud.points), path.string(), warnings);
+}
+
+PointCloud sound_points(std::vector<Vec3> points, const std::string& name, std::vector<std::string>* warnings) {
+  Remarks remarks(name, warnings);
+  if (points.empty()) remarks.fail("no points");
+  check_extent(points, remarks);
+  remarks.count(drop_repeated(points), "points are there more than once: the first is kept");
+  if (points.size() < kLeastCloudPoints)
+    remarks.fail("only " + std::to_string(points.size()) + " points, expected at least " +
                  std::to_string(kLeastCloudPoints));
-  return cloud;
+  return {std::move(points)};
 }
 
 std::vector<double> read_vertex_attribute(const fs::path& path, const std::string& attribute) {

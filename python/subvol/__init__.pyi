@@ -187,7 +187,7 @@ class ShellResult(Result):
     def clearance(self) -> Floats: ...
 
 def fit(
-    target: Surface,
+    target: Union[Surface, npt.ArrayLike],
     template: Optional[Volume] = None,
     *,
     cells: Optional[int] = None,
@@ -202,6 +202,7 @@ def fit(
     correspondence: Literal["closest", "voronoi"] = "closest",
     solver: Literal["newton", "lbfgs"] = "newton",
     energy: Literal["hencky", "inverse_mean_ratio", "condition_number"] = "hencky",
+    point_weights: Literal["equal", "area"] = "equal",
     max_iterations: int = 0,
     time_limit: float = 0.0,
     order: Optional[int] = None,
@@ -264,7 +265,7 @@ def limit_matrix(mesh: Volume) -> SparseMap: ...
 def limit_surface(cage: Volume, *, chord: float = 0.005) -> SurfaceMesh: ...
 def check(
     mesh: Union[Volume, HighOrderMesh],
-    target: Optional[Surface] = None,
+    target: Optional[Union[Surface, npt.ArrayLike]] = None,
     *,
     chord: float = 0.005,
     progress: Optional[Callback] = None,

@@ -119,6 +119,41 @@ class Fits(InFolder):
             subvol.fit(BALL[0], inside_out)
 
 
+class Points(InFolder):
+    """Clouds as targets."""
+
+    def test_an_array_is_fitted_as_the_file_of_it(self):
+        points = np.loadtxt("torus_points.xyz")
+        options = dict(levels=1, point_weights="area", max_iterations=3)
+        fit = subvol.fit(points, "torus_template.mesh", **options)
+        of_file = subvol.fit("torus_points.xyz", "torus_template.mesh", **options)
+        np.testing.assert_array_equal(fit.cage.points, of_file.cage.points)
+        self.assertTrue(fit.report["distance"]["one_sided"])
+        self.assertEqual(subvol.check(fit.mesh, points)["distance"], fit.report["distance"])
+        subvol.write("python.mesh", fit)
+        self.run_program("fit", "torus_points.xyz", "--template", "torus_template.mesh", "--levels", "1", "--point-weights",
+                         "area", "--max-iterations", "3", "-o", "program.mesh", status=fit_status(fit))
+        self.assert_same_file("python.mesh", "program.mesh")
+
+    def test_curved_cells_follow_points(self):
+        curved = subvol.fit(np.loadtxt("torus_points.xyz"), "torus_template.mesh", order=2, max_iterations=3)
+        self.assertTrue(curved.report["distance"]["one_sided"])
+
+    def test_what_makes_no_sense_is_refused(self):
+        points = np.loadtxt("torus_points.xyz")
+        for wrong, options in ((points, dict(template=None)), (points[:5], {}), (points[:, :2], {}),
+                               (points, dict(crease_angle=40.0)), ("torus_target.off", dict(point_weights="area"))):
+            with self.subTest(options), self.assertRaises(subvol.InputError):
+                subvol.fit(wrong, **{"template": "torus_template.mesh", **options})
+
+
+def fit_status(fit):
+    """The program's exit status for a result."""
+    if not fit.report["valid"]:
+        return 1
+    return 0 if fit.report["converged"] else 4
+
+
 class States(InFolder):
     """Checkpoints, and states on the way."""
 

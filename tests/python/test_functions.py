@@ -221,6 +221,15 @@ class Checks(InFolder):
         np.testing.assert_array_equal(found["not_certified_cells"], [0])
         self.assertLess(found["cell_scaled_jacobian"][0], 0)
 
+    def test_a_check_tells_its_parts_and_ends_between_them(self):
+        told = []
+        subvol.check("torus_template.mesh", "torus_target.off", progress=lambda p: told.append((p.stage, p.fraction)))
+        self.assertEqual([stage for stage, _ in told], ["quality", "topology", "self-intersections", "distance"])
+        self.assertEqual(sorted(told, key=lambda t: t[1]), told)
+        part = subvol.check("torus_template.mesh", progress=lambda p: p.stage != "topology")
+        self.assertIn("quality", part)
+        self.assertFalse(part["valid"])
+
     def test_anything_may_be_wrong_with_a_mesh(self):
         for cells in ([[0] * 8], [[0, 1, 2, 3, 4, 5, 6, 6]], [range(8), range(8)], np.empty((0, 8), int)):
             mesh = subvol.VolumeMesh(CUBE_POINTS, hexes=cells, creases=[[0, 6], [2, 2]],
