@@ -28,7 +28,7 @@ struct CellCertificate {
   CellValidity validity = CellValidity::undecided;
   double lower_bound = 0;  ///< of det J over the cell by its canonical coordinates; > 0 exactly when valid
   Vec3 witness{0, 0, 0};   ///< canonical coordinates: det J <= 0 there if invalid, else where the least value was seen
-  double witness_determinant = 0;  ///< det J there
+  double witness_determinant = 0;  ///< det J there; of valid curved cells none is computed, but 0
   int boxes = 0;                   ///< boxes looked at
 };
 

@@ -22,6 +22,8 @@ class ChebyshevExpansion {
       cosines_.push_back(std::cos(std::numbers::pi_v<long double> * j / (2 * num_nodes)));
   }
 
+  int num_nodes() const { return num_nodes_; }
+
   /// coefficients  `count` <= num_nodes entries, written.
   /// log_derivative_bound  logarithm of a bound of |f^(num_nodes)| on the interval; -infinity for polynomials below.
   /// returns  the remainder, with 1e-15 of the largest value for rounding.
@@ -37,8 +39,12 @@ class ChebyshevExpansion {
     long double cut = 0;
     for (int k = 0; k < num_nodes_; ++k) {
       long double sum = 0;
-      for (int m = 0; m < num_nodes_; ++m)
-        sum += values[m] * cosines_[static_cast<std::size_t>(k) * (2 * m + 1) % cosines_.size()];
+      std::size_t at = k;  // k (2m + 1), of a cosine's period
+      for (int m = 0; m < num_nodes_; ++m) {
+        sum += values[m] * cosines_[at];
+        at += 2 * k;
+        if (at >= cosines_.size()) at -= cosines_.size();
+      }
       sum *= (k == 0 ? 1.0L : 2.0L) / num_nodes_;
       if (k < count)
         coefficients[k] = sum;

@@ -22,7 +22,7 @@ Mat3 unrotate(Mat3 m) {
     const double distance = (inverse - m).squaredNorm();
     const double factor = distance > 0.1 ? std::sqrt(inverse.norm() / m.norm()) : 1;
     m = 0.5 * (factor * m + inverse / factor);
-    if (distance < 1e-12) break;
+    if (distance < 1e-6) break;  // the next one would be below 1e-12
   }
   return m.transpose();
 }

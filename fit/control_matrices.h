@@ -14,11 +14,12 @@ namespace subvol {
 /// Entry (row, column) of all of them is one array of doubles; at least kWide matrices.
 class ControlMatrices {
  public:
-  /// Room for `count` matrices; what they are is undefined.
+  /// Room for `count` matrices; what they are is undefined. An entry may be written kWide - 1 numbers beyond its end as
+  /// long as the next one is written later.
   void resize(std::size_t count) {
     count_ = count;
     stride_ = (count + kWide - 1) / kWide * kWide;
-    if (entries_.size() < 9 * stride_) entries_.resize(9 * stride_);
+    if (entries_.size() < 9 * stride_ + kWide) entries_.resize(9 * stride_ + kWide);
   }
   std::size_t size() const { return count_; }
   double* entries(int row, int column) { return entries_.data() + (3 * row + column) * stride_; }

@@ -75,7 +75,7 @@ bool HexBoxes::is_hopeless(const Box& box) {
          remainder(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum() > 2;
 }
 
-std::array<HexBoxes::Box, HexBoxes::kNumChildren> HexBoxes::children(const Box& box) {
+std::array<HexBoxes::Box, HexBoxes::kNumChildren> HexBoxes::children(const Box& box, double) {
   std::array<Box, kNumChildren> result;
   for (int c = 0; c < kNumChildren; ++c)
     result[c] = {box.level + 1, {2 * box.index[0] + c % 2, 2 * box.index[1] + c / 2 % 2, 2 * box.index[2] + c / 4}};

@@ -22,7 +22,7 @@ class HexBoxes {
     int level = 0;
     std::array<int, 3> index{0, 0, 0};
   };
-  static constexpr int kNumChildren = 8, kLevelsPerDepth = 1;
+  static constexpr int kNumChildren = 8, kLevelsPerDepth = 1, kMaxDepth = LineModels::kMaxLevel;
 
   HexBoxes(Basis basis, int order);
 
@@ -31,7 +31,7 @@ class HexBoxes {
 
   static Box root() { return {}; }
   static int num_corners() { return 8; }
-  static std::array<Box, kNumChildren> children(const Box& box);
+  static std::array<Box, kNumChildren> children(const Box& box, double lowest = 0);
   static Vec3 corner_point(const Box& box, int corner);
 
   /// J's coefficients on a box; valid until the next call. Boxes in the order of `children` cost least.

@@ -61,7 +61,7 @@ class Search {
 
   Search(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
       : boxes_(boxes), cell_(cell), options_(options),
-        max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, LineModels::kMaxLevel)) {
+        max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, Boxes::kMaxDepth)) {
     result_.lower_bound = kInfinity;
     result_.witness_determinant = kInfinity;
   }
@@ -76,7 +76,7 @@ class Search {
         decided_ = false;
         continue;
       }
-      auto children = boxes_.children(next.box);
+      auto children = boxes_.children(next.box, next.lowest);
       if (result_.boxes + static_cast<int>(children.size()) > options_.max_boxes) {
         decided_ = false;
         break;
@@ -90,7 +90,9 @@ class Search {
                        : decided_ ? CellValidity::valid
                                   : CellValidity::undecided;
     if (result_.validity != CellValidity::valid) result_.lower_bound = -kInfinity;
-    if (result_.witness_determinant == kInfinity) {
+    if (result_.validity == CellValidity::valid) {
+      result_.witness_determinant = 0;
+    } else if (result_.witness_determinant == kInfinity) {
       result_.witness = boxes_.corner_point(boxes_.root(), 0);
       result_.witness_determinant = evaluate(cell_, result_.witness).value;
     }

@@ -14,16 +14,15 @@ namespace subvol {
 /// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
 /// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
 /// for legendre up to order 8, close for all others, and better with every halving. So are `SimplexModels`, of tets and
-/// of the triangles of prisms; those of fourier orders above 4 are made for the first few halvings only, and cells that
-/// are closer to inversion than the last ones are to the map end undecided, never wrong. Rounding is bounded a priori,
-/// about 1e-13 of the product of the lengths of a hex of order 4. A witness is a point where det J, computed from the
-/// shape functions themselves, is negative beyond its own rounding.
+/// of the triangles of prisms. Rounding is bounded a priori, about 1e-13 of the product of the lengths of a hex of order
+/// 4, 1e-11 of a tet of order 8: cells that are closer to inversion end undecided, never wrong. A witness is a point
+/// where det J, computed from the shape functions themselves, is negative beyond its own rounding.
 /// Paper: left open there for the Fourier basis (section 5).
 ///
 /// Holds buffers: one object per thread.
 class HighOrderCertifier {
  public:
-  /// `space` must outlive it. InputError: options out of range. max_depth above 12 counts as 12.
+  /// `space` must outlive it. InputError: options out of range. max_depth above 12 (hexes) or 20 counts as that.
   explicit HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options = {});
   ~HighOrderCertifier();
   HighOrderCertifier(HighOrderCertifier&&) noexcept;
@@ -31,8 +30,8 @@ class HighOrderCertifier {
   /// coefficients  one per node of the space (asserted), any values: cells with one that is not finite, or so large or
   ///               small (beyond 1e+-50) that products overflow, end undecided.
   /// returns       as for linear cells: lower_bound > 0 exactly when valid, else -infinity; never a wrong `valid` or
-  ///               `invalid`. Cost of a well-shaped hex at orders 1, 2, 4, 8: about 1, 2 to 4, 5, 65 us; models
-  ///               first (`SimplexModels::part`).
+  ///               `invalid`. Cost of a well-shaped hex at orders 1, 2, 4, 8: about 1, 2 to 4, 5, 65 us, of a tet 0.6,
+  ///               1, 4, 300 us (fourier) or 0.6, 0.6, 1, 8 us; models first (`SimplexModels::part`).
   CellCertificate certify(std::span<const Vec3> coefficients, std::size_t cell);
 
  private:

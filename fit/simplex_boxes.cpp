@@ -7,46 +7,114 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace subvol {
 
+namespace {
+
+/// Control points are averaged this many numbers at a time: the three coordinates of a tet's.
+constexpr std::size_t kLanes = 4;
+using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+
+Lanes load_lanes(const double* from) {
+  Lanes result;
+  std::memcpy(&result, from, sizeof result);
+  return result;
+}
+void store_lanes(const Lanes& value, double* to) { std::memcpy(to, &value, sizeof value); }
+
+/// Rows become columns.
+void transpose(Lanes (&x)[kLanes]) {
+  using Select = long long __attribute__((vector_size(sizeof(Lanes))));
+  const Lanes a = __builtin_shuffle(x[0], x[1], Select{0, 4, 2, 6}), b = __builtin_shuffle(x[0], x[1], Select{1, 5, 3, 7});
+  const Lanes c = __builtin_shuffle(x[2], x[3], Select{0, 4, 2, 6}), d = __builtin_shuffle(x[2], x[3], Select{1, 5, 3, 7});
+  x[0] = __builtin_shuffle(a, c, Select{0, 1, 4, 5});
+  x[1] = __builtin_shuffle(b, d, Select{0, 1, 4, 5});
+  x[2] = __builtin_shuffle(a, c, Select{2, 3, 6, 7});
+  x[3] = __builtin_shuffle(b, d, Select{2, 3, 6, 7});
+}
+
+std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
+
+}  // namespace
+
 SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
     : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1), w_controls_(kind == CellKind::tet ? 1 : line_.degree() + 1),
+      lanes_(rounded_up(3 * num_layers_, kLanes)),
       lower_(simplex_.index().dimension(), simplex_.index().degree() - 1) {
   const SimplexIndex& index = simplex_.index();
-  reduced_.assign(index.size(), {-1, -1, -1, -1});
-  for (int n = 0; n < lower_.size(); ++n) {
-    std::array<int, 4> raised{};
-    for (int c = 0; c <= index.dimension(); ++c) {
+  for (int c = 0; c <= index.dimension(); ++c) {
+    reduced_[c].assign(index.size(), lower_.size());
+    for (int n = 0; n < lower_.size(); ++n) {
       SimplexIndex::Exponents e = lower_.exponents(n);
       ++e[c];
-      raised[c] = index.find(e);
-      reduced_[raised[c]][c] = n;
+      raised_[c].push_back(index.find(e));
+      reduced_[c][raised_[c].back()] = n;
     }
-    raised_.push_back(raised);
+    for (int n = 0; n < index.size(); ++n) exponents_[c].push_back(index.exponents(n)[c]);
+    for (int b = 0; b <= index.dimension(); ++b)
+      if (c < b) halvings_[c][b] = SimplexHalving(index, c, b);
+    raised_[c].resize(rounded_up(lower_.size(), kLanes));
   }
   matrices_.resize(kind == CellKind::tet ? lower_.size() : index.size() * w_controls_);
+  const std::size_t width = rounded_up(w_controls_, kWide);
+  layer_terms_.resize(num_layers_);
+  contracted_.assign(3 * index.size() * width + 2 * kWide, 0);
+  difference_.assign((lower_.size() + 1) * width, 0);
+  for (std::size_t o = 0; o < width; ++o) {
+    below_.push_back(static_cast<double>(o));
+    above_.push_back(w_controls_ - 1 - static_cast<double>(o));
+  }
 }
 
 void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
-  modes_ = modes;
-  coefficients_ = coefficients;
-  slots_.clear();
-  for (const LocalMode& mode : modes) slots_.push_back(simplex_.slot(mode));
+  num_modes_ = static_cast<int>(modes.size());
+  for (auto& layer : layer_terms_) layer.clear();
+  for (std::size_t a = 0; a < modes.size(); ++a)
+    layer_terms_[kind_ == CellKind::prism ? modes[a].k : 0].push_back({simplex_.slot(modes[a]), coefficients[a]});
+  const bool prism = kind_ == CellKind::prism;
+  Mat3 edges = Mat3::Zero();
+  for (std::size_t a = 0; a < modes.size(); ++a) {
+    const LocalMode& mode = modes[a];
+    if (mode.edge >= 0 || (prism && mode.k > 1)) continue;
+    Eigen::RowVector3d gradient = Eigen::RowVector3d::Zero();
+    if (mode.vertex > 0)
+      gradient[mode.vertex - 1] = prism ? 0.5 : 1;
+    else
+      gradient.head(simplex_.index().dimension()).setConstant(prism ? -0.5 : -1);
+    if (prism) gradient[2] = (mode.k == 1 ? 1 : -1) / 3.0;
+    edges += coefficients[a] * gradient;
+  }
+  mean_edges_ = edges.colwise().norm().transpose();
+}
+
+Mat3 SimplexBoxes::lasting_error(const Box& box) const {
+  Mat3 result = Mat3::Zero();
+  for (int k = 0; k < num_layers_; ++k) {
+    const Layer& layer = (*box.layers)[k];
+    const bool prism = kind_ == CellKind::prism;
+    const Vec3 across = layer.gradient_error * (prism ? line_.bounds()[k] : 1);
+    const Vec3 along = prism ? Vec3(layer.error * line_.slope_bounds()[k]) : across;
+    result += (Mat3() << across, across, along).finished();
+  }
+  return result;
 }
 
 bool SimplexBoxes::is_stuck(const Box& box) {
-  if (box.halvings < simplex_.most_halvings() || box.lasting.maxCoeff() == 0) return false;
+  if (box.halvings < simplex_.most_halvings()) return false;
+  const Mat3 lasting = lasting_error(box);
+  if (lasting.maxCoeff() == 0) return false;
   const Mat3 mean = matrices(box).mean();
   mean_.resize(kWide);
   for (int row = 0; row < 3; ++row)
     for (int d = 0; d < 3; ++d) std::fill_n(mean_.entries(row, d), kWide, mean(row, d));
-  return mean.determinant() > 0 && determinant_bound(mean_, box.lasting * sides(box).cwiseAbs()) == 0;
+  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs()) == 0;
 }
 
-SimplexBoxes::Box SimplexBoxes::root() const {
+SimplexBoxes::Box SimplexBoxes::root() {
   Box box;
   const auto vertices = canonical_vertices(kind_);
   std::copy_n(vertices.begin(), simplex_.index().dimension() + 1, box.vertices.begin());
@@ -54,28 +122,47 @@ SimplexBoxes::Box SimplexBoxes::root() const {
   return box;
 }
 
-void SimplexBoxes::take_models(Box& box) const {
-  const bool prism = kind_ == CellKind::prism;
-  const std::size_t size = simplex_.index().size();
-  box.models = simplex_.part(box.part, box.vertices);
-  box.lasting.setZero();
-  box.control.assign(3 * num_layers_ * size, 0);
-  for (std::size_t a = 0; a < modes_.size(); ++a) {
-    const SimplexModels::Function& f = (*box.models)[slots_[a]];
-    const std::size_t layer = prism ? modes_[a].k : 0;
-    const double across = f.gradient_error * (prism ? line_.bounds()[layer] : 1);
-    const double along = prism ? f.error * line_.slope_bounds()[layer] : across;
-    box.lasting += coefficients_[a].cwiseAbs() * Eigen::RowVector3d(across, across, along);
-    const double* b = f.coefficients.data();
-    for (std::size_t row = 0; row < 3; ++row) {
-      double* out = box.control.data() + (row * num_layers_ + layer) * size;
-      const double x = coefficients_[a][row];
-      for (std::size_t n = 0; n < size; ++n) out[n] += x * b[n];
+void SimplexBoxes::take_models(Box& box) {
+  const auto part = simplex_.part(box.part, box.vertices);
+  std::vector<Layer> layers(num_layers_);
+  for (int k = 0; k < num_layers_; ++k) {
+    Layer& layer = layers[k];
+    for (const Term& term : layer_terms_[k]) {
+      const SimplexModels::Function& f = part->functions[term.slot];
+      const Vec3 size = term.coefficient.cwiseAbs();
+      layer.value_bound += f.value_bound * size;
+      layer.gradient_bound += f.gradient_bound * size;
+      layer.error += f.error * size;
+      layer.gradient_error += f.gradient_error * size;
+      layer.largest_coefficient += f.largest_coefficient * size;
+      layer.rounding += f.rounding * size;
     }
   }
+  box.layers = std::make_shared<const std::vector<Layer>>(std::move(layers));
+
+  const std::size_t stride = simplex_.stride();
+  box.control.assign(stride * lanes_, 0);
+  for (int k = 0; k < num_layers_; ++k)
+    for (std::size_t first = 0; first < stride; first += kWide) {
+      Wide sums[3] = {};
+      for (const Term& term : layer_terms_[k]) {
+        const Wide b = load_wide(part->coefficients.data() + term.slot * stride + first);
+        for (int row = 0; row < 3; ++row) sums[row] += term.coefficient[row] * b;
+      }
+      double* out = box.control.data() + first * lanes_ + k;
+      for (int n = 0; n < kWide; ++n)
+        for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[row][n];
+    }
 }
 
-std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box) const {
+/// Errors are measured by the mean edges, as is det J.
+bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
+  constexpr double kShare = 0.1, kGood = 0.3;
+  const double error = lasting_error(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
+  return !(error <= kShare * std::min(lowest / mean_edges_.prod(), kGood));
+}
+
+std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double lowest) {
   const SimplexIndex& index = simplex_.index();
   const Mat3 ideal = ideal_matrix(kind_);
   int a = 0, b = 1;
@@ -96,42 +183,28 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box) const {
   }
   result[0].vertices[b] = result[1].vertices[a] = 0.5 * (box.vertices[a] + box.vertices[b]);
   const int halvings = box.halvings + 1;
-  const bool modelled = halvings <= simplex_.most_halvings() && halvings % simplex_.halvings_between() == 0;
+  const bool modelled = halvings <= simplex_.most_halvings() && halvings % simplex_.halvings_between() == 0 &&
+                        (halvings == simplex_.most_halvings() || models_matter(box, lowest));
   for (std::uint32_t half = 0; half < 2; ++half) {
     result[half].halvings = halvings;
     if (halvings <= simplex_.most_halvings()) result[half].part = 2 * box.part + half;
     if (modelled) take_models(result[half]);
   }
-  if (!modelled) halve_control(box, a, b, result);
+  if (!modelled) halve_control(halvings_[a][b], result[0].control, result[1].control);
   return result;
 }
 
-void SimplexBoxes::halve_control(const Box& box, int a, int b, std::array<Box, 2>& halves) const {
-  // Where the other exponents are the same, the coefficients are those of a polynomial along the side from a to b.
-  const SimplexIndex& index = simplex_.index();
-  std::array<double, 32> line;
-  std::array<int, 32> at;
-  const std::size_t size = index.size();
-  for (int first = 0; first < index.size(); ++first) {
-    SimplexIndex::Exponents e = index.exponents(first);
-    if (e[b] != 0) continue;
-    const int degree = e[a];
-    for (int o = 0; o <= degree; ++o) {
-      at[o] = index.find(e);
-      --e[a];
-      ++e[b];
-    }
-    for (std::size_t layer = 0; layer < 3u * num_layers_; ++layer) {
-      const double* in = box.control.data() + layer * size;
-      double* low = halves[0].control.data() + layer * size;
-      double* high = halves[1].control.data() + layer * size;
-      for (int o = 0; o <= degree; ++o) line[o] = in[at[o]];
-      for (int step = 0; step <= degree; ++step) {
-        low[at[step]] = line[0];
-        high[at[degree - step]] = line[degree - step];
-        for (int o = 0; o < degree - step; ++o) line[o] = 0.5 * (line[o] + line[o + 1]);
+void SimplexBoxes::halve_control(const SimplexHalving& halving, std::vector<double>& low,
+                                 std::vector<double>& high) const {
+  for (const SimplexHalving::Round& round : halving.rounds) {
+    for (const auto& [n, other] : round.means)
+      for (std::size_t lane = 0; lane < lanes_; lane += kLanes) {
+        double* x = low.data() + n * lanes_ + lane;
+        store_lanes(0.5 * (load_lanes(x) + load_lanes(low.data() + other * lanes_ + lane)), x);
       }
-    }
+    for (const auto& [from, to] : round.copies)
+      for (std::size_t lane = 0; lane < lanes_; lane += kLanes)
+        store_lanes(load_lanes(low.data() + from * lanes_ + lane), high.data() + to * lanes_ + lane);
   }
 }
 
@@ -145,55 +218,66 @@ std::size_t SimplexBoxes::corner_matrix(int corner) const {
   const SimplexIndex& index = kind_ == CellKind::tet ? lower_ : simplex_.index();
   e[kind_ == CellKind::tet ? corner : corner % 3] = static_cast<std::int8_t>(index.degree());
   const int layer = kind_ == CellKind::tet ? 0 : corner / 3 * (w_controls_ - 1);
-  return static_cast<std::size_t>(layer * index.size() + index.find(e));
+  return static_cast<std::size_t>(index.find(e) * w_controls_ + layer);
 }
 
 const ControlMatrices& SimplexBoxes::matrices(const Box& box) {
-  const SimplexIndex& index = simplex_.index();
-  const int size = index.size(), degree = index.degree();
-  if (kind_ == CellKind::tet) {
-    for (int row = 0; row < 3; ++row) {
-      const double* x = box.control.data() + row * size;
-      for (int d = 0; d < 3; ++d) {
-        double* out = matrices_.entries(row, d);
-        for (int n = 0; n < lower_.size(); ++n) out[n] = degree * (x[raised_[n][d + 1]] - x[raised_[n][0]]);
-      }
-    }
-    return matrices_;
-  }
-  const double* table = line_.coefficients(line_.level(box.w_level), box.w_index);
-  const int q = w_controls_ - 1;
-  contracted_.resize(static_cast<std::size_t>(w_controls_) * size);
-  for (int row = 0; row < 3; ++row) {
-    std::fill(contracted_.begin(), contracted_.end(), 0.0);
-    for (int k = 0; k < num_layers_; ++k) {
-      const double* x = box.control.data() + (row * num_layers_ + k) * size;
-      for (int o = 0; o <= q; ++o) {
-        const double weight = table[k * LineModels::kStride + o];
-        for (int n = 0; n < size; ++n) contracted_[o * size + n] += weight * x[n];
-      }
-    }
-    for (int o = 0; o <= q; ++o) {
-      const double* x = contracted_.data() + o * size;
-      for (int d = 0; d < 2; ++d) {
-        double* out = matrices_.entries(row, d) + o * size;
-        for (int n = 0; n < size; ++n) {
-          double sum = 0;
-          for (int c = 0; c < 3; ++c) {
-            const int from = reduced_[n][c];
-            if (from >= 0) sum += index.exponents(n)[c] * (x[raised_[from][d + 1]] - x[raised_[from][0]]);
-          }
-          out[n] = sum;
-        }
-      }
-      double* out = matrices_.entries(row, 2) + o * size;
-      for (int n = 0; n < size; ++n) {
-        const double before = o > 0 ? o * (x[n] - x[n - size]) : 0, after = o < q ? (q - o) * (x[n + size] - x[n]) : 0;
-        out[n] = before + after;
-      }
-    }
-  }
+  kind_ == CellKind::tet ? tet_matrices(box) : prism_matrices(box);
   return matrices_;
+}
+
+void SimplexBoxes::tet_matrices(const Box& box) {
+  const double* x = box.control.data();
+  const Lanes degree = Lanes{} + simplex_.index().degree();
+  for (std::size_t first = 0; first < raised_[0].size(); first += kLanes)
+    for (int d = 0; d < 3; ++d) {
+      Lanes columns[kLanes];
+      for (std::size_t n = 0; n < kLanes; ++n)
+        columns[n] = degree * (load_lanes(x + raised_[d + 1][first + n] * kLanes) -
+                               load_lanes(x + raised_[0][first + n] * kLanes));
+      transpose(columns);
+      for (int row = 0; row < 3; ++row) store_lanes(columns[row], matrices_.entries(row, d) + first);
+    }
+}
+
+/// Differences over the triangle and along w, both raised to the degrees of the map. Numbers along w are side by side;
+/// what is computed beyond their end is overwritten.
+void SimplexBoxes::prism_matrices(const Box& box) {
+  const double* table = line_.coefficients(line_.level(box.w_level), box.w_index);
+  const int size = simplex_.index().size();
+  const std::size_t width = below_.size();
+  for (int row = 0; row < 3; ++row) {
+    double* y = contracted_.data() + kWide + row * size * width;
+    for (int n = 0; n < size; ++n) {
+      const double* x = box.control.data() + n * lanes_ + row * num_layers_;
+      for (std::size_t o = 0; o < width; o += kWide) {
+        Wide sum{};
+        for (int k = 0; k < num_layers_; ++k) sum += x[k] * load_wide(table + k * LineModels::kStride + o);
+        store_wide(sum, y + n * width + o);
+      }
+    }
+    for (int d = 0; d < 2; ++d) {
+      for (int n = 0; n < lower_.size(); ++n)
+        for (std::size_t o = 0; o < width; o += kWide)
+          store_wide(load_wide(y + raised_[d + 1][n] * width + o) - load_wide(y + raised_[0][n] * width + o),
+                     difference_.data() + n * width + o);
+      for (int n = 0; n < size; ++n)
+        for (std::size_t o = 0; o < width; o += kWide) {
+          Wide sum{};
+          for (int c = 0; c < 3; ++c)
+            sum += exponents_[c][n] * load_wide(difference_.data() + reduced_[c][n] * width + o);
+          store_wide(sum, matrices_.entries(row, d) + n * w_controls_ + o);
+        }
+    }
+    for (int n = 0; n < size; ++n)
+      for (std::size_t o = 0; o < width; o += kWide) {
+        const double* at = y + n * width + o;
+        const Wide here = load_wide(at);
+        store_wide(load_wide(below_.data() + o) * (here - load_wide(at - 1)) +
+                       load_wide(above_.data() + o) * (load_wide(at + 1) - here),
+                   matrices_.entries(row, 2) + n * w_controls_ + o);
+      }
+  }
 }
 
 Mat3 SimplexBoxes::sides(const Box& box) const {
@@ -206,31 +290,30 @@ Mat3 SimplexBoxes::sides(const Box& box) const {
 double SimplexBoxes::determinant_scale(const Box& box) const { return 1 / sides(box).determinant(); }
 
 Mat3 SimplexBoxes::remainder(const Box& box) const {
-  const bool prism = kind_ == CellKind::prism;
   const LineModels::Level& level = line_.level(box.w_level);
   Mat3 modelling = Mat3::Zero();
-  Vec3 size = Vec3::Zero();
-  for (std::size_t a = 0; a < modes_.size(); ++a) {
-    const SimplexModels::Function& f = (*box.models)[slots_[a]];
-    const Vec3 x = coefficients_[a].cwiseAbs();
-    if (!prism) {
-      modelling += f.gradient_error * x * Eigen::RowVector3d::Ones();
-      size += f.largest_coefficient * x;
+  Vec3 size = Vec3::Zero(), rounding = Vec3::Zero();
+  for (int k = 0; k < num_layers_; ++k) {
+    const Layer& layer = (*box.layers)[k];
+    if (kind_ == CellKind::tet) {
+      modelling = layer.gradient_error * Eigen::RowVector3d::Ones();
+      size = layer.largest_coefficient;
+      rounding = layer.rounding;
       continue;
     }
-    const int k = modes_[a].k;
     const double n = line_.bounds()[k], error = level.error[k], slope_error = level.slope_error[k];
-    const double across = f.gradient_bound * error + f.gradient_error * (n + error);
-    const double along = f.value_bound * slope_error + f.error * (line_.slope_bounds()[k] + slope_error);
-    modelling += x * Eigen::RowVector3d(across, across, along);
-    size += f.largest_coefficient * level.largest_coefficient[k] * x;
+    const Vec3 across = layer.gradient_bound * error + layer.gradient_error * (n + error);
+    const Vec3 along = layer.value_bound * slope_error + layer.error * (line_.slope_bounds()[k] + slope_error);
+    modelling += (Mat3() << across, across, along).finished();
+    size += level.largest_coefficient[k] * layer.largest_coefficient;
+    rounding += level.largest_coefficient[k] * layer.rounding;
   }
   // Sums over modes and along w, tables, the shift, halvings of `degree` averages each, differences, the 16 asked for.
   const int degree = simplex_.index().degree();
-  const double roundings =
-      static_cast<double>(modes_.size()) + 64 + num_layers_ + 4 + 1 + degree * box.level + degree + 8 + 16;
-  const double factor = 2 * std::max(degree, w_controls_ - 1) * roundings * std::numeric_limits<double>::epsilon() / 2;
-  return (1 + 1e-10) * (modelling * sides(box).cwiseAbs() + factor * size * Eigen::RowVector3d::Ones());
+  const double roundings = num_modes_ + num_layers_ + 4 + 1 + degree * box.level + degree + 8 + 16;
+  const Vec3 control = rounding + roundings * (std::numeric_limits<double>::epsilon() / 2) * size;
+  const double differences = 2 * std::max(degree, w_controls_ - 1);
+  return (1 + 1e-10) * (modelling * sides(box).cwiseAbs() + differences * control * Eigen::RowVector3d::Ones());
 }
 
 }  // namespace subvol

@@ -15,28 +15,34 @@ namespace subvol {
 
 /// Bernstein coefficients of the Jacobian of one high-order tet or prism over its parts, got by halving longest sides.
 ///
-/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew where there are some for a part;
-/// parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own. Jacobians are by local
+/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew for a part where the errors of those
+/// before matter; parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own. Jacobians are by local
 /// coordinates: along the part's sides.
 class SimplexBoxes {
  public:
+  /// Sums over the functions with one N_k along w (tets: all of them) of what `SimplexModels::Function` says of them,
+  /// times the sizes of their coefficients.
+  struct Layer {
+    Vec3 value_bound = Vec3::Zero(), gradient_bound = Vec3::Zero(), error = Vec3::Zero(), gradient_error = Vec3::Zero();
+    Vec3 largest_coefficient = Vec3::Zero(), rounding = Vec3::Zero();
+  };
   struct Box {
     int level = 0;                    ///< halvings
     std::array<Vec3, 4> vertices{};   ///< of the simplex, canonical; a prism's triangle has w = 0
     int halvings = 0;                 ///< of the simplex
     std::uint32_t part = 1;           ///< number of the simplex
     int w_level = 0, w_index = 0;     ///< of a prism
-    std::shared_ptr<const SimplexModels::Part> models;  ///< of the part that `control` comes from
-    Mat3 lasting = Mat3::Zero();      ///< what of their errors stays with every part, by canonical coordinates
-    std::vector<double> control;      ///< at ((row num_layers) + k) index.size() + alpha
+    std::shared_ptr<const std::vector<Layer>> layers;  ///< of the models that `control` comes from
+    std::vector<double> control;      ///< at alpha lanes_ + row num_layers_ + k
   };
-  static constexpr int kLevelsPerDepth = 3;
+  static constexpr int kLevelsPerDepth = 3, kMaxDepth = 20;
 
   SimplexBoxes(CellKind kind, Basis basis, int order);
 
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
-  Box root() const;
-  std::array<Box, 2> children(const Box& box) const;
+  Box root();
+  /// lowest: det of dx/du where it is least, as far as known. New models are taken where the old ones' errors matter.
+  std::array<Box, 2> children(const Box& box, double lowest);
   int num_corners() const { return kind_ == CellKind::tet ? 4 : 6; }
   Vec3 corner_point(const Box& box, int corner) const;
 
@@ -52,21 +58,33 @@ class SimplexBoxes {
   /// Columns are the sides of a part.
   Mat3 sides(const Box& box) const;
   /// Takes the models of the box's simplex.
-  void take_models(Box& box) const;
-  /// Halves the side from vertex a to b of the models' control points.
-  void halve_control(const Box& box, int a, int b, std::array<Box, 2>& halves) const;
+  void take_models(Box& box);
+  bool models_matter(const Box& box, double lowest) const;
+  void tet_matrices(const Box& box);
+  void prism_matrices(const Box& box);
+  /// What of the errors of the simplex's models stays with every part, by canonical coordinates.
+  Mat3 lasting_error(const Box& box) const;
+  /// low: control points of the whole, those of one half when done; high: as many, those of the other.
+  void halve_control(const SimplexHalving& halving, std::vector<double>& low, std::vector<double>& high) const;
 
   CellKind kind_;
   const SimplexModels& simplex_;
   const LineModels& line_;  // along w
   int num_layers_, w_controls_;
-  std::span<const LocalMode> modes_;
-  std::span<const Vec3> coefficients_;
-  std::vector<std::size_t> slots_;            // of the modes, in the models of a part
+  std::size_t lanes_;       // numbers per control point: a multiple of kLanes
+  int num_modes_ = 0;
+  struct Term {
+    std::size_t slot;  // of the function, in the models of a part
+    Vec3 coefficient;
+  };
+  std::vector<std::vector<Term>> layer_terms_;  // by the number of N_k along w; a tet's are all in one layer
+  Vec3 mean_edges_;                           // lengths of the linear part's mean columns
   SimplexIndex lower_;                        // degree - 1
-  std::vector<std::array<int, 4>> raised_;    // per index of lower_: with one exponent more
-  std::vector<std::array<int, 4>> reduced_;   // per index: in lower_ with one exponent less, or -1
-  std::vector<double> contracted_;
+  std::array<std::vector<int>, 4> raised_;    // per index of lower_: with one exponent more
+  std::array<std::vector<int>, 4> reduced_;   // per index: in lower_ with one exponent less; lower_.size() if there is none
+  std::array<std::vector<double>, 4> exponents_;  // per index
+  std::array<std::array<SimplexHalving, 4>, 4> halvings_;  // of the side from a to b > a
+  std::vector<double> contracted_, difference_, below_, above_;
   ControlMatrices matrices_, mean_;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/simplex_models.h"
 
-#include "fit/chebyshev.h"
+#include "fit/wide.h"
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,6 @@ namespace subvol {
 namespace {
 
 constexpr long double kPi = std::numbers::pi_v<long double>, kSqrt2 = std::numbers::sqrt2_v<long double>;
-using Coefficients = std::vector<long double>;
 
 /// sin(z) / z and its derivative, z >= 0.
 void sinc(long double z, long double& value, long double& slope) {
@@ -58,228 +57,196 @@ void kernel(Basis basis, int i, long double x, long double& value, long double& 
   if (x > 0.5L) value *= mode_parity(i), slope *= -mode_parity(i);
 }
 
-/// A polynomial in Bernstein form, and how far it is from what it stands for.
-struct Model {
-  int degree;
-  Coefficients b;
-  double value_bound, gradient_bound, error, gradient_error;
+/// What the terms of a sum of products of Chebyshev polynomials add to value and gradient at most, by their total
+/// degree. What no polynomial stands for counts as of a degree beyond all that are kept.
+///
+/// |T_k'(t)| <= k^2 for the gradient, and |T_k'(t)| sqrt(1 - t^2) <= k for the damped one.
+struct Sizes {
+  std::vector<double> value{1}, gradient{0}, damped{0};
+
+  Sizes operator*(const Sizes& other) const {
+    Sizes result;
+    result.value.assign(value.size() + other.value.size() - 1, 0);
+    result.gradient = result.damped = result.value;
+    for (std::size_t k = 0; k < value.size(); ++k)
+      for (std::size_t l = 0; l < other.value.size(); ++l) {
+        result.value[k + l] += value[k] * other.value[l];
+        result.gradient[k + l] += gradient[k] * other.value[l] + value[k] * other.gradient[l];
+        result.damped[k + l] += damped[k] * other.value[l] + value[k] * other.damped[l];
+      }
+    return result;
+  }
+  static double beyond(const std::vector<double>& sizes, int degree) {
+    double sum = 0;
+    for (std::size_t k = degree + 1; k < sizes.size(); ++k) sum += sizes[k];
+    return sum * (1 + 1e-12);
+  }
 };
 
-/// psi_i over [low, high] by a polynomial of a degree, in the Bernstein polynomials of that interval.
-///
-/// |psi_i^(n)| <= 2 sqrt2 (i pi)^n / (n + 1) for fourier: psi_i = phi_i / x + phi_i / (1 - x), each a mean of cosines.
-Model kernel_model(Basis basis, int i, long double low, long double high, int degree) {
-  const bool exact = basis == Basis::legendre;
-  assert(!exact || degree >= i - 1);
-  const double frequency = i * std::numbers::pi;
-  const long double middle = 0.5L * (low + high), radius = 0.5L * (high - low);
-  Model model{degree, Coefficients(degree + 1, 0.0L), exact ? std::sqrt(2 * i + 1.0) : 2 * std::numbers::sqrt2,
-              exact ? 2.0 * i * i * std::sqrt(2 * i + 1.0) : std::numbers::sqrt2 * frequency, 0, 0};
-  model.value_bound *= 1 + 1e-14;
-  model.gradient_bound *= 1 + 1e-14;
-  long double at_middle, slope;
-  kernel(basis, i, middle, at_middle, slope);
-  model.gradient_error = exact ? 0 : model.gradient_bound;
-  if (degree > 0) {
-    const int num_nodes = exact ? std::max(degree, 1) : degree + 16 + i;
-    Coefficients expanded(degree), slopes(degree, 0.0L);
-    const double log_bound = exact ? -std::numeric_limits<double>::infinity()
-                                   : 1.5 * std::numbers::ln2 + (num_nodes + 1) * std::log(frequency);
-    const double remainder = ChebyshevExpansion(num_nodes).expand(
-        [&](long double x) {
-          long double value, at;
-          kernel(basis, i, x, value, at);
-          return at;
-        },
-        middle, radius, log_bound, degree, expanded.data());
-    if (exact || remainder < model.gradient_bound) {
-      if (!exact) model.gradient_error = remainder;
-      const auto to_bernstein = chebyshev_to_bernstein(degree - 1);
-      for (int k = 0; k < degree; ++k)
-        for (int o = 0; o < degree; ++o) slopes[o] += expanded[k] * to_bernstein[k][o];
-      for (int o = 0; o < degree; ++o) model.b[o + 1] = model.b[o] + 2 * radius * slopes[o] / degree;
-    }
-  }
-  long double model_at_middle = 0, binomial = 1;
-  for (int o = 0; o <= degree; ++o) {
-    model_at_middle += std::ldexp(binomial * model.b[o], -degree);
-    binomial = binomial * (degree - o) / (o + 1);
-  }
-  for (long double& b : model.b) b += at_middle - model_at_middle;
-  model.error = static_cast<double>(radius) * model.gradient_error;
-  return model;
-}
+/// psi_i over an interval: sum_k coefficients_k T_k, and the sizes of its terms and of its error.
+struct KernelExpansion {
+  std::vector<double> coefficients;
+  Sizes sizes;
+};
 
-std::vector<long double> multinomials(const SimplexIndex& index) {
-  std::vector<long double> result;
-  for (int m = 0; m < index.size(); ++m) {
-    long double& value = result.emplace_back(1.0L);
-    int n = 0;
-    for (const int exponent : index.exponents(m))
-      for (int k = 1; k <= exponent; ++k) value = value * ++n / k;
+/// |psi_i^(n)| <= 2 sqrt2 (i pi)^n / (n + 1) for fourier: psi_i = phi_i / x + phi_i / (1 - x), each a mean of cosines.
+KernelExpansion expand_kernel(Basis basis, int i, long double low, long double high,
+                              const ChebyshevExpansion& expansion) {
+  const int num_slopes = expansion.num_nodes();
+  const long double middle = 0.5L * (low + high), radius = 0.5L * (high - low);
+  const bool exact = basis == Basis::legendre;
+  const double log_bound = exact ? -std::numeric_limits<double>::infinity()
+                                 : 1.5 * std::numbers::ln2 + (num_slopes + 1) * std::log(i * std::numbers::pi);
+  std::vector<long double> slopes(num_slopes + 2, 0.0L);
+  const auto slope_at = [&](long double x) {
+    long double value, slope;
+    kernel(basis, i, x, value, slope);
+    return slope;
+  };
+  const double remainder = expansion.expand(slope_at, middle, radius, log_bound, num_slopes, slopes.data());
+  // The integral of sum s_k T_k: terms radius (s_{k-1} - s_{k+1}) / 2k, of which s_0 counts twice.
+  slopes[0] *= 2;
+  const int last = exact ? i - 1 : num_slopes;
+  long double at_middle, slope, model_at_middle = 0;
+  kernel(basis, i, middle, at_middle, slope);
+  KernelExpansion result;
+  result.coefficients.assign(last + 1, 0);
+  result.sizes.value.assign(last + 1, 0);
+  result.sizes.gradient = result.sizes.damped = result.sizes.value;
+  for (int k = 1; k <= last; ++k) {
+    const long double c = radius * (slopes[k - 1] - slopes[k + 1]) / (2 * k);
+    result.coefficients[k] = static_cast<double>(c);
+    if (k % 2 == 0) model_at_middle += k % 4 == 0 ? c : -c;
+    result.sizes.value[k] = static_cast<double>(std::abs(c));
+    result.sizes.gradient[k] = static_cast<double>(std::abs(c) * k * k / radius);
+    result.sizes.damped[k] = static_cast<double>(std::abs(c) * k / radius);
+  }
+  result.coefficients[0] = static_cast<double>(at_middle - model_at_middle);
+  result.sizes.value[0] = std::abs(result.coefficients[0]);
+  if (!exact) {
+    result.sizes.value.push_back(static_cast<double>(radius) * remainder);
+    result.sizes.gradient.push_back(remainder);
+    result.sizes.damped.push_back(remainder);
   }
   return result;
 }
 
-/// Bernstein polynomials of all degrees up to one over simplices of a dimension, and what their products need.
-class Bernstein {
- public:
-  Bernstein(int dimension, int degree) : dimension_(dimension) {
-    for (int d = 0; d <= degree; ++d) {
-      indices_.emplace_back(dimension, d);
-      multinomials_.push_back(multinomials(indices_.back()));
-    }
-  }
-  int dimension() const { return dimension_; }
-  const SimplexIndex& index(int degree) const { return indices_[degree]; }
-
-  Coefficients product(int degree_a, const Coefficients& a, int degree_b, const Coefficients& b) const {
-    const SimplexIndex &index_a = indices_[degree_a], &index_b = indices_[degree_b],
-                       &index = indices_[degree_a + degree_b];
-    Coefficients weighted_b(b), result(index.size(), 0.0L);
-    std::vector<int> address_b(index_b.size());
-    for (int n = 0; n < index_b.size(); ++n) {
-      weighted_b[n] *= multinomials_[degree_b][n];
-      address_b[n] = index.address(index_b.exponents(n));
-    }
-    for (int m = 0; m < index_a.size(); ++m) {
-      if (a[m] == 0) continue;
-      const long double weight = a[m] * multinomials_[degree_a][m];
-      const int address = index.address(index_a.exponents(m));
-      for (int n = 0; n < index_b.size(); ++n) result[index.at(address + address_b[n])] += weight * weighted_b[n];
-    }
-    for (int n = 0; n < index.size(); ++n) result[n] /= multinomials_[degree_a + degree_b][n];
-    return result;
-  }
-
-  Model product(const Model& f, const Model& g) const {
-    const double fp = f.value_bound + f.error, gp = g.value_bound + g.error;
-    return {f.degree + g.degree,
-            product(f.degree, f.b, g.degree, g.b),
-            f.value_bound * g.value_bound,
-            f.gradient_bound * g.value_bound + f.value_bound * g.gradient_bound,
-            f.value_bound * g.error + f.error * gp,
-            f.gradient_bound * g.error + f.gradient_error * gp + g.gradient_bound * f.error + g.gradient_error * fp};
-  }
-
- private:
-  int dimension_;
-  std::vector<SimplexIndex> indices_;                     // by degree
-  std::vector<std::vector<long double>> multinomials_;
-};
+/// Bounds of |psi_i| and |psi_i'| over [0, 1].
+double kernel_bound(Basis basis, int i) {
+  return (1 + 1e-14) * (basis == Basis::legendre ? std::sqrt(2 * i + 1.0) : 2 * std::numbers::sqrt2);
+}
+double kernel_slope_bound(Basis basis, int i) {
+  return (1 + 1e-14) * (basis == Basis::legendre ? 2.0 * i * i * std::sqrt(2 * i + 1.0)
+                                                 : std::numbers::sqrt2 * i * std::numbers::pi);
+}
 
 /// Values of an affine function at the vertices of a part.
-using Ends = std::array<long double, 4>;
+using Ends = std::array<double, 4>;
 
-/// Models of the factors of functions over one part of a simplex.
-class Factors {
- public:
-  /// vertices: of the part, in barycentric coordinates of the whole.
-  Factors(const Bernstein& bernstein, Basis basis, const std::array<Ends, 4>& barycentric)
-      : bernstein_(bernstein), basis_(basis), barycentric_(barycentric) {}
-
-  /// l_vertex
-  Model barycentric(int vertex) const { return affine(barycentric_[vertex]); }
-
-  /// V_vertex,j
-  Model at_vertex(int vertex, int j, int degree) const {
-    const Model l = barycentric(vertex);
-    return j == 0 ? l : bernstein_.product(l, kernel(j, barycentric_[vertex], degree));
-  }
-
-  /// E_ab,i
-  Model at_edge(int a, int b, int i, int degree) const {
-    Model both = bernstein_.product(barycentric(a), barycentric(b));
-    both.value_bound = 0.25;
-    both.gradient_bound = 1;
-    Ends argument{};
-    for (std::size_t c = 0; c < 4; ++c) argument[c] = 0.5L * (1 + barycentric_[b][c] - barycentric_[a][c]);
-    return bernstein_.product(both, kernel(i, argument, degree));
-  }
-
- private:
-  Model affine(const Ends& ends) const {
-    const SimplexIndex& index = bernstein_.index(1);
-    Model result{1, Coefficients(index.size(), 0.0L), 1, 1, 0, 0};
-    for (int c = 0; c <= bernstein_.dimension(); ++c) {
-      SimplexIndex::Exponents e{};
-      e[c] = 1;
-      result.b[index.find(e)] = ends[c];
-    }
-    return result;
-  }
-
-  /// psi_i of an affine argument, by the blossom of its model at the argument's values.
-  Model kernel(int i, const Ends& argument, int degree) const {
-    const auto last = argument.begin() + bernstein_.dimension() + 1;
-    const long double low = *std::min_element(argument.begin(), last), high = *std::max_element(argument.begin(), last);
-    Model result = kernel_model(basis_, i, low, high, degree);
-    const SimplexIndex& index = bernstein_.index(degree);
-    const Coefficients line = std::move(result.b);
-    result.b.assign(index.size(), 0.0L);
-    Coefficients b;
-    for (int n = 0; n < index.size(); ++n) {
-      b = line;
-      for (int c = 0; c <= bernstein_.dimension(); ++c) {
-        const long double t = high > low ? (argument[c] - low) / (high - low) : 0.0L;
-        for (int step = 0; step < index.exponents(n)[c]; ++step) {
-          for (std::size_t o = 0; o + 1 < b.size(); ++o) b[o] += t * (b[o + 1] - b[o]);
-          b.pop_back();
-        }
-      }
-      result.b[n] = b[0];
-    }
-    return result;
-  }
-
-  const Bernstein& bernstein_;
-  Basis basis_;
-  const std::array<Ends, 4>& barycentric_;
+/// A product of kernels: polynomials, its own cut behind all total degrees from 0 on, and what they leave out.
+struct KernelProduct {
+  std::vector<SimplexPolynomial> cut;  // at degree n, of that degree
+  Sizes sizes;
+  double bound = 1, slope_bound = 0;   // of the product itself
 };
 
 constexpr std::size_t kMostStoredBytes = 300'000'000;  // of coefficients, per kind, basis and order
 
-/// Times that all sides are halved before models are made: as often as the border of validity asks for at low orders,
-/// as often as is bearable where making them takes a quarter of a second.
-int most_depth(CellKind kind, Basis basis, int order) {
+/// Times that all sides are halved before the last models are made: as often as the border of validity asks for. The
+/// higher the degree, the faster errors fall.
+int most_depth(Basis basis, int order) {
   if (basis == Basis::legendre || order == 1) return 0;
-  if (kind == CellKind::prism) return order <= 4 ? 8 : 4;
-  return order <= 4 ? 6 : order <= 8 ? 2 : 1;
+  return order <= 2 ? 6 : order <= 4 ? 3 : 2;
 }
 
-/// Shares degrees among kernels psi_f of the frequencies given (0: none) so that none is left with a much larger error:
-/// each goes to the one with the largest (f pi r / 2)^n / n!, n = degree + 1, r a usual radius of a part.
-std::array<int, 3> shared_degrees(const std::array<int, 3>& frequencies, int total) {
-  constexpr double kRadius = 0.25;
-  std::array<int, 3> degrees{};
-  std::array<double, 3> errors{};
-  for (std::size_t f = 0; f < 3; ++f) errors[f] = frequencies[f] * std::numbers::pi * kRadius / 2;
-  for (; total > 0; --total) {
-    const auto f = static_cast<std::size_t>(std::max_element(errors.begin(), errors.end()) - errors.begin());
-    ++degrees[f];
-    errors[f] *= frequencies[f] * std::numbers::pi * kRadius / 2 / (degrees[f] + 1);
-  }
-  return degrees;
+/// A degree more than needed brings control points much closer to the map; Fourier: those with which most cells of fitted
+/// meshes are decided at once up to order 4, over parts of half the size above (measured).
+int model_degree(Basis basis, int order) {
+  return basis == Basis::legendre || order == 1 ? std::max(order + 1, 3) : std::min((5 * order + 2) / 2, order + 13);
 }
 
-int model_degree(CellKind kind, Basis basis, int order) {
-  if (basis == Basis::legendre || order == 1) return std::max(order, kind == CellKind::tet ? 3 : 2);
-  return order <= 2 ? 8 : order <= 4 ? 14 : 18;
+int num_nodes(Basis basis, int order) {
+  return basis == Basis::legendre ? order : model_degree(basis, order) + order + 4;
 }
 
 }  // namespace
 
-SimplexIndex::SimplexIndex(int dimension, int degree)
-    : dimension_(dimension), degree_(degree), numbers_((degree + 1) * (degree + 1) * (degree + 1), -1) {
-  const int deepest = dimension == 3 ? degree : 0;
-  for (int e3 = 0; e3 <= deepest; ++e3)
-    for (int e2 = 0; e2 + e3 <= degree; ++e2)
-      for (int e1 = 0; e1 + e2 + e3 <= degree; ++e1) {
-        const auto narrow = [](int e) { return static_cast<std::int8_t>(e); };
-        exponents_.push_back({narrow(degree - e1 - e2 - e3), narrow(e1), narrow(e2), narrow(e3)});
-        numbers_[address(exponents_.back())] = size() - 1;
-      }
-}
+/// The kernels' expansions over one part.
+class SimplexModels::Kernels {
+ public:
+  /// barycentric: of the whole simplex, at the part's vertices.
+  Kernels(const SimplexModels& models, const std::array<Ends, 4>& barycentric)
+      : models_(models), dimension_(models.index_.dimension()), most_(std::max(0, models.index_.degree() - 2)) {
+    for (int v = 0; v <= dimension_; ++v) at_vertices_.push_back(argument(barycentric[v]));
+    for (const auto& [a, b] : cell_topology(models.kind_).edges) {
+      if (static_cast<int>(at_edges_.size()) == (dimension_ == 3 ? 6 : 3)) break;
+      Ends along{};
+      for (std::size_t c = 0; c < 4; ++c) along[c] = 0.5 * (1 + barycentric[b][c] - barycentric[a][c]);
+      at_edges_.push_back(argument(along));
+    }
+    one_.cut.assign(1, SimplexPolynomial(dimension_, 1));
+    for (int n = 1; n <= most_; ++n) one_.cut.push_back(one_.cut.back().raised());
+  }
+
+  /// The kernels of a mode, cut behind one total degree.
+  KernelProduct product(const LocalMode& mode, int degree) {
+    const KernelProduct* rest = &one_;
+    if (mode.k > 0) rest = &at_vertex(3, mode.k, one_, last_[mode.k]);
+    if (mode.j > 0) rest = &at_vertex(mode.vertex, mode.j, *rest, pairs_[{mode.vertex, mode.j, mode.k}]);
+    return times(at_edges_[mode.edge], mode.i, *rest, degree, degree);
+  }
+
+ private:
+  struct Argument {
+    std::pair<double, double> interval;
+    std::vector<SimplexPolynomial> chebyshev;  // T_k of it
+  };
+
+  Argument argument(const Ends& ends) const {
+    const auto last = ends.begin() + dimension_ + 1;
+    const double low = *std::min_element(ends.begin(), last), high = *std::max_element(ends.begin(), last);
+    Ends scaled{};
+    for (int c = 0; c <= dimension_; ++c) scaled[c] = (2 * ends[c] - low - high) / (high - low);
+    std::vector<SimplexPolynomial> t{SimplexPolynomial(dimension_, 1)};
+    for (int k = 1; k <= most_; ++k) {
+      SimplexPolynomial next = t[k - 1].times_affine(scaled);
+      t.push_back(k == 1 ? std::move(next) : SimplexPolynomial::combined(2, next, -1, t[k - 2].raised().raised()));
+    }
+    return {{low, high}, std::move(t)};
+  }
+
+  const KernelExpansion& expansion(const Argument& x, int i) {
+    auto [found, is_new] = expansions_.try_emplace({x.interval.first, x.interval.second, i});
+    if (is_new)
+      found->second = expand_kernel(models_.basis_, i, x.interval.first, x.interval.second, models_.expansion_);
+    return found->second;
+  }
+
+  KernelProduct times(const Argument& x, int i, const KernelProduct& rest, int first, int last) {
+    const KernelExpansion& own = expansion(x, i);
+    KernelProduct result;
+    for (int n = first; n <= last; ++n)
+      result.cut.push_back(SimplexPolynomial::convolved(own.coefficients, x.chebyshev, rest.cut, n));
+    result.sizes = own.sizes * rest.sizes;
+    const double bound = kernel_bound(models_.basis_, i), slope = kernel_slope_bound(models_.basis_, i);
+    result.bound = bound * rest.bound;
+    result.slope_bound = slope * rest.bound + bound * rest.slope_bound;
+    return result;
+  }
+
+  const KernelProduct& at_vertex(int vertex, int j, const KernelProduct& rest, KernelProduct& kept) {
+    if (kept.cut.empty()) kept = times(at_vertices_[vertex], j, rest, 0, most_);
+    return kept;
+  }
+
+  const SimplexModels& models_;
+  int dimension_, most_;
+  std::vector<Argument> at_vertices_, at_edges_;
+  KernelProduct one_;
+  std::map<std::tuple<double, double, int>, KernelExpansion> expansions_;
+  std::map<int, KernelProduct> last_;                          // V_3,k
+  std::map<std::array<int, 3>, KernelProduct> pairs_;          // V_vertex,j V_3,k
+};
 
 const SimplexModels& SimplexModels::get(CellKind kind, Basis basis, int order) {
   assert(kind != CellKind::hex && order >= 1 && order <= kMaxOrder);
@@ -291,8 +258,10 @@ const SimplexModels& SimplexModels::get(CellKind kind, Basis basis, int order) {
 }
 
 SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
-    : kind_(kind), basis_(basis), index_(kind == CellKind::tet ? 3 : 2, model_degree(kind, basis, order)),
-      most_halvings_(most_depth(kind, basis, order) * halvings_between()) {
+    : kind_(kind), basis_(basis), order_(order),
+      index_(kind == CellKind::tet ? 3 : 2, model_degree(basis, order)),
+      stride_((index_.size() + kWide - 1) / kWide * kWide), most_halvings_(most_depth(basis, order) * halvings_between()),
+      expansion_(num_nodes(basis, order)) {
   const int num_vertices = index_.dimension() + 1, num_edges = kind == CellKind::tet ? 6 : 3, n = order - 1;
   const auto add = [&](int edge, int i, int vertex, int j, int k) {
     LocalMode mode;
@@ -301,7 +270,9 @@ SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
     mode.i = static_cast<std::uint8_t>(i);
     mode.j = static_cast<std::uint8_t>(j);
     mode.k = static_cast<std::uint8_t>(k);
-    slots_.emplace(mode, modes_.size());
+    const std::size_t address = slot_address(mode);
+    if (slots_.size() <= address) slots_.resize(address + 1, -1);
+    slots_[address] = static_cast<int>(modes_.size());
     modes_.push_back(mode);
   };
   for (int v = 0; v < num_vertices; ++v) add(-1, 0, v, 0, 0);
@@ -319,61 +290,77 @@ SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
   }
 }
 
+std::size_t SimplexModels::slot_address(const LocalMode& mode) const {
+  const auto n = static_cast<std::size_t>(order_);
+  const std::size_t k = kind_ == CellKind::tet ? mode.k : 0;
+  return ((((mode.edge + 1) * 5 + mode.vertex + 1) * n + mode.i) * n + mode.j) * n + k;
+}
+
 std::shared_ptr<const SimplexModels::Part> SimplexModels::part(std::uint32_t number,
                                                                std::span<const Vec3> vertices) const {
   {
     const std::lock_guard lock(mutex_);
     if (const auto found = stored_.find(number); found != stored_.end()) return found->second;
   }
-  auto made = std::make_shared<const Part>(make_part(vertices));
+  auto made = std::make_shared<const Part>(make_part(number, vertices));
   const std::lock_guard lock(mutex_);
-  if ((stored_.size() + 1) * modes_.size() * index_.size() * sizeof(double) <= kMostStoredBytes)
+  if ((stored_.size() + 1) * modes_.size() * stride_ * sizeof(double) <= kMostStoredBytes)
     stored_.emplace(number, made);
   return made;
 }
 
-SimplexModels::Part SimplexModels::make_part(std::span<const Vec3> vertices) const {
-  const int degree = index_.degree();
-  const Bernstein bernstein(index_.dimension(), degree);
-  std::array<Ends, 4> barycentric{};
-  for (int c = 0; c <= index_.dimension(); ++c) {
+SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<const Vec3> vertices) const {
+  const int degree = index_.degree(), dimension = index_.dimension();
+  std::array<Ends, 4> barycentric{};  // exact: vertices of parts are multiples of a power of 1/2
+  for (int c = 0; c <= dimension; ++c) {
     const Vec3& x = vertices[c];
-    barycentric[0][c] = 1.0L - x[0] - x[1] - x[2];
-    for (int v = 1; v <= index_.dimension(); ++v) barycentric[v][c] = x[v - 1];
+    barycentric[0][c] = 1 - x[0] - x[1] - x[2];
+    for (int v = 1; v <= dimension; ++v) barycentric[v][c] = x[v - 1];
   }
-  const Factors factors(bernstein, basis_, barycentric);
-  const bool exact = basis_ == Basis::legendre;
+  // Over the whole simplex, products of two, three, four coordinates are at most so many times sqrt(1 - t^2), with t
+  // in [-1, 1] what T_k is taken of: twice a coordinate less 1, or the difference of two.
+  constexpr double kDamping[] = {0, 0, 1.0 / 4, 1.0 / 16, 1.0 / 108};
+  const bool whole = number == 1;
+  Kernels kernels(*this, barycentric);
   Part part;
+  part.coefficients.assign(modes_.size() * stride_, 0);
   for (const LocalMode& mode : modes_) {
-    const int i = mode.i, j = mode.j, k = mode.k;
-    Model model;
-    if (mode.edge < 0) {
-      model = factors.barycentric(mode.vertex);
-    } else {
-      const auto [by_edge, by_vertex, by_last] =
-          exact ? std::array{i - 1, j - 1, k - 1} : shared_degrees({i, j, k}, degree - 2 - (j > 0) - (k > 0));
+    std::vector<int> bubble;  // vertices of the barycentric coordinates
+    if (mode.edge >= 0) {
       const auto [a, b] = cell_topology(kind_).edges[mode.edge];
-      model = factors.at_edge(a, b, i, by_edge);
-      if (j > 0)
-        model = bernstein.product(model, factors.at_vertex(mode.vertex, j, by_vertex));
-      if (k > 0) model = bernstein.product(model, factors.at_vertex(3, k, by_last));
+      bubble = {a, b};
     }
-    const int missing = degree - model.degree;
-    assert(missing >= 0);
-    const Coefficients ones(bernstein.index(missing).size(), 1.0L);
-    Function f{model.value_bound, model.gradient_bound, model.error, model.gradient_error, 0, {}};
-    for (const long double b : bernstein.product(model.degree, model.b, missing, ones)) {
-      f.coefficients.push_back(static_cast<double>(b));
-      f.largest_coefficient = std::max(f.largest_coefficient, std::abs(f.coefficients.back()));
+    if (mode.vertex >= 0) bubble.push_back(mode.vertex);
+    if (mode.k > 0) bubble.push_back(3);
+    const int size = static_cast<int>(bubble.size());
+
+    SimplexPolynomial product(dimension, 1), bubble_alone(dimension, 1);
+    Function f{1, 1, 0, 0, 0, 0};
+    int missing = degree - size;
+    if (mode.edge >= 0) {
+      for (const int v : bubble) bubble_alone = bubble_alone.times_affine(barycentric[v]);
+      // The product of n coordinates is at most (1/n)^n, what is left of it when one is taken away bounds its gradient.
+      const double largest = std::min(bubble_alone.bound(), (1 + 1e-12) * std::pow(1.0 / size, size));
+      const double steepest = (1 + 1e-12) * std::pow(1.0 / (size - 1), size - 1);
+      KernelProduct model = kernels.product(mode, missing);
+      product = std::move(model.cut[0]);
+      const double error = Sizes::beyond(model.sizes.value, missing);
+      f.value_bound = largest * model.bound;
+      f.gradient_bound = steepest * model.bound + largest * model.slope_bound;
+      f.error = largest * error;
+      double of_kernels = largest * Sizes::beyond(model.sizes.gradient, missing);
+      if (whole) of_kernels = std::min(of_kernels, kDamping[size] * Sizes::beyond(model.sizes.damped, missing));
+      f.gradient_error = steepest * error + of_kernels;
+      missing = 0;
     }
-    part.push_back(std::move(f));
+    for (const int v : bubble) product = product.times_affine(barycentric[v]);
+    for (; missing > 0; --missing) product = product.raised();
+    f.largest_coefficient = product.bound();
+    f.rounding = product.rounding();
+    product.bernstein(part.coefficients.data() + part.functions.size() * stride_);
+    part.functions.push_back(f);
   }
   return part;
-}
-
-std::size_t SimplexModels::slot(LocalMode mode) const {
-  if (kind_ == CellKind::prism) mode.k = 0;
-  return slots_.at(mode);
 }
 
 }  // namespace subvol
