@@ -14,9 +14,9 @@ namespace subvol {
 /// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
 /// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
 /// for legendre up to order 8, close for all others, and better with every halving. So are `SimplexModels`, of tets and
-/// of the triangles of prisms. Rounding is bounded a priori, about 1e-13 of the product of the lengths of a hex of order
-/// 4, 1e-11 of a tet of order 8: cells that are closer to inversion end undecided, never wrong. A witness is a point
-/// where det J, computed from the shape functions themselves, is negative beyond its own rounding.
+/// of the triangles of prisms. Rounding is bounded a priori, about 1e-13 of the product of the lengths of a hex of
+/// order 4, 1e-11 of a tet of order 8: cells that are closer to inversion end undecided, never wrong. A witness is a
+/// point where det J, computed from the shape functions themselves, is negative beyond its own rounding.
 /// Paper: left open there for the Fourier basis (section 5).
 ///
 /// Holds buffers: one object per thread.

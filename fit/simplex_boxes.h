@@ -15,9 +15,9 @@ namespace subvol {
 
 /// Bernstein coefficients of the Jacobian of one high-order tet or prism over its parts, got by halving longest sides.
 ///
-/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew for a part where the errors of those
-/// before matter; parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own. Jacobians are by local
-/// coordinates: along the part's sides.
+/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew for a part where the errors of the
+/// last ones matter; parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own.
+/// Jacobians are by local coordinates: along the part's sides.
 class SimplexBoxes {
  public:
   /// Sums over the functions with one N_k along w (tets: all of them) of what `SimplexModels::Function` says of them,
@@ -81,7 +81,7 @@ class SimplexBoxes {
   Vec3 mean_edges_;                           // lengths of the linear part's mean columns
   SimplexIndex lower_;                        // degree - 1
   std::array<std::vector<int>, 4> raised_;    // per index of lower_: with one exponent more
-  std::array<std::vector<int>, 4> reduced_;   // per index: in lower_ with one exponent less; lower_.size() if there is none
+  std::array<std::vector<int>, 4> reduced_;   // per index: in lower_ with one exponent less; else lower_.size()
   std::array<std::vector<double>, 4> exponents_;  // per index
   std::array<std::array<SimplexHalving, 4>, 4> halvings_;  // of the side from a to b > a
   std::vector<double> contracted_, difference_, below_, above_;

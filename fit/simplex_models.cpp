@@ -159,8 +159,8 @@ int most_depth(Basis basis, int order) {
   return order <= 2 ? 6 : order <= 4 ? 3 : 2;
 }
 
-/// A degree more than needed brings control points much closer to the map; Fourier: those with which most cells of fitted
-/// meshes are decided at once up to order 4, over parts of half the size above (measured).
+/// A degree more than needed brings control points much closer to the map. Fourier: those with which most cells of
+/// fitted meshes are decided at once up to order 4, over parts of half the size above (measured).
 int model_degree(Basis basis, int order) {
   return basis == Basis::legendre || order == 1 ? std::max(order + 1, 3) : std::min((5 * order + 2) / 2, order + 13);
 }
@@ -260,7 +260,8 @@ const SimplexModels& SimplexModels::get(CellKind kind, Basis basis, int order) {
 SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
     : kind_(kind), basis_(basis), order_(order),
       index_(kind == CellKind::tet ? 3 : 2, model_degree(basis, order)),
-      stride_((index_.size() + kWide - 1) / kWide * kWide), most_halvings_(most_depth(basis, order) * halvings_between()),
+      stride_((index_.size() + kWide - 1) / kWide * kWide),
+      most_halvings_(most_depth(basis, order) * halvings_between()),
       expansion_(num_nodes(basis, order)) {
   const int num_vertices = index_.dimension() + 1, num_edges = kind == CellKind::tet ? 6 : 3, n = order - 1;
   const auto add = [&](int edge, int i, int vertex, int j, int k) {

@@ -16,13 +16,13 @@ namespace subvol {
 
 /// Polynomial models of what prism functions are on their triangle, and of tet functions, over parts of the simplex.
 ///
-///   E_edge,i V_vertex,j V_3,k = sum_alpha b_alpha B_alpha + error             B_alpha: Bernstein polynomials of the part
+///   E_edge,i V_vertex,j V_3,k = sum_alpha b_alpha B_alpha + error          B_alpha: Bernstein polynomials of the part
 ///
 /// A function is a product of barycentric coordinates and of `mode_kernels`. The product of the kernels' Chebyshev
 /// expansions, over the intervals that their arguments take on the part, is cut behind the total degree that is left.
-/// Legendre: exact over the whole simplex, and no other part has models. Fourier: of a fixed degree, so that errors fall
-/// with a power of the part's size; bounds of those of value and gradient (by canonical coordinates, each component) come
-/// with them.
+/// Legendre: exact over the whole simplex, and no other part has models. Fourier: of a fixed degree, so that errors
+/// fall with a power of the part's size; bounds of those of value and gradient (by canonical coordinates, each
+/// component) come with them.
 ///
 /// Parts come about by halving: they are numbered from 1, the whole, and the halves of n are 2n and 2n + 1. There are
 /// models after every `halvings_between` halvings, `most_halvings` at most.

@@ -29,8 +29,8 @@ class SimplexIndex {
 };
 
 /// De Casteljau's rounds that turn the control points of a polynomial into those of its halves: the side from vertex a
-/// to b is cut in the middle. Means c_n <- (c_n + c_m) / 2 leave those of the half at a in place; between rounds, copies
-/// from n to m collect those of the half at b.
+/// to b is cut in the middle. Means c_n <- (c_n + c_m) / 2 leave those of the half at a in place; after each round,
+/// copies from n to m collect those of the half at b.
 struct SimplexHalving {
   using Pair = std::array<std::uint16_t, 2>;  ///< n, m
   struct Round {
@@ -50,7 +50,7 @@ class SimplexPolynomial {
   /// A constant. dimension: 2 or 3.
   SimplexPolynomial(int dimension, double value);
 
-  /// p times the affine function with these values at the vertices: at most 1 in size, good to 4 units of roundoff of 1.
+  /// p times the affine function with these values at the vertices: at most 1 in size, good to 4 units of roundoff.
   SimplexPolynomial times_affine(const std::array<double, 4>& values) const;
   /// The same, of degree + 1.
   SimplexPolynomial raised() const { return times_affine({1, 1, 1, 1}); }

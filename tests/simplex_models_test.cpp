@@ -59,8 +59,9 @@ TEST_CASE("sums of products of polynomials over simplices are what they say", "[
   std::mt19937& random = source.random();
   std::uniform_real_distribution<double> in_range(-1, 1);
   for (const int dimension : {2, 3}) {
-    const auto affine = [&] { return Barycentric{in_range(random), in_range(random), in_range(random), in_range(random)}; };
-    const Barycentric x = affine(), y = affine();
+    Barycentric x, y;
+    for (double& value : x) value = in_range(random);
+    for (double& value : y) value = in_range(random);
     std::vector<SimplexPolynomial> a{SimplexPolynomial(dimension, 1)}, b{SimplexPolynomial(dimension, 1)};
     for (int n = 1; n <= 9; ++n) a.push_back(a.back().times_affine(x)), b.push_back(b.back().times_affine(y));
     const std::vector<double> weights{0.5, -2, 0, 1, 0.25};
