@@ -5,6 +5,7 @@
 #include "fit/target_report.h"
 #include "subvol/types.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -64,6 +65,12 @@ struct FitReport {
   std::optional<CreaseDistance> creases;   ///< of the limit surface; where there are sharp edges to follow
   std::vector<std::string> warnings;       ///< audit: what the template's geometry cannot do, topology mismatch, ...
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...
+
+  /// Name of the last stage whose result was kept; empty: none was.
+  std::string last_kept_stage() const {
+    const auto stage = std::find_if(stages.rbegin(), stages.rend(), [](const StageRecord& s) { return s.kept; });
+    return stage == stages.rend() ? std::string() : stage->name;
+  }
 };
 
 }  // namespace subvol

@@ -181,7 +181,7 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
 /// Keeps where the mesh is, under the name of what it came from.
 void HighOrderFit::keep_state() {
   if (!options_.keep_states) return;
-  states_.push_back({states_.empty() ? "template" : report_.stages.back().name, mesh_.coefficients});
+  states_.push_back({states_.empty() ? "template" : report_.last_kept_stage(), mesh_.coefficients});
 }
 
 bool HighOrderFit::run_stage(const Stage& stage) {

@@ -153,7 +153,7 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
 /// Keeps where the cage is, under the name of what it came from.
 void SubdivisionFit::keep_state() {
   if (!options_.keep_states) return;
-  states_.push_back({states_.empty() ? "template" : result_.report.stages.back().name, unknowns_});
+  states_.push_back({states_.empty() ? "template" : result_.report.last_kept_stage(), unknowns_});
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
