@@ -21,6 +21,22 @@ std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, c
   return {1 - second - third, second, third};
 }
 
+constexpr std::size_t kMostPoints = 6;
+
+/// The points of a triangle that are tied to the target, by their number: the centroid; three inside; these and the
+/// corners, as good as the edges, where surfaces are farthest apart.
+std::span<const std::array<double, 3>> triangle_points(std::size_t number) {
+  constexpr double kThird = 1.0 / 3, kSixth = 1.0 / 6, kTwoThirds = 2.0 / 3;
+  static constexpr std::array<std::array<double, 3>, 1> kOne = {{{kThird, kThird, kThird}}};
+  static constexpr std::array<std::array<double, 3>, kMostPoints> kMost = {{{kTwoThirds, kSixth, kSixth},
+                                                                            {kSixth, kTwoThirds, kSixth},
+                                                                            {kSixth, kSixth, kTwoThirds},
+                                                                            {1, 0, 0},
+                                                                            {0, 1, 0},
+                                                                            {0, 0, 1}}};
+  return number == 1 ? std::span<const std::array<double, 3>>(kOne) : std::span(kMost).first(number);
+}
+
 }  // namespace
 
 ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
@@ -28,17 +44,30 @@ ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<
     : SurfaceTerm(std::move(sample_triangles), num_samples),
       target_(&target),
       tau_(tangential_weight),
-      scale_(1 / (2 * target.area() * target.length() * target.length())),
-      points_per_triangle_(points_per_triangle) {
+      scale_(1 / (2 * target.area() * target.length() * target.length())) {
   if (!(tau_ >= 0 && tau_ <= 1)) throw InputError("ClosestPointEnergy: tangential_weight must be in [0, 1]");
   if (points_per_triangle != 1 && points_per_triangle != 3)
     throw InputError("ClosestPointEnergy: points_per_triangle must be 1 or 3");
+  for (std::size_t t = 0; t <= triangles().size(); ++t) surface_offsets_.push_back(points_per_triangle * t);
   if (!target.is_cloud()) target_tree_.emplace(TriangleMesh{target.positions(), target.triangles()});
 }
 
 void ClosestPointEnergy::emphasize_far(double length) {
   if (!(length > 0)) throw InputError("ClosestPointEnergy: the length beyond which ties count more must be positive");
   inverse_far_ = 1 / length;
+}
+
+void ClosestPointEnergy::refine(std::span<const std::uint8_t> refined) {
+  if (refined.size() != triangles().size())
+    throw InputError("ClosestPointEnergy: one entry is expected for each sample triangle");
+  std::size_t offset = 0;
+  for (std::size_t t = 0; t < refined.size(); ++t) {
+    const std::size_t points = refined[t] ? kMostPoints : surface_offsets_[t + 1] - surface_offsets_[t];
+    surface_offsets_[t] = offset;
+    offset += points;
+  }
+  surface_offsets_.back() = offset;
+  surface_hints_.clear();
 }
 
 void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
@@ -83,31 +112,29 @@ double ClosestPointEnergy::share_over_rim(const Link& link, const ClosestPoint::
 
 void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
   if (!target_tree_) return;
-  constexpr double kThird = 1.0 / 3, kSixth = 1.0 / 6, kTwoThirds = 2.0 / 3;
-  constexpr std::array<std::array<double, 3>, 3> kThree = {
-      {{kTwoThirds, kSixth, kSixth}, {kSixth, kTwoThirds, kSixth}, {kSixth, kSixth, kTwoThirds}}};
-  const int n = points_per_triangle_;
-  surface_links_.resize(n * triangles().size());
-  surface_hints_.resize(n * triangles().size(), kNoIndex);
-  surface_distances_.resize(n * triangles().size());
+  surface_links_.resize(surface_offsets_.back());
+  surface_hints_.resize(surface_links_.size(), kNoIndex);
+  surface_distances_.resize(surface_links_.size());
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < triangles().size(); ++t) {
     const auto& q = triangles()[t];
+    const std::size_t begin = surface_offsets_[t], n = surface_offsets_[t + 1] - begin;
+    const auto points = triangle_points(n);
     Index before = kNoIndex;
-    for (int k = 0; k < n; ++k) {
-      const std::array<double, 3> l = n == 1 ? std::array<double, 3>{kThird, kThird, kThird} : kThree[k];
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::array<double, 3>& l = points[k];
       const Vec3 x = l[0] * samples[q[0]] + l[1] * samples[q[1]] + l[2] * samples[q[2]];
-      Index& hint = surface_hints_[n * t + k];
+      Index& hint = surface_hints_[begin + k];
       const ClosestPoint::Hit hit = target_tree_->closest(x, hint == kNoIndex ? before : hint);
       hint = before = hit.triangle;
-      Link& link = surface_links_[n * t + k];
+      Link& link = surface_links_[begin + k];
       link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
-              emphasis(hit.distance) * triangle_area(t) / n, tau_};
-      surface_distances_[n * t + k] = hit.distance;
+              emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n), tau_};
+      surface_distances_[begin + k] = hit.distance;
       if (!over_rim(hit)) continue;
       link.weight *= share_over_rim(link, hit, samples);
       link.tangential = 0;
-      surface_distances_[n * t + k] = 0;
+      surface_distances_[begin + k] = 0;
     }
   }
 }
@@ -141,8 +168,8 @@ void ClosestPointEnergy::assign(std::span<const Vec3> samples) {
       for (std::size_t k = target_offsets_[t]; k < target_offsets_[t + 1]; ++k)
         add_link(target_links_[k], incidence, row, row.target_to_surface);
       if (!target_tree_) continue;
-      for (int k = 0; k < points_per_triangle_; ++k)
-        add_link(surface_links_[points_per_triangle_ * t + k], incidence, row, row.surface_to_target);
+      for (std::size_t k = surface_offsets_[t]; k < surface_offsets_[t + 1]; ++k)
+        add_link(surface_links_[k], incidence, row, row.surface_to_target);
     }
   });
 }
@@ -160,7 +187,8 @@ ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
     max = std::max(max, target_hits_[j].distance);
   }
   for (std::size_t q = 0; q < surface_distances_.size(); ++q) {
-    const double part = triangle_area(q / points_per_triangle_) / points_per_triangle_;
+    const auto t = static_cast<std::size_t>(surface_links_[q].triangle);
+    const double part = triangle_area(t) / static_cast<double>(surface_offsets_[t + 1] - surface_offsets_[t]);
     area += part;
     to_target += part * surface_distances_[q];
     max = std::max(max, surface_distances_[q]);
@@ -171,7 +199,7 @@ ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
 std::vector<double> ClosestPointEnergy::triangle_distances() const {
   std::vector<double> result(triangles().size(), 0.0);
   for (std::size_t q = 0; q < surface_distances_.size(); ++q) {
-    double& largest = result[q / points_per_triangle_];
+    double& largest = result[surface_links_[q].triangle];
     largest = std::max(largest, surface_distances_[q]);
   }
   for (const ClosestPoint::Hit& hit : target_hits_) result[hit.triangle] = std::max(result[hit.triangle], hit.distance);

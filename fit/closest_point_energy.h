@@ -38,6 +38,10 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// the mean asks for, which keeps the largest distance down. length > 0 in the target's unit, else InputError.
   void emphasize_far(double length);
 
+  /// Six points, the corners among them, on each sample triangle with a 1, whatever `points_per_triangle` says: where S~
+  /// is farthest off is on edges. One entry per sample triangle, else InputError; to be called before `assign`.
+  void refine(std::span<const std::uint8_t> triangles);
+
   /// Cost: one closest-point query per target sample and per quadrature point. The answers of the call before are where
   /// the search starts, and the tree over S~ moves along.
   void assign(std::span<const Vec3> samples) override;
@@ -75,10 +79,10 @@ class ClosestPointEnergy final : public SurfaceTerm {
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 
   double tau_, scale_, inverse_far_ = 0;
-  int points_per_triangle_;
   std::vector<Link> target_links_;           ///< by sample triangle
   std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
-  std::vector<Link> surface_links_;          ///< points_per_triangle_ for each sample triangle
+  std::vector<Link> surface_links_;          ///< by sample triangle
+  std::vector<std::size_t> surface_offsets_; ///< of each sample triangle in surface_links_
   std::vector<Index> surface_hints_;         ///< target triangles of t(x_q)
   std::vector<double> surface_distances_;    ///< |x_q - t(x_q)|
 };

@@ -37,7 +37,7 @@ constexpr double kTrustedJacobian = 0.3;
 constexpr double kPoorJacobian = 0.2;
 
 /// Distances are kept this much below what is asked for: they are seen at samples, which miss the farthest places.
-constexpr double kMeanMargin = 0.9, kMaxMargin = 0.65;
+constexpr double kMeanMargin = 0.9, kMaxMargin = 0.8;
 /// Cells' weights are not lowered further for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
 
@@ -128,6 +128,7 @@ class MeshOptimizer {
   BoundarySamples samples_;
   std::vector<Vec3> ideal_boxes_;
   std::vector<double> weights_;     ///< of the cells; empty: equal
+  std::vector<std::uint8_t> refined_;  ///< sample triangles beside places that are too far off: seen at more points
   std::vector<double> relief_;      ///< of the cells: share of its weight that each keeps for being beside a far place
   std::vector<Index> uncertified_;
   double mean_percent_ = 0, max_percent_ = 0;  ///< distances after the last stage, at its samples
@@ -158,6 +159,7 @@ void MeshOptimizer::find_features() {
 void MeshOptimizer::sample_boundary() {
   constexpr int kIntervals = 2;
   samples_ = make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
+  refined_.assign(samples_.triangles.size(), 0);
 }
 
 /// Per vertex, whether one of the cells has it.
@@ -212,6 +214,7 @@ std::unique_ptr<SurfaceTerm> MeshOptimizer::surface_term(bool emphasize_far) con
   auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples_.triangles, samples_.points.size(),
                                                       kTangentialWeight, points);
   if (emphasize_far) surface->emphasize_far(kFarDistance);
+  surface->refine(refined_);
   if (!creases_.curves().empty())
     surface->add_creases(creases_.energy(samples_.crease_edges, samples_.points.size(),
                                          kCreaseWidth * target_.surface.length(), kTangentialWeight));
@@ -285,13 +288,17 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   return going;
 }
 
-/// The cells beside places that are too far off count half as much from now on. Lowering lambda for the sake of a few
-/// places would cost shape everywhere.
+/// The cells beside places that are too far off count half as much from now on, and their faces are seen at more points.
+/// Lowering lambda for the sake of a few places would cost shape everywhere.
 void MeshOptimizer::relieve_far_cells(std::span<const double> triangle_distances) {
   std::vector<std::uint8_t> far(mesh_.num_vertices(), 0);
   for (std::size_t t = 0; t < triangle_distances.size(); ++t) {
     if (100 * triangle_distances[t] <= kMaxMargin * options_.max_tolerance_percent) continue;
     for (const Index v : topology_.face(samples_.triangle_faces[t])) far[v] = 1;
+  }
+  for (std::size_t t = 0; t < refined_.size(); ++t) {
+    const auto face = topology_.face(samples_.triangle_faces[t]);
+    if (std::any_of(face.begin(), face.end(), [&](Index v) { return far[v] != 0; })) refined_[t] = 1;
   }
   for (std::size_t c = 0; c < mesh_.num_cells(); ++c) {
     const auto cell = mesh_.cell(c);
