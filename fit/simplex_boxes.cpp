@@ -159,9 +159,9 @@ void SimplexBoxes::take_models(Box& box) {
 
 /// Errors are measured by the mean edges, as is det J.
 bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
-  constexpr double kShare = 0.1, kGood = 0.3;
+  constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
   const double error = lasting_error(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
-  return !(error <= kShare * std::min(lowest / mean_edges_.prod(), kGood));
+  return error > 0 && !(error <= std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast));
 }
 
 std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double lowest) {
@@ -186,7 +186,7 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double l
   result[0].vertices[b] = result[1].vertices[a] = 0.5 * (box.vertices[a] + box.vertices[b]);
   const int halvings = box.halvings + 1;
   const bool modelled = halvings <= simplex_.most_halvings() && halvings % simplex_.halvings_between() == 0 &&
-                        (halvings == simplex_.most_halvings() || models_matter(box, lowest));
+                        models_matter(box, lowest);
   for (std::uint32_t half = 0; half < 2; ++half) {
     result[half].halvings = halvings;
     if (halvings <= simplex_.most_halvings()) result[half].part = 2 * box.part + half;

@@ -152,12 +152,8 @@ struct KernelProduct {
 
 constexpr std::size_t kMostStoredBytes = 300'000'000;  // of coefficients, per kind, basis and order
 
-/// Times that all sides are halved before the last models are made: as often as the border of validity asks for. The
-/// higher the degree, the faster errors fall.
-int most_depth(Basis basis, int order) {
-  if (basis == Basis::legendre || order == 1) return 0;
-  return order <= 2 ? 6 : order <= 4 ? 3 : 2;
-}
+/// Times that all sides are halved before the last models are made, at most: parts are numbered in 32 bits.
+int most_depth(Basis basis, int order) { return basis == Basis::legendre || order == 1 ? 0 : 10; }
 
 /// A degree more than needed brings control points much closer to the map. Fourier: those with which most cells of
 /// fitted meshes are decided at once up to order 4, over parts of half the size above (measured).

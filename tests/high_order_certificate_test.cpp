@@ -148,7 +148,7 @@ TEST_CASE("cells that come close to inversion are decided on both sides", "[high
     for (const Basis basis : kBothBases)
       for (const auto& [order, repeats] : {std::pair{2, 4}, std::pair{4, 3}, std::pair{8, 1}, std::pair{12, 1}})
         for (int repeat = 0; repeat < repeats; ++repeat) {
-          if (kind == CellKind::tet && order > 8) continue;  // a minute
+          if (kind != CellKind::hex && order > 8) continue;  // a minute
           const HighOrderMesh mesh = curved(single_cell(kind), basis, order, 0.3, source);
           const auto certify_scaled = [&](double t) {
             return HighOrderCertifier(mesh.space, {.max_depth = 12, .max_boxes = 20000})
