@@ -65,11 +65,13 @@ void append_case(std::ostream& out, const CLI::App& verb, const std::string& pat
 std::string bash_completion(const CLI::App& app) {
   std::ostringstream out;
   out << "_subvol() {\n"
-         "  local word=\"${COMP_WORDS[COMP_CWORD]}\" before=\"${COMP_WORDS[COMP_CWORD-1]}\" options= words= verbs= verb\n"
+         "  local word=\"${COMP_WORDS[COMP_CWORD]}\" before=\"${COMP_WORDS[COMP_CWORD-1]}\"\n"
+         "  local options= words= verbs= verb\n"
          "  verb=\"${COMP_WORDS[1]}\"\n"
          "  COMPREPLY=()\n"
          "  case \"$COMP_CWORD $verb\" in\n"
-         "    '1 '*) verbs='" << joined(names_of(verbs_of(app))) << "'; options='" << joined(options_of(app)) << "' ;;\n";
+         "    '1 '*) verbs='"
+      << joined(names_of(verbs_of(app))) << "'; options='" << joined(options_of(app)) << "' ;;\n";
   for (const CLI::App* verb : verbs_of(app))
     if (const auto below = verbs_of(*verb); !below.empty())
       out << "    '2 " << verb->get_name() << "') verbs='" << joined(names_of(below)) << "' ;;\n"

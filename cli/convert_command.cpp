@@ -43,7 +43,8 @@ void convert_high_order(const ConvertArguments& arguments, const std::vector<Out
 void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
                      std::vector<std::string>& warnings) {
   for (const Output& output : outputs) {
-    if (output.part == Part::cutaway) throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");
+    if (output.part == Part::cutaway)
+      throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");
     if (output.is_volume()) {
       throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
     }

@@ -62,7 +62,8 @@ MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result,
   const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& o) { return o.extension == ".vtu"; });
   const HighOrderMesh mesh = file == outputs.end() ? result : read_high_order(file->path).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, chord_percent);
-  return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, {.progress = teller.work()}); }, target);
+  const MeshCheckOptions options{.progress = teller.work()};
+  return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
 
 Json report_json(const char* command, const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh,

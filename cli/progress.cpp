@@ -60,7 +60,8 @@ void ProgressTeller::tell(const FitProgress& progress) {
 
 void ProgressTeller::tell_work(const char* part, double share) {
   if (kind_ == Kind::bar) return draw_bar(share, part);
-  if (kind_ == Kind::json) std::cout << Json{{"part", part}, {"share", share}, {"seconds", seconds()}}.dump() << std::endl;
+  if (kind_ == Kind::json)
+    std::cout << Json{{"part", part}, {"share", share}, {"seconds", seconds()}}.dump() << std::endl;
   const auto now = Clock::now();
   if (kind_ != Kind::plain || now - last_ < kWorkInterval) return;
   last_ = now;

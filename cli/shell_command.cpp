@@ -167,7 +167,8 @@ void ShellRun::check() {
 
 // Who asks for a control mesh will subdivide it: valid cells may turn inverted then.
 void ShellRun::check_subdivided() {
-  if (std::none_of(outputs_.begin(), outputs_.end(), [](const Output& output) { return output.part == Part::cage; })) return;
+  const auto is_cage = [](const Output& output) { return output.part == Part::cage; };
+  if (std::none_of(outputs_.begin(), outputs_.end(), is_cage)) return;
   subdivided_ = certify(subdivide(result_.mesh, BoundaryRule::catmull_clark).fine);
   if (subdivided_->all_certified()) return;
   add_warnings({std::to_string(subdivided_->not_certified.size()) + " of " +

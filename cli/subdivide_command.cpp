@@ -93,8 +93,8 @@ void add_subdivide_command(CLI::App& app, Action& action) {
       ->type_name("DEGREES");
   add_output_options(*verb, arguments->run,
                      "Refined mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given several\n"
-                         "times");
+                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given\n"
+                         "several times");
   add_writing_options(*verb, arguments->writing);
   verb->add_option("--report", arguments->run.report, "Write what was done")->type_name("FILE.json");
   verb->footer(R"(Example:

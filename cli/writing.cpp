@@ -103,7 +103,8 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
           "which the mesh is shortest, halfway)")
       ->type_name("x|y|z[:SHARE]")
       ->group(group);
-  verb.add_flag("--no-wireframe", options.no_wireframe, "Leave the edges of the cells out of .glb and .gltf")->group(group);
+  verb.add_flag("--no-wireframe", options.no_wireframe, "Leave the edges of the cells out of .glb and .gltf")
+      ->group(group);
   verb.add_flag("--quantize", options.quantize,
                 "Small .glb and .gltf: positions in 16 bits, normals in 8 (KHR_mesh_quantization)")
       ->group(group);

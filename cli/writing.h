@@ -32,7 +32,7 @@ struct WritingOptions {
 /// --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
 
-/// Reads where a cutaway is cut: x, y or z, also with a place between 0 and 1 as "z:0.3". Returns what is wrong, or nothing.
+/// Reads where a cutaway is cut: x, y or z, also with a place as "z:0.3". Returns what is wrong, or nothing.
 std::string parse_cut(const std::string& text, CutPlane& cut);
 
 /// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
@@ -43,7 +43,7 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
 /// Whether the output is a scene of the result's surface.
 bool shows_surface(const Output& output);
 
-/// Writes one mesh as it stands: its cells, the flat faces of its boundary (.usda: as a subdivision cage), or a cutaway.
+/// Writes one mesh as it is: its cells, the flat faces of its boundary (.usda: as a subdivision cage), or a cutaway.
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);
 
 /// Writes a high-order mesh: curved cells (.vtu, .msh), many linear ones (.mesh, .vtk), its curved boundary coloured by

@@ -24,7 +24,7 @@ struct CellView {
   std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
 };
 
-/// field_data: `<DataArray>` elements for the file's field data, or empty. Cell data `order` is written where there are any.
+/// field_data: `<DataArray>` elements for the file's field data, or empty. Cell data `order` goes with them.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {});
 

@@ -16,12 +16,12 @@ struct CutPlane {
 
 /// What a mesh is like inside: its cells up to a plane, whole ones, coloured by their quality.
 ///
-/// Nodes: "surface" (what is left of the boundary, shaded smoothly; a vertex has the least quality of the faces around),
-/// "cut" (the faces of cells that were taken off, each by itself and of its own cell's colour) and "wireframe" (the edges
+/// Nodes: "surface" (what is left of the boundary, shaded smoothly; a vertex has the least quality around), "cut" (the
+/// faces of cells that were taken off, each by itself and of its own cell's colour) and "wireframe" (the edges
 /// of both). Curved faces are cut into quads, two to an interval of the order and four at least.
 ///
 /// cell_minima  one scaled Jacobian per cell.
-/// InputError: no cells; minima of another number; an axis or share out of range. A mesh of one layer of cells is left whole.
+/// InputError: no cells; minima of another number; an axis or share out of range. A mesh of one layer stays whole.
 Scene cutaway_scene(const VolumeMesh& mesh, std::span<const double> cell_minima, const CutPlane& plane = {},
                     const SurfaceSceneOptions& options = {});
 Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima, const CutPlane& plane = {},

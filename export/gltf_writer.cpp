@@ -123,7 +123,8 @@ std::vector<float> relative_positions(const std::vector<Vec3>& positions, const 
   std::vector<float> values;
   values.reserve(3 * positions.size());
   for (const Vec3& position : positions)
-    for (const double x : Vec3((position - place.origin) / place.unit)) values.push_back(to_float(x, "positions", refuse));
+    for (const double x : Vec3((position - place.origin) / place.unit))
+      values.push_back(to_float(x, "positions", refuse));
   return values;
 }
 
@@ -218,7 +219,8 @@ void add_shapes(gltf::Mesh& mesh, BufferWriter& buffer, const SceneNode& node, c
                                     kFloat, kTarget, shape.name + " positions", true);
     if (!normals.empty())
       target["NORMAL"] =
-          buffer.add(differences(unit_normals(shape.normals, refuse), normals), 3, kFloat, kTarget, shape.name + " normals");
+          buffer.add(differences(unit_normals(shape.normals, refuse), normals), 3, kFloat, kTarget,
+                     shape.name + " normals");
     mesh.primitives[0].targets.push_back(std::move(target));
     names.emplace_back(shape.name);
   }
@@ -268,7 +270,8 @@ int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, co
 }
 
 /// Plays the shapes of a node one after the other, then the primitive itself: weight k is 1 at time k.
-void add_animation(gltf::Model& model, BufferWriter& buffer, int node, std::size_t num_shapes, double seconds_per_shape) {
+void add_animation(gltf::Model& model, BufferWriter& buffer, int node, std::size_t num_shapes,
+                   double seconds_per_shape) {
   std::vector<float> times, weights;
   for (std::size_t step = 0; step <= num_shapes; ++step) {
     times.push_back(static_cast<float>(static_cast<double>(step) * seconds_per_shape));

@@ -18,7 +18,7 @@ enum class GltfContainer {
 ///
 ///   world = metres_per_unit R origin + metres_per_unit R p,   p = float(position - origin),   R: up axis to y
 ///
-/// A quantized scene has its coordinates in units of its half extent u: p = u q / 32767 with q of 16 bits, nodes scaled by u.
+/// A quantized scene has its coordinates in units of its half extent u: p = u q / 32767, nodes scaled by u.
 ///
 /// Written per node: POSITION (float32, min and max exact), NORMAL, COLOR_0 (linear RGBA, normalised 16 bits), the
 /// attributes as float32, indices of 16 bits where they reach and of 32 otherwise, and a double-sided, rough, not

@@ -92,7 +92,8 @@ std::vector<Vec3> shaded_normals(const PolygonMesh& mesh, const std::vector<Inde
   const std::vector<Vec3> areas = area_vectors(mesh);
   std::vector<Vec3> normals(num_vertices, Vec3::Zero());
   for (std::size_t f = 0; f < mesh.num_faces(); ++f)
-    for (std::size_t k = mesh.face_offsets[f]; k < mesh.face_offsets[f + 1]; ++k) normals[corner_vertices[k]] += areas[f];
+    for (std::size_t k = mesh.face_offsets[f]; k < mesh.face_offsets[f + 1]; ++k)
+      normals[corner_vertices[k]] += areas[f];
   for (Vec3& normal : normals) normal = normal.norm() > 0 ? Vec3(normal.stableNormalized()) : Vec3::UnitZ();
   return normals;
 }

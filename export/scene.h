@@ -66,7 +66,7 @@ struct Scene {
   SceneValues extras{};           ///< source, colour map, ...; unit, up_axis and version are added by the writer
   SceneValues options{};          ///< the options in force, written as extras.options
   double seconds_per_shape = 0.5; ///< how long it takes from one shape to the next, > 0
-  bool quantize = false;          ///< positions in 16 bits, normals in 8 (KHR_mesh_quantization); shapes stay as they are
+  bool quantize = false;          ///< positions in 16 bits, normals in 8; shapes stay as they are
 };
 
 }  // namespace subvol

@@ -31,7 +31,7 @@ void append_base64(std::string& text, std::string_view bytes);
 /// The bytes again, or nothing where a character or the length is not that of such a text.
 std::optional<std::string> decode_base64(std::string_view digits);
 
-/// A `<DataArray>` with its length in bytes and its numbers in base64. attributes: the name and what else is to be said.
+/// A `<DataArray>` with its length in bytes and its numbers in base64. attributes: the name and what else there is.
 template <class T>
 void append_data_array(std::string& text, const std::string& attributes, std::span<const T> values) {
   const std::uint64_t size = values.size() * sizeof(T);

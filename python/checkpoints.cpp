@@ -15,7 +15,8 @@ Checkpoints::Checkpoints(Keywords& keywords) {
 void Checkpoints::begin(const std::string& call, const Keywords& keywords,
                         const std::vector<std::pair<std::string, std::string>>& inputs) {
   Json options = to_json(keywords.in_force());
-  for (const char* neutral : {"checkpoint", "every", "resume", "progress", "threads", "time_limit", "chord", "keep_states"})
+  for (const char* neutral :
+       {"checkpoint", "every", "resume", "progress", "threads", "time_limit", "chord", "keep_states"})
     options.erase(neutral);
   checkpointing_.emplace(files_, cli::run_identity("python " + call, options, inputs));
 }

@@ -142,7 +142,8 @@ SurfaceMesh (.off, .obj, .stl, .ply).
 
 check  refuse volume meshes that are not sound, but for inverted cells and unused points)");
   module.def("write", &write, py::arg("path"), py::arg("what"),
-             R"(write(path, what, *, chord=0.005, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True, quantize=False)
+             R"(write(path, what, *, chord=0.005, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True,
+    quantize=False)
 --
 
 Writes a mesh or a result; the extension chooses the format: .mesh .vtk .vtu .msh .glb .gltf .obj .usda. A file of that

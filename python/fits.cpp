@@ -104,7 +104,8 @@ class Fit {
     subdivision_.progress = work_.progress();
     FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       subdivision_.log = log;
-      return std::visit([&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); }, target_);
+      return std::visit(
+          [&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); }, target_);
     });
     const MeshCheck found = work_.run("check", [&] {
       return std::visit([&](const auto& target) { return check_mesh(fit.mesh, &target); }, target_);
@@ -176,8 +177,8 @@ constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
     boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, lambda_close=None,
     correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
-    time_limit=0.0, order=None, basis='fourier', adaptive=False, keep_states=False, checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None,
-    threads=None)
+    time_limit=0.0, order=None, basis='fourier', adaptive=False, keep_states=False, checkpoint=None, every=60.0,
+    resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Deforms a template until its boundary reproduces a surface: FitResult.
@@ -207,8 +208,8 @@ point_weights   of points: all count alike, 'equal', or by the area they stand f
 keep_states     fills states of the result, which write("animation:FILE.glb", ...) shows
 max_iterations  per stage; 0: the schedule's own
 time_limit      seconds; 0: none
-checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimisations end, and however
-                the call ends
+checkpoint      file to keep what `resume` needs, written at most every `every` seconds as minimisations end, and
+                however the call ends
 resume          checkpoint of an earlier call with the same target, template and options: goes on where that ended
 chord           how close triangles are to the surface that is measured, per cent of its diagonal
 progress        called with a Progress at every step; returns False to end with the best result so far

@@ -12,7 +12,8 @@ namespace subvol {
 ///
 /// name  where they are from, for messages.
 /// returns  points in their order; of those in one place the first, with a warning.
-/// InputError: no points, fewer than kLeastCloudPoints places, coordinates or an extent that `read_polygon_mesh` refuses.
-PointCloud sound_points(std::vector<Vec3> points, const std::string& name, std::vector<std::string>* warnings = nullptr);
+/// InputError: no points, fewer than kLeastCloudPoints places, coordinates that `read_polygon_mesh` refuses.
+PointCloud sound_points(std::vector<Vec3> points, const std::string& name,
+                        std::vector<std::string>* warnings = nullptr);
 
 }  // namespace subvol

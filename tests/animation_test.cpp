@@ -27,6 +27,11 @@ const samples::Sample& ball() {
   return sample;
 }
 
+FitResult short_fit(bool keep_states) {
+  return fit_subdivision_volume(ball().target, ball().template_mesh,
+                                {.levels = 2, .max_iterations = 3, .keep_states = keep_states});
+}
+
 /// Largest distance of positions from the unit sphere's neighbourhood, as a share.
 double roughness(const std::vector<Vec3>& positions) {
   double largest = 0;
@@ -37,8 +42,7 @@ double roughness(const std::vector<Vec3>& positions) {
 }  // namespace
 
 TEST_CASE("a fit keeps its states by the numbers of the last cage, if asked to", "[animation]") {
-  const FitResult fit =
-      fit_subdivision_volume(ball().target, ball().template_mesh, {.levels = 2, .max_iterations = 3, .keep_states = true});
+  const FitResult fit = short_fit(true);
   REQUIRE(fit.states.size() >= 2);
   CHECK(fit.states[0].name == "template");
   for (const FitState& state : fit.states) REQUIRE(state.positions.size() == fit.cage.positions.size());
@@ -50,15 +54,14 @@ TEST_CASE("a fit keeps its states by the numbers of the last cage, if asked to",
   std::set<std::string> names;
   for (const FitState& state : fit.states) names.insert(state.name);
   CHECK(names.size() == fit.states.size());
-  const FitResult without = fit_subdivision_volume(ball().target, ball().template_mesh, {.levels = 2, .max_iterations = 3});
+  const FitResult without = short_fit(false);
   CHECK(without.states.empty());
   CHECK(without.cage.positions == fit.cage.positions);
 }
 
 TEST_CASE("the animation of a fit goes from the template's limit surface to the fitted one", "[animation]") {
   const TemporaryFolder folder;
-  const FitResult fit =
-      fit_subdivision_volume(ball().target, ball().template_mesh, {.levels = 2, .max_iterations = 3, .keep_states = true});
+  const FitResult fit = short_fit(true);
   const Scene scene = animation_scene(fit.cage, fit.states, {.name = "ball"});
   REQUIRE(scene.nodes.size() == 1);
   CHECK(scene.nodes[0].shapes.size() == fit.states.size());

@@ -92,12 +92,13 @@ TEST_CASE("cutaways of cells of every kind, straight and curved, are files witho
   const TemporaryFolder folder;
   VolumeMesh mesh = mixed_cells();
   jitter(mesh, 0.05);
-  write_gltf(folder / "straight.glb", cutaway_scene(mesh, measure_quality(mesh).cell_minima, {.axis = 0, .share = 0.3}));
+  const CutPlane plane{.axis = 0, .share = 0.3};
+  write_gltf(folder / "straight.glb", cutaway_scene(mesh, measure_quality(mesh).cell_minima, plane));
   PointSource source(3);
   HighOrderMesh curved(ElementSpace(mesh, Basis::legendre, 3), mesh);
   for (std::size_t i = mesh.num_vertices(); i < curved.coefficients.size(); ++i)
     curved.coefficients[i] = 0.02 * source.vector();
-  const Scene scene = cutaway_scene(curved, measure_quality(curved).cell_minima, {.axis = 0, .share = 0.3});
+  const Scene scene = cutaway_scene(curved, measure_quality(curved).cell_minima, plane);
   REQUIRE(scene.nodes.size() == 3);
   CHECK(scene.nodes[1].primitive.positions.size() > 4 * 49 / 2);  // faces are cut finely
   write_gltf(folder / "curved.glb", scene);

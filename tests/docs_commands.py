@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs_commands.py PROGRAM SAMPLES SOURCE [PAGE ...]: runs every command of README.md and docs, as it stands there.
 
-Each page has a folder of its own, with what SAMPLES writes, STAND_INS for models of the reader's, `subvol` on the PATH and both programs under build/release. Commands are the lines of indented
+Each page has a folder of its own, with what SAMPLES writes, STAND_INS for models of the reader's, `subvol` on the PATH
+and both programs under build/release. Commands are the lines of indented
 or ```sh blocks that begin with one of PROGRAMS; a backslash joins lines. Remarks before a block say what is special:
 
     <!-- not run: WHY -->   the block is for reading
@@ -22,8 +23,8 @@ import time
 from pathlib import Path
 
 PROGRAMS = ("subvol", "build/release/subvol", "build/release/subvol_samples", "cmake", "cmake/install_packages", "npm",
-            "python3", "venv/bin/python", "./quickstart", "./runtests", "tests/fuzz/run.py", "tests/robustness/", "node",
-            "apt-get", "blender", "cd", "echo", "source", "ctest", "ninja", "git", "SUBVOL_FUZZ_SECONDS")
+            "python3", "venv/bin/python", "./quickstart", "./runtests", "tests/fuzz/run.py", "tests/robustness/",
+            "node", "apt-get", "blender", "cd", "echo", "source", "ctest", "ninja", "git", "SUBVOL_FUZZ_SECONDS")
 STAND_INS = {"bone.off": "ball_target.off", "bone.mesh": "ball_template.mesh", "torus.off": "torus_target.off"}
 REMARK = re.compile(r"^<!-- (not run: .+|exits \d+|says) -->$")
 

@@ -86,7 +86,8 @@ def read_gmsh(path):
 
 def largest_distance(a, b):
     """Of points of a from the closest of b."""
-    return max(np.sqrt(((part[:, None] - b) ** 2).sum(axis=2).min(axis=1)).max() for part in np.array_split(a, 1 + len(a) // 500))
+    parts = np.array_split(a, 1 + len(a) // 500)
+    return max(np.sqrt(((part[:, None] - b) ** 2).sum(axis=2).min(axis=1)).max() for part in parts)
 
 
 def compare_straight(name):

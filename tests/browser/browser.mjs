@@ -61,7 +61,8 @@ export async function show(page, files, flags = []) {
   const started = late(SECONDS_TO_START, null).then(() => (asked ? new Promise(() => {}) : "never asked"));
   const answer = await Promise.race([answered, started, late(SECONDS_IN_ALL, "no answer")]);
   process.kill(-child.pid, "SIGKILL");  // and the processes it has started
-  await new Promise((resolve) => (child.exitCode === null && child.signalCode === null ? child.on("exit", resolve) : resolve()));
+  const has_ended = () => child.exitCode !== null || child.signalCode !== null;
+  await new Promise((resolve) => (has_ended() ? resolve() : child.on("exit", resolve)));
   server.closeAllConnections();
   server.close();
   rmSync(profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });

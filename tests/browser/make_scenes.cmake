@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Fits a sample in the working directory: PROGRAM fits what SAMPLES writes; scenes, a cutaway, an animation, a report's page.
+# PROGRAM fits what SAMPLES writes, in the working directory: scenes, a cutaway, an animation, a report's page.
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE status ERROR_VARIABLE words)
   if(NOT status EQUAL 0)

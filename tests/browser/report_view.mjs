@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Opens a report's page in headless Chromium, light and dark, wide and as on a phone: node report_view.mjs PAGE.html
-// Exit status 0: no word on the console, nothing asked of the network, all pictures shown, nothing wider than the screen,
-// dark where dark is preferred.
+// Exit status 0: no word on the console, nothing asked of the network, all pictures shown, nothing wider than the
+// screen, dark where dark is preferred.
 import { readFileSync } from "node:fs";
 import { fail, show } from "./browser.mjs";
 
@@ -22,9 +22,11 @@ async function look() {
     const page = frame.contentDocument, root = page.documentElement;
     answer[width] = {
       width: root.scrollWidth, height: root.scrollHeight, pictures: page.images.length,
-      shown: [...page.images].filter((image) => image.naturalWidth > 0).length, plots: page.querySelectorAll("svg").length,
+      shown: [...page.images].filter((image) => image.naturalWidth > 0).length,
+      plots: page.querySelectorAll("svg").length,
       background: frame.contentWindow.getComputedStyle(page.body).backgroundColor,
-      asked: frame.contentWindow.performance.getEntriesByType("resource").filter((e) => !e.name.startsWith("data:")).length };
+      asked: frame.contentWindow.performance.getEntriesByType("resource")
+        .filter((entry) => !entry.name.startsWith("data:")).length };
     frame.remove();
   }
   await fetch("/answer", { method: "POST", body: JSON.stringify(answer) });
@@ -39,10 +41,12 @@ for (const [scheme, flag] of [["light", 1], ["dark", 0]]) {
   const wrong = [...complaints];
   for (const [wanted, found] of Object.entries(answer)) {
     if (found.width > Number(wanted)) wrong.push(`${found.width} pixels wide on a screen of ${wanted}`);
-    if (found.shown < found.pictures || found.plots === 0) wrong.push(`${found.shown} of ${found.pictures} pictures, ${found.plots} plots`);
+    if (found.shown < found.pictures || found.plots === 0)
+      wrong.push(`${found.shown} of ${found.pictures} pictures, ${found.plots} plots`);
     if (found.asked > 0) wrong.push(`${found.asked} requests for more than the page`);
     if (lightness(found.background) > 0.5 !== (scheme === "light")) wrong.push(`background ${found.background}`);
-    console.log(`${scheme}, ${wanted} pixels: ${found.height} high, ${found.shown} pictures, ${found.plots} plots, ${found.background}`);
+    console.log(`${scheme}, ${wanted} pixels: ${found.height} high, ${found.shown} pictures, ${found.plots} plots, ` +
+      found.background);
   }
   if (wrong.length > 0) fail(`${file}, ${scheme}:\n  ${wrong.join("\n  ")}`);
 }

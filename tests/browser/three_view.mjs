@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Loads .glb files with three.js in headless Chromium: node three_view.mjs NODE_MODULES FILE.glb ... [--pictures FOLDER]
+// Loads .glb files with three.js in headless Chromium:
+//   node three_view.mjs NODE_MODULES FILE.glb ... [--pictures FOLDER]
 // Each must be there as a picture: no error, vertices' box on the screen where pixels are drawn, several colours; an
 // animation must change it and end where it began to be. Exit status 0: all are.
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
@@ -17,8 +18,8 @@ if (files.length === 0) fail("usage: three_view.mjs NODE_MODULES FILE.glb ... [-
 
 const page = readFileSync(join(dirname(fileURLToPath(import.meta.url)), "three_page.html"));
 for (const file of files) {
-  const { answer, complaints } = await show("/", { "/": page, "/model.glb": readFileSync(file), "/three/": folder(three) },
-    ["--window-size=800,600"]);
+  const served = { "/": page, "/model.glb": readFileSync(file), "/three/": folder(three) };
+  const { answer, complaints } = await show("/", served, ["--window-size=800,600"]);
   const wrong = [...answer.errors, ...complaints];
   if (answer.seen) {
     const { share, hues, box, sum } = answer.seen;
@@ -29,11 +30,12 @@ for (const file of files) {
       wrong.push(`drawn in ${box}, vertices are in ${answer.projected}`);
     if (answer.steps.length > 0 && (new Set(answer.steps).size < 3 || answer.steps.at(-1) !== sum))
       wrong.push(`the animation does not go from one shape to another and end as the model: ${answer.steps}, ${sum}`);
-    console.log(`${basename(file)}: ${(100 * share).toFixed(1)} % drawn, ${hues} hues, nodes ${answer.names.join(" ")}` +
-      (answer.steps.length > 0 ? ", animated" : ""));
+    console.log(`${basename(file)}: ${(100 * share).toFixed(1)} % drawn, ${hues} hues, ` +
+      `nodes ${answer.names.join(" ")}` + (answer.steps.length > 0 ? ", animated" : ""));
     if (pictures) {
       mkdirSync(pictures, { recursive: true });
-      writeFileSync(join(pictures, basename(file, ".glb") + ".png"), Buffer.from(answer.picture.split(",")[1], "base64"));
+      const picture = join(pictures, basename(file, ".glb") + ".png");
+      writeFileSync(picture, Buffer.from(answer.picture.split(",")[1], "base64"));
     }
   }
   if (wrong.length > 0) fail(`${file}:\n  ${wrong.join("\n  ")}`);

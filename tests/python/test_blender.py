@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cages in Blender: its Subdivision Surface modifier makes our limit surface of them. Scenes in Blender: all is there."""
+"""Cages in Blender: its Subdivision Surface modifier makes our limit surface of them. Scenes: all is there."""
 
 import json
 import os
@@ -39,13 +39,16 @@ class Cages(InFolder):
                 "tets": subvol.template.split(torus, into="tets"), **self.real_cages()}
 
     def real_cages(self):
-        """Fitted to real surfaces, one smooth and one with creases; none where the folder of real inputs is not there."""
+        """Fitted to real surfaces, one smooth and one with creases; none where the real inputs are not there."""
         folder = os.environ.get("SUBVOL_DATA") or os.path.join(SOURCE, "..", "shared", "data")
         if not os.path.isdir(folder):
             print("SKIPPED: the real cages; no folder with real data")
             return {}
-        fit = lambda name, **options: subvol.fit(os.path.join(folder, "fit", name, "target.off"),
-                                                 os.path.join(folder, "fit", name, "template.mesh"), levels=1, **options).cage
+
+        def fit(name, **options):
+            files = (os.path.join(folder, "fit", name, file) for file in ("target.off", "template.mesh"))
+            return subvol.fit(*files, levels=1, **options).cage
+
         return {"hanger139": fit("hanger139"), "cad_fandisk49": fit("cad_fandisk49", crease_angle=40)}
 
     def test_the_modifier_makes_our_limit_surface(self):

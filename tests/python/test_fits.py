@@ -131,8 +131,9 @@ class Points(InFolder):
         self.assertTrue(fit.report["distance"]["one_sided"])
         self.assertEqual(subvol.check(fit.mesh, points)["distance"], fit.report["distance"])
         subvol.write("python.mesh", fit)
-        self.run_program("fit", "torus_points.xyz", "--template", "torus_template.mesh", "--levels", "1", "--point-weights",
-                         "area", "--max-iterations", "3", "-o", "program.mesh", status=fit_status(fit))
+        self.run_program("fit", "torus_points.xyz", "--template", "torus_template.mesh", "--levels", "1",
+                         "--point-weights", "area", "--max-iterations", "3", "-o", "program.mesh",
+                         status=fit_status(fit))
         self.assert_same_file("python.mesh", "program.mesh")
 
     def test_curved_cells_follow_points(self):
@@ -203,8 +204,8 @@ class States(InFolder):
     def test_the_energy_is_the_programs(self):
         fit = subvol.fit(*BALL, levels=1, energy="inverse_mean_ratio")
         subvol.write("python.mesh", fit)
-        self.run_program("fit", *BALL[:1], "--template", BALL[1], "--levels", "1", "--energy", "inverse_mean_ratio", "-o",
-                         "program.mesh")
+        self.run_program("fit", BALL[0], "--template", BALL[1], "--levels", "1", "--energy", "inverse_mean_ratio",
+                         "-o", "program.mesh")
         self.assert_same_file("python.mesh", "program.mesh")
 
 
