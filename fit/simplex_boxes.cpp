@@ -160,7 +160,7 @@ void SimplexBoxes::take_models(Box& box) {
 /// Errors are measured by the mean edges, as is det J.
 bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
   constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
-  const double error = lasting_error(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
+  const double error = by_mean_edges(lasting_error(box));
   return error > 0 && !(error <= std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast));
 }
 
@@ -291,31 +291,42 @@ Mat3 SimplexBoxes::sides(const Box& box) const {
 
 double SimplexBoxes::determinant_scale(const Box& box) const { return 1 / sides(box).determinant(); }
 
-Mat3 SimplexBoxes::remainder(const Box& box) const {
+Mat3 SimplexBoxes::modelling_error(const Box& box) const {
+  if (kind_ == CellKind::tet) return lasting_error(box);
   const LineModels::Level& level = line_.level(box.w_level);
-  Mat3 modelling = Mat3::Zero();
-  Vec3 size = Vec3::Zero(), rounding = Vec3::Zero();
+  Mat3 result = Mat3::Zero();
   for (int k = 0; k < num_layers_; ++k) {
     const Layer& layer = (*box.layers)[k];
-    if (kind_ == CellKind::tet) {
-      modelling = layer.gradient_error * Eigen::RowVector3d::Ones();
-      size = layer.largest_coefficient;
-      rounding = layer.rounding;
-      continue;
-    }
     const double n = line_.bounds()[k], error = level.error[k], slope_error = level.slope_error[k];
     const Vec3 across = layer.gradient_bound * error + layer.gradient_error * (n + error);
     const Vec3 along = layer.value_bound * slope_error + layer.error * (line_.slope_bounds()[k] + slope_error);
-    modelling += (Mat3() << across, across, along).finished();
-    size += level.largest_coefficient[k] * layer.largest_coefficient;
-    rounding += level.largest_coefficient[k] * layer.rounding;
+    result += (Mat3() << across, across, along).finished();
+  }
+  return result;
+}
+
+bool SimplexBoxes::is_hopeless(const Box& box) const {
+  // Shifts of `determinant_bound`, each of which must be < 1 (see `HexBoxes`).
+  const double shifts = by_mean_edges(modelling_error(box));
+  return shifts > 2 && std::isfinite(shifts);
+}
+
+Mat3 SimplexBoxes::remainder(const Box& box) const {
+  const LineModels::Level& level = line_.level(box.w_level);
+  Vec3 size = Vec3::Zero(), rounding = Vec3::Zero();
+  for (int k = 0; k < num_layers_; ++k) {
+    const Layer& layer = (*box.layers)[k];
+    const double along = kind_ == CellKind::prism ? level.largest_coefficient[k] : 1;
+    size += along * layer.largest_coefficient;
+    rounding += along * layer.rounding;
   }
   // Sums over modes and along w, tables, the shift, halvings of `degree` averages each, differences, the 16 asked for.
   const int degree = simplex_.index().degree();
   const double roundings = num_modes_ + num_layers_ + 4 + 1 + degree * box.level + degree + 8 + 16;
   const Vec3 control = rounding + roundings * (std::numeric_limits<double>::epsilon() / 2) * size;
   const double differences = 2 * std::max(degree, w_controls_ - 1);
-  return (1 + 1e-10) * (modelling * sides(box).cwiseAbs() + differences * control * Eigen::RowVector3d::Ones());
+  const Mat3 modelling = modelling_error(box) * sides(box).cwiseAbs();
+  return (1 + 1e-10) * (modelling + differences * control * Eigen::RowVector3d::Ones());
 }
 
 }  // namespace subvol

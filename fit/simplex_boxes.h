@@ -15,8 +15,8 @@ namespace subvol {
 
 /// Bernstein coefficients of the Jacobian of one high-order tet or prism over its parts, got by halving longest sides.
 ///
-/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew for a part where the errors of the
-/// last ones matter; parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own.
+/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew for a part where errors of the last
+/// ones matter; parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own.
 /// Jacobians are by local coordinates: along the part's sides.
 class SimplexBoxes {
  public:
@@ -49,7 +49,8 @@ class SimplexBoxes {
   const ControlMatrices& matrices(const Box& box);
   std::size_t corner_matrix(int corner) const;
   Mat3 remainder(const Box& box) const;
-  bool is_hopeless(const Box&) const { return false; }
+  /// Whether the modelling error is so large that no bound can be hoped for.
+  bool is_hopeless(const Box& box) const;
   /// Whether the last models of the simplex are too far from the map to prove anything near the box's mean.
   bool is_stuck(const Box& box);
   double determinant_scale(const Box& box) const;
@@ -64,6 +65,11 @@ class SimplexBoxes {
   void prism_matrices(const Box& box);
   /// What of the errors of the simplex's models stays with every part, by canonical coordinates.
   Mat3 lasting_error(const Box& box) const;
+  double by_mean_edges(const Mat3& error) const {
+    return error.colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
+  }
+  /// The errors of all models, by canonical coordinates.
+  Mat3 modelling_error(const Box& box) const;
   /// low: control points of the whole, those of one half when done; high: as many, those of the other.
   void halve_control(const SimplexHalving& halving, std::vector<double>& low, std::vector<double>& high) const;
 
