@@ -5,8 +5,11 @@
 #include "fit/target_report.h"
 #include "subvol/error.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace subvol {
 
@@ -37,7 +40,17 @@ Normalisation::Normalisation(const PointCloud& target) {
 }
 
 std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
-  for (Vec3& p : points) p = (p - centre) / diagonal;
+  constexpr double kLeastSize = 1e-6;  // below, cells are lost in the rounding of the target's coordinates
+  Eigen::AlignedBox3d box;
+  for (Vec3& p : points) {
+    p = (p - centre) / diagonal;
+    box.extend(p);
+  }
+  if (!points.empty() && !(box.diagonal().norm() >= kLeastSize)) {
+    char size[32];
+    std::snprintf(size, sizeof size, "%.2g", box.diagonal().norm());
+    throw InputError(std::string("the mesh is ") + size + " times as large as the target; expected one roughly in place");
+  }
   return points;
 }
 

@@ -19,7 +19,7 @@ struct Normalisation {
   /// InputError: a target without extent, or with coordinates that are not finite.
   explicit Normalisation(const TriangleMesh& target);
   explicit Normalisation(const PointCloud& target);
-  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
+  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;  ///< InputError: next to nothing beside the target
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };
 

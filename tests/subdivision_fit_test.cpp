@@ -2,7 +2,9 @@
 #include "fit/boundary_triangles.h"
 #include "fit/certificate.h"
 #include "fit/fit_level.h"
+#include "fit/high_order_fit.h"
 #include "fit/mesh_check.h"
+#include "fit/optimize_mesh.h"
 #include "fit/subdivision_fit.h"
 #include "fit/surface_distance.h"
 #include "samples/shapes.h"
@@ -259,6 +261,18 @@ TEST_CASE("A fit refuses options out of range, empty targets and unusable templa
   VolumeMesh inverted = sample.template_mesh;
   for (Vec3& p : inverted.positions) p[0] = -p[0];
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, inverted, {}), InputError);
+}
+
+// A finding of the fuzzer: such a fit could not begin, lost its cells in rounding, and said that it had converged.
+TEST_CASE("A template that is next to nothing beside its target is refused by every fit") {
+  const samples::Sample sample = samples::ball_sample();
+  VolumeMesh tiny = sample.template_mesh;
+  for (const double size : {1e-8, 1e-20}) {
+    for (std::size_t v = 0; v < tiny.num_vertices(); ++v) tiny.positions[v] = size * sample.template_mesh.positions[v];
+    CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, tiny, quick()), Catch::Contains("times as large as the target"));
+    CHECK_THROWS_AS(fit_high_order(sample.target, tiny, {.order = 2}), InputError);
+    CHECK_THROWS_AS(optimize_mesh(tiny, &sample.target, {}), InputError);
+  }
 }
 
 TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proportions") {

@@ -113,8 +113,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   VolumeMesh start = small_template(bytes.below(3));
   Bytes choices(data + std::min<std::size_t>(size, 3), std::min<std::size_t>(size - std::min<std::size_t>(size, 3), 8));
   Bytes moves(data + std::min<std::size_t>(size, 11), size - std::min<std::size_t>(size, 11));
-  for (Vec3& p : start.positions) p += Vec3(moves.move(1), moves.move(1), moves.move(1));
-  for (Vec3& p : target.positions) p += Vec3(moves.move(1), moves.move(1), moves.move(1));
+  for (std::vector<Vec3>* positions : {&start.positions, &target.positions})
+    for (Vec3& p : *positions)
+      for (double& coordinate : p) coordinate += moves.move(1);
   try {
     bool sound = true;
     for (const MeshDefect& defect : validate(start)) sound = sound && defect.kind == MeshDefect::Kind::unused_vertex;

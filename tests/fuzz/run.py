@@ -44,7 +44,7 @@ class Fuzzing:
         name = fuzzer.name.removeprefix("fuzz_")
         used = processor_seconds()
         done = subprocess.run([fuzzer, f"-max_total_time={self.seconds}", f"-timeout={MOST_SECONDS.get(name, MOST_SECONDS_ELSE)}",
-                               "-rss_limit_mb=2048", "-max_len=4096", "-print_final_stats=1",
+                               "-rss_limit_mb=2048", "-max_len=8192", "-print_final_stats=1",
                                f"-artifact_prefix={self.findings}/{name}-", self.corpus / name],
                               env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True, errors="replace")
         executions = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
