@@ -169,7 +169,8 @@ std::string thicknesses(const Json& report) {
   for (const auto& [side, t] : part(report, "thickness").items())
     for (const char* kind : {"asked", "limited", "achieved", "clearance"})
       if (t.contains(kind))
-        rows += row({escaped(side) + ", " + kind, words(t[kind].at("mean")), words(t[kind].at("min")), words(t[kind].at("max"))});
+        rows += row({escaped(side) + ", " + kind, words(t[kind].at("mean")), words(t[kind].at("min")),
+                     words(t[kind].at("max"))});
   return rows.empty() ? "" : table({"thickness", "mean", "min", "max"}, rows);
 }
 

@@ -45,7 +45,8 @@ std::string energy_plot(const Json& stages) {
   std::vector<std::size_t> ends;
   for (const Json& stage : stages) {
     for (const Json& step : stage.value("history", Json::array()))
-      for (std::size_t k = 0; k < kTerms.size(); ++k) energies[k].push_back(step.at("energy").at(kTerms[k]).get<double>());
+      for (std::size_t k = 0; k < kTerms.size(); ++k)
+        energies[k].push_back(step.at("energy").at(kTerms[k]).get<double>());
     ends.push_back(energies[0].size());
   }
   const std::size_t num_steps = energies[0].size();

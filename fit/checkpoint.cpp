@@ -136,7 +136,8 @@ Checkpoint read_content(std::string_view content) {
   }
   for (std::uint64_t left = reader.number(); left > 0; --left) {
     checkpoint.stages.push_back(read_stage(reader));
-    if (left > 1 && !checkpoint.stages.back().is_over()) throw InputError("a minimisation that is not over is followed by one");
+    if (left > 1 && !checkpoint.stages.back().is_over())
+      throw InputError("a minimisation that is not over is followed by one");
   }
   if (!reader.at_end()) throw InputError("something follows its end");
   return checkpoint;

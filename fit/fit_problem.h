@@ -58,8 +58,8 @@ struct MinimizerOptions {
   /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled with
   /// the step before.
   std::function<bool()> ended;
-  /// Newton's method only: called every few steps with x and what has been done so far, which is all that it takes to go
-  /// on from there (`begun`).
+  /// Newton's method only: called every few steps with x and what has been done so far, which is all that it takes to
+  /// go on from there (`begun`).
   std::function<void(std::span<const Vec3> x, const MinimizerResult& so_far)> keep;
   const MinimizerResult* begun = nullptr;  ///< what was done to get to x, as `keep` was told; null: nothing
 };
@@ -75,9 +75,9 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 /// that stand in the way get a denser quadrature for the steps to come. Where few points would make the step shorter than a
 /// half, the Hessian is made stiffer there (`VolumeTerm::stiffen`) and the direction found again.
 ///
-/// x  feasible start (finite E), else `no_step`; receives the result. With `begun`, where that was kept: it then ends at the
-///    same bits as the minimisation that was interrupted would have. The problem must be as it was at the start of that
-///    one, else InputError where a cell does not exist.
+/// x  feasible start (finite E), else `no_step`; receives the result. With `begun`, where that was kept: it then ends
+///    at the same bits as the minimisation that was interrupted would have. The problem must be as it was at the start
+///    of that one, else InputError where a cell does not exist.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 /// The reference that Newton is measured against, and the paper's algorithm 2: L-BFGS (m = 10) with a weak Wolfe line

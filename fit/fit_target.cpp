@@ -49,7 +49,8 @@ std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
   if (!points.empty() && !(box.diagonal().norm() >= kLeastSize)) {
     char size[32];
     std::snprintf(size, sizeof size, "%.2g", box.diagonal().norm());
-    throw InputError(std::string("the mesh is ") + size + " times as large as the target; expected one roughly in place");
+    throw InputError(std::string("the mesh is ") + size +
+                     " times as large as the target; expected one roughly in place");
   }
   return points;
 }

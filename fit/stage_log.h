@@ -35,8 +35,8 @@ class StageLog {
   StageLog(std::vector<SolvedStage> done, std::string source)
       : stages_(std::move(done)), source_(std::move(source)), earlier_(stages_.size()) {}
 
-  /// The next stage of the earlier run, or null once all have been taken: the stage must then be solved. The last of them
-  /// may not be over.
+  /// The next stage of the earlier run, or null once all have been taken: the stage must then be solved. The last of
+  /// them may not be over.
   /// InputError: it did not start from here. The input or the options are others, or the program or machine is another.
   ///
   /// begun  the stage that is to be solved: its name, fingerprint and start x.

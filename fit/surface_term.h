@@ -24,8 +24,8 @@ class SurfaceTerm {
   /// Must come before the functions below.
   virtual void assign(std::span<const Vec3> samples) = 0;
 
-  /// Drops what earlier assignments have left for the next one to be quicker by, where its result may depend on that (ties):
-  /// it is then a function of the samples alone.
+  /// Drops what earlier assignments have left for the next one to be quicker by, where its result may depend on that
+  /// (ties): it is then a function of the samples alone.
   virtual void forget() {}
 
   /// Adds creases whose segments are edges of sample triangles (else InputError); to be called before `assign`.

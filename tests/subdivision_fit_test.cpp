@@ -269,7 +269,8 @@ TEST_CASE("A template that is next to nothing beside its target is refused by ev
   VolumeMesh tiny = sample.template_mesh;
   for (const double size : {1e-8, 1e-20}) {
     for (std::size_t v = 0; v < tiny.num_vertices(); ++v) tiny.positions[v] = size * sample.template_mesh.positions[v];
-    CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, tiny, quick()), Catch::Contains("times as large as the target"));
+    CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, tiny, quick()),
+                      Catch::Contains("times as large as the target"));
     CHECK_THROWS_AS(fit_high_order(sample.target, tiny, {.order = 2}), InputError);
     CHECK_THROWS_AS(optimize_mesh(tiny, &sample.target, {}), InputError);
   }

@@ -75,7 +75,8 @@ TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property
     place.file("wall.txt", "0.1\n" + std::string(line) + "\n0.1\n0.1\n");
     const Run run = place.run("shell tet.ply --thickness-file wall.txt -o c.mesh");
     CHECK(run.status == 3);
-    CHECK(run.err.find("wall.txt:2: expected a positive thickness, found '" + std::string(line) + "'") != std::string::npos);
+    CHECK(run.err.find("wall.txt:2: expected a positive thickness, found '" + std::string(line) + "'") !=
+          std::string::npos);
   }
   CHECK(place.run("shell tet.ply --thickness-attribute roof -o c.mesh").err.find("roof") != std::string::npos);
   CHECK(place.run("shell target.off --thickness-attribute wall -o c.mesh").status == 3);

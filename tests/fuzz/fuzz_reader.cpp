@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// libFuzzer target of one of the library's readers: kExtension says of which files. Whatever the bytes, the reader returns
-// something sound or throws InputError.
+// libFuzzer target of one of the library's readers: kExtension says of which files. Whatever the bytes, the reader
+// returns something sound or throws InputError.
 
 #include "export/high_order_file.h"
 #include "fit/checkpoint.h"

@@ -5,9 +5,10 @@
 Usage: tests/fuzz/run.py BUILD_FOLDER [--seconds S] [--rounds N] [--minutes M] [--corpus FOLDER] [NAME ...]
        (cmake --preset fuzz && cmake --build build/fuzz;  an hour each: --seconds 600 --rounds 6)
 
-Each round runs every fuzzer for S seconds. Corpora are written by write_corpus into FOLDER (default: BUILD_FOLDER/corpus)
-and grow there, so that a run goes on where the last one ended; FOLDER/totals.json adds up executions and seconds of
-processor time of each fuzzer over all runs. Inputs that fail are kept in BUILD_FOLDER/findings, with what was said of them.
+Each round runs every fuzzer for S seconds. Corpora are written by write_corpus into FOLDER (default:
+BUILD_FOLDER/corpus) and grow there, so that a run goes on where the last one ended; FOLDER/totals.json adds up
+executions and seconds of processor time of each fuzzer over all runs. Inputs that fail are kept in
+BUILD_FOLDER/findings, with what was said of them.
 Exit status: 0 without findings in this run, 1 with some, 2 no fuzzers here.
 """
 import argparse
@@ -21,8 +22,8 @@ import subprocess
 import sys
 import time
 
-# Seconds by the clock that one input may take: generous, for the machine may be busy. What takes more than ten is kept as
-# slow-unit beside the findings.
+# Seconds by the clock that one input may take: generous, for the machine may be busy. What takes more than ten is kept
+# as slow-unit beside the findings.
 MOST_SECONDS = {"fit": 1200}
 MOST_SECONDS_ELSE = 300
 
@@ -42,11 +43,12 @@ class Fuzzing:
     def run(self, fuzzer):
         """One fuzzer for its seconds."""
         name = fuzzer.name.removeprefix("fuzz_")
-        used = processor_seconds()
-        done = subprocess.run([fuzzer, f"-max_total_time={self.seconds}", f"-timeout={MOST_SECONDS.get(name, MOST_SECONDS_ELSE)}",
+        used, most_seconds = processor_seconds(), MOST_SECONDS.get(name, MOST_SECONDS_ELSE)
+        done = subprocess.run([fuzzer, f"-max_total_time={self.seconds}", f"-timeout={most_seconds}",
                                "-rss_limit_mb=2048", "-max_len=8192", "-print_final_stats=1",
                                f"-artifact_prefix={self.findings}/{name}-", self.corpus / name],
-                              env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True, errors="replace")
+                              env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
+                              errors="replace")
         executions = re.search(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
         if not executions:  # it failed: the last line with a number of executions
             executions = re.findall(r"^#(\d+)\s", done.stderr, re.MULTILINE)
@@ -62,13 +64,14 @@ class Fuzzing:
         if done.returncode != 0:
             self.failed += 1
             (self.findings / f"{name}.log").write_text(done.stderr)
-            print("\n".join(line for line in done.stderr.splitlines()
-                            if re.search(r"ERROR|SUMMARY|runtime error|Test unit written|^\s+#[0-9] ", line)), flush=True)
+            telling = re.compile(r"ERROR|SUMMARY|runtime error|Test unit written|^\s+#[0-9] ")
+            print("\n".join(line for line in done.stderr.splitlines() if telling.search(line)), flush=True)
 
     def print_totals(self):
         print(f"\n{'all runs':12} {'executions':>12} {'edges':>7} {'inputs':>7} {'minutes':>8} {'findings':>9}")
         for name, total in sorted(self.totals.items()):
-            print(f"{name:12} {total['executions']:12} {total['edges']:7} {len(list((self.corpus / name).iterdir())):7} "
+            inputs = len(list((self.corpus / name).iterdir()))
+            print(f"{name:12} {total['executions']:12} {total['edges']:7} {inputs:7} "
                   f"{total['processor_seconds'] / 60:8.1f} {total['findings']:9}")
 
 

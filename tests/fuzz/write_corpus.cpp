@@ -113,8 +113,8 @@ void write_points(const fs::path& folder) {
   write(folder / "xyz", "plain", lines);
   write(folder / "xyz", "columns", "# points\n" + lines + "1e3 -2.5 .5 0 0 1 255\n");
   write(folder / "ply", "points",
-        "ply\nformat ascii 1.0\nelement vertex 12\nproperty double x\nproperty double y\nproperty double z\nend_header\n" +
-            lines);
+        "ply\nformat ascii 1.0\nelement vertex 12\nproperty double x\nproperty double y\nproperty double z\n"
+        "end_header\n" + lines);
 }
 
 void write_program_files(const fs::path& folder) {
@@ -129,8 +129,9 @@ void write_program_files(const fs::path& folder) {
   write(folder / "json", "shell", R"({"subvol": "0.1", "command": "shell", "valid": true, "thickness": {"inside":
 {"asked": {"mean": 1, "min": 1, "max": 1}}}, "input": {"surface": {"path": "s.obj"}}})");
   write(folder / "toml", "flat", "levels = 2 # and\n tolerance=0.5\nforce = true\ncage-only = false\n");
-  write(folder / "toml", "tables", "[fit]\noutput = [\"a.mesh\", 'b.glb']\ntemplate = \"t.mesh\"\n[shell]\nside = \"both\"\n"
-                                   "growth = 1.5\n[check]\njson = true\n[optimize]\nlambda = 1e-3\ntime-limit = 5\n");
+  write(folder / "toml", "tables", "[fit]\noutput = [\"a.mesh\", 'b.glb']\ntemplate = \"t.mesh\"\n[shell]\n"
+                                   "side = \"both\"\ngrowth = 1.5\n[check]\njson = true\n[optimize]\n"
+                                   "lambda = 1e-3\ntime-limit = 5\n");
   write(folder / "txt", "thickness", "0.1\n 2e-3 \r\n\n17\n");
 }
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits to damaged surfaces and shells on nasty ones, from a folder of real inputs; nothing may be claimed that is not so.
+"""Fits to damaged surfaces and shells on nasty ones, from real inputs; nothing may be claimed that is not so.
 
 Usage: tests/robustness/hard_inputs.py PROGRAM DATA_FOLDER [--time-limit T] [NAME ...]
 
-Takes DATA_FOLDER/dirty/NAME/target.off (or .xyz) with template.mesh, and DATA_FOLDER/shell/NAME/surface.off (or .obj). What
-counts as a finding is in claims.py. Exit status: 0 without findings, 1 with some, 2 no such folder.
+Takes DATA_FOLDER/dirty/NAME/target.off (or .xyz) with template.mesh, and DATA_FOLDER/shell/NAME/surface.off (or
+.obj). What counts as a finding is in claims.py. Exit status: 0 without findings, 1 with some, 2 no such folder.
 """
 import argparse
 import pathlib
@@ -31,7 +31,8 @@ def run(program, verb, words, target, time_limit):
     """What is wrong, the exit status, and what was said first."""
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        command = [program, *words, "--time-limit", str(time_limit), "-o", "out.mesh", "--report", "report.json", "--quiet"]
+        command = [program, *words, "--time-limit", str(time_limit), "-o", "out.mesh", "--report", "report.json",
+                   "--quiet"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace",
                               env=cases.environment())
         return claims.judge(program, folder, verb, "out.mesh", target, done), done.returncode, done.stderr.strip()

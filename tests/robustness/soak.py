@@ -4,15 +4,15 @@
 
 Usage: tests/robustness/soak.py PROGRAM [--runs N] [--first K] [--seed S] [--time-limit T] [--minutes M] [--keep FOLDER]
 
-Shapes are balls, tori and sheets, plates, needles, solids with cavities in cavities, parts that nearly touch, all of them
-also with noise, holes, flipped and repeated faces; soups of triangles; blocks of cells with inner vertices thrown about;
-in units from 1e-12 to 1e12 and far from the origin.
+Shapes are balls, tori and sheets, plates, needles, solids with cavities in cavities, parts that nearly touch, all of
+them also with noise, holes, flipped and repeated faces; soups of triangles; blocks of cells with inner vertices thrown
+about; in units from 1e-12 to 1e12 and far from the origin.
 
-Each run is a function of its number and the seed. A finding is: an exit status that is not documented, or not one of that
-verb's; more processor time than the limit and a minute; an error without words; a temporary left behind; or a claim of the
-report that `subvol check` of the file written does not bear out: number of cells, certified cells, inverted cells,
-intersections, mean distance. Ends with a table; exit status 0 without findings, 1 with some. What was found is kept in
-FOLDER.
+Each run is a function of its number and the seed. A finding is: an exit status that is not documented, or not one of
+that verb's; more processor time than the limit and a minute; an error without words; a temporary left behind; or a
+claim of the report that `subvol check` of the file written does not bear out: number of cells, certified cells,
+inverted cells, intersections, mean distance. Ends with a table; exit status 0 without findings, 1 with some. What was
+found is kept in FOLDER.
 """
 import argparse
 import collections
