@@ -256,7 +256,7 @@ bool SubdivisionFit::meets_tolerance() {
 }
 
 /// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself: thin
-/// walls that meet in a soft fit stay apart in a stiffer one. Ends where that does not help.
+/// walls that meet in a soft fit stay apart in a stiffer one. What has the fewest pairs is kept.
 bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) {
   for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= kMostUnfoldingLambda;
        lambda *= kUnfoldingFactor) {
@@ -266,14 +266,14 @@ bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) 
     if (!run_stage(stage, stage_name(stage))) return false;
     if (!states_.empty()) states_.pop_back();  // the start, which is there already
     const std::size_t pairs_now = intersecting_pairs();
-    if (pairs_now >= pairs) {
-      unknowns_ = before;
-      lambda_ = lambda_before;
-      mean_.reset();
-      result_.report.stages.back().kept = false;
-      break;
+    if (pairs_now < pairs) {
+      pairs = pairs_now;
+      continue;
     }
-    pairs = pairs_now;
+    unknowns_ = before;
+    lambda_ = lambda_before;
+    mean_.reset();
+    result_.report.stages.back().kept = false;
   }
   return true;
 }
