@@ -347,7 +347,7 @@ HighOrderFit::Outcome HighOrderFit::measured_outcome() {
 /// The last stage with more and more weight on the worst cells: E_W is a mean, to which few cells that are much worse than
 /// they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
 bool HighOrderFit::lift_worst_cells() {
-  if (options_.order < 2) return true;
+  if (!options_.lift_worst_cells || options_.order < 2) return true;
   Outcome now = measured_outcome();
   const double most_mean = options_.tolerance_percent ? std::max(now.mean_percent, *options_.tolerance_percent)
                                                       : kMostDistanceGrowth * now.mean_percent;

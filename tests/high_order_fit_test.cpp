@@ -127,6 +127,10 @@ TEST_CASE("the worst cells of a fit are lifted where that costs little distance"
   for (auto stage = first; stage != stages.end(); ++stage)
     if (stage->kept) reached = stage->mean_distance_percent;
   CHECK(reached <= 1.2 * std::prev(first)->mean_distance_percent);
+  HighOrderFitOptions without = of_order(2);
+  without.lift_worst_cells = false;
+  const FitReport plain = fit_high_order(torus.target, made.templates.front().mesh, without).report;
+  CHECK(std::none_of(plain.stages.begin(), plain.stages.end(), is_lift));
   CHECK(positive(result.mesh, 9));
 }
 
