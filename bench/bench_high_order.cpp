@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Curved cells, one thread: nanoseconds per quadrature point for the energy, its gradient and products with its Hessian,
-// and microseconds per cell for the proof that none is inverted, beside those of an energy and gradient.
+// Curved cells, one thread: nanoseconds per quadrature point for the energy, its gradient (and how much faster two
+// threads are) and products with its Hessian, and microseconds per cell for the proof that none is inverted, beside
+// those of an energy and gradient.
 #include "bench/hex_grid.h"
 #include "fit/high_order_certificate.h"
 #include "fit/high_order_energy.h"
@@ -55,15 +56,20 @@ void print_energy(const ElementSpace& space, const std::vector<Vec3>& nodes, int
   const double num_points = static_cast<double>(energy.num_points());
   const double value = best_microseconds(5, [&] { energy.value(nodes); });
   const double both = best_microseconds(5, [&] { energy.add_gradient(nodes, 1, gradient); });
+  omp_set_num_threads(2);
+  const double both_by_two = best_microseconds(5, [&] { energy.add_gradient(nodes, 1, gradient); });
+  omp_set_num_threads(1);
   const double second = best_microseconds(3, [&] { energy.linearize(nodes, 1, gradient); });
   const double multiply = best_microseconds(5, [&] { energy.multiply(gradient, product); });
   gradient_us_per_cell = both / static_cast<double>(space.num_cells());
   std::printf("%s\n  {\"kind\": \"%s\", \"basis\": \"%s\", \"order\": %d, \"points_per_cell\": %.0f, "
               "\"value_ns_per_point\": %.1f, \"gradient_ns_per_point\": %.1f, \"second_derivative_ns_per_point\": "
-              "%.1f, \"product_ns_per_point\": %.1f, \"gradient_us_per_cell\": %.1f",
+              "%.1f, \"product_ns_per_point\": %.1f, \"gradient_us_per_cell\": %.1f, "
+              "\"gradient_gain_of_two_threads\": %.2f",
               separator, cell_topology(space.kind(0)).name, to_string(space.basis()), order,
               num_points / static_cast<double>(space.num_cells()), 1e3 * value / num_points, 1e3 * both / num_points,
-              1e3 * second / num_points, 1e3 * multiply / num_points, gradient_us_per_cell);
+              1e3 * second / num_points, 1e3 * multiply / num_points, gradient_us_per_cell,
+              both / both_by_two);
 }
 
 /// Shares of a cell's edge by which modes are random.
