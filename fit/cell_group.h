@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fit/element_space.h"
-#include "fit/frozen_hencky.h"
+#include "fit/frozen_distortion.h"
 #include "fit/quadrature.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/distortion.h"
 #include "fit/element_rule.h"
-#include "fit/hencky.h"
 #include "fit/regularised_barrier.h"
 #include "subvol/cell_topology.h"
 
@@ -58,7 +58,7 @@ inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
 /// Adds K_ab = U Z_ab U^T for the active vertices of one point, a <= b: with w_a = V^T diag(1/h) grad N_a,
 ///   Z_ii = stretch_i w_ai w_bi + sum_{j != i} same_ij w_aj w_bj,   Z_ij = cross_ij w_aj w_bi + coupling_ij w_ai w_bj.
 template <bool kCoupled>
-void add_point_hessian(std::span<const ElementRule::Entry> entries, const HenckyBatch& batch,
+void add_point_hessian(std::span<const ElementRule::Entry> entries, const DistortionBatch& batch,
                        const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
   constexpr int kPairs = kMaxCellVertices;
   alignas(64) double w[kPairs][3][kLanes];
@@ -119,7 +119,7 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
 /// One of the distortions, at kAtOnce points.
 struct DistortionKernel {
   static constexpr int kAtOnce = 2;
-  using Batch = HenckyBatch;
+  using Batch = DistortionBatch;
   Batch batches[kAtOnce];
   const DistortionKernels& kernels;
 

@@ -98,7 +98,7 @@ void write_stage(const SolvedStage& stage, Writer& writer) {
 
 MinimizerStop stop_of(std::uint64_t number) {
   for (const MinimizerStop stop : {MinimizerStop::converged, MinimizerStop::iteration_limit, MinimizerStop::no_step,
-                                   MinimizerStop::cancelled})
+                                   MinimizerStop::cancelled, MinimizerStop::infeasible_start})
     if (number == static_cast<std::uint64_t>(stop)) return stop;
   throw InputError("a minimisation ends in no known way");
 }

@@ -38,8 +38,6 @@ struct FitProblem {
   double lambda;                          ///< > 0
 };
 
-enum class MinimizerStop { converged, iteration_limit, cancelled, no_step };
-
 struct MinimizerResult {
   MinimizerStop stop;
   std::string explanation;  ///< the test that fired, with its figure
@@ -75,7 +73,7 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
 /// that stand in the way get a denser quadrature for the steps to come. Where few points would make the step shorter than a
 /// half, the Hessian is made stiffer there (`VolumeTerm::stiffen`) and the direction found again.
 ///
-/// x  feasible start (finite E), else `no_step`; receives the result. With `begun`, where that was kept: it then ends
+/// x  feasible start (finite E), else `infeasible_start`; receives the result. With `begun`, where that was kept: it then ends
 ///    at the same bits as the minimisation that was interrupted would have. The problem must be as it was at the start
 ///    of that one, else InputError where a cell does not exist.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);

@@ -23,15 +23,18 @@ struct FitProgress {
 
 /// Why a solve ended. Everything but `input` problems (those throw) is told here, never by an exception.
 enum class StopReason {
-  converged,        ///< the last stage met its stop test (and the tolerance, where one was asked for)
+  converged,        ///< all stages done, each to its stop test or the steps the schedule gives it; tolerance met, if any
   tolerance_missed, ///< all stages done, but the distance asked for was not reached
-  iteration_limit,
+  iteration_limit,  ///< the last stage took all the steps that the options allow
   time_limit,
   memory_limit,     ///< the next level, or order, would take more memory than is allowed
   cancelled,        ///< the progress callback said so; the best state so far is returned
-  stalled           ///< a level could not be started or no step was possible without inverting a cell
+  stalled           ///< a level or stage could not be started without inverting a cell
 };
 const char* to_string(StopReason reason);
+
+/// Why one minimisation ended; infeasible_start: at once, for E is infinite there.
+enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
 
 /// One Newton (or L-BFGS) step.
 struct IterationRecord {
@@ -49,6 +52,7 @@ struct StageRecord {
   double lambda = 0, tangential_weight = 0;
   std::size_t unknowns = 0, cells = 0;
   std::vector<IterationRecord> iterations;
+  MinimizerStop ended = MinimizerStop::converged;
   std::string stop;                ///< which test ended it, with its figure
   bool kept = true;                ///< false: undone (the boundary came to intersect itself more, or shapes suffered)
   double seconds = 0;
@@ -66,10 +70,10 @@ struct FitReport {
   std::vector<std::string> warnings;       ///< audit: what the template's geometry cannot do, topology mismatch, ...
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...
 
-  /// Name of the last stage whose result was kept; empty: none was.
-  std::string last_kept_stage() const {
+  /// The last stage whose result was kept; null: none was.
+  const StageRecord* last_kept_stage() const {
     const auto stage = std::find_if(stages.rbegin(), stages.rend(), [](const StageRecord& s) { return s.kept; });
-    return stage == stages.rend() ? std::string() : stage->name;
+    return stage == stages.rend() ? nullptr : &*stage;
   }
 };
 

@@ -189,31 +189,31 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
 }
 
 /// The energy at the nodes, by kernel(batches, count) at all points. With kBack, what the batches add to their modes stays in
-/// local_. Calls per_point(group number, batch, q, hencky) when a point is done.
+/// local_. Calls per_point(group number, batch, q, point) when a point is done.
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
     const Wide cell_weight = group.cell_weights[b];
-    HenckyBatch hencky[CellSweep::kAtOnce];
-    for (HenckyBatch& batch : hencky) batch.floor = floor_;
+    DistortionBatch batches[CellSweep::kAtOnce];
+    for (DistortionBatch& batch : batches) batch.floor = floor_;
     Wide sum{};
     sweep.load(b, nodes);
     sweep.template run_several<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
       Wide f[9];
       for (int n = 0; n < count; ++n) {
         product(j[n], group.reference(b, first + n), f);
-        for (int e = 0; e < 9; ++e) store_wide(f[e], hencky[n].jacobian[e]);
+        for (int e = 0; e < 9; ++e) store_wide(f[e], batches[n].jacobian[e]);
       }
-      kernel(hencky, count);
+      kernel(batches, count);
       for (int n = 0; n < count; ++n) {
         const std::size_t q = first + n;
-        sum += group.weights[q] * load_wide(hencky[n].energy);
+        sum += group.weights[q] * load_wide(batches[n].energy);
         if constexpr (kBack) {
-          for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load_wide(hencky[n].stress[e]);
+          for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load_wide(batches[n].stress[e]);
           product_with_transpose(f, group.reference(b, q), j[n]);
         }
-        per_point(g, b, q, hencky[n]);
+        per_point(g, b, q, batches[n]);
       }
     });
     if constexpr (kBack) keep(group, b, sweep.coefficients());
@@ -225,7 +225,7 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
 
 namespace {
 
-constexpr auto kNothingMore = [](std::size_t, std::size_t, std::size_t, const HenckyBatch&) {};
+constexpr auto kNothingMore = [](std::size_t, std::size_t, std::size_t, const DistortionBatch&) {};
 
 }  // namespace
 
@@ -246,11 +246,11 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
     group.frozen.resize(kSize * group.num_points() * group.batches.size());
     group.mean_blocks.assign(54 * group.batches.size(), Wide{});
   }
-  const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const HenckyBatch& hencky) {
+  const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     CellGroup& group = groups_[g];
     Wide* frozen = &group.frozen[kSize * (b * group.num_points() + q)];
     const Wide weight = scale * cell_share() * group.weights[q] * group.cell_weights[b];
-    freeze<kCoupled>(hencky, group.reference(b, q), weight, frozen);
+    freeze<kCoupled>(batch, group.reference(b, q), weight, frozen);
     add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
   };
   const double energy = integrate<true>(nodes, kernels_->hessian, keep_point);

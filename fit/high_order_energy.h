@@ -3,7 +3,7 @@
 
 #include "fit/cell_reference.h"
 #include "fit/element_space.h"
-#include "fit/hencky.h"
+#include "fit/distortion.h"
 #include "fit/quadrature.h"
 #include "fit/volume_term.h"
 #include "fit/wide.h"
@@ -21,7 +21,7 @@ struct CellGroup;
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
 ///
-/// e is a distortion (`hencky.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge
+/// e is a distortion (`distortion.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge
 /// length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
 /// coefficients of edge, face and cell modes. Cells weigh equally unless weights are set, but those that were densified twice as much each
 /// time, up to 64: e grows too slowly towards inversion to keep them from it.

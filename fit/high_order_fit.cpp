@@ -74,6 +74,7 @@ class HighOrderFit {
   void set_orders(const EntityOrders& orders);
   FitProblem problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const;
   bool run_stage(const Stage& stage);
+  void undo_stage(std::vector<Vec3> coefficients, double mean_percent);
   void take_own_boxes();
   void begin_try(const HighOrderTry& attempt);
   bool run_order(Approach approach, int order);
@@ -92,7 +93,6 @@ class HighOrderFit {
   double keep_mean(double distance);
   double measured_mean();
   std::size_t intersecting_pairs() const;
-  void conclude();
 
   HighOrderFitOptions options_;
   FitTarget target_;
@@ -181,7 +181,7 @@ FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySample
 /// Keeps where the mesh is, under the name of what it came from.
 void HighOrderFit::keep_state() {
   if (!options_.keep_states) return;
-  states_.push_back({states_.empty() ? "template" : report_.last_kept_stage(), mesh_.coefficients});
+  states_.push_back({states_.empty() ? "template" : report_.last_kept_stage()->name, mesh_.coefficients});
 }
 
 bool HighOrderFit::run_stage(const Stage& stage) {
@@ -203,6 +203,14 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   return runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
 }
 
+/// Back to before the last stage.
+void HighOrderFit::undo_stage(std::vector<Vec3> coefficients, double mean_percent) {
+  mesh_.coefficients = std::move(coefficients);
+  mean_ = mean_percent;
+  if (!states_.empty()) states_.pop_back();
+  report_.stages.back().kept = false;
+}
+
 TriangleMesh HighOrderFit::boundary(int intervals) const {
   BoundarySamples fine = make_boundary_samples(mesh_.space, intervals);
   return {fine.positions.apply(mesh_.coefficients), std::move(fine.triangles)};
@@ -221,7 +229,9 @@ double HighOrderFit::measured_mean() {
   return mean_ ? *mean_ : keep_mean(target_.mean_distance(measured_boundary()));
 }
 
-std::size_t HighOrderFit::intersecting_pairs() const { return self_intersections(boundary(sample_intervals(order_) + 1)).pairs.size(); }
+std::size_t HighOrderFit::intersecting_pairs() const {
+  return self_intersections(boundary(sample_intervals(order_) + 1)).pairs.size();
+}
 
 bool HighOrderFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
@@ -321,14 +331,11 @@ bool HighOrderFit::lower_lambda() {
   std::size_t pairs = intersecting_pairs();
   for (double lambda = lambda_ / 2; !meets_tolerance() && lambda > 1e-3 * options_.lambda_close; lambda /= 2) {
     const double before = measured_mean();
-    const std::vector<Vec3> coefficients = mesh_.coefficients;
+    std::vector<Vec3> coefficients = mesh_.coefficients;
     if (!run_stage(schedule_.final_stage(lambda))) return false;
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now > pairs) {
-      mesh_.coefficients = coefficients;
-      if (!states_.empty()) states_.pop_back();
-      mean_ = before;
-      report_.stages.back().kept = false;
+      undo_stage(std::move(coefficients), before);
       break;
     }
     pairs = pairs_now;
@@ -355,7 +362,7 @@ bool HighOrderFit::lift_worst_cells() {
   cell_weights_.assign(mesh_.space.num_cells(), 1.0);
   const auto is_poor = [](double value) { return value > 0 && value < kGoodScaledJacobian; };
   for (int round = 0; round < kMostLifts && is_poor(now.least_scaled_jacobian); ++round) {
-    const std::vector<Vec3> coefficients = mesh_.coefficients;
+    std::vector<Vec3> coefficients = mesh_.coefficients;
     const double bad = std::min(kGoodScaledJacobian, kBadShare * now.least_scaled_jacobian);
     for (std::size_t c = 0; c < cell_weights_.size(); ++c)
       if (now.cell_minima[c] < bad) cell_weights_[c] *= kLiftWeight;
@@ -368,23 +375,12 @@ bool HighOrderFit::lift_worst_cells() {
     const bool worth_it = gain > std::max(1.0, loss) && lifted.mean_percent <= most_mean &&
                           lifted.max_percent <= most_max && lifted.pairs <= now.pairs;
     if (!worth_it) {
-      mesh_.coefficients = coefficients;
-      if (!states_.empty()) states_.pop_back();
-      mean_ = now.mean_percent;
-      report_.stages.back().kept = false;
+      undo_stage(std::move(coefficients), now.mean_percent);
       break;
     }
     now = std::move(lifted);
   }
   return true;
-}
-
-void HighOrderFit::conclude() {
-  const bool missed = options_.tolerance_percent && !meets_tolerance();
-  report_.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
-  report_.explanation = missed ? formatted("mean distance %.4g %% is above the tolerance of %.4g %%", measured_mean(),
-                                        *options_.tolerance_percent)
-                               : formatted("all stages done, mean distance %.4g %%", measured_mean());
 }
 
 std::vector<Vec3> HighOrderFit::in_target_units(std::vector<Vec3> coefficients) const {
@@ -399,7 +395,8 @@ HighOrderFitResult HighOrderFit::run() {
   look_over_template();
   const int first = std::min(schedule_.first_orders(options_.adaptive), options_.order);
   try {
-    if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders())) conclude();
+    if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders()))
+      runner_.conclude(measured_mean(), options_.tolerance_percent, report_);
   } catch (const std::bad_alloc&) {
     end_for_memory(formatted("no memory was left at order %d", order_));
   }

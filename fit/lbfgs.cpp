@@ -91,7 +91,7 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
   Value value = objective.evaluate(x, gradient);
   const bool guard = objective.certified(x);
   if (!std::isfinite(value.energy)) {
-    result.stop = MinimizerStop::no_step;
+    result.stop = MinimizerStop::infeasible_start;
     result.explanation = "the start has a cell that is inverted at a quadrature point";
     return result;
   }

@@ -175,7 +175,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     const double volume = problem.volume->linearize(y, problem.lambda, node_gradient);
     const double energy = surface + problem.lambda * volume;
     if (!std::isfinite(energy)) {
-      result.stop = MinimizerStop::no_step;
+      result.stop = MinimizerStop::infeasible_start;
       result.explanation = "the start has a cell that is inverted at a quadrature point";
       return result;
     }

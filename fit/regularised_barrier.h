@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/hencky.h"
+#include "fit/distortion.h"
 #include "subvol/types.h"
 
 namespace subvol {
@@ -13,7 +13,7 @@ namespace subvol {
 ///
 /// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of code (2021), with
 /// other weights: without regularisation (chi = D) it is 13/12 at rotations and agrees there with Hencky's energy
-/// (`hencky.h`) up to second order, so that one turns into the other as cells become positive and well shaped.
+/// (`distortion.h`) up to second order, so that one turns into the other as cells become positive and well shaped.
 ///
 /// The second derivative is that of a function of J and D that is convex once chi is replaced by its tangent; what is
 /// left out is the curvature of D and chi:
@@ -22,7 +22,7 @@ namespace subvol {
 ///
 /// Finite for finite J and eps > 0; no value is NaN.
 struct RegularisedBatch {
-  alignas(64) double jacobian[9][kLanes];                     ///< in: laid out as in `HenckyBatch`
+  alignas(64) double jacobian[9][kLanes];                     ///< in: laid out as in `DistortionBatch`
   alignas(64) double energy[kLanes];                          ///< > 0
   alignas(64) double stress[9][kLanes];                       ///< de/dJ
   alignas(64) double cofactor[9][kLanes];                     ///< C

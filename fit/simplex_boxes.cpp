@@ -27,15 +27,14 @@ void store_lanes(const Lanes& value, double* to) { std::memcpy(to, &value, sizeo
 
 /// Rows become columns.
 void transpose(Lanes (&x)[kLanes]) {
-  using Select = long long __attribute__((vector_size(sizeof(Lanes))));
-  const Lanes a = __builtin_shuffle(x[0], x[1], Select{0, 4, 2, 6});
-  const Lanes b = __builtin_shuffle(x[0], x[1], Select{1, 5, 3, 7});
-  const Lanes c = __builtin_shuffle(x[2], x[3], Select{0, 4, 2, 6});
-  const Lanes d = __builtin_shuffle(x[2], x[3], Select{1, 5, 3, 7});
-  x[0] = __builtin_shuffle(a, c, Select{0, 1, 4, 5});
-  x[1] = __builtin_shuffle(b, d, Select{0, 1, 4, 5});
-  x[2] = __builtin_shuffle(a, c, Select{2, 3, 6, 7});
-  x[3] = __builtin_shuffle(b, d, Select{2, 3, 6, 7});
+  const Lanes a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
+  const Lanes b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
+  const Lanes c = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
+  const Lanes d = __builtin_shufflevector(x[2], x[3], 1, 5, 3, 7);
+  x[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  x[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  x[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  x[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
 std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }

@@ -12,8 +12,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kRoundoff = SimplexPolynomial::kRoundoff;
-
 const std::array<double, 64>& factorials() {
   static const std::array<double, 64> table = [] {
     std::array<double, 64> result{1};

@@ -2,6 +2,7 @@
 #include "fit/stage_runner.h"
 
 #include "fit/closest_point_energy.h"
+#include "fit/option_checks.h"
 #include "fit/surface_energy.h"
 #include "subvol/error.h"
 #include "subvol/fingerprint.h"
@@ -65,6 +66,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   x = std::move(solved.x);
   record.seconds = solved.seconds;
   record.iterations = std::move(solved.result.iterations);
+  record.ended = solved.result.stop;
   record.stop = std::move(solved.result.explanation);
   const std::string name = record.name;
   report.stages.push_back(std::move(record));
@@ -81,6 +83,25 @@ bool StageRunner::in_time(const std::string& work, FitReport& report) const {
   report.stop_reason = StopReason::time_limit;
   report.explanation = "time limit reached in " + work;
   return false;
+}
+
+void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const {
+  const StageRecord* last = report.last_kept_stage();
+  if (last && last->ended == MinimizerStop::infeasible_start) {
+    report.stop_reason = StopReason::stalled;
+    report.explanation = last->name + " could not begin: " + last->stop;
+  } else if (tolerance_percent && mean_percent > *tolerance_percent) {
+    report.stop_reason = StopReason::tolerance_missed;
+    report.explanation =
+        formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
+  } else if (last && last->ended == MinimizerStop::iteration_limit && options_.max_iterations > 0) {
+    report.stop_reason = StopReason::iteration_limit;
+    report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
+                                   options_.max_iterations, mean_percent);
+  } else {
+    report.stop_reason = StopReason::converged;
+    report.explanation = formatted("all stages done, mean distance %.4g %%", mean_percent);
+  }
 }
 
 void StageRunner::solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const {

@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,6 +48,9 @@ class StageRunner {
 
   /// Asked before work that takes long. False, with the report's stop reason set, where the time is over.
   bool in_time(const std::string& work, FitReport& report) const;
+
+  /// Says how a fit ended whose stages are all done, at this mean distance.
+  void conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const;
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 

@@ -64,6 +64,7 @@ class SubdivisionFit {
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   bool run_stage(const Stage& stage, const std::string& name);
   bool run_stages();
+  void undo_stage(std::vector<Vec3> unknowns, std::optional<double> mean);
   bool unfold(const std::vector<Vec3>& start, std::size_t& pairs);
   bool lower_lambda(std::size_t pairs);
   TriangleMesh limit_triangles();
@@ -153,7 +154,7 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
 /// Keeps where the cage is, under the name of what it came from.
 void SubdivisionFit::keep_state() {
   if (!options_.keep_states) return;
-  states_.push_back({states_.empty() ? "template" : result_.report.last_kept_stage(), unknowns_});
+  states_.push_back({states_.empty() ? "template" : result_.report.last_kept_stage()->name, unknowns_});
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
@@ -255,33 +256,39 @@ bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
+/// Back to before the last stage, where the mean distance (percent) was this, if it is known.
+void SubdivisionFit::undo_stage(std::vector<Vec3> unknowns, std::optional<double> mean) {
+  unknowns_ = std::move(unknowns);
+  mean_ = mean;
+  if (!states_.empty()) states_.pop_back();
+  result_.report.stages.back().kept = false;
+}
+
 /// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself: thin
 /// walls that meet in a soft fit stay apart in a stiffer one. What has the fewest pairs is kept.
 bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) {
   for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= kMostUnfoldingLambda;
        lambda *= kUnfoldingFactor) {
     const Stage stage = schedule_.final_stage(lambda);
-    const std::vector<Vec3> before = std::exchange(unknowns_, start);
+    std::vector<Vec3> before = std::exchange(unknowns_, start);
     const double lambda_before = lambda_;
     if (!run_stage(stage, stage_name(stage))) return false;
-    if (!states_.empty()) states_.pop_back();  // the start, which is there already
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now < pairs) {
       pairs = pairs_now;
-      continue;
+      if (!states_.empty()) states_.pop_back();  // the start, which is there already
+    } else {
+      undo_stage(std::move(before), std::nullopt);
+      lambda_ = lambda_before;
     }
-    unknowns_ = before;
-    lambda_ = lambda_before;
-    mean_.reset();
-    result_.report.stages.back().kept = false;
   }
   return true;
 }
 
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
 /// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
-/// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too much of the shape in all,
-/// is undone.
+/// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too
+/// much of the shape in all, is undone.
 bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
@@ -293,16 +300,13 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
-    const std::vector<Vec3> before = unknowns_;
+    std::vector<Vec3> before = unknowns_;
     if (!run_stage(stage, stage_name(stage))) return false;
     const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
     const double loss = shape - mean_scaled_jacobian();
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
-      unknowns_ = before;
-      if (!states_.empty()) states_.pop_back();
-      mean_ = mean;
-      result_.report.stages.back().kept = false;
+      undo_stage(std::move(before), mean);
       break;
     }
     mean = measured_mean();
@@ -423,14 +427,7 @@ FitResult SubdivisionFit::run() {
     result_ = std::move(*best);
   }
   FitReport& report = result_.report;
-  if (done) {
-    const double mean = measured_mean();
-    const bool missed = options_.tolerance_percent && mean > *options_.tolerance_percent;
-    report.stop_reason = missed ? StopReason::tolerance_missed : StopReason::converged;
-    report.explanation = missed ? formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean,
-                                         *options_.tolerance_percent)
-                                : formatted("all stages done, mean distance %.4g %%", mean);
-  }
+  if (done) runner_.conclude(measured_mean(), options_.tolerance_percent, report);
   report.seconds.assign(seconds_.begin(), seconds_.end());
   return std::move(result_);
 }

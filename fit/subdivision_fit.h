@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fit/fit_report.h"
-#include "fit/hencky.h"
+#include "fit/distortion.h"
 #include "subvol/fit_state.h"
 #include "subvol/point_cloud.h"
 #include "subvol/subdivision.h"

@@ -3,8 +3,8 @@
 
 #include "fit/block_sparse.h"
 #include "fit/cell_reference.h"
+#include "fit/distortion.h"
 #include "fit/element_rule.h"
-#include "fit/hencky.h"
 #include "fit/volume_term.h"
 #include "subvol/volume_mesh.h"
 
@@ -18,7 +18,7 @@ namespace subvol {
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
-/// e is a distortion (`hencky.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point q
+/// e is a distortion (`distortion.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point q
 /// against its ideal cell: that of edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a hex's is the box of edges h_c), or a
 /// reference of its own. Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
 ///
@@ -57,7 +57,7 @@ class VolumeEnergy final : public VolumeTerm {
   /// The least det J_cq of each cell, into one place per cell (else InputError).
   void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const;
 
-  /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `hencky.h`) to
+  /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `distortion.h`) to
   /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both
   /// arguments are spoilt).
   double add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;

@@ -50,7 +50,7 @@ struct ShellResult {
 ///
 ///   E(x) = mean over cells and their corners of e(F),  F = dx/du A^-1
 ///
-/// is minimised, e being Hencky's energy (`hencky.h`) and A the polygon a cell stands on, as thick as its layer
+/// is minimised, e being Hencky's energy (`distortion.h`) and A the polygon a cell stands on, as thick as its layer
 /// (`shell_reference`); the surface's own vertices stay, or, where they are free, are drawn to it by
 /// `ClosestPointEnergy` (on real surfaces they leave it by a tenth of the thickness at most, `surface_distance_max`).
 /// Energies of single cells do not keep sheets apart: where faces meet afterwards the thickness asked for is lowered,

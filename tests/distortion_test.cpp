@@ -42,8 +42,8 @@ double by_definition(Distortion distortion, const Mat3& j) {
   return 0;
 }
 
-HenckyBatch evaluated(Distortion distortion, const Mat3& j, double floor = kHessianFloor) {
-  HenckyBatch batch;
+DistortionBatch evaluated(Distortion distortion, const Mat3& j, double floor = kHessianFloor) {
+  DistortionBatch batch;
   batch.floor = floor;
   for (int e = 0; e < 9; ++e)
     for (int l = 0; l < kLanes; ++l) batch.jacobian[e][l] = j(e / 3, e % 3);
@@ -58,7 +58,7 @@ Mat3 matrix(const double (*entries)[kLanes]) {
 }
 
 /// The second derivative as the batch describes it, by entries of J row by row.
-Tensor second_derivative(const HenckyBatch& batch, bool coupled) {
+Tensor second_derivative(const DistortionBatch& batch, bool coupled) {
   const Mat3 u = matrix(batch.u), v = matrix(batch.v);
   const auto outer = [&](int i, int j) {
     const Mat3 m = u.col(i) * v.col(j).transpose();
@@ -153,7 +153,7 @@ TEST_CASE("Distortions are what their definitions say, 0 where cells are ideal, 
       CHECK(std::abs(evaluated(distortion, 3 * turned).energy[0]) < 1e-14);
       CHECK(matrix(evaluated(distortion, 3 * turned).stress).norm() < 1e-14);
     }
-    const HenckyBatch inverted = evaluated(distortion, Vec3(1, 1, -1).asDiagonal());
+    const DistortionBatch inverted = evaluated(distortion, Vec3(1, 1, -1).asDiagonal());
     CHECK(inverted.energy[0] == std::numeric_limits<double>::infinity());
     CHECK(matrix(inverted.stress).norm() == 0);
     CHECK(second_derivative(inverted, distortion != Distortion::hencky).norm() == 0);
@@ -164,12 +164,12 @@ TEST_CASE("Distortions are what their definitions say, 0 where cells are ideal, 
 
 TEST_CASE("Batches of Jacobians worked on side by side give what they give alone") {
   for (Distortion distortion : kAll) {
-    std::vector<HenckyBatch> together, alone;
+    std::vector<DistortionBatch> together, alone;
     for (const Mat3& j : test_jacobians()) alone.push_back(evaluated(distortion, j));
     alone.push_back(evaluated(distortion, Vec3(1, 1, -1).asDiagonal()));
     if (alone.size() % 2 == 0) alone.push_back(evaluated(distortion, Vec3(1, 2, 3).asDiagonal()));
-    for (const HenckyBatch& batch : alone) {
-      HenckyBatch& copy = together.emplace_back();
+    for (const DistortionBatch& batch : alone) {
+      DistortionBatch& copy = together.emplace_back();
       copy.floor = batch.floor;
       std::copy_n(&batch.jacobian[0][0], 9 * kLanes, &copy.jacobian[0][0]);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/element_rule.h"
-#include "fit/hencky.h"
+#include "fit/distortion.h"
 #include "fit/volume_energy.h"
 
 #include <Eigen/Geometry>

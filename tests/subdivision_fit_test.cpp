@@ -213,6 +213,20 @@ TEST_CASE("A time limit ends the fit with a result") {
   CHECK(certify(result.mesh).all_certified());
 }
 
+TEST_CASE("A fit says when the steps allowed were not enough, and when its start was inverted") {
+  samples::Sample sample = samples::ball_sample();
+  FitOptions options = quick(1);
+  options.max_iterations = 1;
+  const FitReport short_of_steps = fit_subdivision_volume(sample.target, sample.template_mesh, options).report;
+  CHECK(short_of_steps.stop_reason == StopReason::iteration_limit);
+  CHECK(short_of_steps.stages.back().ended == MinimizerStop::iteration_limit);
+  CHECK(short_of_steps.explanation.find("all of the 1 steps allowed") != std::string::npos);
+  // A corner drawn through its cells.
+  sample.template_mesh.positions[sample.template_mesh.cell(0)[0]] *= -3;
+  const FitReport inverted = fit_subdivision_volume(sample.target, sample.template_mesh, quick(1)).report;
+  CHECK(inverted.stop_reason == StopReason::stalled);
+}
+
 TEST_CASE("Sharp edges of the target stay sharp, whether an angle or the template's tags tell of them") {
   samples::Sample sample = samples::bracket_sample();
   FitOptions options = quick();

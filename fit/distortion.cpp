@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/hencky.h"
+#include "fit/distortion.h"
 
 #include "fit/wide.h"
 
@@ -182,7 +182,7 @@ SUBVOL_INLINE LogModel log_model(const Wide* lambda, const Wide* x) {
 /// Second derivatives by singular values, clamped. e_i = f_i / s_i,  e_ij = (f_ij - delta_ij f_i) / (s_i s_j).
 template <Distortion kDistortion>
 SUBVOL_INLINE void store_second(const LogModel& f, const Wide* lambda, const Wide* inverse_s, const Wide& on,
-                                HenckyBatch& batch) {
+                                DistortionBatch& batch) {
   const Wide floor = wide(batch.floor);
   Wide s[3], g[3], stretch[3], coupling[3];
   for (int i = 0; i < 3; ++i) {
@@ -218,7 +218,7 @@ SUBVOL_INLINE void store_second(const LogModel& f, const Wide* lambda, const Wid
 /// Energy and derivatives from the eigenvalues and vectors of J^T J.
 template <Distortion kDistortion, Order kOrder>
 SUBVOL_INLINE void evaluate_at(const Wide* j, const WideBits& feasible, const Wide& trace, const Symmetric& eigen,
-                               HenckyBatch& batch) {
+                               DistortionBatch& batch) {
   Wide lambda[3], log_s[3];
   const auto& v = eigen.v;
   for (int i = 0; i < 3; ++i) {
@@ -253,7 +253,7 @@ SUBVOL_INLINE void evaluate_at(const Wide* j, const WideBits& feasible, const Wi
 }
 
 template <Distortion kDistortion, Order kOrder, int kMany>
-SUBVOL_INLINE void evaluate_some(HenckyBatch* batches) {
+SUBVOL_INLINE void evaluate_some(DistortionBatch* batches) {
   Wide j[kMany][9], trace[kMany];
   WideBits feasible[kMany];
   Symmetric eigen[kMany];
@@ -269,7 +269,7 @@ SUBVOL_INLINE void evaluate_some(HenckyBatch* batches) {
 }
 
 template <Distortion kDistortion, Order kOrder>
-void evaluate(HenckyBatch* batches, int count) {
+void evaluate(DistortionBatch* batches, int count) {
   int n = 0;
   for (; n + 2 <= count; n += 2) evaluate_some<kDistortion, kOrder, 2>(batches + n);
   if (n < count) evaluate_some<kDistortion, kOrder, 1>(batches + n);
@@ -299,14 +299,14 @@ const DistortionKernels& kernels_of(Distortion distortion) {
   return kKernels<Distortion::hencky>;
 }
 
-void hencky_energy(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::energy>(&batch, 1); }
+void hencky_energy(DistortionBatch& batch) { evaluate<Distortion::hencky, Order::energy>(&batch, 1); }
 
-void hencky_gradient(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::gradient>(&batch, 1); }
+void hencky_gradient(DistortionBatch& batch) { evaluate<Distortion::hencky, Order::gradient>(&batch, 1); }
 
-void hencky_hessian(HenckyBatch& batch) { evaluate<Distortion::hencky, Order::hessian>(&batch, 1); }
+void hencky_hessian(DistortionBatch& batch) { evaluate<Distortion::hencky, Order::hessian>(&batch, 1); }
 
 double hencky(const Mat3& jacobian, Mat3* stress) {
-  HenckyBatch batch;
+  DistortionBatch batch;
   for (int k = 0; k < 9; ++k)
     for (int l = 0; l < kLanes; ++l) batch.jacobian[k][l] = jacobian(k / 3, k % 3);
   hencky_gradient(batch);

@@ -35,7 +35,7 @@ inline constexpr double kHessianFloor = 0.01;
 /// stands for g_i, and the stretches are coupled: the matrix of d2e/ds_i ds_j has its eigenvalues raised as a whole.
 ///
 /// Infeasible: det J <= 0 gives energy +infinity and zero derivatives. Never NaN for finite J.
-struct HenckyBatch {
+struct DistortionBatch {
   alignas(64) double jacobian[9][kLanes];    ///< in: J row by row; rows are world x, y, z, columns reference directions
   alignas(64) double energy[kLanes];         ///< e(J), dimensionless, >= 0
   alignas(64) double stress[9][kLanes];      ///< de/dJ, laid out like J
@@ -52,19 +52,19 @@ struct HenckyBatch {
 /// What is done at points for one distortion. Each fills what comes before it, too. Of several batches two are worked on
 /// side by side, which takes less time than one after the other; what comes out is the same but for rounding.
 struct DistortionKernels {
-  void (*energy)(HenckyBatch* batches, int count);    ///< `energy`
-  void (*gradient)(HenckyBatch* batches, int count);  ///< and `stress`
-  void (*hessian)(HenckyBatch* batches, int count);   ///< everything
+  void (*energy)(DistortionBatch* batches, int count);    ///< `energy`
+  void (*gradient)(DistortionBatch* batches, int count);  ///< and `stress`
+  void (*hessian)(DistortionBatch* batches, int count);   ///< everything
   bool coupled;                    ///< whether stretches are coupled
 };
 const DistortionKernels& kernels_of(Distortion distortion);
 
 /// Hencky's. Fills `energy`. Cost: one symmetric 3x3 eigenvalue computation per lane.
-void hencky_energy(HenckyBatch& batch);
+void hencky_energy(DistortionBatch& batch);
 /// Fills `energy` and `stress`.
-void hencky_gradient(HenckyBatch& batch);
+void hencky_gradient(DistortionBatch& batch);
 /// Fills everything.
-void hencky_hessian(HenckyBatch& batch);
+void hencky_hessian(DistortionBatch& batch);
 
 /// The same for one Jacobian: e(J), +infinity where det J <= 0; `stress` (may be null) receives de/dJ.
 double hencky(const Mat3& jacobian, Mat3* stress = nullptr);

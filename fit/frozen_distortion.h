@@ -7,7 +7,7 @@ namespace subvol {
 
 /// The second derivative of a distortion at points of eight cells, as numbers that are kept while conjugate gradients
 /// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), and where stretches are
-/// coupled coupling (3), as in `hencky.h`, R being A^-1 and all after it multiplied by the point's weight. Inlined
+/// coupled coupling (3), as in `distortion.h`, R being A^-1 and all after it multiplied by the point's weight. Inlined
 /// everywhere: kept in memory between its steps, a product takes several times as long.
 inline constexpr int frozen_size(bool coupled) { return coupled ? 30 : 27; }
 inline constexpr int kMostFrozen = frozen_size(true);
@@ -16,17 +16,17 @@ inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2,
 
 /// Writes a point's numbers. `weight` multiplies the second derivative.
 template <bool kCoupled>
-[[gnu::always_inline]] inline void freeze(const HenckyBatch& hencky, const Wide* reference, const Wide& weight,
+[[gnu::always_inline]] inline void freeze(const DistortionBatch& batch, const Wide* reference, const Wide& weight,
                                           Wide* frozen) {
   Wide v[9];
-  for (int e = 0; e < 9; ++e) frozen[e] = load_wide(hencky.u[e]);
-  for (int e = 0; e < 9; ++e) v[e] = load_wide(hencky.v[e]);
+  for (int e = 0; e < 9; ++e) frozen[e] = load_wide(batch.u[e]);
+  for (int e = 0; e < 9; ++e) v[e] = load_wide(batch.v[e]);
   product(reference, v, frozen + 9);
   for (int i = 0; i < 3; ++i) {
-    frozen[18 + i] = weight * load_wide(hencky.stretch[i]);
-    frozen[21 + i] = weight * load_wide(hencky.pair_same[i]);
-    frozen[24 + i] = weight * load_wide(hencky.pair_cross[i]);
-    if constexpr (kCoupled) frozen[27 + i] = weight * load_wide(hencky.coupling[i]);
+    frozen[18 + i] = weight * load_wide(batch.stretch[i]);
+    frozen[21 + i] = weight * load_wide(batch.pair_same[i]);
+    frozen[24 + i] = weight * load_wide(batch.pair_cross[i]);
+    if constexpr (kCoupled) frozen[27 + i] = weight * load_wide(batch.coupling[i]);
   }
 }
 
