@@ -25,7 +25,7 @@ struct FitProgress {
 enum class StopReason {
   converged,        ///< all stages done, each to its stop test or the steps the schedule gives it; tolerance met, if any
   tolerance_missed, ///< all stages done, but the distance asked for was not reached
-  iteration_limit,  ///< the last stage took all the steps that the options allow
+  iteration_limit,  ///< the last stage took all the steps that the options allow, and no tolerance tells that it may
   time_limit,
   memory_limit,     ///< the next level, or order, would take more memory than is allowed
   cancelled,        ///< the progress callback said so; the best state so far is returned
@@ -54,7 +54,8 @@ struct StageRecord {
   std::vector<IterationRecord> iterations;
   MinimizerStop ended = MinimizerStop::converged;
   std::string stop;                ///< which test ended it, with its figure
-  bool kept = true;                ///< false: undone (the boundary came to intersect itself more, or shapes suffered)
+  bool kept = true;                ///< false: undone (the boundary came to intersect itself more, shapes suffered, the
+                                   ///< fit was interrupted in one that was not asked for), or of a try that was given up
   double seconds = 0;
   double mean_distance_percent = -1;  ///< after the stage, per cent of the diagonal; negative: not measured
 };
@@ -71,9 +72,14 @@ struct FitReport {
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...
 
   /// The last stage whose result was kept; null: none was.
-  const StageRecord* last_kept_stage() const {
+  StageRecord* last_kept_stage() {
     const auto stage = std::find_if(stages.rbegin(), stages.rend(), [](const StageRecord& s) { return s.kept; });
     return stage == stages.rend() ? nullptr : &*stage;
+  }
+
+  /// Notes that the results of the stages [begin, end) were not kept.
+  void undo_stages(std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) stages[i].kept = false;
   }
 };
 

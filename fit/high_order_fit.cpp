@@ -74,7 +74,8 @@ class HighOrderFit {
   void set_orders(const EntityOrders& orders);
   FitProblem problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const;
   bool run_stage(const Stage& stage);
-  void undo_stage(std::vector<Vec3> coefficients, double mean_percent);
+  FitSnapshot snapshot() const;
+  void go_back(FitSnapshot snapshot);
   void take_own_boxes();
   void begin_try(const HighOrderTry& attempt);
   bool run_order(Approach approach, int order);
@@ -203,12 +204,16 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   return runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
 }
 
-/// Back to before the last stage.
-void HighOrderFit::undo_stage(std::vector<Vec3> coefficients, double mean_percent) {
-  mesh_.coefficients = std::move(coefficients);
-  mean_ = mean_percent;
-  if (!states_.empty()) states_.pop_back();
-  report_.stages.back().kept = false;
+FitSnapshot HighOrderFit::snapshot() const {
+  return {mesh_.coefficients, lambda_, mean_, report_.stages.size(), states_.size()};
+}
+
+void HighOrderFit::go_back(FitSnapshot snapshot) {
+  mesh_.coefficients = std::move(snapshot.x);
+  lambda_ = snapshot.lambda;
+  mean_ = snapshot.mean_percent;
+  states_.resize(snapshot.num_states);
+  report_.undo_stages(snapshot.num_stages, report_.stages.size());
 }
 
 TriangleMesh HighOrderFit::boundary(int intervals) const {
@@ -221,7 +226,7 @@ TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sampl
 
 double HighOrderFit::keep_mean(double distance) {
   mean_ = 100 * distance;
-  if (!report_.stages.empty()) report_.stages.back().mean_distance_percent = *mean_;
+  if (StageRecord* stage = report_.last_kept_stage()) stage->mean_distance_percent = *mean_;
   return *mean_;
 }
 
@@ -271,16 +276,20 @@ bool HighOrderFit::run_first_orders(int last) {
     std::vector<Vec3> ideal_boxes;
     Approach approach;
     std::vector<FitState> states;
+    std::size_t stages_begin, stages_end;  ///< in the report
   };
   std::optional<Arrival> best;
+  const std::size_t stages_before = report_.stages.size();
   for (const HighOrderTry& attempt : schedule_.tries) {
+    const std::size_t stages_begin = report_.stages.size();
     begin_try(attempt);
     for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
       if (!run_order(attempt.approach, order)) return false;
     if (schedule_.tries.size() == 1) return true;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
-    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_, states_};
+    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_, states_,
+                    stages_begin, report_.stages.size()};
     const bool better = !best || std::tuple(arrival.pairs > 0, arrival.mean) < std::tuple(best->pairs > 0, best->mean);
     if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
@@ -290,6 +299,8 @@ bool HighOrderFit::run_first_orders(int last) {
   ideal_boxes_ = std::move(best->ideal_boxes);
   approach_ = best->approach;
   states_ = std::move(best->states);
+  report_.undo_stages(stages_before, best->stages_begin);
+  report_.undo_stages(best->stages_end, report_.stages.size());
   set_orders(EntityOrders(mesh_.space.orders()));
   return true;
 }
@@ -325,18 +336,18 @@ bool HighOrderFit::run_adaptive_orders() {
 }
 
 /// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the surface
-/// intersect itself more is undone.
+/// intersect itself more, or is not done, is undone.
 bool HighOrderFit::lower_lambda() {
   if (!options_.tolerance_percent || meets_tolerance()) return true;
   std::size_t pairs = intersecting_pairs();
   for (double lambda = lambda_ / 2; !meets_tolerance() && lambda > 1e-3 * options_.lambda_close; lambda /= 2) {
     const double before = measured_mean();
-    std::vector<Vec3> coefficients = mesh_.coefficients;
-    if (!run_stage(schedule_.final_stage(lambda))) return false;
-    const std::size_t pairs_now = intersecting_pairs();
-    if (pairs_now > pairs) {
-      undo_stage(std::move(coefficients), before);
-      break;
+    FitSnapshot stiffer = snapshot();
+    const bool going = run_stage(schedule_.final_stage(lambda));
+    const std::size_t pairs_now = going ? intersecting_pairs() : 0;
+    if (!going || pairs_now > pairs) {
+      go_back(std::move(stiffer));
+      return going;
     }
     pairs = pairs_now;
     if (1 - measured_mean() / before < kLeastGain) break;
@@ -362,20 +373,23 @@ bool HighOrderFit::lift_worst_cells() {
   cell_weights_.assign(mesh_.space.num_cells(), 1.0);
   const auto is_poor = [](double value) { return value > 0 && value < kGoodScaledJacobian; };
   for (int round = 0; round < kMostLifts && is_poor(now.least_scaled_jacobian); ++round) {
-    std::vector<Vec3> coefficients = mesh_.coefficients;
+    FitSnapshot unlifted = snapshot();
     const double bad = std::min(kGoodScaledJacobian, kBadShare * now.least_scaled_jacobian);
     for (std::size_t c = 0; c < cell_weights_.size(); ++c)
       if (now.cell_minima[c] < bad) cell_weights_[c] *= kLiftWeight;
     Stage stage = schedule_.final_stage(lambda_);
     stage.max_iterations = kLiftSteps;
-    if (!run_stage(stage)) return false;
+    if (!run_stage(stage)) {
+      go_back(std::move(unlifted));
+      return false;
+    }
     Outcome lifted = measured_outcome();
     const double gain = lifted.least_scaled_jacobian / now.least_scaled_jacobian;
     const double loss = std::max(lifted.mean_percent / now.mean_percent, lifted.max_percent / now.max_percent);
     const bool worth_it = gain > std::max(1.0, loss) && lifted.mean_percent <= most_mean &&
                           lifted.max_percent <= most_max && lifted.pairs <= now.pairs;
     if (!worth_it) {
-      undo_stage(std::move(coefficients), now.mean_percent);
+      go_back(std::move(unlifted));
       break;
     }
     now = std::move(lifted);

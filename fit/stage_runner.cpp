@@ -94,7 +94,7 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
     report.stop_reason = StopReason::tolerance_missed;
     report.explanation =
         formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
-  } else if (last && last->ended == MinimizerStop::iteration_limit && options_.max_iterations > 0) {
+  } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit && options_.max_iterations > 0) {
     report.stop_reason = StopReason::iteration_limit;
     report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
                                    options_.max_iterations, mean_percent);

@@ -64,8 +64,9 @@ class SubdivisionFit {
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   bool run_stage(const Stage& stage, const std::string& name);
   bool run_stages();
-  void undo_stage(std::vector<Vec3> unknowns, std::optional<double> mean);
-  bool unfold(const std::vector<Vec3>& start, std::size_t& pairs);
+  FitSnapshot snapshot() const;
+  void go_back(FitSnapshot snapshot);
+  bool unfold(const FitSnapshot& start, std::size_t& pairs);
   bool lower_lambda(std::size_t pairs);
   TriangleMesh limit_triangles();
   double measured_mean();
@@ -234,7 +235,7 @@ double SubdivisionFit::measured_mean() {
   double mean = 0;
   for (const TriangleMesh& surface : surfaces) mean = std::max(mean, target_.mean_distance(surface));
   mean_ = 100 * mean;
-  if (!result_.report.stages.empty()) result_.report.stages.back().mean_distance_percent = *mean_;
+  if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
   seconds_["distance"] += runner_.seconds() - begin;
   return *mean_;
 }
@@ -256,31 +257,36 @@ bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
-/// Back to before the last stage, where the mean distance (percent) was this, if it is known.
-void SubdivisionFit::undo_stage(std::vector<Vec3> unknowns, std::optional<double> mean) {
-  unknowns_ = std::move(unknowns);
-  mean_ = mean;
-  if (!states_.empty()) states_.pop_back();
-  result_.report.stages.back().kept = false;
+FitSnapshot SubdivisionFit::snapshot() const {
+  return {unknowns_, lambda_, mean_, result_.report.stages.size(), states_.size()};
+}
+
+void SubdivisionFit::go_back(FitSnapshot snapshot) {
+  unknowns_ = std::move(snapshot.x);
+  lambda_ = snapshot.lambda;
+  mean_ = snapshot.mean_percent;
+  states_.resize(snapshot.num_states);
+  result_.report.undo_stages(snapshot.num_stages, result_.report.stages.size());
 }
 
 /// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself: thin
-/// walls that meet in a soft fit stay apart in a stiffer one. What has the fewest pairs is kept.
-bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) {
+/// walls that meet in a soft fit stay apart in a stiffer one. Kept where that leaves at most half of the pairs.
+bool SubdivisionFit::unfold(const FitSnapshot& start, std::size_t& pairs) {
   for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= kMostUnfoldingLambda;
        lambda *= kUnfoldingFactor) {
     const Stage stage = schedule_.final_stage(lambda);
-    std::vector<Vec3> before = std::exchange(unknowns_, start);
-    const double lambda_before = lambda_;
-    if (!run_stage(stage, stage_name(stage))) return false;
-    const std::size_t pairs_now = intersecting_pairs();
-    if (pairs_now < pairs) {
+    FitSnapshot softer = snapshot();
+    unknowns_ = start.x;
+    const bool going = run_stage(stage, stage_name(stage));
+    const std::size_t pairs_now = going ? intersecting_pairs() : pairs;
+    if (pairs_now <= pairs / 2) {
       pairs = pairs_now;
-      if (!states_.empty()) states_.pop_back();  // the start, which is there already
+      result_.report.undo_stages(start.num_stages, softer.num_stages);
+      states_.resize(std::min(states_.size(), start.num_states + 1));  // up to the start, from which it went
     } else {
-      undo_stage(std::move(before), std::nullopt);
-      lambda_ = lambda_before;
+      go_back(std::move(softer));
     }
+    if (!going) return false;
   }
   return true;
 }
@@ -288,25 +294,28 @@ bool SubdivisionFit::unfold(const std::vector<Vec3>& start, std::size_t& pairs) 
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
 /// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
 /// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too
-/// much of the shape in all, is undone.
+/// much of the shape in all, or is not done, is undone.
 bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
   const auto distortion = [this] {
-    const auto& iterations = result_.report.stages.back().iterations;
-    return iterations.empty() ? 0 : iterations.back().volume_energy;
+    const StageRecord* stage = result_.report.last_kept_stage();
+    return !stage || stage->iterations.empty() ? 0 : stage->iterations.back().volume_energy;
   };
   double mean = measured_mean(), volume = distortion();
   const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
     const Stage stage = schedule_.final_stage(lambda);
-    std::vector<Vec3> before = unknowns_;
-    if (!run_stage(stage, stage_name(stage))) return false;
+    FitSnapshot stiffer = snapshot();
+    if (!run_stage(stage, stage_name(stage))) {
+      go_back(std::move(stiffer));
+      return false;
+    }
     const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
     const double loss = shape - mean_scaled_jacobian();
     const std::size_t pairs_now = intersecting_pairs();
     if (pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
-      undo_stage(std::move(before), mean);
+      go_back(std::move(stiffer));
       break;
     }
     mean = measured_mean();
@@ -318,7 +327,7 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
 }
 
 bool SubdivisionFit::run_stages() {
-  const std::vector<Vec3> start = unknowns_;
+  const FitSnapshot start = snapshot();
   for (const Stage& stage : schedule_.stages(number_)) {
     if (!run_stage(stage, stage_name(stage))) return false;
     if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) break;

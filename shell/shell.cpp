@@ -240,6 +240,7 @@ MinimizerStop ShellMaker::solve(int round) {
                 0.95 - 0.85 * std::pow(0.5, round) * (1 - 0.5 * in_round));
   };
   MinimizerResult found = minimize_newton(problem, unknowns, minimizer);
+  stage.ended = found.stop;
   stage.iterations = std::move(found.iterations);
   stage.stop = std::move(found.explanation);
   stage.seconds = seconds() - before;
@@ -258,7 +259,8 @@ void ShellMaker::optimize() {
     if (apart && report_.explanation.empty()) {
       report_.explanation = report_.stages.back().stop;
       if (stop == MinimizerStop::iteration_limit) report_.stop_reason = StopReason::iteration_limit;
-      if (stop == MinimizerStop::no_step) report_.stop_reason = StopReason::stalled;
+      if (stop == MinimizerStop::no_step || stop == MinimizerStop::infeasible_start)
+        report_.stop_reason = StopReason::stalled;
     }
     if (apart) break;
     for (const Index strand : check_.strands(failures)) thickness_[strand] *= kShrink;

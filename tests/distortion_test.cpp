@@ -235,12 +235,12 @@ TEST_CASE("Fits reach the surface with every distortion, with valid cells") {
   for (Distortion distortion : kAll) {
     CAPTURE(to_string(distortion));
     const FitResult linear =
-        fit_subdivision_volume(sample.target, sample.template_mesh, {.levels = 1, .distortion = distortion, .max_iterations = 8});
+        fit_subdivision_volume(sample.target, sample.template_mesh, {.levels = 1, .distortion = distortion});
     CHECK(linear.report.stop_reason == StopReason::converged);
     CHECK(check_mesh(linear.mesh).valid());
     CHECK(check_mesh(linear.mesh, &sample.target).mean_distance_percent() < 2.6);
     const HighOrderFitResult curved =
-        fit_high_order(sample.target, sample.template_mesh, {.order = 2, .distortion = distortion, .max_iterations = 8});
+        fit_high_order(sample.target, sample.template_mesh, {.order = 2, .distortion = distortion});
     CHECK(curved.report.stop_reason == StopReason::converged);
     CHECK(measure_quality(curved.mesh).inverted_cells == 0);
   }

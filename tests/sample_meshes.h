@@ -40,6 +40,19 @@ inline VolumeMesh lattice(int nx, int ny, int nz) {
   return voxels(nx, ny, nz, [](int, int, int) { return true; });
 }
 
+/// One hex whose top is turned and moved: inverted in its middle, though its corners are positive.
+inline VolumeMesh hex_inverted_inside() {
+  VolumeMesh mesh = lattice(1, 1, 1);
+  const double c = std::cos(3.0), s = std::sin(3.0);
+  for (Vec3& p : mesh.positions) {
+    if (p.z() < 0.5) continue;
+    const double x = p.x() - 0.5, y = p.y() - 0.5;
+    p.x() = 0.5 + c * x - s * y + (x * y > 0 ? 0.4 : -0.4);
+    p.y() = 0.5 + s * x + c * y;
+  }
+  return mesh;
+}
+
 /// An L of 3 columns, extruded to `height` layers: one crease of 270 degrees with 3 cells around it.
 inline VolumeMesh l_shape(int height) {
   return voxels(2, 2, height, [](int i, int j, int) { return i == 0 || j == 0; });
