@@ -103,7 +103,7 @@ class HighOrderFit {
   HighOrderMesh mesh_;
   BoundarySamples samples_;
   std::vector<FitState> states_;  ///< of the current try, in the current orders
-  int try_ = 0;              ///< tries begun
+  int try_ = 0;              ///< number of the current try, from 1
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< the highest of any entity
   double lambda_ = 0;        ///< of the last stage
@@ -276,6 +276,7 @@ bool HighOrderFit::run_first_orders(int last) {
     std::vector<Vec3> ideal_boxes;
     Approach approach;
     std::vector<FitState> states;
+    int number;  ///< of the try
     std::size_t stages_begin, stages_end;  ///< in the report
   };
   std::optional<Arrival> best;
@@ -289,7 +290,7 @@ bool HighOrderFit::run_first_orders(int last) {
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
     Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_, states_,
-                    stages_begin, report_.stages.size()};
+                    try_, stages_begin, report_.stages.size()};
     const bool better = !best || std::tuple(arrival.pairs > 0, arrival.mean) < std::tuple(best->pairs > 0, best->mean);
     if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
@@ -299,6 +300,7 @@ bool HighOrderFit::run_first_orders(int last) {
   ideal_boxes_ = std::move(best->ideal_boxes);
   approach_ = best->approach;
   states_ = std::move(best->states);
+  try_ = best->number;
   report_.undo_stages(stages_before, best->stages_begin);
   report_.undo_stages(best->stages_end, report_.stages.size());
   set_orders(EntityOrders(mesh_.space.orders()));
