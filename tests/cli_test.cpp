@@ -446,12 +446,18 @@ TEST_CASE("Bad files are refused by every verb, quickly and without a trace", "[
                                           "subdivide " + path + " --levels 1 -o out.mesh",
                                           "template split " + path + " --into tets -o out.mesh",
                                           "template carve " + path + " --list 0 -o out.mesh",
+                                          "template pillow " + path + " -o out.mesh",
+                                          "template refine " + path + " --list 0 -o out.mesh",
+                                          "template merge " + path + " -o out.mesh",
+                                          "template collapse " + path + " --vertices 0 1 -o out.mesh",
+                                          "optimize " + path + " --order 2 --target target.off -o out.vtk",
                                           "check " + path, "convert " + path + " -o out.vtk"}
                : std::vector<std::string>{"fit " + path + " --levels 1 --template template.mesh -o out.mesh",
                                           "fit " + path + " --levels 1 -o out.mesh",
                                           "optimize template.mesh --max-iterations 2 --target " + path + " -o out.mesh",
                                           "shell " + path + " --thickness 1% -o out.mesh",
                                           "template auto " + path + " -o out.mesh",
+                                          "template extrude " + path + " --thickness 0.1 -o out.mesh",
                                           "check template.mesh --target " + path, "convert " + path + " -o out.obj"};
     for (const std::string& command : commands) {
       for (const char* output : {"out.mesh", "out.vtk", "out.obj"}) fs::remove(place / output);
