@@ -2,6 +2,7 @@
 #include "fit/certificate.h"
 
 #include "fit/bernstein.h"
+#include "fit/parallel_errors.h"
 #include "subvol/error.h"
 
 #include <algorithm>
@@ -334,12 +335,15 @@ CertificateSummary certify(std::span<const Vec3> positions, const VolumeMesh& me
   for (std::size_t c = 0; c < validity.size(); ++c)
     if (validity[c] == CellValidity::undecided) open.push_back(c);
   if (options.max_depth > 0) {
+    ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic, 16)
-    for (std::size_t i = 0; i < open.size(); ++i) {
-      const std::size_t c = open[i];
-      const auto corners = gather_cell(positions, mesh, c);
-      validity[c] = certify_checked(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, options).validity;
-    }
+    for (std::size_t i = 0; i < open.size(); ++i)
+      errors.guard([&] {
+        const std::size_t c = open[i];
+        const auto corners = gather_cell(positions, mesh, c);
+        validity[c] = certify_checked(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, options).validity;
+      });
+    errors.rethrow();
   }
   return summarize(validity);
 }

@@ -2,6 +2,7 @@
 #include "fit/high_order_certificate.h"
 
 #include "fit/hex_boxes.h"
+#include "fit/parallel_errors.h"
 #include "fit/simplex_boxes.h"
 #include "subvol/error.h"
 
@@ -12,6 +13,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace subvol {
@@ -228,12 +230,16 @@ CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coef
     throw InputError("certificate: " + std::to_string(coefficients.size()) + " coefficients for " +
                      std::to_string(space.num_nodes()) + " nodes");
   std::vector<CellValidity> validity(space.num_cells());
+  ParallelErrors errors;
 #pragma omp parallel
   {
-    HighOrderCertifier certifier(space, options);
+    std::optional<HighOrderCertifier> certifier;
+    errors.guard([&] { certifier.emplace(space, options); });
 #pragma omp for schedule(dynamic, 4)
-    for (std::size_t c = 0; c < validity.size(); ++c) validity[c] = certifier.certify(coefficients, c).validity;
+    for (std::size_t c = 0; c < validity.size(); ++c)
+      errors.guard([&] { validity[c] = certifier->certify(coefficients, c).validity; });
   }
+  errors.rethrow();
   return summarize(validity);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "element_fixtures.h"
 #include "fit/high_order_certificate.h"
+#include "fit/parallel_errors.h"
 #include "subvol/error.h"
 
 #include <Eigen/LU>
@@ -234,4 +235,24 @@ TEST_CASE("cells that touch zero or are not finite stay undecided, wrong options
   CHECK_THROWS_AS(certify(space, std::span(good.coefficients).first(3)), InputError);
   CHECK_THROWS_AS(certify(space, good.coefficients, {.max_depth = -1}), InputError);
   CHECK_THROWS_AS(HighOrderCertifier(space, {.max_boxes = 0}), InputError);
+}
+
+TEST_CASE("What is thrown in a parallel region is thrown again after it", "[high_order_certificate]") {
+  for (const int bad : {-1, 0, 57, 99}) {
+    ParallelErrors errors;
+    int done = 0;
+#pragma omp parallel for num_threads(4) reduction(+ : done)
+    for (int i = 0; i < 100; ++i)
+      errors.guard([&] {
+        if (i == bad) throw std::bad_alloc();
+        ++done;
+      });
+    if (bad < 0) {
+      CHECK_NOTHROW(errors.rethrow());
+      CHECK(done == 100);
+    } else {
+      CHECK_THROWS_AS(errors.rethrow(), std::bad_alloc);
+      CHECK(done < 100);
+    }
+  }
 }

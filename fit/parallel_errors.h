@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <exception>
+#include <mutex>
+
+namespace subvol {
+
+/// Carries an exception out of a parallel region, where one that leaves a thread's work would end the program.
+///
+///   ParallelErrors errors;
+///   #pragma omp parallel for
+///   for (..) errors.guard([&] { work(); });
+///   errors.rethrow();
+///
+/// The first one that is met is kept; work that comes after it is left out.
+class ParallelErrors {
+ public:
+  template <class Work>
+  void guard(const Work& work) noexcept {
+    try {
+      if (!any()) work();
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (!error_) error_ = std::current_exception();
+    }
+  }
+  /// After the region: throws what was met in it, if anything.
+  void rethrow() {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  bool any() {
+    const std::lock_guard lock(mutex_);
+    return error_ != nullptr;
+  }
+
+  std::mutex mutex_;
+  std::exception_ptr error_;
+};
+
+}  // namespace subvol
