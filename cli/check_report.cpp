@@ -68,6 +68,7 @@ Json defects_json(const MeshCheck& check) {
 
 Json check_json(const MeshCheck& check) {
   Json json{{"valid", check.valid()}};
+  if (check.ended_early) json["ended_early"] = true;
   if (check.distance) json["distance"] = distance_json(*check.distance, check.target_diagonal);
   if (check.orders) json["orders"] = orders_json(*check.orders);
   if (check.quality) json["quality"] = quality_json(*check.quality);

@@ -6,12 +6,14 @@
 #include "fit/high_order_quality.h"
 #include "fit/self_intersection.h"
 #include "subvol/boundary.h"
+#include "subvol/error.h"
 #include "subvol/mesh_topology.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdio>
 #include <functional>
+#include <memory>
 #include <numeric>
 
 namespace subvol {
@@ -87,24 +89,38 @@ double enclosed_volume(const TriangleMesh& surface) {
 using Compare = std::function<void(const TriangleMesh& boundary, MeshCheck& check)>;
 
 Compare comparison(const TriangleMesh* target, const MeshCheckOptions& options) {
+  if (options.distance_samples < 1)
+    throw InputError("mesh check: distance_samples is " + std::to_string(options.distance_samples) +
+                     ", expected 1 or more");
   if (!target) return {};
-  return [target, samples = options.distance_samples](const TriangleMesh& boundary, MeshCheck& check) {
+  const auto tree = std::make_shared<const ClosestPoint>(*target);
+  return [target, tree, samples = options.distance_samples](const TriangleMesh& boundary, MeshCheck& check) {
     check.target_diagonal = bounding_box_diagonal(*target);
-    check.distance = surface_distance(boundary, *target, {.num_samples = samples});
+    check.distance = surface_distance(boundary, ClosestPoint(boundary), *target, *tree, {.num_samples = samples});
   };
 }
 
 Compare comparison(const PointCloud* target) {
   if (!target) return {};
+  if (target->points.empty()) throw InputError("mesh check: the cloud has no points");
+  for (std::size_t j = 0; j < target->points.size(); ++j)
+    if (!target->points[j].allFinite())
+      throw InputError("mesh check: point " + std::to_string(j) + " of the cloud is not finite");
   return [target](const TriangleMesh& boundary, MeshCheck& check) {
     check.target_diagonal = bounding_box_diagonal(*target);
     check.distance = surface_distance(boundary, *target);
   };
 }
 
+/// Whether the next part is to be looked at.
+bool begins(const char* part, double fraction, const WorkProgress& progress, MeshCheck& check) {
+  check.ended_early = !goes_on(progress, part, fraction);
+  return !check.ended_early;
+}
+
 void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const Compare& compare,
                     const WorkProgress& progress, MeshCheck& check) {
-  if (!goes_on(progress, "self-intersections", 0.3)) return;
+  if (!begins("self-intersections", 0.3, progress, check)) return;
   check.has_boundary_geometry = true;
   check.volume = enclosed_volume(triangles);
   const SelfIntersections found = self_intersections(triangles);
@@ -114,7 +130,7 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  if (compare && goes_on(progress, "distance", 0.6)) compare(triangles, check);
+  if (compare && begins("distance", 0.6, progress, check)) compare(triangles, check);
 }
 
 MeshCheck count_cells(const VolumeMesh& mesh) {
@@ -217,10 +233,17 @@ void append_distance(std::string& text, const MeshCheck& check) {
          check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(), extreme.from[0], extreme.from[1], extreme.from[2]);
 }
 
+void require_samples(int per_direction) {
+  if (per_direction < 2)
+    throw InputError("mesh check: samples_per_direction is " + std::to_string(per_direction) +
+                     ", expected 2 or more");
+}
+
 MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const MeshCheckOptions& options) {
+  require_samples(options.samples_per_direction);
   MeshCheck check = count_cells(mesh);
   if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
-  if (!goes_on(options.progress, "quality", 0)) return check;
+  if (!begins("quality", 0, options.progress, check)) return check;
   check.quality = measure_quality(mesh, options.samples_per_direction);
   check.witnesses = witnesses(
       *check.quality,
@@ -230,7 +253,7 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
       },
       [&](Index c, const Vec3& point) { return single_cell(mesh, c).position(0, point); });
   if (has_any(check.defects, {Kind::repeated_vertex, Kind::face_of_many_cells})) return check;
-  if (!goes_on(options.progress, "topology", 0.2)) return check;
+  if (!begins("topology", 0.2, options.progress, check)) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
   if (!has_any(check.defects, {Kind::bad_tag})) check.subdivision_audit = audit(mesh);
@@ -246,21 +269,23 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
 
 MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const Compare& compare,
                        const WorkProgress& progress, int samples_per_direction) {
+  if (samples_per_direction != 0) require_samples(samples_per_direction);
   const VolumeMesh straight = mesh.straight_sided();
   MeshCheck check = count_cells(straight);
   std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
   check.orders = order_summary(mesh.space);
-  if (!goes_on(progress, "quality", 0)) return check;
+  if (!begins("quality", 0, progress, check)) return check;
   check.quality = measure_quality(mesh, samples_per_direction);
   HighOrderCertifier certifier(mesh.space);
   check.witnesses = witnesses(
       *check.quality, [&](Index c) { return certifier.certify(mesh.coefficients, c); },
       [&](Index c, const Vec3& point) { return mesh.position(c, point); });
+  if (!begins("topology", 0.2, progress, check)) return check;
   check_topology(straight, mesh.space.topology(), check);
-  check.chord_error = boundary.chord_error;
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
   if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
     check_boundary(boundary.triangles, boundary.faces, compare, progress, check);
+  if (check.has_boundary_geometry) check.chord_error = boundary.chord_error;
   return check;
 }
 
@@ -337,6 +362,7 @@ std::string to_text(const MeshCheck& check) {
       append(text, "without area        %zu boundary triangles\n", check.num_degenerate_boundary_triangles);
   }
   if (check.distance) append_distance(text, check);
+  if (check.ended_early) append(text, "ended early         not everything was looked at\n");
   append(text, "%s\n", check.valid() ? "valid" : "NOT VALID");
   return text;
 }

@@ -28,7 +28,8 @@ struct MeshCheckOptions {
   int samples_per_direction = 5;   ///< of the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
   int distance_samples = 50000;    ///< `SurfaceDistanceOptions::num_samples`
-  WorkProgress progress{};         ///< told "quality", "topology", "self-intersections" and "distance" before each
+  /// Told "quality", "topology", "self-intersections" and, where there is a target, "distance" before each.
+  WorkProgress progress{};
 };
 
 /// How fine the cells of a high-order mesh are.
@@ -48,8 +49,11 @@ struct InversionWitness {
   double determinant;  ///< det J by canonical coordinates, <= 0 beyond rounding
 };
 
-/// All that is known of a volume mesh without a fit. Parts that defects rule out are left at their defaults.
+/// All that is known of a volume mesh without a fit. Parts that were not looked at, since defects rule them out or the
+/// progress ended it, are left at their defaults, and neither text nor reports speak of them.
 struct MeshCheck {
+  bool ended_early = false;                                  ///< by the progress
+
   std::vector<MeshDefect> defects;                           ///< `validate`'s
 
   std::size_t num_vertices = 0, num_cells = 0;
@@ -69,17 +73,18 @@ struct MeshCheck {
   std::optional<QualityReport> quality;                      ///< with the certificate
   std::vector<InversionWitness> witnesses;                   ///< of the first ten cells that are refuted
 
-  bool has_boundary_geometry = false;                        ///< whether the parts below were looked at
+  bool has_boundary_geometry = false;                        ///< whether the numbers below are set
   double chord_error = 0;                                    ///< of the triangles that stand for a curved boundary
   double volume = 0;                                         ///< enclosed by the boundary's triangles, signed
   std::vector<std::array<Index, 2>> intersecting_faces;      ///< places in `boundary_faces()`, ascending; may be equal
   std::size_t num_intersecting_triangle_pairs = 0;
-  std::size_t num_degenerate_boundary_triangles = 0;         ///< without area
+  std::size_t num_degenerate_boundary_triangles = 0;         ///< without area: not looked at for intersections
 
   std::optional<SurfaceDistance> distance;                   ///< a: boundary, b: target
   double target_diagonal = 0;                                ///< of the target's bounding box: 100 per cent
 
-  /// Usable as it is: sound but for unused vertices, every cell certified, the boundary free of self-intersection.
+  /// Usable as it is: sound but for unused vertices, every cell certified, the boundary's triangles (those with an area)
+  /// free of self-intersection. False where one of these was not looked at; the distance has no part in it.
   bool valid() const;
   double mean_distance_percent() const { return in_percent(distance ? distance->mean() : 0); }
   double max_distance_percent() const { return in_percent(distance ? distance->max() : 0); }
@@ -91,8 +96,9 @@ struct MeshCheck {
 /// Looks at everything: defects, topology, quality, certificate, self-intersection, distance.
 ///
 /// target   what the boundary should be, or null.
-/// Where the progress ends it, what has not been looked at is as if defects ruled it out: it is then not valid.
-/// InputError: options out of range; a target that `ClosestPoint` refuses. Never for what is wrong with the mesh.
+/// Where the progress ends it, what has not been looked at is as if defects ruled it out.
+/// InputError, before anything is looked at: options out of range; a target that `ClosestPoint` refuses, or a cloud
+/// without points or with one that is not finite. Never for what is wrong with the mesh.
 /// Deterministic for any number of threads. Cost on one core: per hex about 2 us, per boundary quad 50 us without
 /// and 80 us with a target.
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,
@@ -107,7 +113,7 @@ inline MeshCheck check_mesh(const VolumeMesh& mesh, std::nullptr_t, const MeshCh
 /// The same of a curved mesh. Defects are those of the straight-sided mesh, whose cells may be inverted; there is no
 /// audit.
 ///
-/// boundary               what stands for its surface in the parts that need triangles.
+/// boundary               what stands for its surface in the parts that need triangles; must be the mesh's.
 /// samples_per_direction  as for `measure_quality` of a high-order mesh; that of `options` and its quads mean nothing.
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {}, int samples_per_direction = 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/mesh_check.h"
+#include "export/export.h"
 #include "fit/boundary_triangles.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
@@ -141,6 +142,47 @@ TEST_CASE("whatever is wrong with a mesh, its check returns", "[mesh_check]") {
   CHECK_FALSE(check_mesh(twice).valid());
   CHECK_FALSE(to_text(check_mesh(twice)).empty());
   CHECK_THROWS_AS(check_mesh(lattice(1, 1, 1), nullptr, {.samples_per_direction = 1}), InputError);
+}
+
+TEST_CASE("A check that is ended states only what was looked at", "[mesh_check]") {
+  const VolumeMesh mesh = lattice(1, 1, 1);
+  const TriangleMesh target = boundary_triangles(mesh);
+  const HighOrderMesh curved(ElementSpace(mesh, Basis::fourier, 2), mesh);
+  const CurvedBoundary boundary = curved_boundary(curved, 1);
+  const std::vector<std::string> parts{"quality", "topology", "self-intersections", "distance", ""};
+  for (const bool linear : {true, false})
+    for (const std::string& last : parts) {
+      std::vector<std::string> told;
+      const WorkProgress progress = [&](const char* part, double) {
+        told.push_back(part);
+        return part != last;
+      };
+      const MeshCheck check = linear ? check_mesh(mesh, &target, {.progress = progress})
+                                     : check_mesh(curved, boundary, &target, {.progress = progress});
+      CAPTURE(linear, last, to_text(check));
+      const std::size_t done = told.size() - (last.empty() ? 0 : 1);
+      CHECK(told == std::vector(parts.begin(), parts.begin() + static_cast<std::ptrdiff_t>(told.size())));
+      CHECK(check.ended_early == !last.empty());
+      CHECK(check.valid() == (done > 2));
+      CHECK(check.quality.has_value() == (done > 0));
+      CHECK(check.has_topology == (done > 1));
+      CHECK(check.has_boundary_geometry == (done > 2));
+      CHECK(check.chord_error == (done > 2 ? boundary.chord_error : 0) * (linear ? 0 : 1));
+      CHECK(check.distance.has_value() == (done > 3));
+    }
+}
+
+TEST_CASE("Options and targets that a check cannot work with are refused whatever the mesh", "[mesh_check]") {
+  for (const VolumeMesh& mesh : {lattice(1, 1, 1), VolumeMesh{}}) {
+    const TriangleMesh nothing, target = boundary_triangles(lattice(1, 1, 1));
+    CHECK_THROWS_AS(check_mesh(mesh, nullptr, {.samples_per_direction = 1}), InputError);
+    CHECK_THROWS_AS(check_mesh(mesh, &target, {.distance_samples = 0}), InputError);
+    CHECK_THROWS_AS(check_mesh(mesh, &nothing), InputError);
+    PointCloud cloud;
+    CHECK_THROWS_AS(check_mesh(mesh, &cloud), InputError);
+    cloud.points = {Vec3(0, 0, 0), Vec3(0, std::numeric_limits<double>::quiet_NaN(), 0)};
+    CHECK_THROWS_AS(check_mesh(mesh, &cloud), InputError);
+  }
 }
 
 TEST_CASE("refined triangles pass through the bilinear centres and stay watertight", "[boundary_triangles]") {
