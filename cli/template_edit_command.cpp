@@ -109,7 +109,7 @@ VolumeMesh make_merged(EditArguments& arguments) {
   VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
   if (!arguments.other.empty()) mesh = joined(mesh, load_volume(arguments.other, arguments.warnings));
   Eigen::AlignedBox3d box;
-  for (const Vec3& p : mesh.positions) box.extend(p);
+  for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
   return glue(mesh, arguments.tolerance / 100 * box.diagonal().norm());
 }
 

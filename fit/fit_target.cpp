@@ -40,19 +40,21 @@ Normalisation::Normalisation(const PointCloud& target) {
 }
 
 std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
+  for (Vec3& p : points) p = (p - centre) / diagonal;
+  return points;
+}
+
+void Normalisation::take_in(VolumeMesh& mesh) const {
   constexpr double kLeastSize = 1e-6;  // below, cells are lost in the rounding of the target's coordinates
+  mesh.positions = to_unit(std::move(mesh.positions));
   Eigen::AlignedBox3d box;
-  for (Vec3& p : points) {
-    p = (p - centre) / diagonal;
-    box.extend(p);
-  }
-  if (!points.empty() && !(box.diagonal().norm() >= kLeastSize)) {
+  for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
+  if (!box.isEmpty() && !(box.diagonal().norm() >= kLeastSize)) {
     char size[32];
     std::snprintf(size, sizeof size, "%.2g", box.diagonal().norm());
     throw InputError(std::string("the mesh is ") + size +
                      " times as large as the target; expected one roughly in place");
   }
-  return points;
 }
 
 std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {

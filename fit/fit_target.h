@@ -6,6 +6,7 @@
 #include "fit/fit_schedule.h"
 #include "fit/surface_distance.h"
 #include "fit/target_surface.h"
+#include "subvol/volume_mesh.h"
 
 #include <optional>
 
@@ -19,7 +20,9 @@ struct Normalisation {
   /// InputError: a target without extent, or with coordinates that are not finite.
   explicit Normalisation(const TriangleMesh& target);
   explicit Normalisation(const PointCloud& target);
-  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;  ///< InputError: next to nothing beside the target
+  std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
+  /// Moves a mesh to these coordinates. InputError: its cells are next to nothing beside the target.
+  void take_in(VolumeMesh& mesh) const;
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };
 

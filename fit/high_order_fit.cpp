@@ -121,7 +121,8 @@ HighOrderFit::HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, co
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
-  template_.positions = mesh_.coefficients = target_.normalisation.to_unit(std::move(template_.positions));
+  target_.normalisation.take_in(template_);
+  mesh_.coefficients = template_.positions;
 }
 
 void HighOrderFit::look_over_template() {

@@ -92,7 +92,7 @@ class MeshOptimizer {
         target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
         relief_(mesh.num_cells(), 1),
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
-    mesh_.positions = target_.normalisation.to_unit(std::move(mesh_.positions));
+    target_.normalisation.take_in(mesh_);
   }
   OptimizeResult run(const VolumeMesh& original);
 

@@ -113,7 +113,7 @@ SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
-  template_.positions = target_.normalisation.to_unit(template_.positions);
+  target_.normalisation.take_in(template_);
   const bool wants_creases = options.crease_angle_degrees || !template_.tags.creases.empty();
   if (wants_creases && !target_.surface.is_cloud())
     template_creases_ = FollowedCreases(target_.mesh, options.crease_angle_degrees, template_);

@@ -288,6 +288,10 @@ TEST_CASE("A template that is next to nothing beside its target is refused by ev
     CHECK_THROWS_AS(fit_high_order(sample.target, tiny, {.order = 2}), InputError);
     CHECK_THROWS_AS(optimize_mesh(tiny, &sample.target, {}), InputError);
   }
+  tiny.positions.push_back(Vec3(1, 0, 0));  // of no cell: it makes none larger
+  CHECK_THROWS_AS(fit_subdivision_volume(sample.target, tiny, quick()), InputError);
+  CHECK_THROWS_AS(fit_high_order(sample.target, tiny, {.order = 2}), InputError);
+  CHECK_THROWS_AS(optimize_mesh(tiny, &sample.target, {}), InputError);
 }
 
 TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proportions") {
