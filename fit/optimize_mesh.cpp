@@ -278,6 +278,7 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   if (auto* surface = dynamic_cast<ClosestPointEnergy*>(problem.surface.get())) {
     std::vector<Vec3> samples(problem.samples.num_rows());
     problem.apply_samples(x, samples);
+    surface->forget();  // a stage from a log leaves nothing behind either
     surface->assign(samples);
     const auto [mean, max] = surface->assigned_distance();
     mean_percent_ = 100 * mean;

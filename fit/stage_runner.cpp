@@ -52,6 +52,8 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
                         options_.progress({record.name.c_str(), record.level, ++iteration, energy, fraction});
     return wanted && !is_over();
   };
+  // What earlier stages of the same problem have left behind, those that come from a log have not.
+  if (problem.surface) problem.surface->forget();
   SolvedStage solved{record.name, options_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
   const SolvedStage* known = options_.log ? options_.log->recall(solved) : nullptr;
   if (known) solved = *known;
@@ -60,8 +62,9 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
     iteration = static_cast<int>(solved.result.iterations.size());
     solve(problem, minimizer, solved);
     going = solved.is_over();
-  } else if (!solved.result.iterations.empty()) {
-    going = minimizer.progress(solved.result.iterations.back());
+  } else {
+    for (const std::vector<Index>& cells : solved.result.densified) problem.volume->densify(cells);
+    if (!solved.result.iterations.empty()) going = minimizer.progress(solved.result.iterations.back());
   }
   x = std::move(solved.x);
   record.seconds = solved.seconds;

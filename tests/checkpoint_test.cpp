@@ -4,7 +4,9 @@
 #include "fit/checkpoint.h"
 #include "fit/high_order_fit.h"
 #include "fit/optimize_mesh.h"
+#include "fit/stage_runner.h"
 #include "samples/shapes.h"
+#include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/fingerprint.h"
 #include "tests/sample_meshes.h"
@@ -169,6 +171,62 @@ TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits"
     const OptimizeResult result = optimize_mesh(mesh, nullptr, options);
     return std::pair(result.mesh.positions, result.report);
   });
+}
+
+TEST_CASE("An optimisation whose boundary is far from its target goes on to the same bits") {
+  // Beyond the edges of a convex boundary two triangles are equally far.
+  const VolumeMesh mesh = test::lattice(3, 3, 3);
+  TriangleMesh target = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
+  for (Vec3& p : target.positions) p = Vec3(1.5, 1.5, 1.5) + 1.5 * (p - Vec3(1.5, 1.5, 1.5));
+  check_that_it_resumes([&](StageLog* log) {
+    OptimizeOptions options{.max_iterations = 3};
+    options.log = log;
+    const OptimizeResult result = optimize_mesh(mesh, &target, options);
+    return std::pair(result.mesh.positions, result.report);
+  });
+}
+
+TEST_CASE("A stage that comes from a log leaves its problem as one that was solved") {
+  struct Cells : VolumeTerm {
+    std::vector<std::vector<Index>>* densified;
+    explicit Cells(std::vector<std::vector<Index>>& to) : densified(&to) {}
+    double value(std::span<const Vec3>) const override { return 0; }
+    double add_gradient(std::span<const Vec3>, double, std::span<Vec3>) const override { return 0; }
+    double linearize(std::span<const Vec3>, double, std::span<Vec3>) override { return 0; }
+    void multiply(std::span<const Vec3>, std::span<Vec3>) const override {}
+    void add_diagonal_blocks(const SparseMap&, const SparseMap&, std::span<Mat3>) const override {}
+    double max_step(std::span<const Vec3>, std::span<const Vec3>, double) const override { return 1; }
+    std::vector<Index> uncertified(std::span<const Vec3>) const override { return {}; }
+    void densify(std::span<const Index> cells) override { densified->emplace_back(cells.begin(), cells.end()); }
+  };
+  struct Surface : SurfaceTerm {
+    int* forgotten;
+    explicit Surface(int& to) : SurfaceTerm({{0, 1, 2}}, 3), forgotten(&to) {}
+    void assign(std::span<const Vec3> samples) override { begin_assign(samples); }
+    void forget() override { ++*forgotten; }
+  };
+  std::vector<std::vector<Index>> densified;
+  int forgotten = 0;
+  const SparseMap identity{3, {0, 1, 2, 3}, {0, 1, 2}, {1, 1, 1}};
+  FitProblem problem(identity, identity, std::make_unique<Cells>(densified), std::make_unique<Surface>(forgotten), 0.5);
+  std::vector<Vec3> x(3, Vec3::Zero());
+  FitReport report;
+  StageRecord record;
+  record.name = "stage";
+  StageLog first;
+  REQUIRE(StageRunner({.log = &first}).run(problem, {0.5, 0, 2}, record, 0, x, report));
+  REQUIRE(first.stages().size() == 1);
+  CHECK(forgotten > 0);
+  CHECK(densified.empty());
+  std::vector<SolvedStage> solved = first.stages();
+  solved[0].result.densified = {{2, 1}, {0}};
+  StageLog log(solved, "memory");
+  forgotten = 0;
+  x.assign(3, Vec3::Zero());
+  CHECK(StageRunner({.log = &log}).run(problem, {0.5, 0, 2}, record, 0, x, report));
+  CHECK(log.num_recalled() == 1);
+  CHECK(densified == solved[0].result.densified);
+  CHECK(forgotten == 1);
 }
 
 TEST_CASE("A log of another run is refused where it first differs") {
