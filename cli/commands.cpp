@@ -31,7 +31,7 @@ void describe_program(CLI::App& app, Action& action) {
   app.require_subcommand(1);
   app.fallthrough();  // --config may stand after the verb
   app.set_config("--config", "", "Read options from FILE.toml");
-  app.get_config_ptr()->type_name("FILE.toml");
+  app.get_config_ptr()->type_name("FILE.toml")->check(regular_file());
   app.config_formatter(std::make_shared<VerbConfig>(app));
   app.allow_config_extras(CLI::config_extras_mode::error);
   add_fit_command(app, action);

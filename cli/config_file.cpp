@@ -3,9 +3,20 @@
 
 #include "cli/exit_status.h"
 
+#include <filesystem>
 #include <string>
+#include <system_error>
 
 namespace subvol::cli {
+
+CLI::Validator regular_file() {
+  const auto check = [](const std::string& name) -> std::string {
+    std::error_code ignored;
+    if (!std::filesystem::exists(name, ignored) || std::filesystem::is_regular_file(name, ignored)) return {};
+    return name + ": expected a file, not a folder, a device or a pipe";
+  };
+  return CLI::Validator(check, "");
+}
 
 std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const {
   std::vector<std::string> path;  // the verb, and the verb under it where it is a group
@@ -14,6 +25,7 @@ std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const 
     verb = verbs.front();
     path.push_back(verb->get_name());
   }
+  if (path.empty()) return {};  // the parser is about to ask for a verb
   const auto names_a_verb = [&](const std::string& name) {
     return !app_.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == name; }).empty();
   };

@@ -26,6 +26,11 @@ std::optional<Number> parse(std::string_view word) {
   return value;
 }
 
+const char* kind_name(std::filesystem::file_status status) {
+  if (std::filesystem::is_fifo(status)) return "pipe";
+  return std::filesystem::is_socket(status) ? "socket" : "device";
+}
+
 }  // namespace
 
 std::string read_file(const std::filesystem::path& path) {
@@ -33,13 +38,14 @@ std::string read_file(const std::filesystem::path& path) {
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) throw InputError(path.string() + ": no such file");
   if (std::filesystem::is_directory(status)) throw InputError(path.string() + ": is a folder, expected a file");
-  if (std::filesystem::is_character_file(status) || std::filesystem::is_block_file(status))
-    throw InputError(path.string() + ": is a device, expected a file");
+  // A device may have no end, a pipe no beginning; and some files are read twice.
+  if (!std::filesystem::is_regular_file(status))
+    throw InputError(path.string() + ": is a " + kind_name(status) + ", expected a file");
 
   errno = 0;
   std::ifstream file(path, std::ios::binary);
   std::string bytes;
-  if (std::filesystem::is_regular_file(status)) bytes.reserve(std::filesystem::file_size(path, error));
+  if (const auto size = std::filesystem::file_size(path, error); !error) bytes.reserve(size);
   char buffer[1 << 16];
   while (file.read(buffer, sizeof buffer) || file.gcount() > 0)
     bytes.append(buffer, static_cast<std::size_t>(file.gcount()));

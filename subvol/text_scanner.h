@@ -11,7 +11,7 @@
 
 namespace subvol {
 
-/// The whole content of a file. A file that is not there, a folder or one that cannot be read: InputError.
+/// The whole content of a file. InputError: it is not there, no regular file (a folder, device, pipe), or unreadable.
 std::string read_file(const std::filesystem::path& path);
 
 /// Words and numbers of a text file held in memory, one after the other, with the line for complaints.
