@@ -6,6 +6,7 @@
 #include "cli/outputs.h"
 #include "cli/progress.h"
 #include "cli/report.h"
+#include "cli/standard_output.h"
 #include "cli/writing.h"
 #include "subvol/surface_io.h"
 #include "subvol/version.h"
@@ -86,9 +87,9 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   const Json json = report_json(arguments, verb, checked, warnings);
   if (!arguments.run.report.empty()) write_report(arguments.run.report, json);
   if (arguments.json) {
-    std::cout << json_text(json);
+    print(json_text(json));
   } else if (!arguments.run.quiet) {
-    std::cout << to_text(checked.check);
+    print(to_text(checked.check));
   }
   return checked.check.valid() ? kDone : kFailed;
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/commands.h"
 #include "cli/exit_status.h"
+#include "cli/standard_output.h"
 
 #include <algorithm>
-#include <iostream>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -128,8 +128,8 @@ void add_completion_command(CLI::App& app, Action& action) {
   subvol completion fish > ~/.config/fish/completions/subvol.fish)");
   verb->callback([shell, &app, &action] {
     action = [shell, &app] {
-      if (*shell == "zsh") std::cout << "autoload -U +X bashcompinit && bashcompinit\n";
-      std::cout << (*shell == "fish" ? fish_completion(app) : bash_completion(app));
+      if (*shell == "zsh") print("autoload -U +X bashcompinit && bashcompinit\n");
+      print(*shell == "fish" ? fish_completion(app) : bash_completion(app));
       return kDone;
     };
   });

@@ -2,6 +2,7 @@
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/report.h"
+#include "cli/standard_output.h"
 #include "subvol/error.h"
 
 #include <csignal>
@@ -64,6 +65,21 @@ int run(int argc, char** argv) {
   return action();
 }
 
+/// What `run` returns, or the status of the error that it ends with.
+int run_to_status(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const UsageError& error) {
+    return complain(error.what(), kUsage);
+  } catch (const InputError& error) {
+    return complain(error.what(), kRejected);
+  } catch (const std::bad_alloc&) {
+    return complain(kOutOfMemory, kFailed);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kFailed);
+  }
+}
+
 }  // namespace
 }  // namespace subvol::cli
 
@@ -71,15 +87,6 @@ int main(int argc, char** argv) {
   using namespace subvol::cli;
   std::set_terminate(end_in_order);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
-  try {
-    return run(argc, argv);
-  } catch (const UsageError& error) {
-    return complain(error.what(), kUsage);
-  } catch (const subvol::InputError& error) {
-    return complain(error.what(), kRejected);
-  } catch (const std::bad_alloc&) {
-    return complain(kOutOfMemory, kFailed);
-  } catch (const std::exception& error) {
-    return complain(error.what(), kFailed);
-  }
+  prepare_standard_output();
+  return finished_standard_output(run_to_status(argc, argv));
 }

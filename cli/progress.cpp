@@ -2,11 +2,11 @@
 #include "cli/progress.h"
 
 #include "cli/run_options.h"
+#include "cli/standard_output.h"
 #include "fit/option_checks.h"
 
 #include <algorithm>
 #include <cstdio>
-#include <iostream>
 
 #include <unistd.h>
 
@@ -61,7 +61,7 @@ void ProgressTeller::tell(const FitProgress& progress) {
 void ProgressTeller::tell_work(const char* part, double share) {
   if (kind_ == Kind::bar) return draw_bar(share, part);
   if (kind_ == Kind::json)
-    std::cout << Json{{"part", part}, {"share", share}, {"seconds", seconds()}}.dump() << std::endl;
+    print(Json{{"part", part}, {"share", share}, {"seconds", seconds()}}.dump() + '\n');
   const auto now = Clock::now();
   if (kind_ != Kind::plain || now - last_ < kWorkInterval) return;
   last_ = now;
@@ -112,7 +112,7 @@ void ProgressTeller::write_json(const FitProgress& progress) {
             {"iteration", progress.iteration}, {"energy", progress.energy},
             {"fraction", share_done(progress)}, {"seconds", seconds()}};
   if (const double left = seconds_left(share_done(progress)); left >= 0) line["seconds_left"] = left;
-  std::cout << line.dump() << std::endl;
+  print(line.dump() + '\n');
 }
 
 }  // namespace subvol::cli
