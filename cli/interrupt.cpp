@@ -1,25 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/interrupt.h"
 
+#include "cli/exit_status.h"
+
+#include <atomic>
 #include <csignal>
+
+#include <time.h>
+#include <unistd.h>
 
 namespace subvol::cli {
 namespace {
 
-volatile std::sig_atomic_t flag = 0;
+constexpr long long kOneSignalNanoseconds = 200'000'000;
 
-void raise_flag(int) { flag = 1; }
+/// When the first one came; 0: not yet.
+std::atomic<long long> first{0};
+static_assert(std::atomic<long long>::is_always_lock_free);
+
+// Only what a signal handler may call.
+void note(int) {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  const long long now = time.tv_sec * 1'000'000'000LL + time.tv_nsec + 1;
+  long long before = 0;
+  if (first.compare_exchange_strong(before, now)) return;
+  if (now - before > kOneSignalNanoseconds) _exit(kInterrupted);
+}
 
 }  // namespace
 
 void catch_interrupt() {
   struct sigaction action {};
-  action.sa_handler = raise_flag;
-  action.sa_flags = static_cast<int>(SA_RESETHAND) | SA_RESTART;
+  action.sa_handler = note;
+  action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }
 
-bool interrupted() { return flag != 0; }
+bool interrupted() { return first != 0; }
 
 }  // namespace subvol::cli
