@@ -19,6 +19,12 @@ Json typed(const std::string& text) {
   return value.is_number() || value.is_boolean() ? value : Json(text);
 }
 
+Json typed(const std::vector<std::string>& texts) {
+  Json all = Json::array();
+  for (const std::string& text : texts) all.push_back(typed(text));
+  return all;
+}
+
 constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimit = std::size_t{1} << 50;
 
 }  // namespace
@@ -98,6 +104,10 @@ double parse_length(const std::string& option, const std::string& text, double d
   return std::stod(number) * (percent ? diagonal / 100 : 1);
 }
 
+std::string as_utf8(const std::string& text) {
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
 Json options_in_force(const CLI::App& verb) {
   Json all = Json::object();
   for (const CLI::Option* option : verb.get_options()) {
@@ -105,7 +115,7 @@ Json options_in_force(const CLI::App& verb) {
     if (name == "help" || name == "output" || option->get_positional()) continue;
     const auto& given = option->results();
     if (!given.empty()) {
-      all[name] = typed(given.back());
+      all[name] = option->get_items_expected_max() > 1 ? typed(given) : typed(given.back());
     } else if (option->get_expected_min() == 0) {
       all[name] = false;
     } else if (!option->get_default_str().empty()) {

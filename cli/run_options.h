@@ -42,7 +42,9 @@ void require_fitting_options(const CLI::App& verb, bool points);
 CLI::Validator number_in(double low, double high);
 /// A length in the mesh's unit, or with % of a diagonal. UsageError, naming the option: neither.
 double parse_length(const std::string& option, const std::string& text, double diagonal);
-/// The options of a verb that have a value, by long name: given or default.
+/// A text with U+FFFD in place of what is not UTF-8, as names of files need not be.
+std::string as_utf8(const std::string& text);
+/// The options of a verb that have a value, by long name: given or default; a list where there are several.
 Json options_in_force(const CLI::App& verb);
 /// Those of them that bear on what is written: not how a run is told, limited, or kept. What files other than reports say
 /// of a run, so that they are the same bytes for any number of threads, and for a run that was resumed.

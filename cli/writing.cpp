@@ -21,7 +21,7 @@ namespace {
 SceneValue scene_value(const Json& value) {
   if (value.is_boolean()) return value.get<bool>();
   if (value.is_number()) return value.get<double>();
-  return value.get<std::string>();
+  return as_utf8(value.is_string() ? value.get<std::string>() : value.dump());
 }
 
 void write_cells(const Output& output, const VolumeMesh& mesh) {
@@ -64,13 +64,13 @@ std::string parse_cut(const std::string& text, CutPlane& cut) {
 }
 
 SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options) {
-  SurfaceSceneOptions scene{.name = output.path.stem().string(),
+  SurfaceSceneOptions scene{.name = as_utf8(output.path.stem().string()),
                             .max_chord_percent = options.chord_percent,
                             .wireframe = !options.no_wireframe,
                             .quantize = options.quantize,
                             .metres_per_unit = options.metres_per_unit,
                             .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
-                            .source = options.source.filename().string()};
+                            .source = as_utf8(options.source.filename().string())};
   for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
   return scene;
 }
