@@ -80,8 +80,16 @@ RunIdentity run_identity(const std::string& verb, const Json& options,
   RunIdentity identity{{"version", version()}, {"verb", verb}};
   identity.insert(identity.end(), inputs.begin(), inputs.end());
   for (const auto& [name, value] : options.items())
-    if (!kNeutralOptions.contains(name)) identity.emplace_back("--" + name, value.dump());
+    if (!kNeutralOptions.contains(name))
+      identity.emplace_back("--" + name, value.dump(-1, ' ', false, Json::error_handler_t::replace));
   return identity;
+}
+
+void require_resumable(const RunOptions& run, const RunIdentity& identity_but_template) {
+  if (run.resume.empty()) return;
+  RunIdentity earlier = read_checkpoint(run.resume).identity;
+  std::erase_if(earlier, [](const auto& entry) { return entry.first == "template"; });
+  require_same_run(earlier, identity_but_template, run.resume);
 }
 
 Checkpointing::Checkpointing(const RunOptions& run, RunIdentity identity)

@@ -29,6 +29,9 @@ RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::
 RunIdentity run_identity(const std::string& verb, const Json& options,
                          const std::vector<std::pair<std::string, std::string>>& inputs);
 
+/// Refuses the file of --resume before the template is made: InputError as `Checkpointing`, but for the template.
+void require_resumable(const RunOptions& run, const RunIdentity& identity_but_template);
+
 /// Goes on from the checkpoint of an earlier run, and keeps one of this run as its minimisations go on.
 class Checkpointing {
  public:

@@ -85,6 +85,8 @@ class FitRun : public LongRun {
 void FitRun::load() {
   target_ = load_target(arguments_.target, warnings_);
   require_fitting_options(verb_, is_cloud(target_));
+  if (arguments_.template_mesh.path.empty())  // before minutes go into one
+    require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
   tell_warnings();
 }
 

@@ -11,8 +11,10 @@
 #include "cli/report.h"
 #include "cli/untangling.h"
 #include "fit/mesh_check.h"
+#include "fit/quality.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
+#include "subvol/voxel_grid.h"
 
 #include <algorithm>
 #include <chrono>
@@ -25,14 +27,14 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Refuses before the work what no curved mesh can be written to: the template stands for the result.
+/// Refuses before the work what no curved mesh can be written to: the cells of the template stand for the result.
 void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
-                       const VolumeMesh& template_mesh) {
+                       const VolumeMesh& cells) {
   for (const Output& output : outputs) {
     if (output.extension == ".usda")
       throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
     if (output.extension == ".msh")
-      msh_text({ElementSpace(template_mesh, arguments.fit.basis, arguments.fit.order), template_mesh});
+      msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
   }
 }
 
@@ -66,11 +68,12 @@ MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result,
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
 
-Json report_json(const char* command, const CLI::App& verb, const FitReport& report, const HighOrderMesh& mesh,
-                 const MeshCheck& mesh_check) {
+Json report_json(const char* command, const CLI::App& verb, Json input, const FitReport& report,
+                 const HighOrderMesh& mesh, const MeshCheck& mesh_check) {
   Json json{{"subvol", version()},
             {"command", command},
             {"options", options_in_force(verb)},
+            {"input", std::move(input)},
             {"mesh", describe("", mesh)}};
   json.update(fit_json(report));
   json.update(check_json(mesh_check));
@@ -100,6 +103,10 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Target target = arguments.takes_points ? load_target(arguments.target, warnings)
                                                : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
+  if (arguments.template_mesh.path.empty()) {  // what is made are hexes; it takes minutes
+    refuse_impossible(outputs, arguments, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})));
+    require_resumable(arguments.run, run_identity(verb, {{"target", fingerprint(target)}}));
+  }
   const Clock::time_point template_start = Clock::now();
   LoadedTemplate loaded =
       load_template(arguments.template_mesh, target, {.order = arguments.fit.order, .basis = arguments.fit.basis},
@@ -110,13 +117,19 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (loaded.choice && !arguments.run.quiet) std::cerr << to_text(*loaded.choice);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   refuse_impossible(outputs, arguments, template_mesh);
+  const double read_seconds = seconds_since(start) - template_seconds;
+  Json input{{"target", describe(arguments.target, target)}};
+  input[arguments.untangles ? "mesh" : "template"] = describe(arguments.template_mesh.path, template_mesh);
+  if (arguments.untangles && !arguments.run.report.empty())
+    input["quality"] = quality_json(measure_quality(template_mesh));
   Checkpointing checkpointing(
       arguments.run, run_identity(verb, {{"target", fingerprint(target)}, {"template", fingerprint(template_mesh)}}));
+  const Clock::time_point untangle_start = Clock::now();
   if (arguments.untangles || has_few_inverted_cells(template_mesh))
     untangle_template(arguments.template_mesh.path, arguments.run,
                       {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()}, template_mesh,
                       warnings);
-
+  const double untangle_seconds = seconds_since(untangle_start);
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result = fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start),
                                   target, template_mesh);
@@ -142,17 +155,21 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Clock::time_point check_start = Clock::now();
   const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent, arguments.run);
   if (!arguments.run.report.empty()) {
-    Json json = report_json(arguments.command, verb, report, file.mesh, mesh_check);
-    json["input"] = {{"target", describe(arguments.target, target)},
-                     {"template", describe(arguments.template_mesh.path, template_mesh)}};
+    Json json = report_json(arguments.command, verb, std::move(input), report, file.mesh, mesh_check);
+    if (arguments.untangles)
+      json["not_certified_cells"] =
+          mesh_check.quality ? mesh_check.quality->certificate.not_certified : std::vector<Index>{};
     if (loaded.choice) json["template"] = choice_json(*loaded.choice);
     checkpointing.describe(json);
     json["warnings"] = warnings;
-    json["seconds"] = {{"template", template_seconds},
-                       {"fit", fit_seconds},
-                       {"write", write_seconds},
-                       {"check", seconds_since(check_start)},
-                       {"total", seconds_since(start)}};
+    Json seconds{{"read", read_seconds},
+                 {arguments.untangles ? "untangle" : "template", template_seconds + untangle_seconds},
+                 {"fit", fit_seconds},
+                 {"write", write_seconds},
+                 {"check", seconds_since(check_start)}};
+    seconds.update(seconds_json(report));
+    seconds["total"] = seconds_since(start);
+    json["seconds"] = std::move(seconds);
     json["peak_memory_bytes"] = peak_memory_bytes();
     json["outputs"] = output_names(arguments.run);
     write_report(arguments.run.report, json);
