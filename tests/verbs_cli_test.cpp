@@ -205,6 +205,23 @@ TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
   CHECK(place.run("optimize template.mesh --target target.off --order 2 -o b.vtu --progress none").status == 4);
 }
 
+TEST_CASE("The report of optimize has the same entries for straight and for curved cells", "[cli]") {
+  const Workplace place;
+  const std::string optimize = "optimize template.mesh --target target.off --max-iterations 1 ";
+  place.run(optimize + "-o straight.mesh --report straight.json");
+  place.run(optimize + "--order 2 -o curved.vtu --report curved.json");
+  const nlohmann::json straight = place.json("straight.json"), curved = place.json("curved.json");
+  for (const auto& [entry, value] : straight.items()) {
+    INFO(entry);
+    if (entry != "topology") CHECK(curved.contains(entry));  // of straight cells only
+  }
+  for (const char* entry : {"mesh", "target", "quality"}) CHECK(curved.at("input").contains(entry));
+  CHECK(curved.at("input").at("mesh") == straight.at("input").at("mesh"));
+  CHECK(curved.at("input").at("quality") == straight.at("input").at("quality"));
+  CHECK(curved.at("seconds").contains("untangle"));
+  CHECK(curved.at("not_certified_cells").empty());
+}
+
 TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][templates]") {
   const Workplace place;
   const Run made = place.run("template auto target.off --cells 60 -o made.mesh --report made.json");
