@@ -14,7 +14,7 @@ std::string source_dir();
 std::string program();
 
 /// Folder of the real inputs: the environment variable SUBVOL_DATA, or shared/data beside the source folder. Nothing where
-/// neither is there; tests then WARN("SKIPPED: ..."), which ctest counts as skipped, and return.
+/// neither is there; tests then WARN("SKIPPED: ...") and return (tests/skipping.h).
 std::optional<std::filesystem::path> data_dir();
 
 }  // namespace subvol::test

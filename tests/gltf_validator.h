@@ -2,6 +2,7 @@
 #pragma once
 
 #include "tests/data.h"
+#include "tests/skipping.h"
 
 #include <catch2/catch.hpp>
 
@@ -14,14 +15,14 @@ namespace subvol::test {
 
 /// Checks that the Khronos validator has nothing to say about files; warns where it is not there.
 inline void check_with_validator(const std::vector<std::filesystem::path>& files) {
-  int status = 2;
+  int status = kSkippedStatus;
   if (std::getenv("SUBVOL_NODE_MODULES") && std::system("node --version > /dev/null 2>&1") == 0) {
     std::string command = "node \"" + source_dir() + "/tests/gltf_validator.mjs\"";
     for (const auto& file : files) command += " \"" + file.string() + '"';
     const int code = std::system(command.c_str());
     status = code == 0 ? 0 : code >> 8;
   }
-  if (status == 2)
+  if (status == kSkippedStatus)
     WARN("SKIPPED: needs node and the npm package gltf-validator under SUBVOL_NODE_MODULES");
   else
     CHECK(status == 0);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Validates glTF files: node gltf_validator.mjs FILE... with the npm package gltf-validator under SUBVOL_NODE_MODULES.
-// Prints every message; exit status 0 without errors, warnings and remarks, 1 with any, 2 without the package.
+// Prints every message; exit status 0 without errors, warnings and remarks, 1 with any, 77 without the package.
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { resolve } from "node:path";
@@ -10,7 +10,7 @@ try {
   const folder = process.env.SUBVOL_NODE_MODULES;
   validator = createRequire(resolve(folder, "package.json"))(resolve(folder, "gltf-validator"));
 } catch {
-  process.exit(2);
+  process.exit(77);
 }
 let clean = process.argv.length > 2;
 for (const path of process.argv.slice(2)) {

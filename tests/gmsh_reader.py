@@ -2,14 +2,14 @@
 """gmsh_reader.py MESH.msh QUERIES: looks with Gmsh where the nodes of the cells of a .msh are, and compares.
 
 A line of QUERIES: Gmsh's element type, element number, order, canonical coordinates u v w, position x y z.
-Exit status: 0 all equal to 1e-12, 1 not, 2 no Gmsh here.
+Exit status: 0 all equal to 1e-12, 1 not, 77 no Gmsh here.
 """
 import sys
 
 try:
     import gmsh
 except (ImportError, OSError):
-    sys.exit(2)
+    sys.exit(77)
 
 gmsh.initialize()
 gmsh.option.setNumber("General.Terminal", 0)

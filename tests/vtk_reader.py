@@ -2,7 +2,7 @@
 """vtk_reader.py MESH.vtu QUERIES: evaluates the cells of a .vtu with VTK and compares.
 
 A line of QUERIES: cell, VTK's cell type, number of its points, parametric coordinates u v w, position x y z.
-Exit status: 0 all equal to 1e-12, 1 not, 2 no VTK here.
+Exit status: 0 all equal to 1e-12, 1 not, 77 no VTK here.
 """
 import sys
 
@@ -10,7 +10,7 @@ try:
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
     from vtkmodules.vtkCommonCore import mutable
 except ImportError:
-    sys.exit(2)
+    sys.exit(77)
 
 reader = vtkXMLUnstructuredGridReader()
 reader.SetFileName(sys.argv[1])

@@ -42,7 +42,6 @@ class Cages(InFolder):
         """Fitted to real surfaces, one smooth and one with creases; none where the real inputs are not there."""
         folder = os.environ.get("SUBVOL_DATA") or os.path.join(SOURCE, "..", "shared", "data")
         if not os.path.isdir(folder):
-            print("SKIPPED: the real cages; no folder with real data")
             return {}
 
         def fit(name, **options):
@@ -67,6 +66,9 @@ class Cages(InFolder):
             print(f"{name}: {percent:.2g} % of the diagonal")
             # Blender only approximates what is around half-sharp features.
             self.assertLess(percent, 0.005 if name == "half_sharp" else 0.001, name)
+        if "hanger139" not in cages:
+            self.skipTest("the real cages; no folder with real data")
+
 
 class Scenes(InFolder):
     """.glb files as Blender's importer has them."""
