@@ -17,8 +17,6 @@
 namespace subvol {
 namespace {
 
-std::uint8_t vtk_type(CellKind kind) { return kind == CellKind::tet ? 71 : kind == CellKind::hex ? 72 : 73; }
-
 constexpr int kGmshTets[] = {4, 11, 29, 30, 31, 71, 72, 73, 74, 75};
 constexpr int kGmshPrisms[] = {6, 13};
 constexpr int kGmshHexes[] = {5, 12, 92, 93, 94, 95, 96, 97, 98};
@@ -26,11 +24,6 @@ constexpr int kGmshHexes[] = {5, 12, 92, 93, 94, 95, 96, 97, 98};
 std::span<const int> gmsh_types(CellKind kind) {
   if (kind == CellKind::tet) return kGmshTets;
   return kind == CellKind::prism ? std::span<const int>(kGmshPrisms) : std::span<const int>(kGmshHexes);
-}
-
-int gmsh_type(CellKind kind, int order) {
-  assert(order >= 1 && order <= max_gmsh_order(kind));
-  return gmsh_types(kind)[static_cast<std::size_t>(order) - 1];
 }
 
 /// A volume of a .msh: cells of one reference and order. Gmsh takes all tets of a volume for tets of one order.
@@ -145,7 +138,14 @@ void append_node_data(std::string& text, const VertexField& field) {
 
 }  // namespace
 
+std::uint8_t vtk_type(CellKind kind) { return kind == CellKind::tet ? 71 : kind == CellKind::hex ? 72 : 73; }
+
 int max_gmsh_order(CellKind kind) { return static_cast<int>(gmsh_types(kind).size()); }
+
+int gmsh_type(CellKind kind, int order) {
+  assert(order >= 1 && order <= max_gmsh_order(kind));
+  return gmsh_types(kind)[static_cast<std::size_t>(order) - 1];
+}
 
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells) {
   if (!cell_minima.empty() && cell_minima.size() != num_cells)

@@ -5,6 +5,7 @@
 
 #include "export/volume_writer.h"
 
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -30,6 +31,9 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
 
 /// Largest order of a kind that Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
 int max_gmsh_order(CellKind kind);
+/// Its number for cells of a kind and order, 1 .. max_gmsh_order (asserted); and VTK's for Lagrange cells of a kind.
+int gmsh_type(CellKind kind, int order);
+std::uint8_t vtk_type(CellKind kind);
 /// Orders: 1 .. max_gmsh_order (asserted).
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields);
 

@@ -4,16 +4,13 @@
 #include "export/cell_text.h"
 #include "export/lagrange_mesh.h"
 #include "export/text_format.h"
-#include "export/vtu_arrays.h"
+#include "export/vtu_reader.h"
 #include "subvol/atomic_file.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <map>
-#include <string_view>
 
 namespace subvol {
 namespace {
@@ -79,86 +76,7 @@ std::string field_data(const HighOrderMesh& mesh) {
   return text;
 }
 
-/// Linear cells with the references of the curved ones.
-VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
-  std::vector<Index> parents;
-  VolumeMesh cells =
-      linear_cells(mesh, options.linear_intervals ? options.linear_intervals : mesh.space.max_order(), &parents);
-  if (!options.references.empty())
-    for (const Index parent : parents) cells.references.push_back(options.references[parent]);
-  return cells;
-}
-
 // --- Reading --------------------------------------------------------------------------------------------------------
-
-/// The data arrays of a .vtu, by name, decoded when they are asked for.
-class VtuArrays {
- public:
-  VtuArrays(std::string name, std::string_view bytes) : name_(std::move(name)) {
-    const std::size_t begin = bytes.find("<VTKFile");
-    if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
-      fail("expected a whole VTK XML file");
-    const std::string_view header = tag(bytes, begin);
-    for (const auto& [key, expected] : {std::pair{"type", "UnstructuredGrid"}, {"version", "2.2"},
-                                        {"byte_order", "LittleEndian"}, {"header_type", "UInt64"}})
-      if (attribute(header, key) != expected)
-        fail(std::string("expected ") + key + "=\"" + expected + "\", as subvol writes it, found " +
-             in_quotes(attribute(header, key)));
-    if (header.find("compressor") != std::string_view::npos) fail("expected arrays that are not compressed");
-    for (std::size_t at = bytes.find("<DataArray", begin); at != std::string_view::npos;
-         at = bytes.find("<DataArray", at + 1))
-      add(bytes, at);
-  }
-
-  bool has(const std::string& array) const { return arrays_.contains(array); }
-
-  template <class T>
-  std::vector<T> get(const std::string& array) const {
-    const auto found = arrays_.find(array);
-    if (found == arrays_.end()) fail("expected a data array " + array);
-    if (found->second.type != vtu_type<T>())
-      fail(array + ": expected type " + vtu_type<T>() + ", found " + in_quotes(found->second.type));
-    if (found->second.format != "binary") fail(array + ": expected format=\"binary\", as subvol writes it");
-    const std::optional<std::string> bytes = decode_base64(found->second.digits);
-    std::uint64_t size = 0;
-    if (bytes && bytes->size() >= sizeof size) std::memcpy(&size, bytes->data(), sizeof size);
-    if (!bytes || bytes->size() < sizeof size || bytes->size() - sizeof size != size || size % sizeof(T) != 0)
-      fail(array + ": expected base64 of a length and as many bytes");
-    std::vector<T> values(size / sizeof(T));
-    if (size > 0) std::memcpy(values.data(), bytes->data() + sizeof size, size);
-    return values;
-  }
-
-  [[noreturn]] void fail(const std::string& message) const { throw InputError(name_ + ": " + message); }
-
- private:
-  struct Array {
-    std::string_view type, format, digits;
-  };
-
-  std::string_view tag(std::string_view bytes, std::size_t begin) const {
-    const std::size_t end = bytes.find('>', begin);
-    if (end == std::string_view::npos) fail("the file ends inside a tag");
-    return bytes.substr(begin, end - begin);
-  }
-  static std::string_view attribute(std::string_view tag, const std::string& key) {
-    const std::string opening = ' ' + key + "=\"";
-    const std::size_t begin = tag.find(opening);
-    if (begin == std::string_view::npos) return {};
-    const std::string_view rest = tag.substr(begin + opening.size());
-    return rest.substr(0, rest.find('"'));
-  }
-  void add(std::string_view bytes, std::size_t begin) {
-    const std::string_view opening = tag(bytes, begin);
-    const std::string_view content = bytes.substr(begin + opening.size() + 1);
-    const std::string array(attribute(opening, "Name"));
-    const Array found{attribute(opening, "type"), attribute(opening, "format"), content.substr(0, content.find('<'))};
-    if (!arrays_.try_emplace(array, found).second) fail("expected one data array " + in_quotes(array) + ", found more");
-  }
-
-  std::string name_;
-  std::map<std::string, Array> arrays_;
-};
 
 CellKind kind_of(const VtuArrays& file, std::uint8_t type) {
   if (type != 71 && type != 72 && type != 73)
@@ -251,6 +169,15 @@ Basis read_basis(const VtuArrays& file, const std::vector<std::int64_t>& format)
 }
 
 }  // namespace
+
+VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  std::vector<Index> parents;
+  VolumeMesh cells =
+      linear_cells(mesh, options.linear_intervals ? options.linear_intervals : mesh.space.max_order(), &parents);
+  if (!options.references.empty())
+    for (const Index parent : parents) cells.references.push_back(options.references[parent]);
+  return cells;
+}
 
 std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
   require_writable(mesh, options);

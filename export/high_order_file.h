@@ -48,6 +48,9 @@ std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh,
                   const HighOrderFileOptions& options = {});
 
+/// The cells of a .mesh or .vtk: `linear_cells`, with the references of the curved ones.
+VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
+
 /// A mesh from a file, with the references of its cells, or none.
 struct HighOrderFile {
   HighOrderMesh mesh;

@@ -268,6 +268,14 @@ TEST_CASE("Gmsh has the nodes of a high-order .msh where the map has them") {
     CHECK(status == 0);
 }
 
+TEST_CASE("tags that do not end are refused where they begin") {
+  std::string text =
+      "<VTKFile type=\"UnstructuredGrid\" version=\"2.2\" byte_order=\"LittleEndian\" header_type=\"UInt64\">";
+  for (int i = 0; i < 20'000; ++i) text += "<DataArray Name=\"" + std::to_string(i) + "\" ";
+  CHECK_THAT(refusal(text + "></VTKFile>"), Contains("a tag begins inside another"));
+  CHECK_THAT(refusal("<VTKFile type=\"UnstructuredGrid\" </VTKFile>"), Contains("a tag begins inside another"));
+}
+
 TEST_CASE("orders that Gmsh does not evaluate are refused with the limit") {
   PointSource source(8);
   const auto refused = [&](CellKind kind, int order, const std::string& limit) {
