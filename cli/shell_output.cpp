@@ -3,7 +3,7 @@
 
 #include "cli/exit_status.h"
 #include "export/cell_text.h"
-#include "export/gltf_writer.h"
+#include "export/read_back.h"
 #include "export/volume_writer.h"
 #include "fit/target_surface.h"
 #include "subvol/boundary.h"
@@ -123,9 +123,10 @@ bool faces_point_inward(const TriangleMesh& surface) {
 
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {
   if (shows_surface(output)) {
-    write_gltf(output.path, scene_of(shell, scene_options(output, options)));
+    write_scene(output.path, scene_of(shell, scene_options(output, options)));
   } else if (output.extension == ".vtu" || output.extension == ".msh") {
     write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell));
+    require_written(output.path, shell.mesh);
   } else {
     write_output(output, shell.mesh, options);
   }
@@ -134,12 +135,13 @@ void write_shell(const Output& output, const ShellResult& shell, const WritingOp
 void write_shell(const Output& output, const ShellResult& shell, const CurvedShell& curved,
                  const WritingOptions& options) {
   if (output.part == Part::cage) return write_output(output, shell.mesh, options);
-  if (shows_surface(output)) return write_gltf(output.path, scene_of(shell, curved, scene_options(output, options)));
+  if (shows_surface(output)) return write_scene(output.path, scene_of(shell, curved, scene_options(output, options)));
   if (output.extension == ".vtu" || output.extension == ".msh") {
     const std::vector<VertexField> fields = thickness_fields(shell);
-    return write_volume(output.path, curved.mesh,
-                        {.cell_minima = curved.quality.cell_minima, .references = shell.mesh.references,
-                         .fields = fields});
+    return write_curved_cells(output, curved.mesh,
+                              {.cell_minima = curved.quality.cell_minima,
+                               .references = shell.mesh.references,
+                               .fields = fields});
   }
   write_output(output, HighOrderFile{curved.mesh, shell.mesh.references}, options);
 }

@@ -7,6 +7,7 @@
 #include "export/export.h"
 #include "export/gltf_writer.h"
 #include "export/obj_writer.h"
+#include "export/read_back.h"
 #include "export/usd_writer.h"
 #include "export/volume_writer.h"
 #include "fit/high_order_quality.h"
@@ -30,13 +31,18 @@ void write_cells(const Output& output, const VolumeMesh& mesh) {
   } else {
     write_volume_mesh(output.path, mesh);
   }
+  require_written(output.path, mesh);
 }
 
 void write_polygons(const Output& output, const PolygonMesh& surface, const FeatureTags& tags,
                     const WritingOptions& options) {
-  if (output.extension == ".obj") return write_obj(output.path, surface);
-  const SurfaceSceneOptions scene = scene_options(output, options);
-  write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
+  if (output.extension == ".obj") {
+    write_obj(output.path, surface);
+  } else {
+    const SurfaceSceneOptions scene = scene_options(output, options);
+    write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
+  }
+  require_written(output.path, surface);
 }
 
 /// Two triangles that follow one another are a quad again.
@@ -110,6 +116,16 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->group(group);
 }
 
+void write_scene(const std::filesystem::path& path, const Scene& scene) {
+  write_gltf(path, scene);
+  require_written(path, scene);
+}
+
+void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  write_volume(output.path, mesh, options);
+  require_written(output.path, mesh, options);
+}
+
 bool shows_surface(const Output& output) { return output.part == Part::result && output.is_scene(); }
 
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
@@ -117,15 +133,15 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
   if (output.part == Part::cage) return write_output(output, cage, options);
   if (!shows_surface(output)) return write_output(output, mesh, options);
   const std::vector<double> quality = patch_quality(cage, *limit, measure_quality(mesh).cell_minima);
-  write_gltf(output.path, surface_scene(*limit, quality, scene_options(output, options)));
+  write_scene(output.path, surface_scene(*limit, quality, scene_options(output, options)));
 }
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
   if (output.is_volume()) return write_cells(output, mesh);
   if (output.part == Part::cutaway)
-    return write_gltf(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
+    return write_scene(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
                                                  scene_options(output, options)));
-  if (output.is_scene()) return write_gltf(output.path, boundary_scene(mesh, scene_options(output, options)));
+  if (output.is_scene()) return write_scene(output.path, boundary_scene(mesh, scene_options(output, options)));
   const TaggedPolygons boundary = tagged_polygons(mesh);
   write_polygons(output, boundary.polygons, boundary.tags, options);
 }
@@ -135,30 +151,31 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
   if (output.extension == ".usda")
     throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
   if (output.extension == ".obj")
-    return write_obj(output.path, polygons_of(curved_boundary(mesh, options.chord_percent)));
+    return write_polygons(output, polygons_of(curved_boundary(mesh, options.chord_percent)), {}, options);
   const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
   const std::vector<double> minima = is_linear ? std::vector<double>{} : measure_quality(mesh).cell_minima;
   if (output.part == Part::cutaway)
-    return write_gltf(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
-  if (output.is_scene()) return write_gltf(output.path, surface_scene(mesh, minima, scene_options(output, options)));
-  write_volume(output.path, mesh,
-               {.cell_minima = minima, .references = file.references, .linear_intervals = options.linear_intervals});
+    return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
+  if (output.is_scene()) return write_scene(output.path, surface_scene(mesh, minima, scene_options(output, options)));
+  write_curved_cells(
+      output, mesh,
+      {.cell_minima = minima, .references = file.references, .linear_intervals = options.linear_intervals});
 }
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
-  if (output.is_scene()) return write_gltf(output.path, polygon_scene(surface, {}, scene_options(output, options)));
+  if (output.is_scene()) return write_scene(output.path, polygon_scene(surface, {}, scene_options(output, options)));
   write_polygons(output, surface, {}, options);
 }
 
 void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
                      const WritingOptions& options) {
-  write_gltf(output.path, animation_scene(cage, states, scene_options(output, options)));
+  write_scene(output.path, animation_scene(cage, states, scene_options(output, options)));
 }
 
 void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
                      const WritingOptions& options) {
-  write_gltf(output.path, animation_scene(mesh, states, scene_options(output, options)));
+  write_scene(output.path, animation_scene(mesh, states, scene_options(output, options)));
 }
 
 bool has_animation(std::span<const Output> outputs) {

@@ -5,6 +5,7 @@
 #include "export/cutaway.h"
 #include "export/export.h"
 #include "export/high_order_file.h"
+#include "export/scene.h"
 #include "export/tessellate.h"
 #include "subvol/fit_state.h"
 #include "subvol/triangle_mesh.h"
@@ -34,6 +35,12 @@ void add_writing_options(CLI::App& verb, WritingOptions& options);
 
 /// Reads where a cutaway is cut: x, y or z, also with a place as "z:0.3". Returns what is wrong, or nothing.
 std::string parse_cut(const std::string& text, CutPlane& cut);
+
+// Whatever is written is read back and compared with what it should be (`require_written`): IoError.
+
+/// Writes a scene; curved cells as .vtu, .msh, .mesh or .vtk.
+void write_scene(const std::filesystem::path& path, const Scene& scene);
+void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
 
 /// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
 /// coloured by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is asked

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/read_back.h"
+
+#include "export/cell_text.h"
+#include "export/lagrange_mesh.h"
+#include "export/text_format.h"
+#include "export/vtu_reader.h"
+#include "subvol/error.h"
+#include "subvol/mesh_io.h"
+#include "subvol/text_scanner.h"
+
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <tuple>
+
+namespace subvol {
+namespace {
+
+namespace fs = std::filesystem;
+namespace gltf = tinygltf;
+
+/// A file under comparison.
+class WrittenFile {
+ public:
+  explicit WrittenFile(const fs::path& path) : path_(path) {}
+
+  [[noreturn]] void differs(const std::string& what) const {
+    throw IoError(path_.string() + ": was written, but does not hold what it should: " + what);
+  }
+  void same_count(const std::string& what, std::size_t found, std::size_t wanted) const {
+    if (found != wanted) differs(std::to_string(found) + ' ' + what + ", expected " + std::to_string(wanted));
+  }
+  void same(bool same, const char* what, std::size_t number) const {
+    if (!same) differs(what + (' ' + std::to_string(number)));
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// compare(file), where there is something to read.
+template <class Compare>
+void read_back(const fs::path& path, const Compare& compare) {
+  std::error_code ignored;
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) return;
+  try {
+    compare(WrittenFile(path));
+  } catch (const InputError& error) {
+    throw IoError(std::string("was written, but cannot be read back: ") + error.what());
+  }
+}
+
+int reference(std::span<const int> references, std::size_t c) { return references.empty() ? 0 : references[c]; }
+
+/// Cells in the order that a key sorts them in, else by number.
+template <class Key>
+std::vector<std::size_t> sorted_cells(std::size_t num_cells, const Key& key) {
+  std::vector<std::size_t> order(num_cells);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+  return order;
+}
+
+// --- .mesh, .vtk ----------------------------------------------------------------------------------------------------
+
+FeatureTags normal_form(FeatureTags tags) {
+  for (CreaseEdge& crease : tags.creases) {
+    if (crease.v0 > crease.v1) std::swap(crease.v0, crease.v1);
+    crease.sharpness = std::min(crease.sharpness, kInfiniteSharpness);
+  }
+  for (CornerVertex& corner : tags.corners) corner.sharpness = std::min(corner.sharpness, kInfiniteSharpness);
+  const auto edge = [](const CreaseEdge& crease) { return std::tie(crease.v0, crease.v1); };
+  std::sort(tags.creases.begin(), tags.creases.end(), [&](const auto& a, const auto& b) { return edge(a) < edge(b); });
+  std::sort(tags.corners.begin(), tags.corners.end(),
+            [](const CornerVertex& a, const CornerVertex& b) { return a.vertex < b.vertex; });
+  return tags;
+}
+
+void compare_linear(const WrittenFile& file, const VolumeMesh& wanted, bool is_medit) {
+  const VolumeMesh found = read_volume_mesh(file.path(), {.check = false});
+  file.same_count("vertices", found.num_vertices(), wanted.num_vertices());
+  file.same_count("cells", found.num_cells(), wanted.num_cells());
+  for (std::size_t v = 0; v < wanted.num_vertices(); ++v)
+    file.same(found.positions[v] == wanted.positions[v], "vertex", v);
+  // Medit has a section for each kind: hexes, prisms, tets.
+  const auto section = [&](std::size_t c) {
+    return !is_medit ? 0 : wanted.kinds[c] == CellKind::hex ? 1 : wanted.kinds[c] == CellKind::prism ? 2 : 3;
+  };
+  const std::vector<std::size_t> order = sorted_cells(wanted.num_cells(), section);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::size_t c = order[i];
+    file.same(found.kinds[i] == wanted.kinds[c], "the kind of cell", c);
+    file.same(std::ranges::equal(found.cell(i), wanted.cell(c)), "the corners of cell", c);
+    file.same(reference(found.references, i) == reference(wanted.references, c), "the reference of cell", c);
+  }
+  if (!is_medit) return;
+  const FeatureTags tags = normal_form(found.tags), tags_wanted = normal_form(wanted.tags);
+  file.same_count("creases", tags.creases.size(), tags_wanted.creases.size());
+  file.same_count("corners", tags.corners.size(), tags_wanted.corners.size());
+  for (std::size_t i = 0; i < tags.creases.size(); ++i)
+    file.same(tags.creases[i] == tags_wanted.creases[i], "crease", i);
+  for (std::size_t i = 0; i < tags.corners.size(); ++i)
+    file.same(tags.corners[i] == tags_wanted.corners[i], "corner", i);
+}
+
+// --- .vtu, .msh -----------------------------------------------------------------------------------------------------
+
+void compare_vtu(const WrittenFile& file, const CellView& wanted) {
+  const std::string bytes = read_file(file.path());
+  const VtuArrays arrays(file.path().string(), bytes);
+  const auto points = arrays.get<double>("Points");
+  const auto nodes = arrays.get<std::int64_t>("connectivity"), ends = arrays.get<std::int64_t>("offsets");
+  const auto types = arrays.get<std::uint8_t>("types");
+  file.same_count("coordinates", points.size(), 3 * wanted.positions.size());
+  file.same_count("cells", types.size(), wanted.num_cells());
+  file.same_count("ends of cells", ends.size(), wanted.num_cells());
+  file.same_count("nodes of cells", nodes.size(), wanted.nodes.size());
+  for (std::size_t v = 0; v < wanted.positions.size(); ++v)
+    file.same(std::equal(wanted.positions[v].begin(), wanted.positions[v].end(), &points[3 * v]), "point", v);
+  for (std::size_t c = 0; c < wanted.num_cells(); ++c) {
+    file.same(types[c] == vtk_type(wanted.kinds[c]), "the kind of cell", c);
+    file.same(ends[c] == static_cast<std::int64_t>(wanted.offsets[c + 1]), "the end of cell", c);
+    const auto cell = wanted.cell(c);
+    file.same(std::equal(cell.begin(), cell.end(), nodes.begin() + static_cast<std::ptrdiff_t>(wanted.offsets[c])),
+              "the nodes of cell", c);
+  }
+  if (wanted.references.empty()) return;
+  const auto references = arrays.get<std::int32_t>("reference");
+  file.same(std::ranges::equal(references, wanted.references), "references of cells, all", references.size());
+}
+
+void skip_to(TextScanner& scan, std::string_view section) {
+  while (scan.word(std::string(section).c_str()) != section) continue;
+}
+
+void compare_msh(const WrittenFile& file, const CellView& wanted) {
+  const std::string bytes = read_file(file.path());
+  TextScanner scan(file.path().string(), bytes, TextScanner::Comments::none);
+  const auto whole = [&](const char* what) { return static_cast<std::size_t>(scan.integer(what)); };
+  const auto skip = [&](int num_words) {
+    for (int i = 0; i < num_words; ++i) scan.word("a number");
+  };
+  const std::size_t num_nodes = wanted.positions.size(), num_cells = wanted.num_cells();
+  skip_to(scan, "$Nodes");
+  skip(1);
+  file.same_count("nodes", whole("the number of nodes"), num_nodes);
+  skip(5);
+  file.same_count("nodes of the block", whole("the number of nodes"), num_nodes);
+  for (std::size_t v = 0; v < num_nodes; ++v) file.same(whole("a node's number") == v + 1, "the number of node", v + 1);
+  for (std::size_t v = 0; v < num_nodes; ++v)
+    for (const double x : wanted.positions[v]) file.same(scan.number("a coordinate") == x, "node", v + 1);
+  skip_to(scan, "$Elements");
+  const std::size_t num_blocks = whole("the number of blocks");
+  file.same_count("elements", whole("the number of elements"), num_cells);
+  skip(2);
+  const std::vector<std::size_t> order = sorted_cells(num_cells, [&](std::size_t c) {
+    return std::tuple(reference(wanted.references, c), wanted.order(c), wanted.kinds[c]);
+  });
+  std::size_t element = 0;
+  for (std::size_t block = 0; block < num_blocks; ++block) {
+    skip(2);
+    const std::size_t type = whole("a type"), size = whole("a number of elements");
+    for (std::size_t k = 0; k < size; ++k, ++element) {
+      file.same(element < num_cells && whole("an element's number") == element + 1, "the number of element", element + 1);
+      const std::size_t c = order[element];
+      file.same(type == static_cast<std::size_t>(gmsh_type(wanted.kinds[c], wanted.order(c))), "the type of element",
+                element + 1);
+      for (const Index v : wanted.cell(c))
+        file.same(whole("a node") == static_cast<std::size_t>(v) + 1, "the nodes of element", element + 1);
+    }
+  }
+  file.same_count("elements of all blocks", element, num_cells);
+}
+
+void compare_cells(const WrittenFile& file, const std::string& extension, const CellView& wanted) {
+  extension == ".vtu" ? compare_vtu(file, wanted) : compare_msh(file, wanted);
+}
+
+void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, std::span<const int> references) {
+  const HighOrderFile found = read_high_order(file.path());
+  file.same_count("nodes", found.mesh.space.num_nodes(), wanted.space.num_nodes());
+  file.same(found.mesh.space.basis() == wanted.space.basis(), "the basis of all cells,", wanted.space.num_cells());
+  const EntityOrders &orders = found.mesh.space.orders(), &orders_wanted = wanted.space.orders();
+  file.same(orders.edges == orders_wanted.edges && orders.faces == orders_wanted.faces &&
+                orders.cells == orders_wanted.cells,
+            "the orders of all cells,", wanted.space.num_cells());
+  for (std::size_t i = 0; i < wanted.coefficients.size(); ++i)
+    file.same(found.mesh.coefficients[i] == wanted.coefficients[i], "the coefficient of node", i);
+  for (std::size_t c = 0; c < wanted.space.num_cells(); ++c)
+    file.same(reference(found.references, c) == reference(references, c), "the reference of cell", c);
+}
+
+// --- .obj, .usda ----------------------------------------------------------------------------------------------------
+
+void compare_polygons(const WrittenFile& file, const PolygonMesh& found, const PolygonMesh& wanted) {
+  file.same_count("vertices", found.positions.size(), wanted.positions.size());
+  file.same_count("faces", found.num_faces(), wanted.num_faces());
+  for (std::size_t v = 0; v < wanted.positions.size(); ++v)
+    file.same(found.positions[v] == wanted.positions[v], "vertex", v);
+  for (std::size_t f = 0; f < wanted.num_faces(); ++f)
+    file.same(found.face_offsets[f + 1] == wanted.face_offsets[f + 1], "the number of corners of face", f);
+  file.same_count("corners of faces", found.face_vertices.size(), wanted.face_vertices.size());
+  for (std::size_t k = 0; k < wanted.face_vertices.size(); ++k)
+    file.same(found.face_vertices[k] == wanted.face_vertices[k], "corner", k);
+}
+
+/// As it is written: no polygon is dropped, as a reader of other programs' files does.
+PolygonMesh obj_polygons(const WrittenFile& file) {
+  const std::string bytes = read_file(file.path());
+  TextScanner lines(file.path().string(), bytes, TextScanner::Comments::none);
+  PolygonMesh mesh;
+  while (const auto line = lines.line()) {
+    if (!line->starts_with("v ") && !line->starts_with("f ")) continue;
+    TextScanner words(file.path().string(), line->substr(1));
+    if ((*line)[0] == 'v') {
+      const double x = words.number("x"), y = words.number("y");
+      mesh.positions.emplace_back(x, y, words.number("z"));
+      continue;
+    }
+    while (words.peek()) mesh.face_vertices.push_back(static_cast<Index>(words.integer("a vertex") - 1));
+    mesh.face_offsets.push_back(mesh.face_vertices.size());
+  }
+  return mesh;
+}
+
+/// The numbers of an array of a .usda.
+std::vector<double> usda_array(const WrittenFile& file, const std::string& bytes, const std::string& declaration) {
+  const std::string opening = ' ' + declaration + " = [";
+  const std::size_t begin = bytes.find(opening), end = bytes.find(']', begin + opening.size());
+  if (begin == std::string::npos || end == std::string::npos) file.differs("there is no " + declaration);
+  std::string numbers = bytes.substr(begin + opening.size(), end - begin - opening.size());
+  std::replace_if(numbers.begin(), numbers.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
+  TextScanner scan(file.path().string(), numbers);
+  std::vector<double> values;
+  while (scan.peek()) values.push_back(scan.number("a number"));
+  return values;
+}
+
+PolygonMesh usda_polygons(const WrittenFile& file) {
+  const std::string bytes = read_file(file.path());
+  PolygonMesh mesh;
+  const std::vector<double> points = usda_array(file, bytes, "point3f[] points");
+  for (std::size_t i = 0; i + 2 < points.size(); i += 3) mesh.positions.emplace_back(&points[i]);
+  for (const double count : usda_array(file, bytes, "int[] faceVertexCounts"))
+    mesh.face_offsets.push_back(mesh.face_offsets.back() + static_cast<std::size_t>(count));
+  for (const double vertex : usda_array(file, bytes, "int[] faceVertexIndices"))
+    mesh.face_vertices.push_back(static_cast<Index>(vertex));
+  return mesh;
+}
+
+// --- .glb, .gltf ----------------------------------------------------------------------------------------------------
+
+/// The numbers of an accessor.
+class Numbers {
+ public:
+  Numbers(const WrittenFile& file, const gltf::Model& model, int accessor)
+      : accessor_(model.accessors.at(static_cast<std::size_t>(accessor))),
+        view_(model.bufferViews.at(static_cast<std::size_t>(accessor_.bufferView))),
+        bytes_(model.buffers.at(static_cast<std::size_t>(view_.buffer)).data) {
+    const int stride = accessor_.ByteStride(view_);
+    begin_ = view_.byteOffset + accessor_.byteOffset;
+    if (stride <= 0 || begin_ + accessor_.count * static_cast<std::size_t>(stride) > bytes_.size())
+      file.differs("accessor " + std::to_string(accessor) + " goes beyond its buffer");
+    stride_ = static_cast<std::size_t>(stride);
+  }
+  std::size_t count() const { return accessor_.count; }
+  int type() const { return accessor_.componentType; }
+  double at(std::size_t i, std::size_t component) const {
+    switch (type()) {
+      case TINYGLTF_COMPONENT_TYPE_FLOAT: return number<float>(i, component);
+      case TINYGLTF_COMPONENT_TYPE_SHORT: return number<std::int16_t>(i, component);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return number<std::uint16_t>(i, component);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return number<std::uint32_t>(i, component);
+      default: return std::nan("");
+    }
+  }
+
+ private:
+  template <class T>
+  double number(std::size_t i, std::size_t component) const {
+    T value;
+    std::memcpy(&value, bytes_.data() + begin_ + i * stride_ + component * sizeof(T), sizeof value);
+    return static_cast<double>(value);
+  }
+
+  const gltf::Accessor& accessor_;
+  const gltf::BufferView& view_;
+  const std::vector<unsigned char>& bytes_;
+  std::size_t begin_ = 0, stride_ = 0;
+};
+
+gltf::Model read_model(const WrittenFile& file) {
+  const std::string bytes = read_file(file.path());
+  gltf::Model model;
+  gltf::TinyGLTF reader;
+  std::string errors, warnings;
+  const auto size = static_cast<unsigned>(bytes.size());
+  const bool read =
+      lower_case_extension(file.path()) == ".glb"
+          ? reader.LoadBinaryFromMemory(&model, &errors, &warnings,
+                                        reinterpret_cast<const unsigned char*>(bytes.data()), size)
+          : reader.LoadASCIIFromString(&model, &errors, &warnings, bytes.data(), size, "");
+  if (!read) file.differs(errors);
+  return model;
+}
+
+void compare_node(const WrittenFile& file, const gltf::Model& model, const gltf::Node& node, const SceneNode& wanted,
+                  const Vec3& origin) {
+  const std::string where = "node \"" + wanted.name + "\": ";
+  if (node.name != wanted.name || node.mesh < 0) file.differs("expected a " + where + "it is \"" + node.name + '"');
+  const gltf::Mesh& mesh = model.meshes.at(static_cast<std::size_t>(node.mesh));
+  file.same_count(where + "primitives", mesh.primitives.size(), 1);
+  const gltf::Primitive& primitive = mesh.primitives[0];
+  const Numbers positions(file, model, primitive.attributes.at("POSITION")), indices(file, model, primitive.indices);
+  file.same_count(where + "positions", positions.count(), wanted.primitive.positions.size());
+  file.same_count(where + "indices", indices.count(), wanted.primitive.indices.size());
+  file.same_count(where + "shapes", primitive.targets.size(), wanted.shapes.size());
+  const bool quantized = positions.type() == TINYGLTF_COMPONENT_TYPE_SHORT;
+  const double step = quantized && !node.scale.empty() ? node.scale[0] / 32767 : 1;
+  constexpr double kHalfStep = 0.51;  // and the rounding to float before it
+  for (std::size_t v = 0; v < positions.count(); ++v)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double x = wanted.primitive.positions[v][static_cast<int>(k)] - origin[static_cast<int>(k)];
+      const double found = positions.at(v, k);
+      const bool same = quantized ? std::abs(found * step - x) <= kHalfStep * step : found == static_cast<float>(x);
+      if (!same) file.differs(where + "position " + std::to_string(v));
+    }
+  for (std::size_t i = 0; i < indices.count(); ++i)
+    if (indices.at(i, 0) != wanted.primitive.indices[i]) file.differs(where + "index " + std::to_string(i));
+}
+
+void compare_scene(const WrittenFile& file, const Scene& wanted) {
+  const gltf::Model model = read_model(file);
+  file.same_count("nodes", model.nodes.size(), wanted.nodes.size() + 1);
+  const auto has_shapes = [](const SceneNode& node) { return !node.shapes.empty(); };
+  file.same_count("animations", model.animations.size(),
+                  static_cast<std::size_t>(std::ranges::count_if(wanted.nodes, has_shapes)));
+  for (std::size_t i = 0; i < wanted.nodes.size(); ++i)
+    compare_node(file, model, model.nodes[i + 1], wanted.nodes[i], wanted.origin);
+}
+
+}  // namespace
+
+void require_written(const fs::path& path, const VolumeMesh& mesh) {
+  const std::string extension = lower_case_extension(path);
+  read_back(path, [&](const WrittenFile& file) {
+    if (extension == ".mesh" || extension == ".vtk") return compare_linear(file, mesh, extension == ".mesh");
+    compare_cells(file, extension,
+                  {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references});
+  });
+}
+
+void require_written(const fs::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  const std::string extension = lower_case_extension(path);
+  if (extension == ".mesh" || extension == ".vtk") return require_written(path, small_cells(mesh, options));
+  read_back(path, [&](const WrittenFile& file) {
+    const bool is_vtu = extension == ".vtu";
+    const LagrangeMesh cells = lagrange_mesh(mesh, lagrange_orders(mesh.space, is_vtu ? kMaxVtkOrder : kMaxOrder),
+                                             is_vtu ? NodeOrdering::vtk : NodeOrdering::gmsh);
+    compare_cells(file, extension,
+                  {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references});
+    if (is_vtu) compare_map(file, mesh, options.references);
+  });
+}
+
+void require_written(const fs::path& path, const PolygonMesh& surface) {
+  const bool is_obj = lower_case_extension(path) == ".obj";
+  read_back(path, [&](const WrittenFile& file) {
+    compare_polygons(file, is_obj ? obj_polygons(file) : usda_polygons(file), surface);
+  });
+}
+
+void require_written(const fs::path& path, const Scene& scene) {
+  read_back(path, [&](const WrittenFile& file) { compare_scene(file, scene); });
+}
+
+}  // namespace subvol
