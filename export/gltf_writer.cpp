@@ -274,7 +274,10 @@ void add_animation(gltf::Model& model, BufferWriter& buffer, int node, std::size
                    double seconds_per_shape) {
   std::vector<float> times, weights;
   for (std::size_t step = 0; step <= num_shapes; ++step) {
-    times.push_back(static_cast<float>(static_cast<double>(step) * seconds_per_shape));
+    const auto time = static_cast<float>(static_cast<double>(step) * seconds_per_shape);
+    if (!std::isfinite(time) || (step > 0 && !(time > times.back())))
+      throw InputError("scene: seconds_per_shape: expected times of the shapes that differ, in the range of float32");
+    times.push_back(time);
     for (std::size_t shape = 0; shape < num_shapes; ++shape) weights.push_back(step == shape ? 1.0F : 0.0F);
   }
   constexpr int kNoTarget = 0, kFloat = TINYGLTF_COMPONENT_TYPE_FLOAT;

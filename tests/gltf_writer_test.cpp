@@ -266,6 +266,32 @@ TEST_CASE("shapes become morph targets that an animation goes through to the sce
   refused([](Scene& s) { s.nodes[0].shapes[1].normals.clear(); });
   refused([](Scene& s) { s.nodes[1].shapes = {{"line", s.nodes[1].primitive.positions}}; });
   refused([](Scene& s) { s.seconds_per_shape = 0; });
+  refused([](Scene& s) { s.seconds_per_shape = 1e-60; });  // in float32 all at the same time
+  refused([](Scene& s) { s.seconds_per_shape = 3e38; });
+}
+
+TEST_CASE("times of an animation start at 0 and rise, whatever the shapes are") {
+  Scene scene = two_quads();
+  const ScenePrimitive& surface = scene.nodes[0].primitive;
+  for (std::size_t num_shapes = 1; num_shapes <= 3; ++num_shapes) {
+    scene.nodes[0].shapes.push_back({"as it is", surface.positions, surface.normals});  // all of them the same
+    scene.seconds_per_shape = 0.1;
+    const GlbFile file(gltf_bytes(scene, GltfContainer::glb));
+    const auto& sampler = file.json["animations"][0]["samplers"][0];
+    const auto times = file.numbers<float>(sampler["input"]);
+    REQUIRE(times.size() == num_shapes + 1);
+    CHECK(times[0] == 0);
+    for (std::size_t k = 0; k < num_shapes; ++k) CHECK(times[k] < times[k + 1]);
+    const auto& accessor = file.json["accessors"][sampler["input"].get<int>()];
+    CHECK(accessor["min"] == nlohmann::json({0}));
+    CHECK(accessor["max"][0].get<float>() == times.back());
+    CHECK(file.numbers<float>(sampler["output"]).size() == times.size() * num_shapes);
+    const auto path = scratch("same.glb");
+    write_gltf(path, scene);
+    check_with_validator({path});
+  }
+  scene.nodes[0].shapes.clear();
+  CHECK(!GlbFile(gltf_bytes(scene, GltfContainer::glb)).json.contains("animations"));
 }
 
 TEST_CASE("a quantized scene is within half a step of the scene, in fewer bytes") {
