@@ -14,7 +14,9 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <map>
+#include <set>
 
 using namespace subvol;
 using namespace subvol::test;
@@ -57,6 +59,33 @@ TEST_CASE("a cutaway of a box of cubes shows the lower half of it, closed by the
   for (const Vec3& normal : cut.normals) CHECK(normal.z() == Approx(1));
   // Edges of both, once each: of the bottom, the uprights, and of the cut inside its rim.
   CHECK(scene.nodes[2].primitive.indices.size() == 2 * (31 + 14 + 31));
+}
+
+TEST_CASE("the wireframe of a cutaway has the edges of the cells that stay, and no others") {
+  VolumeMesh mesh = lattice(5, 4, 3);
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) mesh.positions[v] += 0.1 * mesh.positions[v].y() * Vec3::UnitX();
+  const std::vector<double> minima(mesh.num_cells(), 1);
+  for (const CutPlane& plane :
+       {CutPlane{.axis = 0, .share = 0.6}, CutPlane{.axis = 1}, CutPlane{.axis = 2, .share = 0.3}}) {
+    const Scene scene = cutaway_scene(mesh, minima, plane);
+    std::set<std::array<double, 6>> of_cells, drawn;
+    const auto edge = [](Vec3 a, Vec3 b) {
+      if (std::lexicographical_compare(b.begin(), b.end(), a.begin(), a.end())) std::swap(a, b);
+      return std::array{a.x(), a.y(), a.z(), b.x(), b.y(), b.z()};
+    };
+    // What is left of the cells, by the faces that are seen: the surface's and the cut's.
+    for (const std::size_t node : {0, 1}) {
+      const ScenePrimitive& faces = scene.nodes[node].primitive;
+      for (std::size_t i = 0; i < faces.indices.size(); i += 3)
+        for (std::size_t k = 0; k < 3; ++k)
+          of_cells.insert(edge(faces.positions[faces.indices[i + k]], faces.positions[faces.indices[i + (k + 1) % 3]]));
+    }
+    const ScenePrimitive& wires = scene.nodes[2].primitive;
+    for (std::size_t i = 0; i < wires.indices.size(); i += 2)
+      CHECK(drawn.insert(edge(wires.positions[wires.indices[i]], wires.positions[wires.indices[i + 1]])).second);
+    for (const auto& wire : drawn) CHECK(of_cells.contains(wire));
+    CHECK(drawn.size() > mesh.num_cells() / 2);
+  }
 }
 
 TEST_CASE("the plane of a cutaway stands where it is told to") {
