@@ -87,7 +87,7 @@ Vec3 HexBoxes::corner_point(const Box& box, int corner) {
   return size * Vec3(box.index[0] + corner % 2, box.index[1] + corner / 2 % 2, box.index[2] + corner / 4);
 }
 
-std::size_t HexBoxes::corner_matrix(int corner) const {
+std::size_t HexBoxes::corner_matrix(const Box&, int corner) const {
   return static_cast<std::size_t>((q1_ - 1) * ((corner % 2 * q1_ + corner / 4) * q1_ + corner / 2 % 2));
 }
 

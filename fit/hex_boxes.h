@@ -32,12 +32,14 @@ class HexBoxes {
   static Box root() { return {}; }
   static int num_corners() { return 8; }
   static std::array<Box, kNumChildren> children(const Box& box, double lowest = 0);
+  /// Models are as good as their level allows.
+  static bool improve(Box&, double) { return false; }
   static Vec3 corner_point(const Box& box, int corner);
 
   /// J's coefficients on a box; valid until the next call. Boxes in the order of `children` cost least.
   const ControlMatrices& matrices(const Box& box);
   /// Number of the matrix at a corner of the box: J there, by the model.
-  std::size_t corner_matrix(int corner) const;
+  std::size_t corner_matrix(const Box& box, int corner) const;
   /// Bounds of the errors of J's entries: modelling and rounding.
   const Mat3& remainder(const Box& box);
   /// Whether the modelling error is so large that no bound can be hoped for.

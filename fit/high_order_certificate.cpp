@@ -115,20 +115,23 @@ class Search {
   void look_at(Box box, double parent_lowest) {
     ++result_.boxes;
     if (boxes_.is_hopeless(box)) return keep(std::move(box), parent_lowest);
-    const ControlMatrices& matrices = boxes_.matrices(box);
-    const double scale = boxes_.determinant_scale(box);
-    const double bound = scale * determinant_bound(matrices, boxes_.remainder(box));
-    if (bound > 0) {
-      result_.lower_bound = std::min(result_.lower_bound, bound);
-      return;
-    }
-    int lowest_corner = 0;
-    double lowest = kInfinity;
-    for (int corner = 0; corner < boxes_.num_corners(); ++corner) {
-      const double value = scale * matrices[boxes_.corner_matrix(corner)].determinant();
-      if (value < lowest) lowest = value, lowest_corner = corner;
-    }
-    if (lowest <= 0) lowest = try_witness(boxes_.corner_point(box, lowest_corner));
+    double lowest;
+    do {
+      const ControlMatrices& matrices = boxes_.matrices(box);
+      const double scale = boxes_.determinant_scale(box);
+      const double bound = scale * determinant_bound(matrices, boxes_.remainder(box));
+      if (bound > 0) {
+        result_.lower_bound = std::min(result_.lower_bound, bound);
+        return;
+      }
+      int lowest_corner = 0;
+      lowest = kInfinity;
+      for (int corner = 0; corner < boxes_.num_corners(); ++corner) {
+        const double value = scale * matrices[boxes_.corner_matrix(box, corner)].determinant();
+        if (value < lowest) lowest = value, lowest_corner = corner;
+      }
+      if (lowest <= 0) lowest = try_witness(boxes_.corner_point(box, lowest_corner));
+    } while (lowest > 0 && boxes_.improve(box, lowest));
     if (lowest > 0 && boxes_.is_stuck(box))
       decided_ = false;
     else

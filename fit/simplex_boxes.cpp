@@ -14,8 +14,7 @@ namespace subvol {
 
 namespace {
 
-/// Control points are averaged this many numbers at a time: the three coordinates of a tet's.
-constexpr std::size_t kLanes = 4;
+constexpr std::size_t kLanes = SimplexTables::kLanes;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 
 Lanes load_lanes(const double* from) {
@@ -39,32 +38,23 @@ void transpose(Lanes (&x)[kLanes]) {
 
 std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
 
+/// Share of the mean edges up to which errors of models are small as long as nothing is known of det J. At high orders
+/// low degrees cost more in boxes than they save (measured).
+double small_error(int order) { return order <= 4 ? 0.05 : 0.004; }
+/// Beyond this one nothing can be hoped for.
+constexpr double kHopelessError = 1;
+/// New models need not be closer than by this factor: the ones after them will be.
+constexpr double kFall = 0.05;
+
 }  // namespace
 
 SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
     : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1), w_controls_(kind == CellKind::tet ? 1 : line_.degree() + 1),
-      lanes_(rounded_up(3 * num_layers_, kLanes)),
-      lower_(simplex_.index().dimension(), simplex_.index().degree() - 1) {
-  const SimplexIndex& index = simplex_.index();
-  for (int c = 0; c <= index.dimension(); ++c) {
-    reduced_[c].assign(index.size(), lower_.size());
-    for (int n = 0; n < lower_.size(); ++n) {
-      SimplexIndex::Exponents e = lower_.exponents(n);
-      ++e[c];
-      raised_[c].push_back(index.find(e));
-      reduced_[c][raised_[c].back()] = n;
-    }
-    for (int n = 0; n < index.size(); ++n) exponents_[c].push_back(index.exponents(n)[c]);
-    for (int b = 0; b <= index.dimension(); ++b)
-      if (c < b) halvings_[c][b] = SimplexHalving(index, c, b);
-    raised_[c].resize(rounded_up(lower_.size(), kLanes));
-  }
-  matrices_.resize(kind == CellKind::tet ? lower_.size() : index.size() * w_controls_);
-  const std::size_t width = rounded_up(w_controls_, kWide);
+      lanes_(rounded_up(3 * num_layers_, kLanes)), small_error_(small_error(order)),
+      whole_models_(simplex_.num_tiers()) {
   layer_terms_.resize(num_layers_);
-  contracted_.assign(3 * index.size() * width + 2 * kWide, 0);
-  difference_.assign((lower_.size() + 1) * width, 0);
+  const std::size_t width = rounded_up(w_controls_, kWide);
   for (std::size_t o = 0; o < width; ++o) {
     below_.push_back(static_cast<double>(o));
     above_.push_back(w_controls_ - 1 - static_cast<double>(o));
@@ -72,10 +62,15 @@ SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
 }
 
 void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
-  num_modes_ = static_cast<int>(modes.size());
+  num_modes_ = highest_ = 0;
   for (auto& layer : layer_terms_) layer.clear();
-  for (std::size_t a = 0; a < modes.size(); ++a)
-    layer_terms_[kind_ == CellKind::prism ? modes[a].k : 0].push_back({simplex_.slot(modes[a]), coefficients[a]});
+  for (std::size_t a = 0; a < modes.size(); ++a) {
+    if (coefficients[a] == Vec3::Zero()) continue;
+    ++num_modes_;
+    highest_ = std::max(highest_, simplex_.own_order(modes[a]));
+    layer_terms_[kind_ == CellKind::prism ? modes[a].k : 0].push_back(
+        {simplex_.slot(modes[a]), simplex_.own_order(modes[a]), coefficients[a]});
+  }
   const bool prism = kind_ == CellKind::prism;
   Mat3 edges = Mat3::Zero();
   for (std::size_t a = 0; a < modes.size(); ++a) {
@@ -85,7 +80,7 @@ void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Ve
     if (mode.vertex > 0)
       gradient[mode.vertex - 1] = prism ? 0.5 : 1;
     else
-      gradient.head(simplex_.index().dimension()).setConstant(prism ? -0.5 : -1);
+      gradient.head(simplex_.dimension()).setConstant(prism ? -0.5 : -1);
     if (prism) gradient[2] = (mode.k == 1 ? 1 : -1) / 3.0;
     edges += coefficients[a] * gradient;
   }
@@ -105,7 +100,7 @@ Mat3 SimplexBoxes::lasting_error(const Box& box) const {
 }
 
 bool SimplexBoxes::is_stuck(const Box& box) {
-  if (box.halvings < simplex_.most_halvings()) return false;
+  if (box.halvings < simplex_.most_halvings() || box.tier < 0) return false;
   const Mat3 lasting = lasting_error(box);
   if (lasting.maxCoeff() == 0) return false;
   const Mat3 mean = matrices(box).mean();
@@ -118,58 +113,127 @@ bool SimplexBoxes::is_stuck(const Box& box) {
 SimplexBoxes::Box SimplexBoxes::root() {
   Box box;
   const auto vertices = canonical_vertices(kind_);
-  std::copy_n(vertices.begin(), simplex_.index().dimension() + 1, box.vertices.begin());
-  take_models(box);
+  std::copy_n(vertices.begin(), simplex_.dimension() + 1, box.vertices.begin());
+  take_models(box, small_error_, 0);
   return box;
 }
 
-void SimplexBoxes::take_models(Box& box) {
-  const auto part = simplex_.part(box.part, box.vertices);
+int SimplexBoxes::choose_tier(const Box& box, const SimplexModels::Part& part, double wanted, int least_tier) const {
+  const int last = simplex_.num_tiers() - 1;
+  if (simplex_.is_exact()) {  // a degree more than needed brings control points much closer to the map
+    int tier = 0;
+    while (tier < last && simplex_.tables(tier).index.degree() < highest_ + 2) ++tier;
+    return tier;
+  }
+  if (!(mean_edges_.minCoeff() > 0)) return 0;
+  const Vec3 inverse = mean_edges_.cwiseInverse();
+  Wide errors{};
+  for (int k = 0; k < num_layers_; ++k) {
+    const bool prism = kind_ == CellKind::prism;
+    const double across = inverse[0] + inverse[1] + (prism ? 0 : inverse[2]), along = prism ? inverse[2] : 0;
+    Wide value{}, gradient{};
+    for (const Term& term : layer_terms_[k]) {
+      const double* e = part.errors.data() + 2 * SimplexModels::kMostTiers * term.slot;
+      const double size = term.coefficient.cwiseAbs().sum();
+      value += size * load_wide(e);
+      gradient += size * load_wide(e + SimplexModels::kMostTiers);
+    }
+    errors += gradient * (across * (prism ? line_.bounds()[k] : 1)) + value * (along * line_.slope_bounds()[k]);
+  }
+  for (int tier = least_tier; tier <= last; ++tier)
+    if (errors[tier] <= wanted) return tier;
+  const bool parts_follow = box.halvings + simplex_.halvings_between() <= simplex_.most_halvings();
+  return parts_follow && !(errors[last] <= kHopelessError) ? -1 : last;
+}
+
+void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
+  const bool whole = box.part == 1;
+  if (whole && !whole_) whole_ = simplex_.part(box.part, box.vertices);
+  const auto part = whole ? whole_ : simplex_.part(box.part, box.vertices);
+  box.tier = choose_tier(box, *part, wanted, least_tier);
+  box.modelled = box.halvings;
+  if (box.tier < 0) {
+    box.layers.reset();
+    box.control.clear();
+    return;
+  }
+  SimplexModels::Models own;
+  SimplexModels::Models& models = whole ? whole_models_[box.tier] : own;
+  simplex_.add_models(box.part, box.vertices, *part, box.tier, highest_, models);
+
   std::vector<Layer> layers(num_layers_);
   for (int k = 0; k < num_layers_; ++k) {
     Layer& layer = layers[k];
     for (const Term& term : layer_terms_[k]) {
-      const SimplexModels::Function& f = part->functions[term.slot];
+      const auto& f = part->functions[term.slot];
+      const auto& batch = *models[term.order];
+      const auto& model = batch.sizes[term.slot - batch.first];
       const Vec3 size = term.coefficient.cwiseAbs();
       layer.value_bound += f.value_bound * size;
       layer.gradient_bound += f.gradient_bound * size;
-      layer.error += f.error * size;
-      layer.gradient_error += f.gradient_error * size;
-      layer.largest_coefficient += f.largest_coefficient * size;
-      layer.rounding += f.rounding * size;
+      layer.error += part->error(term.slot, box.tier) * size;
+      layer.gradient_error += part->gradient_error(term.slot, box.tier) * size;
+      layer.largest_coefficient += model.largest_coefficient * size;
+      layer.rounding += model.rounding * size;
     }
   }
   box.layers = std::make_shared<const std::vector<Layer>>(std::move(layers));
 
-  const std::size_t stride = simplex_.stride();
+  const std::size_t stride = tables(box).stride;
   box.control.assign(stride * lanes_, 0);
-  for (int k = 0; k < num_layers_; ++k)
+  struct Used {
+    const double* model;
+    Vec3 coefficient;
+  };
+  std::vector<Used> used;
+  for (int k = 0; k < num_layers_; ++k) {
+    used.clear();
+    for (const Term& term : layer_terms_[k]) {
+      const auto& batch = *models[term.order];
+      if (!part->functions[term.slot].is_left_out(box.tier))
+        used.push_back({batch.coefficients.data() + (term.slot - batch.first) * stride, term.coefficient});
+    }
     for (std::size_t first = 0; first < stride; first += kWide) {
       Wide sums[3] = {};
-      for (const Term& term : layer_terms_[k]) {
-        const Wide b = load_wide(part->coefficients.data() + term.slot * stride + first);
-        for (int row = 0; row < 3; ++row) sums[row] += term.coefficient[row] * b;
+      for (const Used& f : used) {
+        const Wide b = load_wide(f.model + first);
+        for (int row = 0; row < 3; ++row) sums[row] += f.coefficient[row] * b;
       }
       double* out = box.control.data() + first * lanes_ + k;
       for (int n = 0; n < kWide; ++n)
         for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[row][n];
     }
+  }
+}
+
+bool SimplexBoxes::improve(Box& box, double lowest) {
+  if (simplex_.is_exact() || box.tier < 0 || box.modelled != box.halvings ||
+      box.tier + 1 >= simplex_.num_tiers() || !models_matter(box, lowest))
+    return false;
+  const double error = by_mean_edges(lasting_error(box));
+  take_models(box, std::max(wanted_error(lowest / mean_edges_.prod()), kFall * error), box.tier + 1);
+  return true;
 }
 
 /// Errors are measured by the mean edges, as is det J.
 bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
-  constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
   const double error = by_mean_edges(lasting_error(box));
-  return error > 0 && !(error <= std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast));
+  return error > 0 && !(error <= wanted_error(lowest / mean_edges_.prod()));
+}
+
+/// What errors may be where det J is so low, or (-infinity) where that is not known.
+double SimplexBoxes::wanted_error(double lowest) const {
+  constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
+  if (lowest == -std::numeric_limits<double>::infinity()) return small_error_;
+  return std::max(kShare * std::min(lowest, kGood), kLeast);
 }
 
 std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double lowest) {
-  const SimplexIndex& index = simplex_.index();
   const Mat3 ideal = ideal_matrix(kind_);
   int a = 0, b = 1;
   double longest = 0;
-  for (int i = 0; i <= index.dimension(); ++i)
-    for (int j = i + 1; j <= index.dimension(); ++j) {
+  for (int i = 0; i <= simplex_.dimension(); ++i)
+    for (int j = i + 1; j <= simplex_.dimension(); ++j) {
       const double length = (ideal * (box.vertices[j] - box.vertices[i])).norm();
       if (length > longest * (1 + 1e-9)) longest = length, a = i, b = j;
     }
@@ -185,13 +249,15 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double l
   result[0].vertices[b] = result[1].vertices[a] = 0.5 * (box.vertices[a] + box.vertices[b]);
   const int halvings = box.halvings + 1;
   const bool modelled = halvings <= simplex_.most_halvings() && halvings % simplex_.halvings_between() == 0 &&
-                        models_matter(box, lowest);
+                        (box.tier < 0 || models_matter(box, lowest));
+  const double wanted = std::max(wanted_error(lowest / mean_edges_.prod()),
+                                 modelled && box.tier >= 0 ? kFall * by_mean_edges(lasting_error(box)) : 0);
   for (std::uint32_t half = 0; half < 2; ++half) {
     result[half].halvings = halvings;
     if (halvings <= simplex_.most_halvings()) result[half].part = 2 * box.part + half;
-    if (modelled) take_models(result[half]);
+    if (modelled) take_models(result[half], wanted, 0);
   }
-  if (!modelled) halve_control(halvings_[a][b], result[0].control, result[1].control);
+  if (!modelled && box.tier >= 0) halve_control(tables(box).halving(a, b), result[0].control, result[1].control);
   return result;
 }
 
@@ -214,9 +280,9 @@ Vec3 SimplexBoxes::corner_point(const Box& box, int corner) const {
   return box.vertices[corner % 3] + std::ldexp(box.w_index + corner / 3, -box.w_level) * Vec3::UnitZ();
 }
 
-std::size_t SimplexBoxes::corner_matrix(int corner) const {
+std::size_t SimplexBoxes::corner_matrix(const Box& box, int corner) const {
   SimplexIndex::Exponents e{};
-  const SimplexIndex& index = kind_ == CellKind::tet ? lower_ : simplex_.index();
+  const SimplexIndex& index = kind_ == CellKind::tet ? tables(box).lower : tables(box).index;
   e[kind_ == CellKind::tet ? corner : corner % 3] = static_cast<std::int8_t>(index.degree());
   const int layer = kind_ == CellKind::tet ? 0 : corner / 3 * (w_controls_ - 1);
   return static_cast<std::size_t>(index.find(e) * w_controls_ + layer);
@@ -228,14 +294,16 @@ const ControlMatrices& SimplexBoxes::matrices(const Box& box) {
 }
 
 void SimplexBoxes::tet_matrices(const Box& box) {
+  const SimplexTables& t = tables(box);
+  matrices_.resize(t.lower.size());
   const double* x = box.control.data();
-  const Lanes degree = Lanes{} + simplex_.index().degree();
-  for (std::size_t first = 0; first < raised_[0].size(); first += kLanes)
+  const Lanes degree = Lanes{} + t.index.degree();
+  for (std::size_t first = 0; first < t.raised[0].size(); first += kLanes)
     for (int d = 0; d < 3; ++d) {
       Lanes columns[kLanes];
       for (std::size_t n = 0; n < kLanes; ++n)
-        columns[n] = degree * (load_lanes(x + raised_[d + 1][first + n] * kLanes) -
-                               load_lanes(x + raised_[0][first + n] * kLanes));
+        columns[n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kLanes) -
+                               load_lanes(x + t.raised[0][first + n] * kLanes));
       transpose(columns);
       for (int row = 0; row < 3; ++row) store_lanes(columns[row], matrices_.entries(row, d) + first);
     }
@@ -245,8 +313,13 @@ void SimplexBoxes::tet_matrices(const Box& box) {
 /// what is computed beyond their end is overwritten.
 void SimplexBoxes::prism_matrices(const Box& box) {
   const double* table = line_.coefficients(line_.level(box.w_level), box.w_index);
-  const int size = simplex_.index().size();
+  const SimplexTables& t = tables(box);
+  const int size = t.index.size();
   const std::size_t width = below_.size();
+  matrices_.resize(static_cast<std::size_t>(size) * w_controls_);
+  contracted_.resize(std::max(contracted_.size(), 3 * size * width + 2 * kWide));
+  difference_.resize(std::max(difference_.size(), (t.lower.size() + 1) * width));
+  std::fill_n(difference_.begin() + static_cast<std::ptrdiff_t>(t.lower.size() * width), width, 0.0);
   for (int row = 0; row < 3; ++row) {
     double* y = contracted_.data() + kWide + row * size * width;
     for (int n = 0; n < size; ++n) {
@@ -258,15 +331,15 @@ void SimplexBoxes::prism_matrices(const Box& box) {
       }
     }
     for (int d = 0; d < 2; ++d) {
-      for (int n = 0; n < lower_.size(); ++n)
+      for (int n = 0; n < t.lower.size(); ++n)
         for (std::size_t o = 0; o < width; o += kWide)
-          store_wide(load_wide(y + raised_[d + 1][n] * width + o) - load_wide(y + raised_[0][n] * width + o),
+          store_wide(load_wide(y + t.raised[d + 1][n] * width + o) - load_wide(y + t.raised[0][n] * width + o),
                      difference_.data() + n * width + o);
       for (int n = 0; n < size; ++n)
         for (std::size_t o = 0; o < width; o += kWide) {
           Wide sum{};
           for (int c = 0; c < 3; ++c)
-            sum += exponents_[c][n] * load_wide(difference_.data() + reduced_[c][n] * width + o);
+            sum += t.exponents[c][n] * load_wide(difference_.data() + t.reduced[c][n] * width + o);
           store_wide(sum, matrices_.entries(row, d) + n * w_controls_ + o);
         }
     }
@@ -306,11 +379,16 @@ Mat3 SimplexBoxes::modelling_error(const Box& box) const {
 
 bool SimplexBoxes::is_hopeless(const Box& box) const {
   // Shifts of `determinant_bound`, each of which must be < 1 (see `HexBoxes`).
+  if (box.tier < 0) return true;
   const double shifts = by_mean_edges(modelling_error(box));
   return shifts > 2 && std::isfinite(shifts);
 }
 
 Mat3 SimplexBoxes::remainder(const Box& box) const {
+  return (1 + 1e-10) * (modelling_error(box) * sides(box).cwiseAbs() + rounding_error(box));
+}
+
+Mat3 SimplexBoxes::rounding_error(const Box& box) const {
   const LineModels::Level& level = line_.level(box.w_level);
   Vec3 size = Vec3::Zero(), rounding = Vec3::Zero();
   for (int k = 0; k < num_layers_; ++k) {
@@ -320,12 +398,11 @@ Mat3 SimplexBoxes::remainder(const Box& box) const {
     rounding += along * layer.rounding;
   }
   // Sums over modes and along w, tables, the shift, halvings of `degree` averages each, differences, the 16 asked for.
-  const int degree = simplex_.index().degree();
+  const int degree = tables(box).index.degree();
   const double roundings = num_modes_ + num_layers_ + 4 + 1 + degree * box.level + degree + 8 + 16;
   const Vec3 control = rounding + roundings * (std::numeric_limits<double>::epsilon() / 2) * size;
   const double differences = 2 * std::max(degree, w_controls_ - 1);
-  const Mat3 modelling = modelling_error(box) * sides(box).cwiseAbs();
-  return (1 + 1e-10) * (modelling + differences * control * Eigen::RowVector3d::Ones());
+  return differences * control * Eigen::RowVector3d::Ones();
 }
 
 }  // namespace subvol

@@ -15,9 +15,10 @@ namespace subvol {
 
 /// Bernstein coefficients of the Jacobian of one high-order tet or prism over its parts, got by halving longest sides.
 ///
-/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels`, anew for a part where errors of the last
-/// ones matter; parts between follow by de Casteljau. Along a prism's w each part has `LineModels` of its own.
-/// Jacobians are by local coordinates: along the part's sides.
+/// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels` of the lowest tier whose errors, by
+/// this cell's coefficients, are small; anew for a part where errors of the last ones matter. Parts between follow by
+/// de Casteljau. Along a prism's w each part has `LineModels` of its own. Jacobians are by local coordinates: along
+/// the part's sides.
 class SimplexBoxes {
  public:
   /// Sums over the functions with one N_k along w (tets: all of them) of what `SimplexModels::Function` says of them,
@@ -32,7 +33,9 @@ class SimplexBoxes {
     int halvings = 0;                 ///< of the simplex
     std::uint32_t part = 1;           ///< number of the simplex
     int w_level = 0, w_index = 0;     ///< of a prism
-    std::shared_ptr<const std::vector<Layer>> layers;  ///< of the models that `control` comes from
+    int tier = -1;                    ///< of the models that `control` comes from; -1: none is close enough
+    int modelled = 0;                 ///< halvings of the part that they are of
+    std::shared_ptr<const std::vector<Layer>> layers;  ///< what they leave out
     std::vector<double> control;      ///< at alpha lanes_ + row num_layers_ + k
   };
   static constexpr int kLevelsPerDepth = 3, kMaxDepth = 20;
@@ -43,11 +46,13 @@ class SimplexBoxes {
   Box root();
   /// lowest: det of dx/du where it is least, as far as known. New models are taken where the old ones' errors matter.
   std::array<Box, 2> children(const Box& box, double lowest);
+  /// Takes models of a higher tier where the errors of those there are matter. False: there are none.
+  bool improve(Box& box, double lowest);
   int num_corners() const { return kind_ == CellKind::tet ? 4 : 6; }
   Vec3 corner_point(const Box& box, int corner) const;
 
   const ControlMatrices& matrices(const Box& box);
-  std::size_t corner_matrix(int corner) const;
+  std::size_t corner_matrix(const Box& box, int corner) const;
   Mat3 remainder(const Box& box) const;
   /// Whether the modelling error is so large that no bound can be hoped for.
   bool is_hopeless(const Box& box) const;
@@ -58,8 +63,11 @@ class SimplexBoxes {
  private:
   /// Columns are the sides of a part.
   Mat3 sides(const Box& box) const;
-  /// Takes the models of the box's simplex.
-  void take_models(Box& box);
+  /// Takes models of the box's simplex: of the lowest tier from `least_tier` on with errors, measured by the mean
+  /// edges, up to `wanted`; else of the highest, or none where that is hopeless and parts of it will have their own.
+  void take_models(Box& box, double wanted, int least_tier);
+  int choose_tier(const Box& box, const SimplexModels::Part& part, double wanted, int least_tier) const;
+  double wanted_error(double lowest) const;
   bool models_matter(const Box& box, double lowest) const;
   void tet_matrices(const Box& box);
   void prism_matrices(const Box& box);
@@ -70,26 +78,29 @@ class SimplexBoxes {
   }
   /// The errors of all models, by canonical coordinates.
   Mat3 modelling_error(const Box& box) const;
+  /// Of `matrices`.
+  Mat3 rounding_error(const Box& box) const;
   /// low: control points of the whole, those of one half when done; high: as many, those of the other.
   void halve_control(const SimplexHalving& halving, std::vector<double>& low, std::vector<double>& high) const;
+
+  const SimplexTables& tables(const Box& box) const { return simplex_.tables(box.tier); }
 
   CellKind kind_;
   const SimplexModels& simplex_;
   const LineModels& line_;  // along w
   int num_layers_, w_controls_;
-  std::size_t lanes_;       // numbers per control point: a multiple of kLanes
-  int num_modes_ = 0;
+  std::size_t lanes_;       // numbers per control point: a multiple of SimplexTables::kLanes
+  double small_error_;      // share of the mean edges
+  int num_modes_ = 0, highest_ = 0;  // of the coefficients that are not 0: how many, and the highest order i + j + k
   struct Term {
     std::size_t slot;  // of the function, in the models of a part
+    int order;
     Vec3 coefficient;
   };
   std::vector<std::vector<Term>> layer_terms_;  // by the number of N_k along w; a tet's are all in one layer
-  Vec3 mean_edges_;                           // lengths of the linear part's mean columns
-  SimplexIndex lower_;                        // degree - 1
-  std::array<std::vector<int>, 4> raised_;    // per index of lower_: with one exponent more
-  std::array<std::vector<int>, 4> reduced_;   // per index: in lower_ with one exponent less; else lower_.size()
-  std::array<std::vector<double>, 4> exponents_;  // per index
-  std::array<std::array<SimplexHalving, 4>, 4> halvings_;  // of the side from a to b > a
+  Vec3 mean_edges_;                             // lengths of the linear part's mean columns
+  std::shared_ptr<const SimplexModels::Part> whole_;  // what the whole simplex has been asked for
+  std::vector<SimplexModels::Models> whole_models_;   // by tier
   std::vector<double> contracted_, difference_, below_, above_;
   ControlMatrices matrices_, mean_;
 };

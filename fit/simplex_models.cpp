@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/simplex_models.h"
 
-#include "fit/wide.h"
-
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -142,68 +140,115 @@ double kernel_slope_bound(Basis basis, int i) {
 
 /// Values of an affine function at the vertices of a part.
 using Ends = std::array<double, 4>;
+using Interval = std::pair<double, double>;
 
-/// A product of kernels: polynomials, its own cut behind all total degrees from 0 on, and what they leave out.
-struct KernelProduct {
-  std::vector<SimplexPolynomial> cut;  // at degree n, of that degree
+Interval range(const Ends& ends, int dimension) {
+  const auto last = ends.begin() + dimension + 1;
+  return {*std::min_element(ends.begin(), last), *std::max_element(ends.begin(), last)};
+}
+
+/// What E_edge,i is the kernel of, from the barycentric coordinates of the edge's ends.
+Ends along_edge(const Ends& a, const Ends& b) {
+  Ends along{};
+  for (std::size_t c = 0; c < 4; ++c) along[c] = 0.5 * (1 + b[c] - a[c]);
+  return along;
+}
+
+/// Barycentric coordinates of the whole simplex at a part's vertices: exact, as these are multiples of a power of 1/2.
+std::array<Ends, 4> barycentric_at(std::span<const Vec3> vertices, int dimension) {
+  std::array<Ends, 4> result{};
+  for (int c = 0; c <= dimension; ++c) {
+    const Vec3& x = vertices[c];
+    result[0][c] = 1 - x[0] - x[1] - x[2];
+    for (int v = 1; v <= dimension; ++v) result[v][c] = x[v - 1];
+  }
+  return result;
+}
+
+/// A product of kernels: the sizes of its terms, and bounds of itself.
+struct ProductSizes {
   Sizes sizes;
-  double bound = 1, slope_bound = 0;   // of the product itself
+  double bound = 1, slope_bound = 0;
 };
 
-constexpr std::size_t kMostStoredBytes = 300'000'000;  // of coefficients, per kind, basis and order
+constexpr std::size_t kMostStoredBytes = 200'000'000;  // per kind, basis and order
 
 /// Times that all sides are halved before the last models are made, at most: parts are numbered in 32 bits.
 int most_depth(Basis basis, int order) { return basis == Basis::legendre || order == 1 ? 0 : 10; }
 
-/// A degree more than needed brings control points much closer to the map. Fourier: those with which most cells of
-/// fitted meshes are decided at once up to order 4, over parts of half the size above (measured).
-int model_degree(Basis basis, int order) {
-  return basis == Basis::legendre || order == 1 ? std::max(order + 1, 3) : std::min((5 * order + 2) / 2, order + 13);
+/// The highest degree. One more than needed brings control points much closer to the map. Fourier: errors of the
+/// highest functions up to order 8 are small over the whole simplex.
+int highest_degree(Basis basis, int order) {
+  return basis == Basis::legendre || order == 1 ? std::max(order + 1, 3)
+                                                : std::min({(5 * order + 2) / 2, order + 13, 21});
+}
+
+std::vector<const SimplexTables*> make_tiers(CellKind kind, Basis basis, int order) {
+  const int dimension = kind == CellKind::tet ? 3 : 2, highest = highest_degree(basis, order);
+  std::vector<const SimplexTables*> tiers;
+  for (const int degree : {3, 4, 6, 8, 11, 14, 17})
+    if (degree < highest) tiers.push_back(&SimplexTables::get(dimension, degree));
+  if (tiers.size() == SimplexModels::kMostTiers) tiers.erase(tiers.begin());
+  tiers.push_back(&SimplexTables::get(dimension, highest));
+  return tiers;
 }
 
 int num_nodes(Basis basis, int order) {
-  return basis == Basis::legendre ? order : model_degree(basis, order) + order + 4;
+  return basis == Basis::legendre ? order : std::min((5 * order + 2) / 2, order + 13) + order + 4;
 }
 
 }  // namespace
 
-/// The kernels' expansions over one part.
-class SimplexModels::Kernels {
+/// The kernels' expansions over the intervals of one part.
+class SimplexModels::Expansions {
  public:
-  /// barycentric: of the whole simplex, at the part's vertices.
-  Kernels(const SimplexModels& models, const std::array<Ends, 4>& barycentric)
-      : models_(models), dimension_(models.index_.dimension()), most_(std::max(0, models.index_.degree() - 2)) {
-    for (int v = 0; v <= dimension_; ++v) at_vertices_.push_back(argument(barycentric[v]));
-    for (const auto& [a, b] : cell_topology(models.kind_).edges) {
-      if (static_cast<int>(at_edges_.size()) == (dimension_ == 3 ? 6 : 3)) break;
-      Ends along{};
-      for (std::size_t c = 0; c < 4; ++c) along[c] = 0.5 * (1 + barycentric[b][c] - barycentric[a][c]);
-      at_edges_.push_back(argument(along));
-    }
-    one_.cut.assign(1, SimplexPolynomial(dimension_, 1));
-    for (int n = 1; n <= most_; ++n) one_.cut.push_back(one_.cut.back().raised());
-  }
-
-  /// The kernels of a mode, cut behind one total degree.
-  KernelProduct product(const LocalMode& mode, int degree) {
-    const KernelProduct* rest = &one_;
-    if (mode.k > 0) rest = &at_vertex(3, mode.k, one_, last_[mode.k]);
-    if (mode.j > 0) rest = &at_vertex(mode.vertex, mode.j, *rest, pairs_[{mode.vertex, mode.j, mode.k}]);
-    return times(at_edges_[mode.edge], mode.i, *rest, degree, degree);
+  explicit Expansions(const SimplexModels& models) : models_(models) {}
+  const KernelExpansion& operator()(const Interval& x, int i) {
+    auto [found, is_new] = known_.try_emplace({x.first, x.second, i});
+    if (is_new) found->second = expand_kernel(models_.basis_, i, x.first, x.second, models_.expansion_);
+    return found->second;
   }
 
  private:
+  const SimplexModels& models_;
+  std::map<std::tuple<double, double, int>, KernelExpansion> known_;
+};
+
+/// Products of the kernels' expansions over one part, for models of one degree.
+class SimplexModels::Kernels {
+ public:
+  /// barycentric: of the whole simplex, at the part's vertices.
+  Kernels(const SimplexModels& models, int degree, const std::array<Ends, 4>& barycentric)
+      : expansions_(models), dimension_(models.dimension()), most_(std::max(0, degree - 2)) {
+    for (int v = 0; v <= dimension_; ++v) at_vertices_.push_back(argument(barycentric[v]));
+    for (const auto& [a, b] : cell_topology(models.kind_).edges) {
+      if (static_cast<int>(at_edges_.size()) == (dimension_ == 3 ? 6 : 3)) break;
+      at_edges_.push_back(argument(along_edge(barycentric[a], barycentric[b])));
+    }
+    one_.assign(1, SimplexPolynomial(dimension_, 1));
+    for (int n = 1; n <= most_; ++n) one_.push_back(one_.back().raised());
+  }
+
+  /// The kernels of a mode, cut behind one total degree.
+  SimplexPolynomial product(const LocalMode& mode, int degree) {
+    const Cut* rest = &one_;
+    if (mode.k > 0) rest = &at_vertex(3, mode.k, one_, last_[mode.k]);
+    if (mode.j > 0) rest = &at_vertex(mode.vertex, mode.j, *rest, pairs_[{mode.vertex, mode.j, mode.k}]);
+    return times(at_edges_[mode.edge], mode.i, *rest, degree);
+  }
+
+ private:
+  using Cut = std::vector<SimplexPolynomial>;  // behind all total degrees from 0 on; at degree n, of that degree
   struct Argument {
-    std::pair<double, double> interval;
-    std::vector<SimplexPolynomial> chebyshev;  // T_k of it
+    Interval interval;
+    Cut chebyshev;  // T_k of it
   };
 
   Argument argument(const Ends& ends) const {
-    const auto last = ends.begin() + dimension_ + 1;
-    const double low = *std::min_element(ends.begin(), last), high = *std::max_element(ends.begin(), last);
+    const auto [low, high] = range(ends, dimension_);
     Ends scaled{};
     for (int c = 0; c <= dimension_; ++c) scaled[c] = (2 * ends[c] - low - high) / (high - low);
-    std::vector<SimplexPolynomial> t{SimplexPolynomial(dimension_, 1)};
+    Cut t{SimplexPolynomial(dimension_, 1)};
     for (int k = 1; k <= most_; ++k) {
       SimplexPolynomial next = t[k - 1].times_affine(scaled);
       t.push_back(k == 1 ? std::move(next) : SimplexPolynomial::combined(2, next, -1, t[k - 2].raised().raised()));
@@ -211,37 +256,22 @@ class SimplexModels::Kernels {
     return {{low, high}, std::move(t)};
   }
 
-  const KernelExpansion& expansion(const Argument& x, int i) {
-    auto [found, is_new] = expansions_.try_emplace({x.interval.first, x.interval.second, i});
-    if (is_new)
-      found->second = expand_kernel(models_.basis_, i, x.interval.first, x.interval.second, models_.expansion_);
-    return found->second;
+  SimplexPolynomial times(const Argument& x, int i, const Cut& rest, int degree) {
+    return SimplexPolynomial::convolved(expansions_(x.interval, i).coefficients, x.chebyshev, rest, degree);
   }
 
-  KernelProduct times(const Argument& x, int i, const KernelProduct& rest, int first, int last) {
-    const KernelExpansion& own = expansion(x, i);
-    KernelProduct result;
-    for (int n = first; n <= last; ++n)
-      result.cut.push_back(SimplexPolynomial::convolved(own.coefficients, x.chebyshev, rest.cut, n));
-    result.sizes = own.sizes * rest.sizes;
-    const double bound = kernel_bound(models_.basis_, i), slope = kernel_slope_bound(models_.basis_, i);
-    result.bound = bound * rest.bound;
-    result.slope_bound = slope * rest.bound + bound * rest.slope_bound;
-    return result;
-  }
-
-  const KernelProduct& at_vertex(int vertex, int j, const KernelProduct& rest, KernelProduct& kept) {
-    if (kept.cut.empty()) kept = times(at_vertices_[vertex], j, rest, 0, most_);
+  const Cut& at_vertex(int vertex, int j, const Cut& rest, Cut& kept) {
+    for (int n = static_cast<int>(kept.size()); n <= most_; ++n)
+      kept.push_back(times(at_vertices_[vertex], j, rest, n));
     return kept;
   }
 
-  const SimplexModels& models_;
+  Expansions expansions_;
   int dimension_, most_;
   std::vector<Argument> at_vertices_, at_edges_;
-  KernelProduct one_;
-  std::map<std::tuple<double, double, int>, KernelExpansion> expansions_;
-  std::map<int, KernelProduct> last_;                          // V_3,k
-  std::map<std::array<int, 3>, KernelProduct> pairs_;          // V_vertex,j V_3,k
+  Cut one_;
+  std::map<int, Cut> last_;                  // V_3,k
+  std::map<std::array<int, 3>, Cut> pairs_;  // V_vertex,j V_3,k
 };
 
 const SimplexModels& SimplexModels::get(CellKind kind, Basis basis, int order) {
@@ -254,12 +284,11 @@ const SimplexModels& SimplexModels::get(CellKind kind, Basis basis, int order) {
 }
 
 SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
-    : kind_(kind), basis_(basis), order_(order),
-      index_(kind == CellKind::tet ? 3 : 2, model_degree(basis, order)),
-      stride_((index_.size() + kWide - 1) / kWide * kWide),
+    : kind_(kind), basis_(basis), order_(order), tiers_(make_tiers(kind, basis, order)),
       most_halvings_(most_depth(basis, order) * halvings_between()),
       expansion_(num_nodes(basis, order)) {
-  const int num_vertices = index_.dimension() + 1, num_edges = kind == CellKind::tet ? 6 : 3, n = order - 1;
+  assert(num_tiers() <= kMostTiers);
+  const int num_vertices = dimension() + 1, num_edges = kind == CellKind::tet ? 6 : 3, n = order - 1;
   const auto add = [&](int edge, int i, int vertex, int j, int k) {
     LocalMode mode;
     mode.edge = static_cast<std::int8_t>(edge);
@@ -267,9 +296,6 @@ SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
     mode.i = static_cast<std::uint8_t>(i);
     mode.j = static_cast<std::uint8_t>(j);
     mode.k = static_cast<std::uint8_t>(k);
-    const std::size_t address = slot_address(mode);
-    if (slots_.size() <= address) slots_.resize(address + 1, -1);
-    slots_[address] = static_cast<int>(modes_.size());
     modes_.push_back(mode);
   };
   for (int v = 0; v < num_vertices; ++v) add(-1, 0, v, 0, 0);
@@ -285,6 +311,16 @@ SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
         }
     }
   }
+  const auto lower = [&](const LocalMode& x, const LocalMode& y) { return own_order(x) < own_order(y); };
+  std::stable_sort(modes_.begin(), modes_.end(), lower);
+  for (std::size_t slot = 0; slot < modes_.size(); ++slot) {
+    const std::size_t address = slot_address(modes_[slot]);
+    if (slots_.size() <= address) slots_.resize(address + 1, -1);
+    slots_[address] = static_cast<int>(slot);
+  }
+  for (int o = 0; o <= kMaxOrder; ++o)
+    first_slots_[o] = static_cast<std::size_t>(std::count_if(
+        modes_.begin(), modes_.end(), [&](const LocalMode& mode) { return own_order(mode) < o; }));
 }
 
 std::size_t SimplexModels::slot_address(const LocalMode& mode) const {
@@ -293,71 +329,151 @@ std::size_t SimplexModels::slot_address(const LocalMode& mode) const {
   return ((((mode.edge + 1) * 5 + mode.vertex + 1) * n + mode.i) * n + mode.j) * n + k;
 }
 
+/// Vertices of the barycentric coordinates that a mode has as factors.
+std::vector<int> SimplexModels::bubble(const LocalMode& mode) const {
+  std::vector<int> vertices;
+  if (mode.edge >= 0) {
+    const auto [a, b] = cell_topology(kind_).edges[mode.edge];
+    vertices = {a, b};
+  }
+  if (mode.vertex >= 0) vertices.push_back(mode.vertex);
+  if (mode.k > 0) vertices.push_back(3);
+  return vertices;
+}
+
+/// What is kept and what is new; the lock is held.
+void SimplexModels::count(std::size_t bytes) const {
+  stored_bytes_ += bytes;
+  if (stored_bytes_ <= kMostStoredBytes) return;
+  std::erase_if(stored_, [](const auto& stored) { return stored.first != 1; });
+  stored_bytes_ = bytes;
+}
+
 std::shared_ptr<const SimplexModels::Part> SimplexModels::part(std::uint32_t number,
                                                                std::span<const Vec3> vertices) const {
-  {
+  const auto known = [&]() -> std::shared_ptr<const Part> {
     const std::lock_guard lock(mutex_);
-    if (const auto found = stored_.find(number); found != stored_.end()) return found->second;
-  }
+    const auto found = stored_.find(number);
+    return found != stored_.end() ? found->second.part : nullptr;
+  };
+  if (auto found = known()) return found;
+  const std::lock_guard alone(making_);
+  if (auto found = known()) return found;
   auto made = std::make_shared<const Part>(make_part(number, vertices));
   const std::lock_guard lock(mutex_);
-  if ((stored_.size() + 1) * modes_.size() * stride_ * sizeof(double) <= kMostStoredBytes)
-    stored_.emplace(number, made);
+  count(made->errors.size() * sizeof(double));
+  stored_[number].part = made;
   return made;
 }
 
-SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<const Vec3> vertices) const {
-  const int degree = index_.degree(), dimension = index_.dimension();
-  std::array<Ends, 4> barycentric{};  // exact: vertices of parts are multiples of a power of 1/2
-  for (int c = 0; c <= dimension; ++c) {
-    const Vec3& x = vertices[c];
-    barycentric[0][c] = 1 - x[0] - x[1] - x[2];
-    for (int v = 1; v <= dimension; ++v) barycentric[v][c] = x[v - 1];
+void SimplexModels::add_models(std::uint32_t number, std::span<const Vec3> vertices, const Part& part, int tier,
+                               int order, Models& models) const {
+  const auto is_complete = [&] {
+    return std::all_of(models.begin(), models.begin() + order + 1, [](const auto& batch) { return batch != nullptr; });
+  };
+  const auto take_known = [&] {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = stored_.find(number); found != stored_.end())
+      for (int o = 0; o <= order; ++o)
+        if (!models[o]) models[o] = found->second.models[tier][o];
+    return is_complete();
+  };
+  if (is_complete() || take_known()) return;
+  const std::lock_guard alone(making_);
+  if (take_known()) return;
+  const std::array<Ends, 4> barycentric = barycentric_at(vertices, dimension());
+  Kernels kernels(*this, tables(tier).index.degree(), barycentric);
+  for (int o = 0; o <= order; ++o) {
+    if (models[o]) continue;
+    models[o] = std::make_shared<const Batch>(make_batch(o, tier, part, kernels, barycentric));
+    const std::lock_guard lock(mutex_);
+    count(models[o]->coefficients.size() * sizeof(double));
+    if (const auto found = stored_.find(number); found != stored_.end()) found->second.models[tier][o] = models[o];
   }
+}
+
+SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<const Vec3> vertices) const {
+  const std::array<Ends, 4> barycentric = barycentric_at(vertices, dimension());
   // Over the whole simplex, products of two, three, four coordinates are at most so many times sqrt(1 - t^2), with t
   // in [-1, 1] what T_k is taken of: twice a coordinate less 1, or the difference of two.
   constexpr double kDamping[] = {0, 0, 1.0 / 4, 1.0 / 16, 1.0 / 108};
   const bool whole = number == 1;
-  Kernels kernels(*this, barycentric);
+  Expansions expansions(*this);
+  const auto times = [&](const Ends& argument, int i, const ProductSizes& rest) {
+    const double bound = kernel_bound(basis_, i), slope = kernel_slope_bound(basis_, i);
+    return ProductSizes{expansions(range(argument, dimension()), i).sizes * rest.sizes, bound * rest.bound,
+                        slope * rest.bound + bound * rest.slope_bound};
+  };
+  std::map<std::array<int, 3>, ProductSizes> pairs;  // V_vertex,j V_3,k
   Part part;
-  part.coefficients.assign(modes_.size() * stride_, 0);
-  for (const LocalMode& mode : modes_) {
-    std::vector<int> bubble;  // vertices of the barycentric coordinates
+  part.errors.assign(2 * kMostTiers * modes_.size(), 0);
+  for (std::size_t slot = 0; slot < modes_.size(); ++slot) {
+    const LocalMode& mode = modes_[slot];
+    Part::Function f{1, 1, 0};
     if (mode.edge >= 0) {
       const auto [a, b] = cell_topology(kind_).edges[mode.edge];
-      bubble = {a, b};
-    }
-    if (mode.vertex >= 0) bubble.push_back(mode.vertex);
-    if (mode.k > 0) bubble.push_back(3);
-    const int size = static_cast<int>(bubble.size());
-
-    SimplexPolynomial product(dimension, 1), bubble_alone(dimension, 1);
-    Function f{1, 1, 0, 0, 0, 0};
-    int missing = degree - size;
-    if (mode.edge >= 0) {
-      for (const int v : bubble) bubble_alone = bubble_alone.times_affine(barycentric[v]);
+      const std::vector<int> vertices_of = bubble(mode);
+      const int size = static_cast<int>(vertices_of.size());
+      SimplexPolynomial alone(dimension(), 1);
+      for (const int v : vertices_of) alone = alone.times_affine(barycentric[v]);
+      ProductSizes& rest = pairs[{mode.vertex, mode.j, mode.k}];
+      if (rest.slope_bound == 0) {
+        if (mode.k > 0) rest = times(barycentric[3], mode.k, rest);
+        if (mode.j > 0) rest = times(barycentric[mode.vertex], mode.j, rest);
+      }
+      const ProductSizes product = times(along_edge(barycentric[a], barycentric[b]), mode.i, rest);
       // The product of n coordinates is at most (1/n)^n, what is left of it when one is taken away bounds its gradient.
-      const double largest = std::min(bubble_alone.bound(), (1 + 1e-12) * std::pow(1.0 / size, size));
+      const double largest = std::min(alone.bound(), (1 + 1e-12) * std::pow(1.0 / size, size));
       const double steepest = (1 + 1e-12) * std::pow(1.0 / (size - 1), size - 1);
-      KernelProduct model = kernels.product(mode, missing);
-      product = std::move(model.cut[0]);
-      const double error = Sizes::beyond(model.sizes.value, missing);
-      f.value_bound = largest * model.bound;
-      f.gradient_bound = steepest * model.bound + largest * model.slope_bound;
-      f.error = largest * error;
-      double of_kernels = largest * Sizes::beyond(model.sizes.gradient, missing);
-      if (whole) of_kernels = std::min(of_kernels, kDamping[size] * Sizes::beyond(model.sizes.damped, missing));
-      f.gradient_error = steepest * error + of_kernels;
-      missing = 0;
+      f.value_bound = largest * product.bound;
+      f.gradient_bound = steepest * product.bound + largest * product.slope_bound;
+      for (int tier = 0; tier < num_tiers(); ++tier) {
+        const int degree = tables(tier).index.degree() - size;
+        double& error = part.errors[2 * kMostTiers * slot + tier];
+        double& gradient_error = part.errors[2 * kMostTiers * slot + kMostTiers + tier];
+        if (degree >= 0) {
+          const double of_kernel = Sizes::beyond(product.sizes.value, degree);
+          error = largest * of_kernel;
+          double of_kernels = largest * Sizes::beyond(product.sizes.gradient, degree);
+          if (whole) of_kernels = std::min(of_kernels, kDamping[size] * Sizes::beyond(product.sizes.damped, degree));
+          gradient_error = steepest * of_kernel + of_kernels;
+        }
+        if (degree < 0 || gradient_error >= f.gradient_bound) {
+          error = f.value_bound;
+          gradient_error = f.gradient_bound;
+          f.left_out = static_cast<std::uint8_t>(f.left_out | 1 << tier);
+        }
+      }
     }
-    for (const int v : bubble) product = product.times_affine(barycentric[v]);
-    for (; missing > 0; --missing) product = product.raised();
-    f.largest_coefficient = product.bound();
-    f.rounding = product.rounding();
-    product.bernstein(part.coefficients.data() + part.functions.size() * stride_);
     part.functions.push_back(f);
   }
   return part;
+}
+
+SimplexModels::Batch SimplexModels::make_batch(int own_order, int tier, const Part& part, Kernels& kernels,
+                                               const std::array<Ends, 4>& barycentric) const {
+  const SimplexTables& t = tables(tier);
+  Batch batch;
+  batch.first = first_slots_[own_order];
+  const std::size_t end = own_order < kMaxOrder ? first_slots_[own_order + 1] : modes_.size();
+  batch.coefficients.assign((end - batch.first) * t.stride, 0);
+  for (std::size_t slot = batch.first; slot < end; ++slot) {
+    Batch::Size& size = batch.sizes.emplace_back(Batch::Size{0, 0});
+    if (part.functions[slot].is_left_out(tier)) continue;
+    const LocalMode& mode = modes_[slot];
+    const std::vector<int> factors = bubble(mode);
+    SimplexPolynomial product(dimension(), 1);
+    int missing = t.index.degree() - static_cast<int>(factors.size());
+    if (mode.edge >= 0) {
+      product = kernels.product(mode, missing);
+      missing = 0;
+    }
+    for (const int v : factors) product = product.times_affine(barycentric[v]);
+    for (; missing > 0; --missing) product = product.raised();
+    size = {product.bound(), product.rounding()};
+    product.bernstein(batch.coefficients.data() + (slot - batch.first) * t.stride);
+  }
+  return batch;
 }
 
 }  // namespace subvol

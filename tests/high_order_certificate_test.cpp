@@ -99,7 +99,6 @@ TEST_CASE("affine cells of any order are certified in one box, with their exact 
   for (const CellKind kind : kAllKinds)
     for (const Basis basis : kBothBases)
       for (const int order : {1, 2, 3, 4, 8, 12, kMaxOrder}) {
-        if (kind == CellKind::tet && order > 8) continue;  // models take a second
         VolumeMesh mesh = single_cell(kind);
         for (Vec3& p : mesh.positions) p = matrix * p + Vec3(100, -20, 3);
         const HighOrderMesh straight(ElementSpace(mesh, basis, order), mesh);
@@ -120,7 +119,7 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
     for (const Basis basis : kBothBases)
       for (const auto& [order, repeats] : {std::pair{2, 60}, std::pair{4, 40}, std::pair{8, 12}, std::pair{12, 4}})
         for (int repeat = 0; repeat < repeats; ++repeat) {
-          if (kind == CellKind::tet && order > 8) continue;
+          if (kind == CellKind::tet && order > 8 && repeat % 3 == 0) continue;  // half a second each
           VolumeMesh straight = single_cell(kind);
           jitter(straight, 0.15, source.random()());
           const HighOrderMesh mesh =

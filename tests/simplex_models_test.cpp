@@ -120,7 +120,7 @@ TEST_CASE("models of functions on simplices are as close to them as they say", "
     for (const Basis basis : kBothBases)
       for (const int order : {2, 3, 4, 6}) {
         const SimplexModels& models = SimplexModels::get(kind, basis, order);
-        const int dimension = models.index().dimension();
+        const int dimension = models.dimension(), last_tier = models.num_tiers() - 1;
         const VolumeMesh cell = single_cell(kind);
         const ElementSpace space(cell, basis, order);
         ShapeFunctions shapes(kind, basis, order);
@@ -133,7 +133,11 @@ TEST_CASE("models of functions on simplices are as close to them as they say", "
         if (dimension == 3) parts[2].push_back(0.5 * (canonical[3] + canonical[2]));
         for (std::size_t p = 0; p < (basis == Basis::legendre ? 1 : parts.size()); ++p) {
           // Numbers after five halvings: nothing else asks for models there.
-          const auto part = models.part(p == 0 ? 1u : 31u + static_cast<std::uint32_t>(p), parts[p]);
+          const std::uint32_t number = p == 0 ? 1u : 31u + static_cast<std::uint32_t>(p);
+          const auto part = models.part(number, parts[p]);
+          std::vector<SimplexModels::Models> made(models.num_tiers());
+          for (int tier = 0; tier <= last_tier; ++tier)
+            models.add_models(number, parts[p], *part, tier, order - 1, made[tier]);
           Mat3 sides = Mat3::Identity();
           for (int d = 0; d < dimension; ++d) sides.col(d) = parts[p][d + 1] - parts[p][0];
           const Mat3 by_canonical = sides.inverse().transpose();
@@ -150,17 +154,33 @@ TEST_CASE("models of functions on simplices are as close to them as they say", "
             shapes.set_point(x);
             for (const LocalMode& mode : space.modes(0)) {
               if (kind == CellKind::prism && mode.k > 0) continue;  // N_0 = 1 at w = 0
-              const SimplexModels::Function& f = part->functions[models.slot(mode)];
-              Barycentric slopes;
-              const double modelled = bernstein_sum(
-                  models.index(), part->coefficients.data() + models.slot(mode) * models.stride(), l, slopes);
-              Vec3 local = Vec3::Zero(), exact;
-              for (int d = 0; d < dimension; ++d) local[d] = slopes[d + 1] - slopes[0];
+              const std::size_t slot = models.slot(mode);
+              const auto& f = part->functions[slot];
+              Vec3 exact;
               const double value = shapes.value(mode, exact);
-              const Vec3 gradient = by_canonical * local;
-              const double off = (gradient - exact).head(dimension).cwiseAbs().maxCoeff();
-              worst = std::max({worst, std::abs(modelled - value) - f.error, off - f.gradient_error});
-              if (basis == Basis::legendre) CHECK(f.gradient_error == 0);
+              for (const int tier : {repeat % models.num_tiers()}) {
+                const SimplexTables& tables = models.tables(tier);
+                const SimplexModels::Batch& batch = *made[tier][models.own_order(mode)];
+                const double* b = batch.coefficients.data() + (slot - batch.first) * tables.stride;
+                Barycentric slopes;
+                const double modelled = bernstein_sum(tables.index, b, l, slopes);
+                Vec3 local = Vec3::Zero();
+                for (int d = 0; d < dimension; ++d) local[d] = slopes[d + 1] - slopes[0];
+                const double off = (by_canonical * local - exact).head(dimension).cwiseAbs().maxCoeff();
+                worst = std::max({worst, std::abs(modelled - value) - part->error(slot, tier),
+                                  off - part->gradient_error(slot, tier)});
+                const double largest = *std::max_element(b, b + tables.index.size(), [](double left, double right) {
+                  return std::abs(left) < std::abs(right);
+                });
+                CHECK(std::abs(largest) <= batch.sizes[slot - batch.first].largest_coefficient);
+                const bool is_enough = tables.index.degree() >= models.own_order(mode) + 1;
+                if (basis == Basis::legendre && is_enough) CHECK(part->gradient_error(slot, tier) == 0);
+                if (f.is_left_out(tier)) CHECK(part->gradient_error(slot, tier) == f.gradient_bound);
+              }
+              if (basis == Basis::fourier) {  // the highest tier is close
+                CHECK(part->gradient_error(slot, last_tier) < (p == 0 ? 0.05 : 1e-2));
+                CHECK(part->gradient_error(slot, last_tier) <= part->gradient_error(slot, 0));
+              }
               CHECK(std::abs(value) <= f.value_bound + kRounding);
               CHECK(exact.head(dimension).cwiseAbs().maxCoeff() <= f.gradient_bound + kRounding);
             }
