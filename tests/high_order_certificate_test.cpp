@@ -154,8 +154,8 @@ TEST_CASE("cells that come close to inversion are decided on both sides", "[high
             return HighOrderCertifier(mesh.space, {.max_depth = 12, .max_boxes = 20000})
                 .certify(scaled_modes(mesh, t).coefficients, 0);
           };
-          // Of the amplitude. Rounding in models of high orders on simplices is some 1e-11 of the cell's size.
-          const double gap = kind == CellKind::hex || order <= 4 ? 1e-5 : 1e-4;
+          // Of the amplitude. Rounding in models of high orders on simplices is some 1e-11 of the size of the cell.
+          constexpr double gap = 1e-5;
           double low = 0, high = 100;
           CAPTURE(kind, basis, order, repeat);
           while (high - low > gap * high) {
