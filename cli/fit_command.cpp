@@ -150,7 +150,8 @@ void FitRun::check() {
   VolumeMesh reread;
   const VolumeMesh* mesh = &result_.mesh;
   for (const Output& output : outputs_) {
-    if (output.part != Part::result || output.extension != ".mesh") continue;
+    if (output.part != Part::result || output.extension != ".mesh" || !std::filesystem::is_regular_file(output.path))
+      continue;
     reread = read_volume_mesh(output.path, {.check = false});
     mesh = &reread;
     break;

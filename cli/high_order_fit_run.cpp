@@ -61,7 +61,9 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
 MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const Target& target,
                 double chord_percent, const RunOptions& run) {
   ProgressTeller teller(run.progress, run.quiet);
-  const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& o) { return o.extension == ".vtu"; });
+  const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& output) {
+    return output.extension == ".vtu" && std::filesystem::is_regular_file(output.path);
+  });
   const HighOrderMesh mesh = file == outputs.end() ? result : read_high_order(file->path).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, chord_percent);
   const MeshCheckOptions options{.progress = teller.work()};

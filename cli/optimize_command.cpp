@@ -89,7 +89,9 @@ void OptimizeRun::write() {
 
 // What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
 void OptimizeRun::check() {
-  const auto is_mesh = [](const Output& output) { return output.extension == ".mesh"; };
+  const auto is_mesh = [](const Output& output) {
+    return output.extension == ".mesh" && std::filesystem::is_regular_file(output.path);
+  };
   const auto file = std::find_if(outputs_.begin(), outputs_.end(), is_mesh);
   const VolumeMesh mesh = file == outputs_.end() ? result_.mesh : read_volume_mesh(file->path, {.check = false});
   mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &surface_, {.progress = progress}); });

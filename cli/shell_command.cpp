@@ -152,6 +152,7 @@ void ShellRun::write() {
 void ShellRun::check() {
   failures_ = result_.failures;
   for (const Output& output : outputs_) {
+    if (!std::filesystem::is_regular_file(output.path)) continue;
     if (curved_ && output.extension == ".vtu") {
       const HighOrderMesh reread = read_high_order(output.path).mesh;
       const MeshCheck found = check_mesh(reread, curved_boundary(reread, arguments_.writing.chord_percent));
