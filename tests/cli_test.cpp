@@ -26,7 +26,6 @@
 
 namespace fs = std::filesystem;
 using subvol::test::content_of;
-using subvol::test::kQuickSeconds;
 using subvol::test::kSanitized;
 using subvol::test::Run;
 using subvol::test::TemporaryFolder;
@@ -281,7 +280,7 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
     INFO(arguments << '\n' << run.err);
     CHECK(run.status == status);
     CHECK(run.err.find(word) != std::string::npos);
-    CHECK(run.seconds < kQuickSeconds);
+    CHECK(run.err.find(" s  ") == std::string::npos);  // no progress was told
     CHECK(place.names() == before);
   };
   refuses("", 2, "subcommand");
@@ -341,7 +340,7 @@ TEST_CASE("A folder that cannot be written to is found before the work", "[cli]"
   const Run run = place.run(std::string(kFit) + "-o /proc/out.mesh");
   CHECK(run.status == 1);
   CHECK(run.err.find("/proc/out.mesh") != std::string::npos);
-  CHECK(run.seconds < kQuickSeconds);
+  CHECK(run.err.find(" s  ") == std::string::npos);  // no progress was told
 }
 
 TEST_CASE("Options may come from a file; the command line wins and unknown keys are errors", "[cli]") {
@@ -424,7 +423,7 @@ TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
   CHECK(place.run("subdivide template.mesh --boundary averaging -o plain.mesh").status == 0);
 }
 
-TEST_CASE("Bad files are refused by every verb, quickly and without a trace", "[cli][data]") {
+TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][data]") {
   const auto data = subvol::test::data_dir();
   if (!data) {
     WARN("SKIPPED: no folder with real data");
@@ -465,7 +464,6 @@ TEST_CASE("Bad files are refused by every verb, quickly and without a trace", "[
       const Run run = place.run(command, kSanitized ? -1 : static_cast<int>(RLIMIT_DATA), rlim_t{512} << 20);
       INFO(command << '\n' << run.err);
       const bool is_check = command.starts_with("check");
-      CHECK(run.seconds < kQuickSeconds);
       if (run.status == 0 || place.names() != before) {
         // Flat and inverted cells may pass, with words; what is written is then said not to be valid, or not converged.
         CHECK(!must_refuse);

@@ -8,7 +8,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include <chrono>
 #include <set>
 #include <sstream>
 #include <string>
@@ -30,22 +29,17 @@
 
 namespace subvol::test {
 
-/// Whether the address or thread sanitizer is built in: its own memory leaves no sense to a limit on memory, and all
-/// takes several times as long.
+/// Whether the address or thread sanitizer is built in: its own memory leaves no sense to a limit on memory.
 #ifdef SUBVOL_IS_SANITIZED
 inline constexpr bool kSanitized = true;
 #else
 inline constexpr bool kSanitized = false;
 #endif
 
-/// What the program may take to refuse an input.
-inline constexpr double kQuickSeconds = kSanitized ? 60 : 5;
-
 /// How the program ended.
 struct Run {
   int status = -1;
   std::string out, err;
-  double seconds = 0;
 };
 
 /// A folder with one sample in it, in which the program is run.
@@ -80,14 +74,11 @@ class Workplace {
     waitpid(child, &status, 0);
     // A shell's convention, so that a crash is no status of ours.
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), content_of(folder_ / "stdout.txt"),
-            content_of(folder_ / "stderr.txt"), 0};
+            content_of(folder_ / "stderr.txt")};
   }
 
   Run run(const std::string& arguments, int limit_kind = -1, rlim_t limit = 0) const {
-    const auto begin = std::chrono::steady_clock::now();
-    Run result = finish(start(arguments, limit_kind, limit));
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return result;
+    return finish(start(arguments, limit_kind, limit));
   }
 
   std::filesystem::path operator/(const char* name) const { return folder_ / name; }
