@@ -2,7 +2,9 @@
 #include "cli/automatic_template.h"
 #include "cli/check_report.h"
 #include "cli/report.h"
+#include "cli/untangling.h"
 #include "cli/writing.h"
+#include "fit/curve_mesh.h"
 #include "fit/high_order_fit.h"
 #include "fit/mesh_check.h"
 #include "fit/template_choice.h"
@@ -12,6 +14,8 @@
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/error.h"
+
+#include <algorithm>
 
 namespace subvol::python {
 namespace {
@@ -51,6 +55,10 @@ class Fit {
     target_ = target_from(target, "target");
     refuse_for_points(template_mesh.is_none());
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
+    double& time_limit = curved_ ? high_order_.time_limit_seconds : subdivision_.time_limit_seconds;
+    untangle_template(time_limit);
+    // What is left of it: a template may have been made.
+    if (time_limit > 0) time_limit = std::max(1e-3, time_limit - work_.seconds());
     checkpoints_.begin("fit", keywords_,
                        {{"target", cli::fingerprint(target_)}, {"template", cli::fingerprint(*template_)}});
   }
@@ -83,6 +91,19 @@ class Fit {
     }
     take_chord(keywords_, writing_);
     keywords_.finish();
+  }
+
+  /// As the program does: a few inverted cells are made valid; a mesh that is mostly inverted is refused by the fit.
+  void untangle_template(double time_limit_seconds) {
+    if (!cli::has_few_inverted_cells(*template_)) return;
+    auto mesh = std::make_shared<VolumeMesh>(*template_);
+    const std::size_t untangled = work_.run("untangle", [&] {
+      return untangle_before_fit(
+          *mesh, {.time_limit_seconds = time_limit_seconds, .progress = work_.progress()});
+    });
+    if (untangled > 0)
+      warnings_.push_back(std::to_string(untangled) + " cells were not valid; they were untangled before the fit");
+    template_ = std::move(mesh);
   }
 
   void refuse_for_points(bool has_no_template) {

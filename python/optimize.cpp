@@ -6,6 +6,7 @@
 #include "fit/boundary_triangles.h"
 #include "fit/curve_mesh.h"
 #include "fit/mesh_check.h"
+#include "fit/option_checks.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
 #include "python/fit_options.h"
@@ -67,6 +68,7 @@ class Optimization {
     curving_.lambda_close = kCurvingLambda;
     curving_.tolerance_percent = options_.mean_tolerance_percent;
     keywords_.take("order", curving_.order);
+    require_in_range("optimize", "order", curving_.order, 2, kMaxOrder);
     keywords_.take("basis", curving_.basis, bases());
     keywords_.take("tolerance", curving_.tolerance_percent);
     keywords_.take("lambda_", curving_.lambda_close);

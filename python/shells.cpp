@@ -58,6 +58,7 @@ class Growing {
     keywords_.take("crease_angle", crease_angle_);
     curved_options_.order = 1;
     keywords_.take("order", curved_options_.order);
+    if (!keywords_.has("order")) keywords_.refuse({"basis"}, "goes with order only");
     keywords_.take("basis", curved_options_.basis, bases());
     keywords_.take("max_iterations", options_.max_iterations);
     keywords_.take("time_limit", options_.time_limit_seconds);
@@ -113,7 +114,8 @@ class Growing {
             {"quality", cli::quality_json(shell.quality)},
             {"not_certified_cells", shell.failures.certificate.not_certified},
             {"boundary_self_intersections", shell.failures.intersecting.size()},
-            {"intersecting_faces", shell.failures.intersecting}};
+            {"intersecting_faces", shell.failures.intersecting},
+            {"mesh", result.curved ? cli::describe("", result.curved->mesh) : cli::describe("", shell.mesh)}};
   }
 
   Keywords keywords_;

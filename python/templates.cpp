@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/loading.h"
+#include "fit/option_checks.h"
 #include "python/arrays.h"
 #include "python/keywords.h"
 #include "python/meshes.h"
@@ -18,6 +19,7 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <utility>
 
 namespace subvol::python {
@@ -70,6 +72,7 @@ MeshPointer make_grid(const py::object& surface, const py::kwargs& given) {
   keywords.take("size", size);
   keywords.take("margin", margin);
   keywords.finish();
+  require_in_range("grid", "margin", margin, 0, 1000);
   if (box.has_value() != surface.is_none()) throw InputError("grid: give a surface or box, one of them");
   if (counts.has_value() == size.has_value()) throw InputError("grid: give counts or size, one of them");
   Vec3 low, high;
@@ -138,7 +141,14 @@ MeshPointer make_refined(const py::object& object, const py::kwargs& given) {
   keywords.finish();
   const auto mesh = sound_volume_from(object, "mesh");
   choice.prepare(*mesh, "refine: give one of inside, box, list and thin");
-  return made([&] { return refine_at(*mesh, vertices_of(*mesh, choice.chosen(*mesh))); });
+  bool any = false;
+  MeshPointer refined = made([&] {
+    const std::vector<char> chosen = choice.chosen(*mesh);
+    any = std::find(chosen.begin(), chosen.end(), 1) != chosen.end();
+    return refine_at(*mesh, vertices_of(*mesh, chosen));
+  });
+  if (!any) warn({"no cell is chosen: the mesh stays as it is"});
+  return refined;
 }
 
 MeshPointer make_extruded(const py::object& object, const py::kwargs& given) {
@@ -186,6 +196,7 @@ MeshPointer make_merged(const py::object& object, const py::object& other, const
   double tolerance = 1e-6;
   keywords.take("tolerance", tolerance);
   keywords.finish();
+  require_in_range("merge", "tolerance", tolerance, 0, 10);
   const auto mesh = volume_from(object, "mesh");
   const auto beside = other.is_none() ? nullptr : volume_from(other, "other");
   return made([&] {

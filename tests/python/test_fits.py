@@ -57,6 +57,23 @@ class Fits(InFolder):
         np.testing.assert_array_equal(again.coefficients, fit.mesh.coefficients)
         self.assertEqual(subvol.check("b.vtu", BALL[0])["distance"], fit.report["distance"])
 
+    def test_a_template_with_a_few_inverted_cells_is_untangled_as_with_the_program(self):
+        template = subvol.read("torus_template.mesh")
+        boundary = {tuple(point) for point in template.boundary().points}
+        cell = template.hexes[0]
+        corner = next(k for k in range(8) if tuple(template.points[cell[k]]) not in boundary)
+        opposite = (corner + 2) % 4 + (0 if corner >= 4 else 4)
+        template.points[cell[corner]] += 0.75 * (template.points[cell[opposite]] - template.points[cell[corner]])
+        self.assertGreater(subvol.check(template)["quality"]["inverted_cells"], 0)
+        subvol.write("tangled.mesh", template)
+        for option, value, name in (("levels", 1, "mesh"), ("order", 2, "vtu")):
+            self.run_program("fit", "torus_target.off", "--template", "tangled.mesh", f"--{option}", str(value),
+                             "--max-iterations", "2", "-o", f"a.{name}", status=4)
+            fit = subvol.fit("torus_target.off", "tangled.mesh", max_iterations=2, **{option: value})
+            self.assertTrue(any("untangled" in warning for warning in fit.report["warnings"]))
+            subvol.write(f"b.{name}", fit)
+            self.assert_same_file(f"a.{name}", f"b.{name}")
+
     def test_a_template_is_made_where_none_is_given(self):
         fit = subvol.fit(BALL[0], cells=8, levels=1)
         self.assertEqual(fit.report["template"]["handles"], 0)
@@ -257,48 +274,42 @@ class Running(InFolder):
                 work()
             self.assertEqual(len(calls), 1)
 
-    def interrupt(self, work, longest):
-        sent = []
-
-        def send():
-            sent.append(time.monotonic())
-            os.kill(os.getpid(), signal.SIGINT)
-
-        timer = threading.Timer(0.3, send)
+    def interrupt(self, work):
+        """work() would take much longer than the signal takes to come, and must not come to its end."""
+        returned = []
+        timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
         timer.start()
         try:
             with self.assertRaises(KeyboardInterrupt):
                 work()
-                time.sleep(5)  # work that was done before: the signal is met here, too late
-                self.fail("not interrupted")
+                returned.append(True)
+                time.sleep(60)  # the signal is met here, too late
         finally:
             timer.cancel()
-        self.assertLess(time.monotonic() - sent[0], longest)
+        self.assertFalse(returned)
 
     def test_ctrl_c_ends_a_fit_soon(self):
-        self.interrupt(self.fit, 3)
+        self.interrupt(self.fit)
 
     def test_ctrl_c_ends_the_search_for_a_template_soon(self):
-        self.interrupt(lambda: subvol.fit(self.target, levels=4), 3)
+        self.interrupt(lambda: subvol.fit(self.target, levels=4))
 
     def test_ctrl_c_while_a_callback_runs(self):
-        self.interrupt(lambda: self.fit(progress=lambda p: time.sleep(0.05)), 3)
+        self.interrupt(lambda: self.fit(progress=lambda p: time.sleep(0.05)))
 
     def test_other_threads_run_meanwhile(self):
         ticks, done = [], threading.Event()
 
         def tick():
             while not done.wait(0.005):
-                ticks.append(time.monotonic())
+                ticks.append(None)
 
         thread = threading.Thread(target=tick)
         thread.start()
-        begin = time.monotonic()
         subvol.fit(*BALL, levels=1)
-        elapsed = time.monotonic() - begin
         done.set()
         thread.join()
-        self.assertGreater(len(ticks), min(5, elapsed / 0.05))
+        self.assertGreater(len(ticks), 1)  # one may come between the fit and the end
 
     def test_two_fits_at_a_time(self):
         results = [None, None]

@@ -84,6 +84,8 @@ class Optimizing(InFolder):
     def test_options_that_do_not_go_together(self):
         with self.assertRaisesRegex(subvol.InputError, "order needs a target"):
             subvol.optimize(cube(), order=2)
+        with self.assertRaisesRegex(subvol.InputError, r"order must be in \[2, 16\]"):
+            subvol.optimize(cube(), order=1, target=cube())
         with self.assertRaisesRegex(subvol.InputError, "sizes does not go with order"):
             subvol.optimize(cube(), order=2, target=cube(), sizes="local")
 
@@ -120,6 +122,10 @@ class Shells(InFolder):
         view = result.linear_mesh.points
         del result
         np.testing.assert_array_equal(view[:8], surface.points)
+
+    def test_options_of_curved_cells_go_with_order(self):
+        with self.assertRaisesRegex(subvol.InputError, "basis goes with order only"):
+            subvol.shell(cube().boundary(), 0.1, basis="fourier")
 
     def test_a_thickness_that_makes_no_sense(self):
         for thickness in ("two", "-1%", 0, -1.0, float("nan"), [0.1, 0.2], np.full(8, -1.0)):
