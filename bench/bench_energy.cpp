@@ -26,11 +26,15 @@ VolumeMesh shaken(CellKind kind, int n) {
     for (int j = 0; j <= n; ++j)
       for (int i = 0; i <= n; ++i)
         mesh.positions.emplace_back(i + shift(engine), j + shift(engine), k + shift(engine));
-  const auto add = [&mesh](CellKind cell, std::initializer_list<Index> v) { mesh.add_cell(cell, {v.begin(), v.size()}); };
+  const auto add = [&mesh](CellKind cell, std::initializer_list<Index> v) {
+    mesh.add_cell(cell, {v.begin(), v.size()});
+  };
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i) {
-        const auto id = [&](int a, int b, int c) { return static_cast<Index>(i + a + (n + 1) * (j + b + (n + 1) * (k + c))); };
+        const auto id = [&](int a, int b, int c) {
+          return static_cast<Index>(i + a + (n + 1) * (j + b + (n + 1) * (k + c)));
+        };
         const Index p[8] = {id(0, 0, 0), id(1, 0, 0), id(1, 1, 0), id(0, 1, 0),
                             id(0, 0, 1), id(1, 0, 1), id(1, 1, 1), id(0, 1, 1)};
         if (kind == CellKind::hex) mesh.add_cell(kind, p);
@@ -39,7 +43,8 @@ VolumeMesh shaken(CellKind kind, int n) {
           add(kind, {p[0], p[2], p[3], p[4], p[6], p[7]});
         }
         if (kind == CellKind::tet)
-          for (const auto& [a, b] : {std::pair{1, 2}, {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}}) add(kind, {p[0], p[a], p[b], p[6]});
+          for (const auto& [a, b] : {std::pair{1, 2}, {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}})
+            add(kind, {p[0], p[a], p[b], p[6]});
       }
   return mesh;
 }
@@ -89,15 +94,17 @@ int main() {
           for (std::size_t q = 0; q < rule.num_points(); ++q) {
             Mat3 j = Mat3::Zero(), stress;
             for (const auto& entry : rule.point(q))
-              j += mesh.positions[mesh.cell(c)[entry.vertex]] * Eigen::Map<const Eigen::RowVector3d>(entry.gradient.data());
+              j += mesh.positions[mesh.cell(c)[entry.vertex]] *
+                   Eigen::Map<const Eigen::RowVector3d>(entry.gradient.data());
             sum += reference_hencky(j, stress);
             for (const auto& entry : rule.point(q))
               gradient[mesh.cell(c)[entry.vertex]] += stress * Eigen::Map<const Vec3>(entry.gradient.data());
           }
       });
-      std::printf("%s\n {\"kind\": \"%s\", \"points_per_direction\": %d, \"value\": %.1f, \"gradient\": %.1f, \"hessian\": "
-                  "%.1f, \"one_by_one_gradient\": %.1f, \"ratio\": %.2f}",
-                  separator, cell_topology(kind).name, n, value, first, second, reference, reference / first);
+      std::printf(
+          "%s\n {\"kind\": \"%s\", \"points_per_direction\": %d, \"value\": %.1f, \"gradient\": %.1f, \"hessian\": "
+          "%.1f, \"one_by_one_gradient\": %.1f, \"ratio\": %.2f}",
+          separator, cell_topology(kind).name, n, value, first, second, reference, reference / first);
       separator = ",";
       if (!std::isfinite(sum)) return 1;
     }

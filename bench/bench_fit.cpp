@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole fits with and without each accelerator: Newton against L-BFGS, closest points against Voronoi cells, one against
-// all threads. JSON to stdout. Usage: bench_fit [TARGET TEMPLATE [LEVELS]]; without arguments the torus sample, level 2.
+// Whole fits with and without each accelerator: Newton against L-BFGS, closest points against Voronoi cells, one
+// against all threads. JSON to stdout. Usage: bench_fit [TARGET TEMPLATE [LEVELS]]; without arguments the torus sample,
+// level 2.
 #include "fit/closest_point.h"
 #include "fit/boundary_triangles.h"
 #include "fit/subdivision_fit.h"

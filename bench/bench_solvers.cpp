@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Newton's method against plain L-BFGS on one problem: the last stage of a fit of curved elements, from the same start
-// with the same ideal cells. JSON to stdout: processor time until the energy is within 1 % of the least that either finds.
-// Usage: bench_solvers [TARGET TEMPLATE [ORDER]]; without arguments the torus sample, order 4. One thread.
+// with the same ideal cells. JSON to stdout: processor time until the energy is within 1 % of the least that either
+// finds. Usage: bench_solvers [TARGET TEMPLATE [ORDER]]; without arguments the torus sample, order 4. One thread.
 #include "fit/boundary_samples.h"
 #include "fit/fit_level.h"
 #include "fit/fit_target.h"
@@ -41,11 +41,12 @@ FitProblem last_stage(const HighOrderMesh& mesh, const VolumeMesh& cells, const 
                       const BoundarySamples& samples) {
   std::vector<int> points(mesh.space.num_cells(), points_for_order(mesh.space.max_order()));
   const auto vertices = std::span(mesh.coefficients).first(cells.num_vertices());
-  return {identity_map(mesh.space.num_nodes()), samples.positions,
-          std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
-          make_surface_term(target.surface, samples.triangles, samples.points.size(), kTangentialWeight,
-                            Correspondence::closest),
-          kLambda};
+  return {
+      identity_map(mesh.space.num_nodes()), samples.positions,
+      std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
+      make_surface_term(target.surface, samples.triangles, samples.points.size(), kTangentialWeight,
+                        Correspondence::closest),
+      kLambda};
 }
 
 template <class Minimizer>
@@ -89,7 +90,8 @@ int main(int argc, char** argv) {
   const Run lbfgs = timed(minimize_lbfgs, problem(), mesh.coefficients);
 
   const double near = kNear * std::min(newton.least(), lbfgs.least());
-  std::printf("{\"bench\": \"solvers\", \"order\": %d, \"unknowns\": %zu, \"rows\": [", order, mesh.coefficients.size());
+  std::printf("{\"bench\": \"solvers\", \"order\": %d, \"unknowns\": %zu, \"rows\": [", order,
+              mesh.coefficients.size());
   const auto print = [&](const char* name, const Run& run) {
     std::printf("\n {\"solver\": \"%s\", \"steps\": %zu, \"least_energy\": %.6g, \"cpu_seconds\": %.3f, "
                 "\"seconds_to_1_percent\": %.3f, \"ratio_to_newton\": %.2f}",

@@ -97,10 +97,12 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
 }  // namespace
 
 void add_check_command(CLI::App& app, Action& action) {
-  CLI::App* verb = app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
+  CLI::App* verb =
+      app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
   const auto arguments = std::make_shared<CheckArguments>();
   verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats())->required()->type_name("FILE");
-  verb->add_option("--target", arguments->target, "Measure the distance to this surface, or of these points: " + target_formats())
+  verb->add_option("--target", arguments->target,
+                   "Measure the distance to this surface, or of these points: " + target_formats())
       ->type_name("SURFACE");
   verb->add_option("--chord", arguments->chord_percent,
                    "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")

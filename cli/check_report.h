@@ -18,8 +18,8 @@ Json quality_json(const QualityReport& quality);
 /// What in a mesh's boundary works against good cells under subdivision.
 Json audit_json(const SubdivisionAudit& found);
 
-/// A distance in the mesh's unit and in per cent of a diagonal; `a` is ours, `b` the target. One-sided: what goes to the target
-/// is left out.
+/// A distance in the mesh's unit and in per cent of a diagonal; `a` is ours, `b` the target. One-sided: what goes to
+/// the target is left out.
 Json distance_json(const SurfaceDistance& distance, double diagonal);
 
 /// How well creases meet the target's sharp edges; and the same as one line for people.

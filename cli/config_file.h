@@ -11,7 +11,8 @@ namespace subvol::cli {
 /// Accepts what is no device and no pipe, which may have no end; and names of nothing, which are refused elsewhere.
 CLI::Validator regular_file();
 
-/// Reads --config files: keys are the long options of the verb in use, without a section or in one named after the verb.
+/// Reads --config files: keys are the long options of the verb in use, without a section or in one named after the
+/// verb.
 ///
 /// Sections of other verbs are passed over, so that one file can serve several. The command line wins over the file.
 class VerbConfig : public CLI::ConfigTOML {

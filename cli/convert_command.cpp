@@ -20,8 +20,8 @@ struct ConvertArguments {
   bool limit = false;
 };
 
-void convert_volume(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
-                    std::vector<std::string>& warnings) {
+void convert_volume(const ConvertArguments& arguments, const std::vector<Output>& outputs,
+                    const WritingOptions& writing, std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.input, warnings);
   for (const Output& output : outputs) {
     if (arguments.limit && shows_surface(output)) {
@@ -40,8 +40,8 @@ void convert_high_order(const ConvertArguments& arguments, const std::vector<Out
   for (const Output& output : outputs) write_output(output, file, writing);
 }
 
-void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs, const WritingOptions& writing,
-                     std::vector<std::string>& warnings) {
+void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs,
+                     const WritingOptions& writing, std::vector<std::string>& warnings) {
   for (const Output& output : outputs) {
     if (output.part == Part::cutaway)
       throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");
@@ -93,7 +93,8 @@ void add_convert_command(CLI::App& app, Action& action) {
                          "; cutaway:FILE.glb for the cells inside; may be given several times");
   verb->get_option("--output")->required();
   add_writing_options(*verb, arguments->writing);
-  verb->footer(R"(Surface formats take the boundary of a volume mesh; .usda keeps it a subdivision cage with its creases.
+  verb->footer(
+      R"(Surface formats take the boundary of a volume mesh; .usda keeps it a subdivision cage with its creases.
 The curved boundary of a high-order .vtu is cut into triangles within --chord of it.
 
 Examples:

@@ -115,7 +115,8 @@ void FitRun::fit() {
   options.keep_states = has_animation(outputs_);
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
   // What is left of it: a template may have been made.
-  if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
+  if (options.time_limit_seconds > 0)
+    options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
   options.point_weights = point_weights(arguments_);
   options.distortion = distortion(arguments_);
   result_ = followed([&](auto progress) {
@@ -216,8 +217,9 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->check(CLI::Range(1, 6))
       ->type_name("L")
       ->capture_default_str();
-  verb.add_option("--tolerance", fit.tolerance_percent,
-                  "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
+  verb.add_option(
+          "--tolerance", fit.tolerance_percent,
+          "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
   verb.add_option("--surface", arguments.surface,
@@ -250,7 +252,9 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->needs(order)
       ->group(group);
-  verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")->needs(order)->group(group);
+  verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
+      ->needs(order)
+      ->group(group);
   for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far"})
     order->excludes(verb.get_option(other));
 }
@@ -282,10 +286,11 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("W")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--lambda-close", fit.lambda_close,
-                  "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
-                  "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05, lowered\n"
-                  "for a --tolerance alone")
+  verb.add_option(
+          "--lambda-close", fit.lambda_close,
+          "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
+          "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05,\n"
+          "lowered for a --tolerance alone")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()
@@ -307,8 +312,9 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("hencky|inverse_mean_ratio|condition_number")
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--point-weights", arguments.point_weights,
-                  "How much each point of a cloud counts: all alike, or by the area it stands for, where scans are uneven")
+  verb.add_option(
+          "--point-weights", arguments.point_weights,
+          "How much each point of a cloud counts: all alike, or by the area it stands for, where scans are uneven")
       ->check(CLI::IsMember({"equal", "area"}))
       ->type_name("equal|area")
       ->capture_default_str()

@@ -129,8 +129,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Clock::time_point untangle_start = Clock::now();
   if (arguments.untangles || has_few_inverted_cells(template_mesh))
     untangle_template(arguments.template_mesh.path, arguments.run,
-                      {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()}, template_mesh,
-                      warnings);
+                      {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()},
+                      template_mesh, warnings);
   const double untangle_seconds = seconds_since(untangle_start);
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result = fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start),

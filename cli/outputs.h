@@ -36,7 +36,8 @@ std::string output_formats();
 /// existing file without --force. IoError: a folder that is not there or cannot be written to.
 std::vector<Output> checked_outputs(const RunOptions& options, const std::vector<Part>& parts);
 
-/// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: no place to write.
+/// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: no place to
+/// write.
 void require_free(const std::filesystem::path& file, bool force);
 
 /// The file names, as the report lists them.

@@ -24,10 +24,12 @@ h1 { font-size: 1.5rem; margin: 0 0 .3rem; overflow-wrap: anywhere; } h2 { font-
 .verdict { font-weight: 600; } .good { color: var(--good); } .bad { color: var(--bad); } .soft { color: var(--soft); }
 .grid { display: grid; gap: 1rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr)); }
 figure { margin: 0; padding: .8rem; background: var(--card); border-radius: .6rem; }
-figure img, figure svg { display: block; width: 100%; height: auto; } figcaption { font-size: .9rem; margin-top: .4rem; }
+figure img, figure svg { display: block; width: 100%; height: auto; }
+figcaption { font-size: .9rem; margin-top: .4rem; }
 .scale { display: flex; gap: .5rem; align-items: center; font-size: .8rem; color: var(--soft); }
 .scale i { flex: 1; height: .6rem; border-radius: .3rem; }
-.plot { max-width: 46rem; margin: .8rem 0; } .wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .9rem; }
+.plot { max-width: 46rem; margin: .8rem 0; } .wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; }
 th, td { padding: .25rem .8rem .25rem 0; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap;
   font-variant-numeric: tabular-nums; }
 th { color: var(--soft); font-weight: 500; } th:first-child, td:first-child { text-align: left; }
@@ -184,8 +186,8 @@ std::string stages(const Json& report) {
                  entry(energy, "surface"), entry(energy, "volume"), entry(stage, "mean_distance_percent"),
                  entry(stage, "seconds"), stage.value("kept", true) ? "" : "undone"});
   }
-  return rows.empty() ? "" : table({"", "stage", "unknowns", "steps", "surface", "volume", "mean distance, %", "seconds", ""},
-                                   rows);
+  if (rows.empty()) return "";
+  return table({"", "stage", "unknowns", "steps", "surface", "volume", "mean distance, %", "seconds", ""}, rows);
 }
 
 std::string convergence(const Json& report) {
@@ -193,8 +195,8 @@ std::string convergence(const Json& report) {
   if (plot.empty()) return {};
   return "<figure class=\"plot\">" + plot +
          "<figcaption class=\"key\">Energy by step, logarithmic: <b class=\"surface\">surface</b>, "
-         "<b class=\"volume\">volume</b> (without its weight), <b class=\"total\">total</b>. Lines part stages.</figcaption>"
-         "</figure>\n";
+         "<b class=\"volume\">volume</b> (without its weight), <b class=\"total\">total</b>. Lines part stages."
+         "</figcaption></figure>\n";
 }
 
 std::string histogram(const Json& report) {
@@ -252,11 +254,13 @@ Json parse_report(std::string_view bytes, const std::string& name) {
   return report;
 }
 
-std::string report_page(const Json& report, std::span<const ReportPicture> pictures, std::span<const std::string> notes) {
+std::string report_page(const Json& report, std::span<const ReportPicture> pictures,
+                        std::span<const std::string> notes) {
   std::string page = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
                      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
                      "<link rel=\"icon\" href=\"data:,\">\n<title>" +
-                     escaped("subvol " + report.value("command", std::string()) + ": " + input_name(report)) + "</title>\n<style>";
+                     escaped("subvol " + report.value("command", std::string()) + ": " + input_name(report)) +
+                     "</title>\n<style>";
   page += kStyle;
   page += "</style>\n</head>\n<body>\n";
   page += heading(report) + gallery(pictures, notes);

@@ -91,8 +91,9 @@ std::string histogram_plot(const Json& counts) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] > 0)) continue;
     const double height = std::max(1.0, (kHeight - kBottom - kTop) * values[i] / most);
-    svg += format("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
-                  kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
+    svg +=
+        format("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
+               kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
   }
   for (int i = 0; i <= 4; ++i)
     svg += format("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4,

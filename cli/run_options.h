@@ -32,8 +32,8 @@ void add_resource_options(CLI::App& verb, RunOptions& options);
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help);
 /// --report, --progress, --seed: for what runs long.
 void add_long_run_options(CLI::App& verb, RunOptions& options);
-/// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own limit
-/// on data: what goes beyond it fails to be allocated (`std::bad_alloc`).
+/// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own
+/// limit on data: what goes beyond it fails to be allocated (`std::bad_alloc`).
 void apply_resources(const RunOptions& options);
 
 /// UsageError: an option was given that means nothing for the target that there is, points or a surface.
@@ -46,8 +46,8 @@ double parse_length(const std::string& option, const std::string& text, double d
 std::string as_utf8(const std::string& text);
 /// The options of a verb that have a value, by long name: given or default; a list where there are several.
 Json options_in_force(const CLI::App& verb);
-/// Those of them that bear on what is written: not how a run is told, limited, or kept. What files other than reports say
-/// of a run, so that they are the same bytes for any number of threads, and for a run that was resumed.
+/// Those of them that bear on what is written: not how a run is told, limited, or kept. What files other than reports
+/// say of a run, so that they are the same bytes for any number of threads, and for a run that was resumed.
 Json options_of_result(const CLI::App& verb);
 
 }  // namespace subvol::cli

@@ -124,7 +124,8 @@ void ShellRun::curve() {
   if (!result_.failures.none()) {
     return add_warnings({"the cells were left straight, for the shell is not valid"});
   }
-  CurvedShellOptions options{.order = arguments_.order, .basis = arguments_.basis == "fourier" ? Basis::fourier : Basis::legendre,
+  CurvedShellOptions options{.order = arguments_.order,
+                             .basis = arguments_.basis == "fourier" ? Basis::fourier : Basis::legendre,
                              .max_iterations = arguments_.shell.max_iterations};
   if (const double limit = arguments_.shell.time_limit_seconds; limit > 0)
     options.time_limit_seconds = std::max(1e-3, limit - seconds());
@@ -147,8 +148,8 @@ void ShellRun::write() {
     curved_ ? write_shell(output, result_, *curved_, writing) : write_shell(output, result_, writing);
 }
 
-// What counts is what is on the disk: the first .mesh, of curved cells the first .vtu, is read back and checked in place
-// of the result in memory.
+// What counts is what is on the disk: the first .mesh, of curved cells the first .vtu, is read back and checked in
+// place of the result in memory.
 void ShellRun::check() {
   failures_ = result_.failures;
   for (const Output& output : outputs_) {
@@ -268,11 +269,11 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
                   "Edges of the surface sharper than this become creases (default: only those the file tags)")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
-  CLI::Option* order =
-      verb.add_option("--order", arguments.order, "Order of the cells; above 1 they are curved, but for the surface itself")
-          ->check(CLI::Range(1, kMaxOrder))
-          ->type_name("P")
-          ->capture_default_str();
+  CLI::Option* order = verb.add_option("--order", arguments.order,
+                                       "Order of the cells; above 1 they are curved, but for the surface itself")
+                           ->check(CLI::Range(1, kMaxOrder))
+                           ->type_name("P")
+                           ->capture_default_str();
   verb.add_option("--basis", arguments.basis, "Modes of curved cells")
       ->check(CLI::IsMember({"fourier", "legendre"}))
       ->type_name("fourier|legendre")

@@ -168,7 +168,8 @@ void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surfac
                        output.path.string());
     if (output.extension != ".msh") continue;
     for (std::size_t f = 0; f < surface.num_faces(); ++f) {
-      const CellKind kind = surface.face_offsets[f + 1] - surface.face_offsets[f] == 3 ? CellKind::prism : CellKind::hex;
+      const CellKind kind =
+          surface.face_offsets[f + 1] - surface.face_offsets[f] == 3 ? CellKind::prism : CellKind::hex;
       if (order > max_gmsh_order(kind))
         throw UsageError(output.path.string() + ": Gmsh evaluates a " + cell_topology(kind).name + " up to order " +
                          std::to_string(max_gmsh_order(kind)) + " only; take .vtu");

@@ -17,7 +17,8 @@ inline constexpr const char* kFacesPointInward =
 /// Writes a shell: its cells with thickness at the vertices where the format has fields, its sheets as named nodes of a
 /// scene, or its boundary as polygons.
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options);
-/// The same of a shell that has been curved; `shell` has its figures (`take_figures`). As a control mesh: the linear cells.
+/// The same of a shell that has been curved; `shell` has its figures (`take_figures`). As a control mesh: the linear
+/// cells.
 void write_shell(const Output& output, const ShellResult& shell, const CurvedShell& curved,
                  const WritingOptions& options);
 /// What is true of a curved shell in place of what was of the linear one; faces that meet are those of its boundary.

@@ -99,7 +99,8 @@ void add_subdivide_command(CLI::App& app, Action& action) {
   verb->add_option("--report", arguments->run.report, "Write what was done")->type_name("FILE.json");
   verb->footer(R"(Example:
   subvol subdivide cage.mesh --levels 2 --crease-angle 40 -o fine.mesh -o fine.glb)");
-  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_subdivide(*arguments, *verb); }; });
+  verb->callback(
+      [arguments, verb, &action] { action = [arguments, verb] { return run_subdivide(*arguments, *verb); }; });
 }
 
 }  // namespace subvol::cli

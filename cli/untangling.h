@@ -10,8 +10,8 @@
 
 namespace subvol::cli {
 
-/// Whether some cells of a template, but not most of them, are flat or left-handed at a corner: a mesh that can be mended,
-/// not one that is numbered the other way round.
+/// Whether some cells of a template, but not most of them, are flat or left-handed at a corner: a mesh that can be
+/// mended, not one that is numbered the other way round.
 bool has_few_inverted_cells(const VolumeMesh& mesh);
 
 /// Makes a template's cells valid over its own boundary, and tells so in a warning. Nothing is done where they all are.

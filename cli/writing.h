@@ -43,8 +43,8 @@ void write_scene(const std::filesystem::path& path, const Scene& scene);
 void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
 
 /// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
-/// coloured by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is asked
-/// for where a scene of it is to be written (`shows_surface`) and may be null elsewhere.
+/// coloured by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is
+/// asked for where a scene of it is to be written (`shows_surface`) and may be null elsewhere.
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
                   const WritingOptions& options);
 /// Whether the output is a scene of the result's surface.

@@ -13,7 +13,8 @@ if(OpenSubdiv_INCLUDE_DIR)
   endif()
 endif()
 include(FindPackageHandleStandardArgs)
-find_package_handle_standard_args(OpenSubdiv REQUIRED_VARS OpenSubdiv_LIBRARY OpenSubdiv_INCLUDE_DIR VERSION_VAR OpenSubdiv_VERSION)
+find_package_handle_standard_args(OpenSubdiv REQUIRED_VARS OpenSubdiv_LIBRARY OpenSubdiv_INCLUDE_DIR
+  VERSION_VAR OpenSubdiv_VERSION)
 if(OpenSubdiv_FOUND AND NOT TARGET OpenSubdiv::OpenSubdiv)
   add_library(OpenSubdiv::OpenSubdiv UNKNOWN IMPORTED)
   set_target_properties(OpenSubdiv::OpenSubdiv PROPERTIES

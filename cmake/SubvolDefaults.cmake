@@ -26,7 +26,8 @@ target_compile_options(subvol_defaults INTERFACE -Wall -Wextra -Wpedantic -Wshad
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # GCC 12 sees std::sort of a few elements run past the end of a small array, and its own AVX-512 headers read what
   # they have not set, and a string put before another overlap it.
-  target_compile_options(subvol_defaults INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-uninitialized -Wno-restrict)
+  target_compile_options(subvol_defaults INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized
+    -Wno-uninitialized -Wno-restrict)
 endif()
 # No code of ours reads errno after a square root or traps on floating-point exceptions; with either, loops over lanes
 # do not vectorise. Neither changes a value.

@@ -11,7 +11,8 @@
 
 namespace subvol {
 
-/// Cells with points on regular grids, listed as the file format wants them. The arrays are consistent; see the writers.
+/// Cells with points on regular grids, listed as the file format wants them. The arrays are consistent; see the
+/// writers.
 struct CellView {
   std::span<const Vec3> positions;
   std::span<const CellKind> kinds;
@@ -35,7 +36,8 @@ int max_gmsh_order(CellKind kind);
 int gmsh_type(CellKind kind, int order);
 std::uint8_t vtk_type(CellKind kind);
 /// Orders: 1 .. max_gmsh_order (asserted).
-std::string msh_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields);
+std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
+                         std::span<const VertexField> fields);
 
 /// InputError unless there is one finite number per cell, or none at all.
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells);

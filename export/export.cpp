@@ -262,7 +262,8 @@ Scene boundary_scene(const VolumeMesh& mesh, const SurfaceSceneOptions& options)
   const MeshTopology topology(mesh);
   const QualityReport quality = measure_quality(mesh);
   std::vector<double> face_quality;
-  for (const Index f : topology.boundary_faces()) face_quality.push_back(quality.cell_minima[topology.face_cells(f)[0]]);
+  for (const Index f : topology.boundary_faces())
+    face_quality.push_back(quality.cell_minima[topology.face_cells(f)[0]]);
   return polygon_scene(boundary_surface(mesh, topology, nullptr), face_quality, options);
 }
 

@@ -18,7 +18,8 @@ namespace subvol {
 /// What a scene of a surface says of itself, and how fine it is.
 struct SurfaceSceneOptions {
   std::string name = "subvol";          ///< of the root node
-  double max_chord_percent = 0.005;     ///< chord error of a curved surface, per cent of its bounding box's diagonal, > 0
+  /// Chord error of a curved surface, per cent of its bounding box's diagonal, > 0.
+  double max_chord_percent = 0.005;
   double crease_angle_degrees = 30;     ///< faces that meet at more are not shaded smoothly, [0, 180]
   bool wireframe = true;                ///< a second node with the cells' edges as lines
   bool quantize = false;                ///< a smaller file: `Scene::quantize`
@@ -30,13 +31,14 @@ struct SurfaceSceneOptions {
 
 /// The limit surface of a control cage, coloured by the quality of the cells below it.
 ///
-/// Nodes: "surface" (normals, COLOR_0 by `quality_color`, _SCALED_JACOBIAN, quads as consecutive pairs of triangles) and
-/// "wireframe" (the cage's boundary edges as curves). A vertex has the least quality of the patches around it.
+/// Nodes: "surface" (normals, COLOR_0 by `quality_color`, _SCALED_JACOBIAN, quads as consecutive pairs of triangles)
+/// and "wireframe" (the cage's boundary edges as curves). A vertex has the least quality of the patches around it.
 ///
-/// finest   the cage refined k >= 0 times (so cells follow by parent, then corner), whose cells give the quality: a patch
-///          has the minimum over the descendants of its child cell. Null: the cage's own cells.
+/// finest   the cage refined k >= 0 times (so cells follow by parent, then corner), whose cells give the quality: a
+///          patch has the minimum over the descendants of its child cell. Null: the cage's own cells.
 /// InputError: a finest mesh whose number of cells fits no k; options out of range; what `tessellate` refuses.
-Scene surface_scene(const VolumeMesh& cage, const VolumeMesh* finest = nullptr, const SurfaceSceneOptions& options = {});
+Scene surface_scene(const VolumeMesh& cage, const VolumeMesh* finest = nullptr,
+                    const SurfaceSceneOptions& options = {});
 
 /// The same from parts made before. patch_quality: one scaled Jacobian per patch, or empty (no colours then).
 Scene surface_scene(const TessellatedSurface& surface, std::span<const double> patch_quality,
@@ -75,8 +77,8 @@ struct SceneSheet {
   std::vector<std::array<Index, 2>> wires{};  ///< edges to draw, by vertex; empty: those of all polygons
 };
 
-/// Several sheets as they stand, flat faces, and one "wireframe" with the edges of all. `colour_map` names what the shades
-/// show. InputError: no sheets, arrays of another length than the vertices.
+/// Several sheets as they stand, flat faces, and one "wireframe" with the edges of all. `colour_map` names what the
+/// shades show. InputError: no sheets, arrays of another length than the vertices.
 Scene sheet_scene(std::span<const SceneSheet> sheets, const std::string& colour_map,
                   const SurfaceSceneOptions& options = {});
 

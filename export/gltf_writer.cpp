@@ -246,15 +246,16 @@ int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, co
                        : buffer.add(normals, 3, kFloat, kTarget, "normals");
   }
   if (!source.colors.empty())
-    primitive.attributes["COLOR_0"] = buffer.add(color_words(source, refuse), 4,
-                                                 TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kTarget, "colors", false, true);
+    primitive.attributes["COLOR_0"] = buffer.add(color_words(source, refuse), 4, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT,
+                                                 kTarget, "colors", false, true);
   for (const SceneAttribute& attribute : source.attributes) {
     std::vector<float> values;
     for (const double x : attribute.values) values.push_back(to_float(x, attribute.name, refuse));
     primitive.attributes[attribute.name] = buffer.add(values, 1, kFloat, kTarget, attribute.name, true);
   }
   primitive.indices = add_indices(buffer, source);
-  primitive.mode = source.topology == ScenePrimitive::Topology::triangles ? TINYGLTF_MODE_TRIANGLES : TINYGLTF_MODE_LINE;
+  primitive.mode =
+      source.topology == ScenePrimitive::Topology::triangles ? TINYGLTF_MODE_TRIANGLES : TINYGLTF_MODE_LINE;
   primitive.material = add_material(model, node, refuse);
   gltf::Mesh mesh;
   mesh.name = node.name;

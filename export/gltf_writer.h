@@ -25,12 +25,14 @@ enum class GltfContainer {
 /// metallic material. Shapes become morph targets with their names in the mesh's extras.targetNames, and one animation
 /// "shapes" that goes from the first to the primitive itself; at rest the primitive is shown.
 /// A quad's two triangles stay one after the other. asset.generator is "subvol VERSION"; asset.extras
-/// and the root node's extras (which survive an import) both hold unit, up_axis, version, the scene's extras and options.
+/// and the root node's extras (which survive an import) both hold unit, up_axis, version, the scene's extras and
+/// options.
 ///
 /// InputError, naming node and array: no nodes; a node without positions or indices; arrays of unequal length; an index
-/// out of range; a number that is not finite, or overflows float32; a normal whose length is not 1 within 1e-6; a colour
-/// outside [0, 1]; an attribute name that is not underscore and capitals; shapes of lines; metres_per_unit or
-/// seconds_per_shape not positive, or times of shapes that are the same in float32; text that is not UTF-8; more than 2^31 bytes.
+/// out of range; a number that is not finite, or overflows float32; a normal whose length is not 1 within 1e-6; a
+/// colour outside [0, 1]; an attribute name that is not underscore and capitals; shapes of lines; metres_per_unit or
+/// seconds_per_shape not positive, or times of shapes that are the same in float32; text that is not UTF-8; more than
+/// 2^31 bytes.
 std::string gltf_bytes(const Scene& scene, GltfContainer container);
 
 /// Writes `gltf_bytes` to a .glb or .gltf file, all of it or nothing.

@@ -135,10 +135,13 @@ void require_nodes(const VtuArrays& file, const VolumeMesh& mesh, const EntityOr
       !in_range(orders.cells))
     file.fail("expected an order from 1 to " + std::to_string(kMaxOrder) + " for every edge, face and cell");
   std::size_t expected = mesh.num_vertices();
-  const auto count = [&](EntityShape shape, int order) { expected += static_cast<std::size_t>(num_modes(shape, order)); };
+  const auto count = [&](EntityShape shape, int order) {
+    expected += static_cast<std::size_t>(num_modes(shape, order));
+  };
   for (const int order : orders.edges) count(EntityShape::edge, order);
   for (std::size_t f = 0; f < topology.num_faces(); ++f)
-    count(topology.face(static_cast<Index>(f)).size() == 3 ? EntityShape::triangle : EntityShape::quad, orders.faces[f]);
+    count(topology.face(static_cast<Index>(f)).size() == 3 ? EntityShape::triangle : EntityShape::quad,
+          orders.faces[f]);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) count(entity_shape(mesh.kinds[c]), orders.cells[c]);
   if (num_nodes != expected)
     file.fail("subvol_coefficients: expected " + std::to_string(expected) + " nodes for the orders, found " +

@@ -15,7 +15,8 @@ namespace subvol {
 struct HighOrderFileOptions {
   std::span<const double> cell_minima{};  ///< one scaled Jacobian per cell, or empty: cell data `scaled_jacobian`
   std::span<const int> references{};      ///< one per cell, or empty: all 0
-  /// One number per vertex of the mesh each: point data of .vtu and .msh, linear in between (order 1 of the cell's kind).
+  /// One number per vertex of the mesh each: point data of .vtu and .msh, linear in between (order 1 of the cell's
+  /// kind).
   std::span<const VertexField> fields{};
   int linear_intervals = 0;               ///< of `linear_cells` in .mesh and .vtk; 0: the largest order of the mesh
 };
@@ -25,10 +26,10 @@ inline constexpr int kMaxVtkOrder = 12;
 
 /// The mesh as a VTK XML unstructured grid, version 2.2, arrays in base64.
 ///
-/// Cells are Lagrange tets, wedges and hexes (71, 73, 72), each of the largest order of its edges, faces and itself (cell
-/// data `order`), sampled from the map: exact everywhere for legendre up to kMaxVtkOrder, at the points for fourier.
-/// Points that cells of equal order have in common are there once; the first are the mesh's vertices, and the first
-/// of every cell are its corners. The map itself is in the field data, for `read_high_order`:
+/// Cells are Lagrange tets, wedges and hexes (71, 73, 72), each of the largest order of its edges, faces and itself
+/// (cell data `order`), sampled from the map: exact everywhere for legendre up to kMaxVtkOrder, at the points for
+/// fourier. Points that cells of equal order have in common are there once; the first are the mesh's vertices, and the
+/// first of every cell are its corners. The map itself is in the field data, for `read_high_order`:
 ///
 ///   subvol_format        Int64: 1, basis (0 fourier, 1 legendre), number of vertices
 ///   subvol_edge_orders, subvol_face_orders, subvol_cell_orders      UInt8, as MeshTopology numbers edges and faces
@@ -43,8 +44,8 @@ std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
 /// InputError as above, and for orders beyond what Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// Writes .vtu or .msh as above, .mesh or .vtk as `linear_cells` (whose references are those of the curved cells), all of
-/// it or nothing. InputError: another extension, and as above. IoError: the file cannot be written.
+/// Writes .vtu or .msh as above, .mesh or .vtk as `linear_cells` (whose references are those of the curved cells), all
+/// of it or nothing. InputError: another extension, and as above. IoError: the file cannot be written.
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh,
                   const HighOrderFileOptions& options = {});
 
@@ -60,8 +61,8 @@ struct HighOrderFile {
 /// Reads what `vtu_text` has written: orders, coefficients and references bit by bit.
 ///
 /// InputError, naming the file and what was expected: any other .vtu, a file cut short or changed, arrays that do not
-/// fit together, numbers that are not finite, cells that do not fit together (`validate`, of the straight-sided mesh; its
-/// cells may be inverted). Memory: a few times the size of the file.
+/// fit together, numbers that are not finite, cells that do not fit together (`validate`, of the straight-sided mesh;
+/// its cells may be inverted). Memory: a few times the size of the file.
 HighOrderFile read_high_order(const std::filesystem::path& path);
 
 }  // namespace subvol

@@ -21,8 +21,8 @@ enum class NodeOrdering {
 /// The grid points of one kind of cell of an order >= 1: (p+1)^3 of a hex, (p+1)^2 (p+2)/2 of a prism,
 /// (p+1)(p+2)(p+3)/6 of a tet. InputError: an order below 1; for gmsh a prism of an order above 2.
 ///
-/// VTK and Gmsh both list corners, points inside edges, inside faces, inside the cell, and differ in which way edges and
-/// faces run and in what is inside: rows, or again a smaller cell of the same kind with its corners first.
+/// VTK and Gmsh both list corners, points inside edges, inside faces, inside the cell, and differ in which way edges
+/// and faces run and in what is inside: rows, or again a smaller cell of the same kind with its corners first.
 std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering ordering);
 
 }  // namespace subvol

@@ -21,7 +21,8 @@ struct LatticeNode {
   enum class On { vertex, edge, face, cell };
   On on = On::cell;
   int part = 0;                 ///< local number of the vertex, edge or face
-  std::array<std::int64_t, 8> weights{};  ///< of the local vertices; sum: order, to the power of the cell's line factors
+  /// Of the local vertices; sum: order, to the power of the cell's line factors.
+  std::array<std::int64_t, 8> weights{};
 };
 
 /// Shares of the corners, exact whole numbers.
@@ -146,7 +147,8 @@ void evaluate(const HighOrderMesh& mesh, const std::map<LatticeKey, Lattice>& la
   const std::size_t num_vertices = mesh.space.num_vertices();
   for (const auto& [key, members] : groups) {
     const std::vector<Index>& cells = members;  // Clang before 16 takes no structured binding into a parallel region
-    const PatternTable table(mesh.space, key.first, lattices.at({mesh.space.pattern_kind(key.first), key.second}).points);
+    const PatternTable table(mesh.space, key.first,
+                             lattices.at({mesh.space.pattern_kind(key.first), key.second}).points);
 #pragma omp parallel
     {
       std::vector<Vec3> x(table.num_points());
@@ -182,7 +184,8 @@ std::vector<std::vector<LatticePoint>> pieces(CellKind kind, int n) {
           if (i + j < n) add(at, {p(0, 0, 0), p(1, 0, 0), p(0, 1, 0), p(0, 0, 1), p(1, 0, 1), p(0, 1, 1)});
           if (i + j + 1 < n) add(at, {p(1, 0, 0), p(1, 1, 0), p(0, 1, 0), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)});
         } else {
-          // A tet at the corner, four around the diagonal of the octahedron behind it, and one more that fills the cube.
+          // A tet at the corner, four around the diagonal of the octahedron behind it, and one more that fills the
+          // cube.
           const LatticePoint a = p(1, 0, 0), b = p(0, 1, 0), c = p(0, 0, 1), ab = p(1, 1, 0), bc = p(0, 1, 1),
                              ac = p(1, 0, 1), abc = p(1, 1, 1);
           if (i + j + k < n) add(at, {p(0, 0, 0), a, b, c});
@@ -238,7 +241,8 @@ VolumeMesh linear_cells(const HighOrderMesh& mesh, int intervals, std::vector<In
   if (intervals < 1)
     throw InputError("linear_cells: intervals is " + std::to_string(intervals) + ", expected 1 or more");
   if (std::pow(intervals, 3) * static_cast<double>(num_cells) > std::numeric_limits<Index>::max())
-    throw InputError("linear_cells: " + std::to_string(intervals) + " intervals make more cells than an index can tell");
+    throw InputError("linear_cells: " + std::to_string(intervals) +
+                     " intervals make more cells than an index can tell");
   const LagrangeMesh grid = lagrange_mesh(mesh, std::vector<int>(num_cells, intervals), NodeOrdering::rows);
   std::map<CellKind, std::vector<std::vector<int>>> places;  // of the corners of each piece in the grid's rows
   for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex}) {

@@ -11,7 +11,8 @@ namespace subvol {
 
 /// Points of the regular grids of all cells, those on common vertices, edges and faces once.
 ///
-/// A common edge or face is shared by the cells that have the same order; where orders differ, each has points of its own.
+/// A common edge or face is shared by the cells that have the same order; where orders differ, each has points of its
+/// own.
 struct LagrangeMesh {
   std::vector<Vec3> positions;  ///< the mesh's vertices with their numbers, then the other points
   std::vector<CellKind> kinds;
@@ -25,8 +26,8 @@ struct LagrangeMesh {
   }
 };
 
-/// Samples the cells on grids of the given orders, one per cell, >= 1. What is polynomial of that order (legendre: every
-/// cell at its `lagrange_orders`) is met everywhere, all else at the points.
+/// Samples the cells on grids of the given orders, one per cell, >= 1. What is polynomial of that order (legendre:
+/// every cell at its `lagrange_orders`) is met everywhere, all else at the points.
 ///
 /// InputError: wrong number of orders, what `cell_lattice` refuses. Parallel, same bits for any number of threads.
 LagrangeMesh lagrange_mesh(const HighOrderMesh& mesh, std::span<const int> orders, NodeOrdering ordering);
@@ -37,7 +38,8 @@ std::vector<int> lagrange_orders(const ElementSpace& space, int limit);
 /// The curved cells as many small linear ones: n^3 hexes of a hex, n^3 prisms of a prism, n^3 tets of a tet.
 ///
 /// Conforming as the mesh is: all edges are cut alike, at equal parameters. With 1 the straight-sided mesh itself.
-/// intervals  n >= 1, else InputError, as when there were more than 2^31 - 1 cells. parents: cell of each small one, or null.
+/// intervals  n >= 1, else InputError, as when there were more than 2^31 - 1 cells. parents: cell of each small one, or
+///            null.
 VolumeMesh linear_cells(const HighOrderMesh& mesh, int intervals, std::vector<Index>* parents = nullptr);
 
 }  // namespace subvol

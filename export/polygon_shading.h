@@ -15,8 +15,8 @@ struct ShadedPolygons {
 
 /// Mean normals of faces that meet smoothly.
 ///
-/// crease_angle_degrees  in [0, 180]: at a vertex, faces that share an edge and whose normals differ by less are averaged,
-///                       by area. 0 gives flat faces.
+/// crease_angle_degrees  in [0, 180]: at a vertex, faces that share an edge and whose normals differ by less are
+///                       averaged, by area. 0 gives flat faces.
 /// Degenerate: a vertex whose faces have no area gets (0, 0, 1). InputError: a mesh without faces, of faces with fewer
 /// than three corners, with indices out of range or positions that are not finite; an angle out of range.
 ShadedPolygons shade_polygons(const PolygonMesh& mesh, double crease_angle_degrees = 30);

@@ -166,7 +166,8 @@ void compare_msh(const WrittenFile& file, const CellView& wanted) {
     skip(2);
     const std::size_t type = whole("a type"), size = whole("a number of elements");
     for (std::size_t k = 0; k < size; ++k, ++element) {
-      file.same(element < num_cells && whole("an element's number") == element + 1, "the number of element", element + 1);
+      file.same(element < num_cells && whole("an element's number") == element + 1, "the number of element",
+                element + 1);
       const std::size_t c = order[element];
       file.same(type == static_cast<std::size_t>(gmsh_type(wanted.kinds[c], wanted.order(c))), "the type of element",
                 element + 1);
@@ -362,8 +363,9 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
     const bool is_vtu = extension == ".vtu";
     const LagrangeMesh cells = lagrange_mesh(mesh, lagrange_orders(mesh.space, is_vtu ? kMaxVtkOrder : kMaxOrder),
                                              is_vtu ? NodeOrdering::vtk : NodeOrdering::gmsh);
-    compare_cells(file, extension,
-                  {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references});
+    compare_cells(
+        file, extension,
+        {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references});
     if (is_vtu) compare_map(file, mesh, options.references);
   });
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-// Files that have been written are read back and compared with what went into them: how many things there are, where they
-// are (exactly, or within the steps of a quantized scene), and of which kind.
+// Files that have been written are read back and compared with what went into them: how many things there are, where
+// they are (exactly, or within the steps of a quantized scene), and of which kind.
 //
-// All throw IoError, naming the file and the first thing that differs, or why it cannot be read. What is no regular file (a
-// pipe, a device) is passed over: what went in does not come out again. Cost: about that of writing.
+// All throw IoError, naming the file and the first thing that differs, or why it cannot be read. What is no regular
+// file (a pipe, a device) is passed over: what went in does not come out again. Cost: about that of writing.
 
 #include "export/high_order_file.h"
 #include "export/scene.h"

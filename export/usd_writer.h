@@ -27,12 +27,13 @@ struct UsdOptions {
 ///          upAxis and defaultPrim for the stage. Points are single precision in USD's schema; the digits of the double
 ///          are written all the same.
 ///
-/// InputError: a mesh without faces or with indices out of range or coordinates that are not finite; a tag that names no
-/// vertex or no edge of the cage, or has a sharpness that is not positive; a name that is no USD identifier;
+/// InputError: a mesh without faces or with indices out of range or coordinates that are not finite; a tag that names
+/// no vertex or no edge of the cage, or has a sharpness that is not positive; a name that is no USD identifier;
 /// metres_per_unit not positive.
 std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options = {});
 
-/// Writes `usd_text` to a .usda file, all of it or nothing. InputError: another extension. IoError: the file cannot be written.
+/// Writes `usd_text` to a .usda file, all of it or nothing. InputError: another extension. IoError: the file cannot be
+/// written.
 void write_usd(const std::filesystem::path& path, const PolygonMesh& cage, const FeatureTags& tags,
                const UsdOptions& options = {});
 

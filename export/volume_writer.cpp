@@ -54,7 +54,8 @@ std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima,
                   std::span<const VertexField> fields) {
   const std::string extension = lower_case_extension(path);
-  if (extension != ".vtu" && extension != ".msh") throw InputError(path.string() + ": expected the extension .vtu or .msh");
+  if (extension != ".vtu" && extension != ".msh")
+    throw InputError(path.string() + ": expected the extension .vtu or .msh");
   write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields)
                                                   : msh_text(mesh, cell_minima, fields));
 }

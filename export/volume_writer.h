@@ -33,8 +33,8 @@ std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                      std::span<const VertexField> fields = {});
 
-/// Writes `vtu_text` or `msh_text` by the extension, all of it or nothing. InputError: another extension. IoError: the file
-/// cannot be written.
+/// Writes `vtu_text` or `msh_text` by the extension, all of it or nothing. InputError: another extension. IoError: the
+/// file cannot be written.
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                   std::span<const VertexField> fields = {});
 

@@ -14,8 +14,8 @@
 
 namespace subvol {
 
-/// The data arrays of a .vtu as it is written here, by name, decoded when they are asked for. InputError, naming the file:
-/// it is no such file, or an array is not there, of another type or malformed. Cost: linear in the file.
+/// The data arrays of a .vtu as it is written here, by name, decoded when they are asked for. InputError, naming the
+/// file: it is no such file, or an array is not there, of another type or malformed. Cost: linear in the file.
 class VtuArrays {
  public:
   /// name: of the file, for messages; bytes must outlive this.

@@ -7,8 +7,9 @@
 
 namespace subvol {
 
-/// The shape that a cell should have at one of its points, where that is not the ideal cell's: a matrix A with det A > 0,
-/// whose columns are what the derivatives along the canonical axes should be (up to one rotation), in the mesh's unit.
+/// The shape that a cell should have at one of its points, where that is not the ideal cell's: a matrix A with det A >
+/// 0, whose columns are what the derivatives along the canonical axes should be (up to one rotation), in the mesh's
+/// unit.
 ///
 ///   F = dx/du A^-1,  u canonical (`cell_topology.h`)                           Paper: section 4.4
 ///

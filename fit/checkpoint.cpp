@@ -171,7 +171,9 @@ Checkpoint parse_checkpoint(std::string_view bytes, const std::string& name) {
   }
 }
 
-Checkpoint read_checkpoint(const std::filesystem::path& path) { return parse_checkpoint(read_file(path), path.string()); }
+Checkpoint read_checkpoint(const std::filesystem::path& path) {
+  return parse_checkpoint(read_file(path), path.string());
+}
 
 void require_same_run(const RunIdentity& checkpoint, const RunIdentity& run, const std::string& name) {
   std::map<std::string, std::pair<std::string, std::string>> values;

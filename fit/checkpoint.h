@@ -11,8 +11,8 @@
 
 namespace subvol {
 
-/// What a run must have in common with the one that it continues: names, and what they stand for, as text. The program's
-/// version, options that bear on the result, fingerprints of the inputs.
+/// What a run must have in common with the one that it continues: names, and what they stand for, as text. The
+/// program's version, options that bear on the result, fingerprints of the inputs.
 using RunIdentity = std::vector<std::pair<std::string, std::string>>;
 
 /// A run that ended before its time, as its file has it.

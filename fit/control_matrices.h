@@ -43,8 +43,8 @@ class ControlMatrices {
 ///   all S_b positive definite   =>   det J(u) >= min_b det S_b / (det L det C) > 0 for all u
 ///
 /// since sym(L J C) - sum_b B_b S_b is positive semidefinite, det M >= det sym M where sym M > 0 (Ostrowski, Taussky)
-/// and det^(1/3) is concave (Minkowski). C scales the columns of the mean matrix to length 1, L undoes its rotation; any
-/// choice is sound. In the limit of small boxes nothing is lost but the square of the deviation from the mean.
+/// and det^(1/3) is concave (Minkowski). C scales the columns of the mean matrix to length 1, L undoes its rotation;
+/// any choice is sound. In the limit of small boxes nothing is lost but the square of the deviation from the mean.
 ///
 /// remainder  R >= 0: bounds of the error of J's entries, and of the rounding errors in J_b's (each at least
 ///            16 units of roundoff of the entry). Entries at most 1e60 in size. Rounding here is accounted for.

@@ -68,8 +68,8 @@ struct Symmetric {
   Wide v[3][3];
 };
 
-/// Eigenvalues, on the diagonals, and vectors of kMany matrices with entries of at most 1, side by side: a rotation waits
-/// for the one before, not for that of another matrix. Four cyclic sweeps reach rounding.
+/// Eigenvalues, on the diagonals, and vectors of kMany matrices with entries of at most 1, side by side: a rotation
+/// waits for the one before, not for that of another matrix. Four cyclic sweeps reach rounding.
 template <bool kVectors, int kMany>
 SUBVOL_INLINE void diagonalise(Symmetric* m) {
   for (int n = 0; n < kMany; ++n)
@@ -135,8 +135,8 @@ SUBVOL_INLINE Wide exponential(const Wide& x) {
   return result;
 }
 
-/// A distortion f as a function of x_i = ln s_i: its value, first derivatives, second ones of one x_i, and of x_i and x_j
-/// for (i, j) = (0,1), (1,2), (2,0).
+/// A distortion f as a function of x_i = ln s_i: its value, first derivatives, second ones of one x_i, and of x_i and
+/// x_j for (i, j) = (0,1), (1,2), (2,0).
 struct LogModel {
   Wide value, first[3], second[3], mixed[3];
 };

@@ -31,8 +31,9 @@ inline constexpr double kHessianFloor = 0.01;
 ///   stretch_i = (1 - ln s_i)/s_i^2,  twist_ij = (g_i + g_j)/(s_i + s_j),  flip_ij = (g_i - g_j)/(s_i - s_j),
 ///   g_i = ln s_i / s_i;
 ///
-/// each is raised to at least the floor, so that the Hessian is positive definite. Of the other distortions e_i = de/ds_i
-/// stands for g_i, and the stretches are coupled: the matrix of d2e/ds_i ds_j has its eigenvalues raised as a whole.
+/// each is raised to at least the floor, so that the Hessian is positive definite. Of the other distortions e_i =
+/// de/ds_i stands for g_i, and the stretches are coupled: the matrix of d2e/ds_i ds_j has its eigenvalues raised as a
+/// whole.
 ///
 /// Infeasible: det J <= 0 gives energy +infinity and zero derivatives. Never NaN for finite J.
 struct DistortionBatch {
@@ -49,8 +50,8 @@ struct DistortionBatch {
   double floor = kHessianFloor;              ///< in: least eigenvalue of the second derivative; -infinity: as it is
 };
 
-/// What is done at points for one distortion. Each fills what comes before it, too. Of several batches two are worked on
-/// side by side, which takes less time than one after the other; what comes out is the same but for rounding.
+/// What is done at points for one distortion. Each fills what comes before it, too. Of several batches two are worked
+/// on side by side, which takes less time than one after the other; what comes out is the same but for rounding.
 struct DistortionKernels {
   void (*energy)(DistortionBatch* batches, int count);    ///< `energy`
   void (*gradient)(DistortionBatch* batches, int count);  ///< and `stress`

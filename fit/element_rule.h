@@ -15,9 +15,9 @@ namespace subvol {
 ///   J_q = sum_a x_a grad N_a(u_q) A^-1 / h                                     Paper: Eqs. 4-6
 ///
 /// A maps the canonical to the ideal cell of edge length 1: the unit cube, the prism over the equilateral triangle, the
-/// regular tetrahedron. Points form the trapezoidal grid with `points_per_direction` samples (both ends included) and its
-/// counterparts on triangle and tetrahedron: the corners of the regular split into (n-1)^2 triangles, with the weights
-/// of the vertex rule on each. A tet's Jacobian is constant: one point. Weights sum to 1.
+/// regular tetrahedron. Points form the trapezoidal grid with `points_per_direction` samples (both ends included) and
+/// its counterparts on triangle and tetrahedron: the corners of the regular split into (n-1)^2 triangles, with the
+/// weights of the vertex rule on each. A tet's Jacobian is constant: one point. Weights sum to 1.
 ///
 /// Only the vertices whose shape function has a non-zero gradient at a point are listed: at a hex's corner 4 of 8.
 struct ElementRule {
@@ -32,7 +32,9 @@ struct ElementRule {
   std::vector<Entry> entries;
 
   std::size_t num_points() const { return weights.size(); }
-  std::span<const Entry> point(std::size_t q) const { return {entries.data() + offsets[q], offsets[q + 1] - offsets[q]}; }
+  std::span<const Entry> point(std::size_t q) const {
+    return {entries.data() + offsets[q], offsets[q + 1] - offsets[q]};
+  }
 };
 
 /// The rule of a kind. points_per_direction >= 2, else InputError. Nested when n - 1 divides n' - 1.

@@ -91,8 +91,8 @@ SparseMap bilinear_refinement(const BoundaryRefinement& once, std::size_t num_no
   return map;
 }
 
-/// Mean lengths of a cell's edges: along the three directions of a hex, around the triangles of a prism (twice) and across,
-/// of all edges of a tet (three times).
+/// Mean lengths of a cell's edges: along the three directions of a hex, around the triangles of a prism (twice) and
+/// across, of all edges of a tet (three times).
 Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes) {
   const CellTopology& topology = cell_topology(kind);
   Vec3 sums = Vec3::Zero(), counts = Vec3::Zero();
@@ -101,7 +101,8 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
     const double length = (nodes[cell[b]] - nodes[cell[a]]).norm();
     const Vec3 along = (canonical_vertices(kind)[b] - canonical_vertices(kind)[a]).cwiseAbs();
     for (int i = 0; i < 3; ++i) {
-      const bool counts_here = kind == CellKind::tet || (kind == CellKind::prism && i < 2 ? along[2] == 0 : along[i] > 0);
+      const bool counts_here =
+          kind == CellKind::tet || (kind == CellKind::prism && i < 2 ? along[2] == 0 : along[i] > 0);
       if (!counts_here) continue;
       sums[i] += length;
       counts[i] += 1;

@@ -19,7 +19,8 @@ namespace subvol {
 /// FittedSurface::mesh). N goes further refinements down on the boundary alone, to as many points of the limit surface
 /// as the target's detail asks for. On the finest level, where the mesh itself is a result as well, N lies
 /// between the limit surface and the mesh's bilinear quads, which shares the gap between the two; but on
-/// the limit surface alone where that gap is too wide for the mesh to follow the target, unless a tolerance is asked for.
+/// the limit surface alone where that gap is too wide for the mesh to follow the target, unless a tolerance is asked
+/// for.
 struct FitLevel {
   VolumeMesh mesh;               ///< the finite element mesh: hexes
   SparseMap refine;              ///< S alone: control vertices to the vertices of the next control mesh
@@ -46,9 +47,9 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
 ///
 ///   h_ci = common^(1 - own_share) own_ci^own_share,  all rescaled so that the stretched ideal cells have the volume
 ///
-/// own_ci is the mean length of a hex's four edges along its direction i; of the edges around a prism's triangles for both
-/// directions there, and of those across; of all edges of a tet. A box of the cell's own proportions has the cell pay for
-/// shear and for change, not for being long or flat.
+/// own_ci is the mean length of a hex's four edges along its direction i; of the edges around a prism's triangles for
+/// both directions there, and of those across; of all edges of a tet. A box of the cell's own proportions has the cell
+/// pay for shear and for change, not for being long or flat.
 ///
 /// nodes   the vertices' positions; lengths below a thousandth of the common size are raised to it.
 /// volume  > 0, in the cube of the nodes' unit.

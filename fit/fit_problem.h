@@ -53,8 +53,8 @@ struct MinimizerOptions {
   int cg_max_iterations = 200;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
-  /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled with
-  /// the step before.
+  /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled
+  /// with the step before.
   std::function<bool()> ended;
   /// Newton's method only: called every few steps with x and what has been done so far, which is all that it takes to
   /// go on from there (`begun`).
@@ -68,14 +68,14 @@ bool has_ended(const MinimizerOptions& options, MinimizerResult& result);
 /// Keeps the record of a step and tells the caller; false, with the result's stop set, when they want to end here.
 bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result);
 
-/// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of the
-/// pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`VolumeTerm`) certified; cells
-/// that stand in the way get a denser quadrature for the steps to come. Where few points would make the step shorter than a
-/// half, the Hessian is made stiffer there (`VolumeTerm::stiffen`) and the direction found again.
+/// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of
+/// the pulled-back Hessian. Each step keeps E decreasing and every cell that is certified (`VolumeTerm`) certified;
+/// cells that stand in the way get a denser quadrature for the steps to come. Where few points would make the step
+/// shorter than a half, the Hessian is made stiffer there (`VolumeTerm::stiffen`) and the direction found again.
 ///
-/// x  feasible start (finite E), else `infeasible_start`; receives the result. With `begun`, where that was kept: it then ends
-///    at the same bits as the minimisation that was interrupted would have. The problem must be as it was at the start
-///    of that one, else InputError where a cell does not exist.
+/// x  feasible start (finite E), else `infeasible_start`; receives the result. With `begun`, where that was kept: it
+///    then ends at the same bits as the minimisation that was interrupted would have. The problem must be as it was at
+///    the start of that one, else InputError where a cell does not exist.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 /// The reference that Newton is measured against, and the paper's algorithm 2: L-BFGS (m = 10) with a weak Wolfe line

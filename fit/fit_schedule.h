@@ -48,7 +48,8 @@ struct FitSchedule {
   std::vector<Stage> stages(int number) const;
   /// The last stage with another lambda.
   Stage final_stage(double lambda) const;
-  /// Quadrature points per direction: nested from level to level, so that no child starts inverted at one of its points.
+  /// Quadrature points per direction: nested from level to level, so that no child starts inverted at one of its
+  /// points.
   int quadrature_points(int number) const { return number == 1 ? 5 : number == 2 ? 3 : 2; }
   /// Rough share of the work that is done when a level begins.
   double fraction(int number) const;

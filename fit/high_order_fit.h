@@ -26,7 +26,8 @@ struct HighOrderFitOptions {
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
-  StageLog* log = nullptr;                       ///< takes the results of minimisations from here and keeps them here; null: no
+  /// Takes the results of minimisations from here and keeps them here; null: no.
+  StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills HighOrderFitResult::states
 };
 
@@ -37,13 +38,15 @@ struct HighOrderFitResult {
   std::vector<FitState> states;
 };
 
-/// Fits curved elements: the template at order 1, then orders raised step by step (paper: Algorithm 1), of all edges, faces
-/// and cells alike or of those that gain most (`order_indicator.h`).
+/// Fits curved elements: the template at order 1, then orders raised step by step (paper: Algorithm 1), of all edges,
+/// faces and cells alike or of those that gain most (`order_indicator.h`).
 ///
 /// target   triangles in any state that encloses a volume; the unit of length is the target's.
-/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target is.
-/// returns  the last state reached; no step makes a cell lose its certificate (`VolumeTerm::uncertified`). Cells that had
-///          none are guarded at their quadrature points only, and the boundary may come to intersect itself: check it.
+/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target
+///                is.
+/// returns  the last state reached; no step makes a cell lose its certificate (`VolumeTerm::uncertified`). Cells that
+///          had none are guarded at their quadrature points only, and the boundary may come to intersect itself: check
+///          it.
 /// InputError: options out of range, an empty target, a template that is not sound.
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options);

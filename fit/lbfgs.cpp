@@ -17,8 +17,8 @@ struct Value {
   double surface = 0, volume = 0, energy = std::numeric_limits<double>::infinity();
 };
 
-/// E and its gradient over the unknowns. Correspondences are found anew at each evaluation: dE/dx needs no derivative of
-/// theirs, since they are the best ones where they are found.
+/// E and its gradient over the unknowns. Correspondences are found anew at each evaluation: dE/dx needs no derivative
+/// of theirs, since they are the best ones where they are found.
 class Objective {
  public:
   explicit Objective(FitProblem& problem)

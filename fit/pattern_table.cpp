@@ -11,7 +11,8 @@ PatternTable::PatternTable(const ElementSpace& space, std::size_t pattern, std::
                            Derivatives derivatives)
     : pattern_(pattern) {
   if (pattern >= space.num_patterns())
-    throw InputError("PatternTable: pattern " + std::to_string(pattern) + " of " + std::to_string(space.num_patterns()));
+    throw InputError("PatternTable: pattern " + std::to_string(pattern) + " of " +
+                     std::to_string(space.num_patterns()));
   const auto modes = space.pattern_modes(pattern);
   const auto rows = static_cast<Eigen::Index>(points.size()), cols = static_cast<Eigen::Index>(modes.size());
   values_.resize(rows, cols);

@@ -38,7 +38,8 @@ struct HalfEdge {
 };
 
 /// All half-edges but those of triangles with equal corners, those of one edge in a row.
-std::vector<HalfEdge> sorted_half_edges(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
+std::vector<HalfEdge> sorted_half_edges(std::span<const Vec3> positions,
+                                        std::span<const std::array<Index, 3>> triangles) {
   const std::vector<Index> number = merged_numbers(positions, triangles);
   std::vector<HalfEdge> half_edges;
   half_edges.reserve(3 * triangles.size());

@@ -25,8 +25,8 @@ struct SolvedStage {
 ///
 /// A fit is a function of its input, its options and the results of its minimisations, and these take most of its time.
 /// So their results are all that is kept of a fit that was interrupted: run again with them it goes the same way, takes
-/// each result from here where it would minimise, and goes on where the log ends, bit for bit as if it had never stopped.
-/// Tries that were given up, continuation and undone stages need nothing of their own.
+/// each result from here where it would minimise, and goes on where the log ends, bit for bit as if it had never
+/// stopped. Tries that were given up, continuation and undone stages need nothing of their own.
 class StageLog {
  public:
   StageLog() = default;

@@ -11,8 +11,9 @@
 
 namespace subvol {
 
-/// The largest t of a geometric sequence that starts at `limit` so that every det(J + s D), 0 <= s <= t, keeps at least a
-/// tenth of det J, over all pairs (J, D) that were admitted. Pairs may come from many threads at once; same t for any.
+/// The largest t of a geometric sequence that starts at `limit` so that every det(J + s D), 0 <= s <= t, keeps at least
+/// a tenth of det J, over all pairs (J, D) that were admitted. Pairs may come from many threads at once; same t for
+/// any.
 class StepLimit {
  public:
   explicit StepLimit(double limit) {
@@ -34,7 +35,8 @@ class StepLimit {
   static bool safe(const Mat3& j, const Mat3& d, double t) { return Path(j, d).safe(t); }
 
  private:
-  /// det(J + t D) - kKept det J = c0 + c1 t + c2 t^2 + c3 t^3; positive on [0, t] if its four Bernstein coefficients there are.
+  /// det(J + t D) - kKept det J = c0 + c1 t + c2 t^2 + c3 t^3; positive on [0, t] if its four Bernstein coefficients
+  /// there are.
   struct Path {
     double c0, c1, c2, c3;
     Path(const Mat3& j, const Mat3& d) {

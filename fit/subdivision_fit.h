@@ -33,7 +33,8 @@ enum class Correspondence {
 
 struct FitOptions {
   int levels = 3;                                ///< subdivision level of the finest mesh, 1..6
-  std::optional<double> tolerance_percent;       ///< stop once the mean distance is below; per cent of the diagonal, > 0
+  /// Stop once the mean distance is below; per cent of the diagonal, > 0.
+  std::optional<double> tolerance_percent;
   FittedSurface surface = FittedSurface::limit;
   BoundaryRule boundary = BoundaryRule::catmull_clark;
   bool cage_only = false;                        ///< unknowns stay on the given template
@@ -50,7 +51,8 @@ struct FitOptions {
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
-  StageLog* log = nullptr;                       ///< takes the results of minimisations from here and keeps them here; null: no
+  /// Takes the results of minimisations from here and keeps them here; null: no.
+  StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills FitResult::states
 };
 
@@ -65,11 +67,13 @@ struct FitResult {
 /// Fits a subdivision volume recursively (paper: section 4.3).
 ///
 /// target   triangles in any state that encloses a volume; the unit of length is the target's.
-/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target is.
+/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target
+///                is.
 /// returns  the best state reached; every cell of `mesh` is certified (`certificate.h`) unless report.stop_reason is
 ///          `stalled`, or the template has cells that are not: no step makes a certified cell lose its certificate.
 /// InputError: options out of range, an empty target, a template that cannot be subdivided or that has inverted cells.
-FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options);
+FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
+                                 const FitOptions& options);
 
 /// The same to points: every one of them pulls at the nearest place of the fitted surface (inverse fitting), and all
 /// distances are from the points to the surface. Where there are no points cells alone tell where the surface runs.

@@ -47,12 +47,15 @@ std::vector<std::string> warnings_of(const TargetReport& target) {
   if (edges.open_edges > 0)
     warnings.push_back(counted(edges.open_edges, "open edges: nothing draws the fitted surface where holes are"));
   if (edges.turned_edges > 0)
-    warnings.push_back(counted(edges.turned_edges, "edges whose triangles disagree about what is outside: it does not matter"));
+    warnings.push_back(
+        counted(edges.turned_edges, "edges whose triangles disagree about what is outside: it does not matter"));
   if (edges.crowded_edges > 0)
-    warnings.push_back(counted(edges.crowded_edges, "edges of three triangles or more: its topology is not compared with the "
-                                                    "template's"));
+    warnings.push_back(counted(edges.crowded_edges,
+                               "edges of three triangles or more: its topology is not compared with the "
+                               "template's"));
   if (target.volume_source == VolumeSource::flood && target.num_points == 0)
-    warnings.push_back("target: it bounds no solid as it stands; its volume is that of a grid which the outside cannot reach");
+    warnings.push_back(
+        "target: it bounds no solid as it stands; its volume is that of a grid which the outside cannot reach");
   if (target.volume_source == VolumeSource::given)
     warnings.push_back("target: it encloses nothing; the template's volume is taken for the one wanted");
   if (target.topology && target.template_topology && !target.same_topology())

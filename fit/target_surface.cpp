@@ -25,8 +25,8 @@ constexpr int kFloodResolution = 96;
 constexpr std::size_t kMaxSamples = std::size_t{1} << 27;
 constexpr double kOnEdge = 1e-9;        // barycentric coordinates up to this are 0
 
-/// Cells of a cloud's grid, by the spacing of its points: first those that hold ten of them or so where the surface goes
-/// straight through, then larger ones.
+/// Cells of a cloud's grid, by the spacing of its points: first those that hold ten of them or so where the surface
+/// goes straight through, then larger ones.
 constexpr double kCloudCells[] = {3, 4.5, 6.5};
 
 /// Volume of the sphere of the given area: no surface of that area encloses more.

@@ -71,8 +71,8 @@ class TargetSurface {
   double diagonal() const { return diagonal_; }  ///< of the bounding box
   Vec3 centre() const { return centre_; }        ///< of the bounding box
 
-  /// Points on the surface: the triangles' barycentres, or, where an edge is longer than the spacing, those of the parts
-  /// that halving its longest edges leads to. A cloud's points.
+  /// Points on the surface: the triangles' barycentres, or, where an edge is longer than the spacing, those of the
+  /// parts that halving its longest edges leads to. A cloud's points.
   const std::vector<Vec3>& samples() const { return samples_; }
   /// The triangle each lies in; empty for a cloud.
   const std::vector<Index>& sample_triangles() const { return sample_triangles_; }

@@ -48,8 +48,8 @@ struct TemplateChoice {
 /// Makes several templates from a surface (`auto_templates`) and keeps the one that fits best.
 ///
 /// Right Betti numbers alone do not make a good template: a handle may sit in the wrong place. So each candidate is
-/// fitted as the result will be, with one subdivision or with elements of order 2 at most, for a limited number of steps,
-/// and judged by
+/// fitted as the result will be, with one subdivision or with elements of order 2 at most, for a limited number of
+/// steps, and judged by
 ///
 ///   max distance / 1.5 % + mean distance / 0.15 % + 5 max(0, 0.9 - mean scaled Jacobian) + 1 where the boundary meets
 ///   itself
@@ -57,7 +57,8 @@ struct TemplateChoice {
 /// A pillowed candidate is tried where its core is several cells thick: on thin parts a pillow only takes cells away.
 /// Where the best candidate's max distance is above 1.5 % the next larger count is tried.
 ///
-/// InputError: as `auto_templates`; an order outside [0, kMaxOrder]; a target whose topology no grid carries. Deterministic.
+/// InputError: as `auto_templates`; an order outside [0, kMaxOrder]; a target whose topology no grid carries.
+/// Deterministic.
 TemplateChoice choose_template(const TriangleMesh& target, const TemplateChoiceOptions& options = {});
 
 }  // namespace subvol

@@ -180,7 +180,8 @@ struct VolumeEnergy::BatchState {
   }
 };
 
-/// Has a kernel evaluated at all points of a batch, some at a time, and calls per_point(q, kernel batch) with the results.
+/// Has a kernel evaluated at all points of a batch, some at a time, and calls per_point(q, kernel batch) with the
+/// results.
 template <class Kernel, class PerPoint>
 void VolumeEnergy::for_points(const Group& group, std::size_t b, const BatchState& state, Kernel& kernel,
                               void (Kernel::*evaluate)(int), const PerPoint& per_point) const {

@@ -18,15 +18,16 @@ namespace subvol {
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
-/// e is a distortion (`distortion.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point q
-/// against its ideal cell: that of edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a hex's is the box of edges h_c), or a
-/// reference of its own. Dimensionless, >= 0, +infinity where a determinant is not positive at a point.
+/// e is a distortion (`distortion.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point
+/// q against its ideal cell: that of edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a
+/// hex's is the box of edges h_c), or a reference of its own. Dimensionless, >= 0, +infinity where a determinant is not
+/// positive at a point.
 ///
-/// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for any
-/// number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
+/// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for
+/// any number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
 ///
-/// With a regularisation epsilon > 0 the density is that of `regularised_barrier.h`: finite also where cells are inverted,
-/// so that minimising it untangles them. No step is limited then, and no cell counts as uncertified.
+/// With a regularisation epsilon > 0 the density is that of `regularised_barrier.h`: finite also where cells are
+/// inverted, so that minimising it untangles them. No step is limited then, and no cell counts as uncertified.
 class VolumeEnergy final : public VolumeTerm {
  public:
   /// mesh  must outlive the energy; its positions are not read.
@@ -75,7 +76,8 @@ class VolumeEnergy final : public VolumeTerm {
     /// Ideal to reference shape, A_ideal A^-1, per batch and point, row by row and lane by lane; empty: ideal cells.
     std::vector<double> to_reference;
     const double (*reference(std::size_t batch, std::size_t q) const)[kLanes] {
-      return reinterpret_cast<const double(*)[kLanes]>(to_reference.data() + 9 * kLanes * (batch * rule.num_points() + q));
+      return reinterpret_cast<const double(*)[kLanes]>(to_reference.data() +
+                                                       9 * kLanes * (batch * rule.num_points() + q));
     }
   };
 

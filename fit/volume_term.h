@@ -11,7 +11,8 @@ namespace subvol {
 
 /// The distortion E_W of the cells of a finite element mesh, as a function of its nodes y. Paper: Eqs. 2, 3, 7.
 ///
-/// Dimensionless, >= 0, +infinity where a determinant is not positive at a quadrature point; never NaN for finite nodes.
+/// Dimensionless, >= 0, +infinity where a determinant is not positive at a quadrature point; never NaN for finite
+/// nodes.
 class VolumeTerm {
  public:
   virtual ~VolumeTerm() = default;
@@ -34,15 +35,16 @@ class VolumeTerm {
   /// on the way from y to y + t d at the quadrature points. The nodes must be feasible.
   virtual double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const = 0;
 
-  /// Makes H stiffer where the way from y to y + t d would be too long for `max_step`, so that the next direction leaves
-  /// those points nearly as they are and the rest may move on. False where nothing was changed, or cannot be.
+  /// Makes H stiffer where the way from y to y + t d would be too long for `max_step`, so that the next direction
+  /// leaves those points nearly as they are and the rest may move on. False where nothing was changed, or cannot be.
   virtual bool stiffen(std::span<const Vec3> /*nodes*/, std::span<const Vec3> /*direction*/, double /*t*/) {
     return false;
   }
 
   /// Cells that are not proved to be nowhere inverted, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
-  /// Gives these cells more quadrature points from now on, for they invert between those they have. May weigh them more.
+  /// Gives these cells more quadrature points from now on, for they invert between those they have. May weigh them
+  /// more.
   /// InputError: there is no such cell.
   virtual void densify(std::span<const Index> cells) = 0;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The comparison of the paper's figure 2: cells of order 3 around a singular line, where 3, 4 or 5 blocks of them meet, are
-// left to themselves, with no surface to follow, under each distortion energy. A rigid one keeps the volume of every cell; a
-// conformal one shrinks or swells cells by the singularity to keep their shapes.
+// The comparison of the paper's figure 2: cells of order 3 around a singular line, where 3, 4 or 5 blocks of them meet,
+// are left to themselves, with no surface to follow, under each distortion energy. A rigid one keeps the volume of
+// every cell; a conformal one shrinks or swells cells by the singularity to keep their shapes.
 
 #include "export/high_order_file.h"
 #include "fit/fit_problem.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fits a ring of 60 hexes to noisy points on a bumpy torus: a subdivision volume and curved elements, seen beside the surface
-// that the points were taken from.
+// Fits a ring of 60 hexes to noisy points on a bumpy torus: a subdivision volume and curved elements, seen beside the
+// surface that the points were taken from.
 
 #include "export/export.h"
 #include "export/gltf_writer.h"

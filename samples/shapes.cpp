@@ -234,7 +234,8 @@ PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, doub
   }
   PointCloud cloud;
   while (cloud.points.size() < count && area > 0) {
-    const auto t = static_cast<std::size_t>(std::lower_bound(ends.begin(), ends.end() - 1, area * random()) - ends.begin());
+    const auto t =
+        static_cast<std::size_t>(std::lower_bound(ends.begin(), ends.end() - 1, area * random()) - ends.begin());
     const auto& [a, b, c] = surface.triangles[t];
     const double root = std::sqrt(random()), share = random();
     Vec3 point = (1 - root) * surface.positions[a] + root * (1 - share) * surface.positions[b] +

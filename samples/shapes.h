@@ -35,7 +35,8 @@ PolygonMesh bowl_surface(int n = 12);
 /// A ball of 448 hexes, the vertices inside thrown about: four in five cells are inverted. The same one everywhere.
 VolumeMesh tangled_ball();
 
-/// Points scattered evenly at random over a surface, each moved by up to `noise` along every axis: the same ones everywhere.
+/// Points scattered evenly at random over a surface, each moved by up to `noise` along every axis: the same ones
+/// everywhere.
 PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, double noise = 0);
 
 /// Points as the text of an .xyz file.

@@ -214,8 +214,8 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
   }
   SparseMap samples = select_rows(nodes, sampled);
   FitProblem problem(std::move(nodes), std::move(samples),
-                     std::make_unique<VolumeEnergy>(cells_, shell_reference(layers_, thickness_), 2), std::move(surface),
-                     lambda);
+                     std::make_unique<VolumeEnergy>(cells_, shell_reference(layers_, thickness_), 2),
+                     std::move(surface), lambda);
   problem.fixed_nodes = std::move(fixed);
   problem.fixed_samples = std::move(fixed_samples);
   return problem;

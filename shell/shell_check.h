@@ -50,12 +50,14 @@ class ShellCheck {
   bool surface_moves_;
 };
 
-/// The strands that each node of a shell goes with. The nodes of linear cells are their vertices: a vertex goes with its
-/// own strand, one of the surface with both of its column. Nodes of curved cells: `curved_shell.h`.
+/// The strands that each node of a shell goes with. The nodes of linear cells are their vertices: a vertex goes with
+/// its own strand, one of the surface with both of its column. Nodes of curved cells: `curved_shell.h`.
 struct NodeStrands {
   std::vector<std::size_t> offsets{0};
   std::vector<Index> strands;
-  std::span<const Index> of_node(std::size_t i) const { return {strands.data() + offsets[i], offsets[i + 1] - offsets[i]}; }
+  std::span<const Index> of_node(std::size_t i) const {
+    return {strands.data() + offsets[i], offsets[i + 1] - offsets[i]};
+  }
 };
 NodeStrands vertex_strands(const ShellLayers& layers);
 

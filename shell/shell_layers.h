@@ -59,9 +59,9 @@ std::vector<double> layer_shares(int num_layers, double growth);
 
 /// Pairs the surface's edges and checks what a shell needs of it.
 ///
-/// InputError: no faces; more cells than can be numbered; vertices out of range, not finite, named twice by a face or by none; a face of more than four
-/// corners; an edge of more than two faces, or of two that run the same way along it; a vertex whose faces form more
-/// than one fan; a face without area.
+/// InputError: no faces; more cells than can be numbered; vertices out of range, not finite, named twice by a face or
+/// by none; a face of more than four corners; an edge of more than two faces, or of two that run the same way along it;
+/// a vertex whose faces form more than one fan; a face without area.
 ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth);
 
 /// The cells with all sheets in the place of the surface. References number the layers from the innermost, from 1.

@@ -8,8 +8,8 @@ namespace subvol {
 
 /// Writes a whole file or nothing: into a temporary in the same folder, flushed to the disk, then renamed over `path`.
 ///
-/// path     a symbolic link is followed; an existing regular file keeps its permissions; anything else that exists and is
-///          no folder (a pipe, a device) cannot be renamed over and is written to directly.
+/// path     a symbolic link is followed; an existing regular file keeps its permissions; anything else that exists and
+///          is no folder (a pipe, a device) cannot be renamed over and is written to directly.
 /// bytes    the whole content, possibly empty.
 ///
 /// Throws IoError that names the path, the step and the system's reason; the temporary is removed and an existing file

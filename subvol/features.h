@@ -11,8 +11,8 @@ namespace subvol {
 ///   crease  boundary edge whose two faces' normals n0, n1 differ by more than the angle: |angle(n0, n1)| > angle
 ///   corner  boundary vertex of three or more creases, or of two whose directions differ by more than the angle
 ///
-/// A face's normal is that of its area vector, so a warped quad counts with its mean plane. Convex and reflex edges count
-/// alike. A vertex with one crease (where it runs out) stays smooth, as subdivision surfaces treat it.
+/// A face's normal is that of its area vector, so a warped quad counts with its mean plane. Convex and reflex edges
+/// count alike. A vertex with one crease (where it runs out) stays smooth, as subdivision surfaces treat it.
 ///
 /// mesh           passes `validate` but for `unused_vertex` and `inverted_cell`; its own tags are not read.
 /// angle_degrees  deviation from flat, in [0, 180]; outside or NaN: InputError. 180 tags nothing.

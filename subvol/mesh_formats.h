@@ -28,7 +28,8 @@ std::string format_legacy_vtk(const VolumeMesh& mesh);
 
 /// Why no pyramid can be read, for messages.
 inline constexpr const char* kNoPyramids =
-    "pyramids cannot be used: four edges meet at the apex, so splitting its corners gives no hexes; cut each pyramid into "
+    "pyramids cannot be used: four edges meet at the apex, so splitting its corners gives no hexes; cut each pyramid "
+    "into "
     "two tets, or refine it into hexes, prisms and tets";
 
 }  // namespace subvol

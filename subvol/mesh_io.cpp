@@ -80,7 +80,8 @@ void check_mesh(const std::string& name, ParsedMesh& parsed) {
   if (const std::size_t n = drop_inner_tags(parsed.mesh))
     parsed.warnings.push_back(std::to_string(n) + " tagged edges or corners are not on the boundary: dropped");
   warn_of(defects, MeshDefect::Kind::inverted_cell,
-          " of " + std::to_string(parsed.mesh.num_cells()) + " cells are flat or left-handed somewhere", parsed.warnings);
+          " of " + std::to_string(parsed.mesh.num_cells()) + " cells are flat or left-handed somewhere",
+          parsed.warnings);
   warn_of(defects, MeshDefect::Kind::unused_vertex, " vertices belong to no cell", parsed.warnings);
 }
 

@@ -152,7 +152,8 @@ class MeditParser {
 
   void check_number(std::int64_t number, std::size_t size, const char* what, std::size_t line) const {
     if (number < 1 || static_cast<std::uint64_t>(number) > size)
-      scan_.fail(std::string(what) + " number " + std::to_string(number) + " is not in 1.." + std::to_string(size), line);
+      scan_.fail(std::string(what) + " number " + std::to_string(number) + " is not in 1.." + std::to_string(size),
+                 line);
   }
 
   int read_reference() {
@@ -196,7 +197,8 @@ class MeditParser {
   void check_cells() const {
     const VolumeMesh& mesh = parsed_.mesh;
     for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-      for (const Index v : mesh.cell(c)) check_number(std::int64_t{v} + 1, mesh.num_vertices(), "vertex", cell_lines_[c]);
+      for (const Index v : mesh.cell(c))
+        check_number(std::int64_t{v} + 1, mesh.num_vertices(), "vertex", cell_lines_[c]);
   }
 
   void resolve_tags() {

@@ -126,7 +126,8 @@ class VtkParser {
     std::vector<std::int64_t> numbers;
     numbers.reserve(std::min(n, scan_.bytes_left()));
     read_values(n, type, what, [&](std::size_t, double value) {
-      if (value != std::floor(value) || std::abs(value) > 1e15) scan_.fail(std::string(what) + " must be whole numbers");
+      if (value != std::floor(value) || std::abs(value) > 1e15)
+        scan_.fail(std::string(what) + " must be whole numbers");
       numbers.push_back(static_cast<std::int64_t>(value));
     });
     return numbers;
@@ -167,8 +168,9 @@ class VtkParser {
       if (at == numbers.size()) scan_.fail("CELLS has fewer cells than it says", cells_line_);
       const std::int64_t corners = numbers[at++];
       if (corners < 0 || static_cast<std::uint64_t>(corners) > numbers.size() - at)
-        scan_.fail("cell " + std::to_string(c) + " has " + std::to_string(corners) + " corners, beyond the size of CELLS",
-                   cells_line_);
+        scan_.fail(
+            "cell " + std::to_string(c) + " has " + std::to_string(corners) + " corners, beyond the size of CELLS",
+            cells_line_);
       corners_.insert(corners_.end(), numbers.begin() + at, numbers.begin() + at + corners);
       at += static_cast<std::size_t>(corners);
       offsets_.push_back(corners_.size());
@@ -296,7 +298,8 @@ class VtkParser {
 
   void build_cells() {
     if (types_.size() != num_cells_)
-      scan_.fail(std::to_string(types_.size()) + " cell types for " + std::to_string(num_cells_) + " cells", types_line_);
+      scan_.fail(std::to_string(types_.size()) + " cell types for " + std::to_string(num_cells_) + " cells",
+                 types_line_);
     for (std::size_t c = 0; c < num_cells_; ++c) {
       const auto known = std::find_if(std::begin(kVtkCells), std::end(kVtkCells),
                                       [&](const VtkCell& cell) { return cell.type == types_[c]; });
@@ -306,8 +309,9 @@ class VtkParser {
       }
       const std::string name = "cell " + std::to_string(c);
       if (types_[c] == kPyramid)
-        scan_.fail(name + " is a pyramid, of " + std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) + ": " +
-                       kNoPyramids, types_line_);
+        scan_.fail(name + " is a pyramid, of " + std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) +
+                       ": " + kNoPyramids,
+                   types_line_);
       if (std::find(std::begin(kLowerDimensions), std::end(kLowerDimensions), types_[c]) == std::end(kLowerDimensions))
         scan_.fail(name + " has VTK type " + std::to_string(types_[c]) +
                        ", expected 10 (tet), 11 (voxel), 12 (hex) or 13 (wedge)", types_line_);

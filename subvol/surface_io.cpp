@@ -66,8 +66,8 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
       continue;
     }
     if (corners.size() > kMaxPolygonCorners)
-      remarks.fail("face " + std::to_string(f) + " has " + std::to_string(corners.size()) + " corners, expected at most " +
-                   std::to_string(kMaxPolygonCorners));
+      remarks.fail("face " + std::to_string(f) + " has " + std::to_string(corners.size()) +
+                   " corners, expected at most " + std::to_string(kMaxPolygonCorners));
     num_shortened += corners.size() < size;
     kept.face_vertices.insert(kept.face_vertices.end(), corners.begin(), corners.end());
     kept.face_offsets.push_back(kept.face_vertices.size());
@@ -106,8 +106,10 @@ void check_extent(const std::vector<Vec3>& positions, const Remarks& remarks) {
   const double extent = (upper - lower).maxCoeff();
   std::string figure;
   append_number(figure, largest > kLargestCoordinate ? largest : extent);
-  if (largest > kLargestCoordinate) remarks.fail("coordinates up to " + figure + ": areas overflow; scale the surface down");
-  if (extent < kSmallestExtent) remarks.fail("the bounding box is only " + figure + " wide: areas underflow; scale it up");
+  if (largest > kLargestCoordinate)
+    remarks.fail("coordinates up to " + figure + ": areas overflow; scale the surface down");
+  if (extent < kSmallestExtent)
+    remarks.fail("the bounding box is only " + figure + " wide: areas underflow; scale it up");
 }
 
 using Triangle = std::array<Index, 3>;

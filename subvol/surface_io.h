@@ -13,8 +13,8 @@ namespace subvol {
 /// Most corners a polygon in a file may have.
 inline constexpr std::size_t kMaxPolygonCorners = 1000;
 
-/// Reads polygons; the extension chooses the format (docs/file-formats.md). Soups are welcome: nothing is welded, flipped or
-/// oriented, but STL, which has no vertex numbers, gets one vertex per distinct position.
+/// Reads polygons; the extension chooses the format (docs/file-formats.md). Soups are welcome: nothing is welded,
+/// flipped or oriented, but STL, which has no vertex numbers, gets one vertex per distinct position.
 ///
 ///   .off  OFF, COFF, NOFF, CNOFF, STOFF and the like, text     .stl  text or binary
 ///   .obj  polygons only; materials and the like are skipped    .ply  1.0, text or binary of either byte order
@@ -23,13 +23,14 @@ inline constexpr std::size_t kMaxPolygonCorners = 1000;
 /// returns   faces and vertices in the file's order. Dropped, with a warning: corners that repeat the one before, faces
 ///           that then have fewer than three corners or name a vertex twice, and vertices of no face.
 ///
-/// Throws InputError with file and line (binary: byte) for anything malformed, counts beyond what the file can hold, indices
-/// out of range, numbers that are not finite, larger polygons, no faces, all vertices in one place, and coordinates
-/// or extents whose squares overflow or underflow. Memory: a few times the size of the file, whatever it claims.
+/// Throws InputError with file and line (binary: byte) for anything malformed, counts beyond what the file can hold,
+/// indices out of range, numbers that are not finite, larger polygons, no faces, all vertices in one place, and
+/// coordinates or extents whose squares overflow or underflow. Memory: a few times the size of the file, whatever it
+/// claims.
 PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
-/// The same as triangles (`triangulate`). Also dropped, with a warning: triangles without area, and all but the first of
-/// triangles with the same three positions.
+/// The same as triangles (`triangulate`). Also dropped, with a warning: triangles without area, and all but the first
+/// of triangles with the same three positions.
 TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
 /// Fewest points that a cloud may have.
@@ -48,7 +49,8 @@ PointCloud read_point_cloud(const std::filesystem::path& path, std::vector<std::
 
 /// Values of a vertex property of a .ply, one per vertex in the file's order.
 ///
-/// InputError: another extension; no such property; a file that `read_polygon_mesh` refuses; a value that is not finite.
+/// InputError: another extension; no such property; a file that `read_polygon_mesh` refuses; a value that is not
+/// finite.
 std::vector<double> read_vertex_attribute(const std::filesystem::path& path, const std::string& attribute);
 
 /// Extensions the readers accept, as text for help and messages.

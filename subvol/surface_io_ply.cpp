@@ -48,7 +48,10 @@ class PlyParser {
  public:
   /// attribute  vertex property whose values are kept as well; empty: none.
   PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "")
-      : name_(name), size_(bytes.size()), scan_(name, bytes, TextScanner::Comments::none), attribute_(std::move(attribute)) {}
+      : name_(name),
+        size_(bytes.size()),
+        scan_(name, bytes, TextScanner::Comments::none),
+        attribute_(std::move(attribute)) {}
 
   PolygonMesh parse() {
     read_header();
@@ -181,7 +184,8 @@ class PlyParser {
     } else if (property.use == Use::attribute) {
       values_.push_back(read_number(property.type, "a value of " + attribute_));
     } else {
-      mesh_.positions.back()[static_cast<int>(property.use) - static_cast<int>(Use::x)] = read_number(property.type, "a coordinate");
+      mesh_.positions.back()[static_cast<int>(property.use) - static_cast<int>(Use::x)] =
+          read_number(property.type, "a coordinate");
     }
   }
 

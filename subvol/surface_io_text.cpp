@@ -132,7 +132,8 @@ PolygonMesh parse_off(const std::string& name, std::string_view bytes) {
     for (std::size_t i = 0; i < corners; ++i) {
       const std::int64_t v = scan.integer("a vertex number");
       if (v < 0 || static_cast<std::uint64_t>(v) >= num_vertices)
-        scan.fail("vertex number " + std::to_string(v) + " with " + std::to_string(num_vertices) + " vertices; numbers start at 0");
+        scan.fail("vertex number " + std::to_string(v) + " with " + std::to_string(num_vertices) +
+                  " vertices; numbers start at 0");
       mesh.face_vertices.push_back(static_cast<Index>(v));
     }
     mesh.face_offsets.push_back(mesh.face_vertices.size());
@@ -156,8 +157,8 @@ std::vector<Vec3> parse_xyz(const std::string& name, std::string_view bytes, std
       const auto word = words.next();
       const auto value = word ? parse_number(*word) : std::nullopt;
       if (!value)
-        scan.fail("expected three coordinates (finite numbers) to a line, found " + in_quotes(word.value_or("")) + " as number " +
-                  std::to_string(i + 1));
+        scan.fail("expected three coordinates (finite numbers) to a line, found " + in_quotes(word.value_or("")) +
+                  " as number " + std::to_string(i + 1));
       point[i] = *value;
     }
     longer_lines += words.next().has_value();

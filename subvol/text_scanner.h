@@ -37,8 +37,8 @@ class TextScanner {
   double number(const char* expected);
   /// The next word as a whole number of 64 bits.
   std::int64_t integer(const char* expected);
-  /// The next word as a number of entries of at least `words_per_entry` words each. Refused when negative, beyond 2^31 - 1,
-  /// or when the bytes left cannot hold so many.
+  /// The next word as a number of entries of at least `words_per_entry` words each. Refused when negative, beyond 2^31
+  /// - 1, or when the bytes left cannot hold so many.
   std::size_t count(const char* expected, std::size_t words_per_entry);
 
   /// The rest of the current line without its end; moves to the next. Nothing at the end of the file.

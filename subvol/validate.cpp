@@ -91,10 +91,12 @@ class Validator {
     };
     if (mesh_.kinds.empty()) defects_.push_back({Kind::no_cells, kNoIndex, "the mesh has no cells"});
     const auto& offsets = mesh_.cell_offsets;
-    if (offsets.size() != mesh_.kinds.size() + 1 || offsets.front() != 0 || offsets.back() != mesh_.cell_vertices.size())
+    if (offsets.size() != mesh_.kinds.size() + 1 || offsets.front() != 0 ||
+        offsets.back() != mesh_.cell_vertices.size())
       return fail("cell_offsets must run from 0 to the size of cell_vertices, one entry more than there are cells");
     for (std::size_t c = 0; c < mesh_.kinds.size(); ++c) {
-      if (static_cast<int>(mesh_.kinds[c]) >= kNumCellKinds) return fail("cell " + std::to_string(c) + " is of no kind");
+      if (static_cast<int>(mesh_.kinds[c]) >= kNumCellKinds)
+        return fail("cell " + std::to_string(c) + " is of no kind");
       const std::size_t expected = static_cast<std::size_t>(cell_topology(mesh_.kinds[c]).num_vertices);
       if (offsets[c + 1] < offsets[c] || offsets[c + 1] - offsets[c] != expected)
         return fail(cell_name(c) + " must have " + std::to_string(expected) + " corners");
@@ -111,7 +113,8 @@ class Validator {
     for (std::size_t c = 0; c < mesh_.num_cells(); ++c)
       for (const Index v : mesh_.cell(c))
         if (v < 0 || v >= num_vertices) {
-          add(Kind::index_out_of_range, c, cell_name(c) + " names " + name_of(v) + " of " + std::to_string(num_vertices));
+          add(Kind::index_out_of_range, c,
+              cell_name(c) + " names " + name_of(v) + " of " + std::to_string(num_vertices));
           good = false;
         }
     return good;
@@ -119,7 +122,8 @@ class Validator {
 
   void check_positions() {
     for (std::size_t v = 0; v < mesh_.num_vertices(); ++v)
-      if (!mesh_.positions[v].allFinite()) add(Kind::not_finite, v, name_of(v) + " has a coordinate that is not finite");
+      if (!mesh_.positions[v].allFinite())
+        add(Kind::not_finite, v, name_of(v) + " has a coordinate that is not finite");
   }
 
   bool check_cells() {
@@ -301,7 +305,8 @@ class Validator {
         if (corner(1) == after && corner(n - 1) == before)
           add(Kind::inconsistent_orientation, c, both + "see their face " + list(face) + " from the same side");
         else if (corner(1) != before || corner(n - 1) != after)
-          add(Kind::nonconforming_face, c, both + "join the corners of their face " + list(face) + " in different orders");
+          add(Kind::nonconforming_face, c,
+              both + "join the corners of their face " + list(face) + " in different orders");
       }
     }
   }

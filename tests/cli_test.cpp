@@ -39,8 +39,8 @@ constexpr const char* kFit = "fit target.off --template template.mesh ";
 
 TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the truth", "[cli]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) +
-                            "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
+  const Run run = place.run(
+      std::string(kFit) + "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   CHECK(run.out.empty());
@@ -71,7 +71,8 @@ TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the t
   CHECK(report.at("outputs").size() == 4);
   REQUIRE(!report.at("stages").empty());
   for (const auto& stage : report.at("stages")) {
-    for (const char* key : {"name", "level", "lambda", "iterations", "evaluations", "seconds"}) CHECK(stage.contains(key));
+    for (const char* key : {"name", "level", "lambda", "iterations", "evaluations", "seconds"})
+      CHECK(stage.contains(key));
   }
   CHECK(report.at("stages").back().at("energy").at("total") > 0);
 }
@@ -132,7 +133,8 @@ TEST_CASE("A fit of curved elements goes from files to files that check agrees w
   CHECK(report.at("stages").back().at("order") == 3);
   CHECK(report.at("orders").at("max") == 3);
   CHECK(report.at("quality").at("certified_cells") == report.at("quality").at("cells"));
-  CHECK(report.at("distance").at("mean_percent") < 0.2 * report.at("initial_distance").at("mean_percent").get<double>());
+  CHECK(report.at("distance").at("mean_percent") <
+        0.2 * report.at("initial_distance").at("mean_percent").get<double>());
   const Run checked = place.run("check out.vtu --target target.off --json");
   CHECK(checked.status == 0);
   CHECK(nlohmann::json::parse(checked.out).at("distance") == report.at("distance"));
@@ -140,8 +142,8 @@ TEST_CASE("A fit of curved elements goes from files to files that check agrees w
 
 TEST_CASE("An adaptive fit goes from files to files", "[cli]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) +
-                            "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
+  const Run run = place.run(
+      std::string(kFit) + "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   const auto orders = place.json("report.json").at("orders");

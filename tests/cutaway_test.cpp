@@ -63,7 +63,8 @@ TEST_CASE("a cutaway of a box of cubes shows the lower half of it, closed by the
 
 TEST_CASE("the wireframe of a cutaway has the edges of the cells that stay, and no others") {
   VolumeMesh mesh = lattice(5, 4, 3);
-  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) mesh.positions[v] += 0.1 * mesh.positions[v].y() * Vec3::UnitX();
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+    mesh.positions[v] += 0.1 * mesh.positions[v].y() * Vec3::UnitX();
   const std::vector<double> minima(mesh.num_cells(), 1);
   for (const CutPlane& plane :
        {CutPlane{.axis = 0, .share = 0.6}, CutPlane{.axis = 1}, CutPlane{.axis = 2, .share = 0.3}}) {

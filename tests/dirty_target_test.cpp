@@ -61,7 +61,8 @@ void make_uneven(TriangleMesh& mesh) {
   for (std::size_t t = 0; t < n; t += 3) {
     const auto corners = mesh.triangles[t];
     const auto middle = static_cast<Index>(mesh.positions.size());
-    mesh.positions.push_back(mesh.positions[corners[0]] + 1e-9 * (mesh.positions[corners[1]] - mesh.positions[corners[0]]));
+    mesh.positions.push_back(mesh.positions[corners[0]] +
+                             1e-9 * (mesh.positions[corners[1]] - mesh.positions[corners[0]]));
     mesh.triangles[t] = {middle, corners[1], corners[2]};
     mesh.triangles.push_back({corners[0], middle, corners[2]});
     mesh.triangles.push_back({corners[0], corners[0], corners[1]});
@@ -70,7 +71,8 @@ void make_uneven(TriangleMesh& mesh) {
   for (std::size_t t = 0; t < n / 4; ++t) {
     const auto corners = mesh.triangles[t];
     const auto middle = static_cast<Index>(mesh.positions.size());
-    mesh.positions.push_back((mesh.positions[corners[0]] + mesh.positions[corners[1]] + mesh.positions[corners[2]]) / 3);
+    mesh.positions.push_back((mesh.positions[corners[0]] + mesh.positions[corners[1]] + mesh.positions[corners[2]]) /
+                             3);
     mesh.triangles[t] = {corners[0], corners[1], middle};
     mesh.triangles.push_back({corners[1], corners[2], middle});
     mesh.triangles.push_back({corners[2], corners[0], middle});

@@ -85,7 +85,8 @@ Tensor differences_of_stress(Distortion distortion, const Mat3& j) {
     Mat3 plus = j, minus = j;
     plus(c / 3, c % 3) += h;
     minus(c / 3, c % 3) -= h;
-    const Mat3 change = (matrix(evaluated(distortion, plus).stress) - matrix(evaluated(distortion, minus).stress)) / (2 * h);
+    const Mat3 change =
+        (matrix(evaluated(distortion, plus).stress) - matrix(evaluated(distortion, minus).stress)) / (2 * h);
     for (int r = 0; r < 9; ++r) result(r, c) = change(r / 3, r % 3);
   }
   return result;
@@ -94,7 +95,8 @@ Tensor differences_of_stress(Distortion distortion, const Mat3& j) {
 std::vector<Mat3> test_jacobians() {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  std::vector<Mat3> result = {Mat3::Identity(), 1.7 * Mat3::Identity(), Vec3(2, 2, 1).asDiagonal(), Vec3(1, 1.00001, 0.4).asDiagonal()};
+  std::vector<Mat3> result = {Mat3::Identity(), 1.7 * Mat3::Identity(), Vec3(2, 2, 1).asDiagonal(),
+                              Vec3(1, 1.00001, 0.4).asDiagonal()};
   while (result.size() < 60) {
     Mat3 j = Mat3::Identity();
     for (int e = 0; e < 9; ++e) j(e / 3, e % 3) += (result.size() % 2 ? 0.15 : 0.5) * normal(random);
@@ -118,10 +120,12 @@ void check_derivatives(Energy& energy, Distortion distortion, const std::vector<
     for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(d[i]);
     return sum;
   };
-  std::vector<Vec3> gradient(x.size(), Vec3::Zero()), plus = gradient, minus = gradient, unused = gradient, product(x.size());
+  std::vector<Vec3> gradient(x.size(), Vec3::Zero()), plus = gradient, minus = gradient, unused = gradient,
+                                                      product(x.size());
   energy.set_distortion(distortion, kNoFloor);
   CHECK(energy.add_gradient(x, 1, gradient) == Approx(energy.value(x)).epsilon(1e-14));
-  CHECK(times(gradient) == Approx((energy.value(moved(x, d, h)) - energy.value(moved(x, d, -h))) / (2 * h)).epsilon(1e-6));
+  CHECK(times(gradient) ==
+        Approx((energy.value(moved(x, d, h)) - energy.value(moved(x, d, -h))) / (2 * h)).epsilon(1e-6));
   energy.add_gradient(moved(x, d, h), 1, plus);
   energy.add_gradient(moved(x, d, -h), 1, minus);
   energy.linearize(x, 1, unused);
@@ -176,12 +180,14 @@ TEST_CASE("Batches of Jacobians worked on side by side give what they give alone
     kernels_of(distortion).hessian(together.data(), static_cast<int>(together.size()));
     for (std::size_t n = 0; n < alone.size(); ++n) {
       CHECK(together[n].energy[kLanes - 1] == Approx(alone[n].energy[0]).margin(1e-14));
-      CHECK((matrix(together[n].stress) - matrix(alone[n].stress)).norm() <= 1e-13 * (1 + matrix(alone[n].stress).norm()));
+      CHECK((matrix(together[n].stress) - matrix(alone[n].stress)).norm() <=
+            1e-13 * (1 + matrix(alone[n].stress).norm()));
     }
   }
 }
 
-TEST_CASE("Stress and second derivative of every distortion agree with differences, and the clamped one is the nearest") {
+TEST_CASE(
+    "Stress and second derivative of every distortion agree with differences, and the clamped one is the nearest") {
   for (Distortion distortion : kAll) {
     CAPTURE(to_string(distortion));
     const bool coupled = kernels_of(distortion).coupled;

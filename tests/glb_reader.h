@@ -41,7 +41,8 @@ struct GlbFile {
     const std::string type = accessor.at("type");
     const std::size_t width = type == "SCALAR" ? 1 : type == "VEC3" ? 3 : 4;
     std::vector<T> values(accessor.at("count").get<std::size_t>() * width);
-    if (view.at("byteLength").get<std::size_t>() != values.size() * sizeof(T)) throw std::runtime_error("glb: bad view");
+    if (view.at("byteLength").get<std::size_t>() != values.size() * sizeof(T))
+      throw std::runtime_error("glb: bad view");
     std::memcpy(values.data(), binary.data() + view.value("byteOffset", std::size_t{0}), values.size() * sizeof(T));
     return values;
   }

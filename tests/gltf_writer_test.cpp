@@ -86,7 +86,8 @@ TEST_CASE("min and max of positions are the exact float32 extremes") {
   const auto& accessor = file.json["accessors"][file.primitive("surface")["attributes"]["POSITION"].get<int>()];
   for (int k = 0; k < 3; ++k) {
     float low = positions[k], high = positions[k];
-    for (std::size_t i = k; i < positions.size(); i += 3) low = std::min(low, positions[i]), high = std::max(high, positions[i]);
+    for (std::size_t i = k; i < positions.size(); i += 3)
+      low = std::min(low, positions[i]), high = std::max(high, positions[i]);
     CHECK(accessor["min"][k].get<double>() == static_cast<double>(low));
     CHECK(accessor["max"][k].get<double>() == static_cast<double>(high));
   }

@@ -43,8 +43,8 @@ VolumeMesh single_cell(CellKind kind) {
 
 constexpr CellKind kKinds[] = {CellKind::tet, CellKind::prism, CellKind::hex};
 
-/// Derivatives along d against central differences of step h. No eigenvalue may be clamped at x, as where cells are half
-/// again as large as ideal ones. Blocks of the Hessian are stored in single precision.
+/// Derivatives along d against central differences of step h. No eigenvalue may be clamped at x, as where cells are
+/// half again as large as ideal ones. Blocks of the Hessian are stored in single precision.
 void check_derivatives(const VolumeEnergy& energy, const std::vector<Vec3>& x, const std::vector<Vec3>& d, double h,
                        double tolerance) {
   const auto moved = [&](double t) {
@@ -166,7 +166,8 @@ TEST_CASE("Gradient and Hessian of the volume energy agree with differences for 
     }
 }
 
-TEST_CASE("Against references of their own, cells are undistorted in that shape, and derivatives agree with differences") {
+TEST_CASE(
+    "Against references of their own, cells are undistorted in that shape, and derivatives agree with differences") {
   std::mt19937 random(12);
   std::normal_distribution<double> normal;
   for (CellKind kind : kKinds)

@@ -37,7 +37,8 @@ std::vector<Vec3> moved(std::vector<Vec3> x, const std::vector<Vec3>& d, double 
 
 void check_derivatives(VolumeTerm& energy, const std::vector<Vec3>& x, const std::vector<Vec3>& d) {
   constexpr double h = 1e-5, scale = 0.7;
-  std::vector<Vec3> gradient(x.size(), Vec3::Zero()), again = gradient, plus = gradient, minus = gradient, product(x.size());
+  std::vector<Vec3> gradient(x.size(), Vec3::Zero()), again = gradient, plus = gradient, minus = gradient,
+                                                      product(x.size());
   const double value = energy.value(x);
   CHECK(energy.add_gradient(x, scale, gradient) == Approx(value).epsilon(1e-14));
   CHECK(energy.linearize(x, scale, again) == Approx(value).epsilon(1e-14));
@@ -46,7 +47,8 @@ void check_derivatives(VolumeTerm& energy, const std::vector<Vec3>& x, const std
     CHECK((gradient[i] - again[i]).norm() < 1e-14);
     slope += gradient[i].dot(d[i]);
   }
-  CHECK(slope == Approx(scale * (energy.value(moved(x, d, h)) - energy.value(moved(x, d, -h))) / (2 * h)).epsilon(1e-7));
+  CHECK(slope ==
+        Approx(scale * (energy.value(moved(x, d, h)) - energy.value(moved(x, d, -h))) / (2 * h)).epsilon(1e-7));
   energy.add_gradient(moved(x, d, h), scale, plus);
   energy.add_gradient(moved(x, d, -h), scale, minus);
   energy.multiply(d, product);
@@ -116,9 +118,11 @@ TEST_CASE("curved cells are undistorted against references that follow them", "[
     HighOrderMesh curved(space, mesh);
     for (std::size_t i = mesh.num_vertices(); i < curved.coefficients.size(); ++i)
       curved.coefficients[i] = 0.05 * source.vector();
-    const HighOrderEnergy energy(space, [&](Index c, const Vec3& u) { return curved.jacobian(c, u); }, points_of(space, 5));
+    const HighOrderEnergy energy(
+        space, [&](Index c, const Vec3& u) { return curved.jacobian(c, u); }, points_of(space, 5));
     CHECK(energy.value(curved.coefficients) < 1e-26);
-    CHECK_THROWS_AS(HighOrderEnergy(space, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, points_of(space, 3)),
+    CHECK_THROWS_AS(HighOrderEnergy(
+                        space, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, points_of(space, 3)),
                     InputError);
   }
 }
@@ -144,7 +148,8 @@ TEST_CASE("an inverted curved cell costs infinity and leaves the gradient alone;
   CHECK(energy.num_points() == 9 * 9 * 9);
 }
 
-TEST_CASE("cells weigh what they are given, and more when they stand in the way, with derivatives to match", "[elements]") {
+TEST_CASE("cells weigh what they are given, and more when they stand in the way, with derivatives to match",
+          "[elements]") {
   PointSource source(6);
   const VolumeMesh mesh = mixed_cells();
   const ElementSpace space(mesh, Basis::fourier, 2);

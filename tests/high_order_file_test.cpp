@@ -148,7 +148,8 @@ TEST_CASE("Lagrange cells have their points on the map, and common points once")
       const auto grid = cell_lattice(mesh.space.kind(c), orders[c], NodeOrdering::vtk);
       REQUIRE(cells.cell(c).size() == grid.size());
       for (std::size_t q = 0; q < grid.size(); ++q)
-        CHECK((cells.positions[cells.cell(c)[q]] - mesh.position(c, grid[q].cast<double>() / orders[c])).norm() < 1e-13);
+        CHECK((cells.positions[cells.cell(c)[q]] - mesh.position(c, grid[q].cast<double>() / orders[c])).norm() <
+              1e-13);
     }
   }
   const ElementSpace two(lattice(2, 1, 1), Basis::legendre, 3);
@@ -257,7 +258,8 @@ TEST_CASE("Gmsh has the nodes of a high-order .msh where the map has them") {
     for (std::size_t c = 0; c < list.size(); ++c)
       for (const LatticePoint& p : cell_lattice(list[c].kind, list[c].order, NodeOrdering::rows)) {
         const Vec3 at = p.cast<double>() / list[c].order;
-        write_query(out, std::to_string(list[c].type) + ' ' + std::to_string(c + 1) + ' ' + std::to_string(list[c].order),
+        write_query(out,
+                    std::to_string(list[c].type) + ' ' + std::to_string(c + 1) + ' ' + std::to_string(list[c].order),
                     at, mesh.position(c, at));
       }
   }

@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 namespace {
 
 const fs::path kRoot = subvol::test::source_dir();
-const std::vector<std::string> kLayers{"subvol", "fit", "shell", "export", "cli", "python", "samples", "bench", "tests"};
+const std::vector<std::string> kLayers{"subvol", "fit",     "shell", "export", "cli",
+                                       "python", "samples", "bench", "tests"};
 
 const std::map<std::string, std::set<std::string>> kMayInclude{
     {"subvol", {"subvol"}},

@@ -146,7 +146,8 @@ TEST_CASE("A process that gets no memory ends in order, wherever that is", "[cli
   const Workplace place;
   for (const std::string& words : {kShort + "--levels 2 -o out.mesh -o out.glb", kShort + "--order 4 -o out.vtu"})
     for (const rlim_t megabytes : {2, 6, 13, 20, 30}) {
-      const Run run = place.run(words + " --threads 2 --chord 0.05 --report r.json --quiet", RLIMIT_DATA, megabytes << 20);
+      const Run run =
+          place.run(words + " --threads 2 --chord 0.05 --report r.json --quiet", RLIMIT_DATA, megabytes << 20);
       INFO(words << ", " << megabytes << " MB: " << run.err);
       CHECK((run.status == 0 || run.status == 1 || run.status == 4));
       if (run.status == 1)  // the second: there is not even room for a second thread

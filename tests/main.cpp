@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tests' main: a run in which nothing failed and something was left out ends with a status of its own, so that ctest
-// tells skipped tests from those that passed, and never takes a failure for either.
+// The tests' main: a run in which nothing failed and something was left out ends with a status of its own, so that
+// ctest tells skipped tests from those that passed, and never takes a failure for either.
 #define CATCH_CONFIG_RUNNER
 #include "tests/skipping.h"
 

@@ -86,7 +86,8 @@ TEST_CASE("Medit is read whatever its layout, order, comments and other sections
       "#a comment with Vertices 3\n"
       "Edges\n2\n4 3 9\n1 2 9\n"
       "Vertices 8 0 0 0 0 1 0 0 0 1 1 0 0 0 +1 0 0 0. 0 1 0 1 0 1e0 0 1 1 1 0 0 1 1 0\n"
-      "Triangles\n1\n1 2 3 0\nQuadrilaterals\n1\n1 2 3 4 0\nRequiredVertices 1 1 Normals 1 0 0 1 NormalAtVertices 1 1 1\n"
+      "Triangles\n1\n1 2 3 0\nQuadrilaterals\n1\n1 2 3 4 0\nRequiredVertices 1 1 Normals 1 0 0 1 NormalAtVertices 1 1 "
+      "1\n"
       "SubDomainFromMesh 1 3 1 0\nBoundingBox 0 0 0 1 1 1\nPyramids 0\nEnd\nanything");
   CHECK(mesh.num_cells() == 1);
   CHECK(mesh.references == std::vector<int>{5});
@@ -104,7 +105,8 @@ TEST_CASE("edges that are not ridges are no creases, and ridges inside the mesh 
   while (mesh.positions[static_cast<std::size_t>(centre)] != Vec3(1, 1, 1)) ++centre;
   Index below = 0;
   while (mesh.positions[static_cast<std::size_t>(below)] != Vec3(1, 1, 0)) ++below;
-  text += "Edges\n2\n1 2 0\n" + std::to_string(centre + 1) + " " + std::to_string(below + 1) + " 0\nRidges\n1\n2\nEnd\n";
+  text +=
+      "Edges\n2\n1 2 0\n" + std::to_string(centre + 1) + " " + std::to_string(below + 1) + " 0\nRidges\n1\n2\nEnd\n";
   std::vector<std::string> warnings;
   CHECK(read_text(text, &warnings).tags.empty());
   REQUIRE(warnings.size() == 1);

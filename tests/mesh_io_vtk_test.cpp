@@ -63,8 +63,9 @@ std::string vtk_file(const Style& style, const std::vector<double>& coordinates,
     offsets.push_back(static_cast<std::int64_t>(corners.size()));
   }
   if (style.offsets)
-    out += "CELLS " + std::to_string(offsets.size()) + " " + std::to_string(corners.size()) + "\nOFFSETS vtktypeint64\n" +
-           array_of(offsets, style.binary) + "CONNECTIVITY vtktypeint64\n" + array_of(corners, style.binary);
+    out += "CELLS " + std::to_string(offsets.size()) + " " + std::to_string(corners.size()) +
+           "\nOFFSETS vtktypeint64\n" + array_of(offsets, style.binary) + "CONNECTIVITY vtktypeint64\n" +
+           array_of(corners, style.binary);
   else
     out += "CELLS " + std::to_string(cells.size()) + " " + std::to_string(counted.size()) + "\n" +
            array_of(counted, style.binary);
@@ -117,7 +118,8 @@ TEST_CASE("every flavour of legacy VTK gives the same mesh, cells right-handed a
 }
 
 TEST_CASE("a voxel becomes a hex of positive volume") {
-  const VolumeMesh mesh = read_bytes(vtk_file({}, {kPoints.begin(), kPoints.begin() + 24}, {{0, 1, 3, 2, 4, 5, 7, 6}}, {11}));
+  const VolumeMesh mesh =
+      read_bytes(vtk_file({}, {kPoints.begin(), kPoints.begin() + 24}, {{0, 1, 3, 2, 4, 5, 7, 6}}, {11}));
   CHECK(mesh.cell_vertices == std::vector<Index>{0, 1, 2, 3, 4, 5, 6, 7});
 }
 
@@ -127,11 +129,12 @@ TEST_CASE("whole-number cell data become references, in whatever form they come"
   const std::string values = array_of(std::vector<std::int32_t>{5, 6, 7, 8, 9}, binary);
   const std::string floats = array_of(std::vector<float>(5, 0.5f), binary);
   const std::string others = array_of(std::vector<float>(11, std::numeric_limits<float>::quiet_NaN()), binary);
-  const std::string after = GENERATE_COPY(
-      "CELL_DATA 5\nSCALARS part int 1\nLOOKUP_TABLE default\n" + values,
-      "POINT_DATA 11\nSCALARS q float\nLOOKUP_TABLE default\n" + others + "CELL_DATA 5\nFIELD FieldData 2\nq 1 5 float\n" +
-          floats + "METADATA\nINFORMATION 0\n\npart 1 5 int\n" + values,
-      "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\nnonsense");
+  const std::string after =
+      GENERATE_COPY("CELL_DATA 5\nSCALARS part int 1\nLOOKUP_TABLE default\n" + values,
+                    "POINT_DATA 11\nSCALARS q float\nLOOKUP_TABLE default\n" + others +
+                        "CELL_DATA 5\nFIELD FieldData 2\nq 1 5 float\n" + floats +
+                        "METADATA\nINFORMATION 0\n\npart 1 5 int\n" + values,
+                    "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\nnonsense");
   CHECK(read_bytes(base + after).references == std::vector<int>{5, 6, 7});
 }
 

@@ -152,7 +152,8 @@ TEST_CASE("quality is defined for odd input and refuses too few samples", "[qual
   CHECK(report.certificate.certified == 0);
 }
 
-TEST_CASE("against a reference of their own cells have quality 1 in that shape, and against the ideal one the usual", "[quality]") {
+TEST_CASE("against a reference of their own cells have quality 1 in that shape, and against the ideal one the usual",
+          "[quality]") {
   Mat3 shape;
   shape << 1.2, 0.3, -0.1, 0.1, 0.8, 0.2, -0.2, 0.1, 0.1;
   for (VolumeMesh mesh : {box(1, 1, 1), ideal_prism(1), ideal_tet()}) {

@@ -77,8 +77,9 @@ TEST_CASE("cells that were written are told from cells that differ in anything")
     write_volume_mesh(folder / name, mesh);
     tells<VolumeMesh>(folder / name, mesh, {moved, turned, fewer, more, other_reference});
   }
-  tells<VolumeMesh>(folder / "a.mesh", mesh,
-                    {[](VolumeMesh& m) { m.tags.creases[0].sharpness = 2; }, [](VolumeMesh& m) { m.tags.corners.clear(); }});
+  tells<VolumeMesh>(
+      folder / "a.mesh", mesh,
+      {[](VolumeMesh& m) { m.tags.creases[0].sharpness = 2; }, [](VolumeMesh& m) { m.tags.corners.clear(); }});
   for (const char* name : {"a.vtu", "a.msh"}) {
     write_volume(folder / name, mesh, {});
     tells<VolumeMesh>(folder / name, mesh, {moved, turned, fewer, more});

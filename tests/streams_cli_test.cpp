@@ -43,8 +43,9 @@ TEST_CASE("Options from a file without a verb are a usage error", "[cli]") {
 TEST_CASE("Names that are not UTF-8 are written with a sign in place of what is not text", "[cli]") {
   const Workplace place;
   place.file("t\xff.off", content_of(place / "target.off"));
-  const Run run = place.run("fit t\xff.off --template template.mesh --levels 1 --max-iterations 1 --chord 1 -o o\xff.glb "
-                            "-o o\xff.gltf -o o\xff.usda -o o\xff.vtu -o o\xff.msh --report r.json");
+  const Run run = place.run(
+      "fit t\xff.off --template template.mesh --levels 1 --max-iterations 1 --chord 1 -o o\xff.glb "
+      "-o o\xff.gltf -o o\xff.usda -o o\xff.vtu -o o\xff.msh --report r.json");
   INFO(run.err);
   CHECK(run.status == 4);
   for (const char* file : {"o\xff.gltf", "o\xff.usda", "o\xff.vtu", "o\xff.msh"}) CHECK(place.has(file));

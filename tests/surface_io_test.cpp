@@ -24,7 +24,8 @@ PolygonMesh read_text(const std::string& name, const std::string& text, std::vec
   return read_polygon_mesh(folder.file(name, text), warnings);
 }
 
-TriangleMesh read_triangles(const std::string& name, const std::string& text, std::vector<std::string>* warnings = nullptr) {
+TriangleMesh read_triangles(const std::string& name, const std::string& text,
+                            std::vector<std::string>* warnings = nullptr) {
   const TemporaryFolder folder;
   return read_triangle_mesh(folder.file(name, text), warnings);
 }
@@ -122,9 +123,10 @@ TEST_CASE("OFF is read with comments, colours, normals and counts of every kind"
 }
 
 TEST_CASE("OBJ is read with negative numbers, textures, forward references and long lines") {
-  check_tet(read_triangles("a.obj",
-                           "# c\nmtllib m.mtl\no tet\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nvt 0 0\nvn 0 0 1\ng a b\n"
-                           "usemtl m\ns off\nf 1/1/1 3/1/1 2/1/1\nf 1//1 2//1 4//1\nv 0 0 1\nf -3 -2 \\\n -1\nf 3/1 1/1 4/1\nl 1 2\n"));
+  check_tet(read_triangles(
+      "a.obj",
+      "# c\nmtllib m.mtl\no tet\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nvt 0 0\nvn 0 0 1\ng a b\n"
+      "usemtl m\ns off\nf 1/1/1 3/1/1 2/1/1\nf 1//1 2//1 4//1\nv 0 0 1\nf -3 -2 \\\n -1\nf 3/1 1/1 4/1\nl 1 2\n"));
 }
 
 TEST_CASE("STL is read as text and binary, also when a binary file begins with solid") {
@@ -168,7 +170,8 @@ TEST_CASE("what is dropped is said: unused vertices, repeated corners, faces wit
 }
 
 TEST_CASE("a soup keeps its separate vertices") {
-  const TriangleMesh mesh = read_triangles("a.off", "OFF\n6 2 0\n0 0 0\n1 0 0\n0 1 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 3 5 4\n");
+  const TriangleMesh mesh =
+      read_triangles("a.off", "OFF\n6 2 0\n0 0 0\n1 0 0\n0 1 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 3 5 4\n");
   CHECK(mesh.positions.size() == 6);
   CHECK(mesh.triangles.size() == 2);
 }
@@ -183,7 +186,8 @@ TEST_CASE("what is malformed in an OFF file is refused with its line") {
   CHECK_THAT(refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 -1")), Contains(":7:"));
   CHECK_THAT(refusal("a.off", replaced(kTetOff, "3 0 2 1", "2000000000 0 2 1")), Contains(":7:"));
   CHECK_THAT(refusal("a.off", replaced(kTetOff, "1 0 0", "1 nan 0")), Contains(":4:") && Contains("'nan'"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "4 4 6", "4 3 6")), Contains(":10:") && Contains("more than the counts"));
+  CHECK_THAT(refusal("a.off", replaced(kTetOff, "4 4 6", "4 3 6")),
+             Contains(":10:") && Contains("more than the counts"));
   CHECK_THAT(refusal("a.off", replaced(kTetOff, "4 4 6", "4 5 6")), Contains("the file ends"));
   CHECK_THAT(refusal("a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"), Contains("no faces"));
 }
@@ -228,7 +232,8 @@ TEST_CASE("what is malformed in a PLY file is refused with its line or byte") {
   CHECK_THAT(refusal("a.ply", "ply\nelement vertex 1\nend_header\n"), Contains("no format"));
   CHECK_THAT(refusal("a.ply", replaced(kTextPly, "ascii 1.0", "ascii 2.0")), Contains(":2:"));
   CHECK_THAT(refusal("a.ply", replaced(kTextPly, "property float x", "property half x")), Contains("'half'"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "property float x", "property float u")), Contains("without x, y and z"));
+  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "property float x", "property float u")),
+             Contains("without x, y and z"));
   CHECK_THAT(refusal("a.ply", replaced(kTextPly, "vertex_indices", "corners")), Contains("without vertex_indices"));
   CHECK_THAT(refusal("a.ply", replaced(kTextPly, "vertex 4", "vertex 4000000000")), Contains(":4:"));
   CHECK_THAT(refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 4 0")), Contains("vertex 4 of 4"));
@@ -253,7 +258,8 @@ TEST_CASE("surfaces without extent, or whose areas leave the range of a double, 
 
 TEST_CASE("an unknown surface extension is refused with the known ones") {
   const TemporaryFolder folder;
-  CHECK_THROWS_WITH(read_triangle_mesh(folder.file("a.xyz", "")), Contains("'.xyz'") && Contains(".off") && Contains(".ply"));
+  CHECK_THROWS_WITH(read_triangle_mesh(folder.file("a.xyz", "")),
+                    Contains("'.xyz'") && Contains(".off") && Contains(".ply"));
   CHECK_THROWS_WITH(read_triangle_mesh(folder / "none.off"), Contains("no such file"));
 }
 

@@ -102,7 +102,8 @@ TEST_CASE("open, crowded and turned edges are counted, and what lies on a rim is
   for (std::size_t t = 0; t < target.triangles().size(); ++t) {
     const auto triangle = static_cast<Index>(t);
     CHECK(!target.on_rim(triangle, {1. / 3, 1. / 3, 1. / 3}));
-    for (const std::array<double, 3>& at : {std::array{0.5, 0.5, 0.}, std::array{0., 0.5, 0.5}, std::array{0.5, 0., 0.5}})
+    for (const std::array<double, 3>& at :
+         {std::array{0.5, 0.5, 0.}, std::array{0., 0.5, 0.5}, std::array{0.5, 0., 0.5}})
       edges += target.on_rim(triangle, at);
     for (const std::array<double, 3>& at : {std::array{1., 0., 0.}, std::array{0., 1., 0.}, std::array{0., 0., 1.}})
       corners += target.on_rim(triangle, at);

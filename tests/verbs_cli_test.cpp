@@ -17,7 +17,8 @@ using subvol::test::Workplace;
 TEST_CASE("A shell goes from a surface to cells, named sheets and a report that tells the truth", "[cli]") {
   const Workplace place;
   const Run run = place.run(
-      "shell target.off --thickness 2% --layers 2 --side both -o shell.mesh -o shell.vtu -o shell.glb --report report.json");
+      "shell target.off --thickness 2% --layers 2 --side both -o shell.mesh -o shell.vtu -o shell.glb --report "
+      "report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   CHECK(place.names().size() == 6);
@@ -40,8 +41,9 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
 
 TEST_CASE("A shell of curved cells goes to its files with its thickness, and is what the files say", "[cli]") {
   const Workplace place;
-  const Run run = place.run("shell target.off --thickness 2% --side both --order 2 -o shell.vtu -o shell.msh -o shell.glb "
-                            "-o cage:cage.mesh --report report.json");
+  const Run run = place.run(
+      "shell target.off --thickness 2% --side both --order 2 -o shell.vtu -o shell.msh -o shell.glb "
+      "-o cage:cage.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   const auto report = place.json("report.json");
@@ -193,7 +195,8 @@ TEST_CASE("optimize untangles a mesh, proves it, and says which cells it could n
 TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
   const Workplace place;
   const Run run = place.run(
-      "optimize template.mesh --target target.off --order 2 --tolerance 0.5 -o curved.vtu --report report.json --progress none");
+      "optimize template.mesh --target target.off --order 2 --tolerance 0.5 -o curved.vtu --report report.json "
+      "--progress none");
   INFO(run.err);
   CHECK(run.status == 0);
   const nlohmann::json report = place.json("report.json");

@@ -82,7 +82,9 @@ class Workplace {
   }
 
   std::filesystem::path operator/(const char* name) const { return folder_ / name; }
-  std::filesystem::path file(const std::string& name, const std::string& text) const { return folder_.file(name, text); }
+  std::filesystem::path file(const std::string& name, const std::string& text) const {
+    return folder_.file(name, text);
+  }
   bool has(const char* name) const { return std::filesystem::exists(folder_ / name); }
   nlohmann::json json(const char* name) const { return nlohmann::json::parse(content_of(folder_ / name)); }
 

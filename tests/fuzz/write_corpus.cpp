@@ -78,8 +78,9 @@ void write_surfaces(const fs::path& folder) {
   const float corners[2][9] = {{0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 0, 0, 0, 1, 0, 0, 0, 1}};
   for (std::size_t t = 0; t < 2; ++t) std::memcpy(binary.data() + 84 + 50 * t + 12, corners[t], sizeof corners[t]);
   write(folder / "stl", "binary", binary);
-  const std::string body = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                           "property double quality\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string body =
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property double quality\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
   write(folder / "ply", "text", "ply\nformat ascii 1.0\ncomment c\n" + body + "0 0 0 1\n1 0 0 2\n0 1 0 3\n3 0 1 2\n");
   for (const bool little : {true, false}) {
     std::string bytes = std::string("ply\nformat binary_") + (little ? "little" : "big") + "_endian 1.0\n" + body;

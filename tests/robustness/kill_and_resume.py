@@ -4,10 +4,10 @@
 
 Usage: tests/robustness/kill_and_resume.py PROGRAM SAMPLE_PROGRAM [--kills N] [--seed S] [NAME ...]
 
-Half of the kills wait until a file is being written. After each, every output must be absent, what it was before, or what
-the run that nobody disturbed writes; and the checkpoint, where there is one, must be good: the run is started again with
---resume, and killed again, until it ends by itself. Then all its files must be those of the undisturbed run, byte by byte
-(reports but for times, cases.py). Runs are killed until N kills are done. Exit status: 0 all held, 1 not.
+Half of the kills wait until a file is being written. After each, every output must be absent, what it was before, or
+what the run that nobody disturbed writes; and the checkpoint, where there is one, must be good: the run is started
+again with --resume, and killed again, until it ends by itself. Then all its files must be those of the undisturbed run,
+byte by byte (reports but for times, cases.py). Runs are killed until N kills are done. Exit status: 0 all held, 1 not.
 """
 import argparse
 import pathlib

@@ -41,7 +41,8 @@ def main():
                 other_status, other = run(program, case, samples, threads)
                 if other_status != status:
                     bad.append(f"{label}: exit status {other_status}, not {status}")
-                bad += [f"{label}: {name} differs" for name in first if first[name] is None or first[name] != other[name]]
+                bad += [f"{label}: {name} differs" for name in first
+                        if first[name] is None or first[name] != other[name]]
             sizes = sum(len(data) for data in first.values() if data)
             print(f"{case[0]:14} {len(first)} files {sizes:9} bytes {time.monotonic() - begin:6.1f} s  "
                   + ("; ".join(bad) or "equal"), flush=True)

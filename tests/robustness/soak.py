@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hundreds of fits, shells and optimisations of shapes made at random; nothing may crash, hang, or claim what is not so.
+"""Hundreds of fits, shells and optimisations of random shapes; nothing may crash, hang, or claim what is not so.
 
 Usage: tests/robustness/soak.py PROGRAM [--runs N] [--first K] [--seed S] [--time-limit T] [--minutes M] [--keep FOLDER]
 
@@ -35,7 +35,8 @@ def grid_surface(rng, point, n, m, wrap_u, wrap_v):
     rows, columns = n if wrap_u else n + 1, m if wrap_v else m + 1
     vertices = [point(i / n, j / m) for i in range(rows) for j in range(columns)]
     number = lambda i, j: (i % rows) * columns + j % columns
-    faces = [[number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)] for i in range(n) for j in range(m)]
+    faces = [[number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)]
+             for i in range(n) for j in range(m)]
     if rng.random() < 0.5:
         faces = [t for a, b, c, d in faces for t in ([a, b, c], [a, c, d])]
     return vertices, faces
