@@ -55,6 +55,8 @@ class HighOrderEnergy final : public VolumeTerm {
   bool stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) override;
   /// Number of quadrature points of all cells.
   std::size_t num_points() const;
+  /// Of each cell; more than it was made with where it was densified.
+  std::span<const int> points_per_direction() const { return points_; }
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   /// Cells that are in the way twice as dense, and twice as heavy up to `heaviest_weight`.
   void densify(std::span<const Index> cells) override;

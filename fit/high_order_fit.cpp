@@ -72,7 +72,8 @@ class HighOrderFit {
   bool has_room(const EntityOrders& orders);
   bool end_for_memory(const std::string& why);
   void set_orders(const EntityOrders& orders);
-  FitProblem problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const;
+  std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space) const;
+  FitProblem problem(std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples, const Stage& stage) const;
   bool run_stage(const Stage& stage);
   FitSnapshot snapshot() const;
   void go_back(FitSnapshot snapshot);
@@ -107,6 +108,8 @@ class HighOrderFit {
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< the highest of any entity
   double lambda_ = 0;        ///< of the last stage
+  std::vector<int> points_;  ///< of each cell per direction, at least: cells that stood in the way stay dense
+  bool on_the_way_ = true;   ///< in the first orders: cells that stand in the way become heavier
   std::vector<double> cell_weights_;  ///< in E_W; empty: all 1
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
@@ -166,15 +169,22 @@ void HighOrderFit::set_orders(const EntityOrders& orders) {
   mean_.reset();
 }
 
-FitProblem HighOrderFit::problem(const HighOrderMesh& mesh, const BoundarySamples& samples, const Stage& stage) const {
+std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace& space) const {
   constexpr int kLeastPoints = 5;
-  std::vector<int> points(mesh.space.num_cells());
+  std::vector<int> points(space.num_cells());
   for (std::size_t c = 0; c < points.size(); ++c)
-    points[c] = std::max(kLeastPoints, points_for_order(mesh.space.pattern_order(mesh.space.pattern(c))));
-  auto volume = std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes_, points);
+    points[c] = std::max({kLeastPoints, points_for_order(space.pattern_order(space.pattern(c))),
+                          points_.empty() ? 0 : points_[c]});
+  auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
   volume->set_distortion(options_.distortion);
+  if (!on_the_way_) volume->set_heaviest_weight(1);
   if (!cell_weights_.empty()) volume->set_cell_weights(cell_weights_);
-  return {identity_map(mesh.space.num_nodes()), samples.positions, std::move(volume),
+  return volume;
+}
+
+FitProblem HighOrderFit::problem(std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
+                                 const Stage& stage) const {
+  return {identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
           make_surface_term(target_.surface, samples.triangles, samples.points.size(), stage.tangential_weight,
                             options_.correspondence),
           stage.lambda};
@@ -200,9 +210,13 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   keep_state();
   lambda_ = stage.lambda;
   mean_.reset();
-  FitProblem stage_problem = problem(mesh_, samples_, stage);
+  std::unique_ptr<HighOrderEnergy> volume = volume_energy(mesh_.space);
+  const HighOrderEnergy& energy = *volume;
+  FitProblem stage_problem = problem(std::move(volume), samples_, stage);
   const double fraction = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_) + 1);
-  return runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
+  const bool going = runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
+  points_.assign(energy.points_per_direction().begin(), energy.points_per_direction().end());
+  return going;
 }
 
 FitSnapshot HighOrderFit::snapshot() const {
@@ -253,6 +267,7 @@ void HighOrderFit::begin_try(const HighOrderTry& attempt) {
   ++try_;
   approach_ = attempt.approach;
   states_.clear();
+  points_.clear();
   mesh_ = HighOrderMesh(mesh_.space.with_orders(EntityOrders::uniform(mesh_.space.topology(), 1)), template_);
   ideal_boxes_ = ideal_boxes(template_, template_.positions, target_.surface.volume(), attempt.own_box_share);
 }
@@ -275,6 +290,7 @@ bool HighOrderFit::run_first_orders(int last) {
     double mean, distortion;
     HighOrderMesh mesh;
     std::vector<Vec3> ideal_boxes;
+    std::vector<int> points;
     Approach approach;
     std::vector<FitState> states;
     int number;  ///< of the try
@@ -290,7 +306,7 @@ bool HighOrderFit::run_first_orders(int last) {
     if (schedule_.tries.size() == 1) return true;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
-    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, approach_, states_,
+    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, points_, approach_, states_,
                     try_, stages_begin, report_.stages.size()};
     const bool better = !best || std::tuple(arrival.pairs > 0, arrival.mean) < std::tuple(best->pairs > 0, best->mean);
     if (better) best = std::move(arrival);
@@ -299,6 +315,7 @@ bool HighOrderFit::run_first_orders(int last) {
   }
   mesh_ = std::move(best->mesh);
   ideal_boxes_ = std::move(best->ideal_boxes);
+  points_ = std::move(best->points);
   approach_ = best->approach;
   states_ = std::move(best->states);
   try_ = best->number;
@@ -309,6 +326,7 @@ bool HighOrderFit::run_first_orders(int last) {
 }
 
 bool HighOrderFit::run_higher_orders() {
+  on_the_way_ = false;
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
   return lower_lambda() && lift_worst_cells();
@@ -321,7 +339,7 @@ bool HighOrderFit::raise_where_it_pays() {
   const HighOrderMesh raised = mesh_.with_orders(next);
   if (raised.space.num_nodes() == mesh_.space.num_nodes()) return false;
   const BoundarySamples samples = make_boundary_samples(raised.space, sample_intervals(raised.space.max_order()));
-  FitProblem raised_problem = problem(raised, samples, schedule_.final_stage(lambda_));
+  FitProblem raised_problem = problem(volume_energy(raised.space), samples, schedule_.final_stage(lambda_));
   const EntityValues gains = order_gains(raised_problem, raised.space, mesh_.space.orders(), raised.coefficients);
   const double surface = raised_problem.surface->target_to_surface() + raised_problem.surface->surface_to_target();
   if (!(gains.sum() > kLeastOrderGain * surface)) return false;
@@ -331,6 +349,7 @@ bool HighOrderFit::raise_where_it_pays() {
 
 /// Orders rise where it pays; where it does not any more, lambda falls for the sake of the tolerance.
 bool HighOrderFit::run_adaptive_orders() {
+  on_the_way_ = false;
   while (!meets_tolerance() && raise_where_it_pays()) {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;

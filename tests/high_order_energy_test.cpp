@@ -144,7 +144,9 @@ TEST_CASE("an inverted curved cell costs infinity and leaves the gradient alone;
   const double step = energy.max_step(x, d);
   CHECK((step > 0 && step < 1));
   CHECK(std::isfinite(energy.value(moved(x, d, step))));
+  CHECK(energy.points_per_direction()[0] == 5);
   energy.densify(std::vector<Index>{0});
+  CHECK(energy.points_per_direction()[0] == 9);
   CHECK(energy.num_points() == 9 * 9 * 9);
 }
 
