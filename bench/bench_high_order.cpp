@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Curved cells, one thread: nanoseconds per quadrature point for the energy, its gradient (and how much faster two
 // threads are) and products with its Hessian, and microseconds per cell for the proof that none is inverted, beside
-// those of an energy and gradient.
+// those of an energy and gradient: of the first pass, which makes the models that it needs (less those of the row's
+// amplitudes before), and of later ones. Times for the proof and what stands beside it are those of the processor.
 #include "bench/hex_grid.h"
 #include "fit/high_order_certificate.h"
 #include "fit/high_order_energy.h"
@@ -10,6 +11,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <cstdio>
 #include <random>
 
@@ -26,6 +28,18 @@ double best_microseconds(int repeats, const Run& run) {
     run();
     const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - start;
     best = std::min(best, time.count());
+  }
+  return best;
+}
+
+/// The same of the processor's time.
+template <class Run>
+double best_cpu_microseconds(int repeats, const Run& run) {
+  double best = 1e300;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    const std::clock_t start = std::clock();
+    run();
+    best = std::min(best, 1e6 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
   }
   return best;
 }
@@ -61,7 +75,8 @@ void print_energy(const ElementSpace& space, const std::vector<Vec3>& nodes, int
   omp_set_num_threads(1);
   const double second = best_microseconds(3, [&] { energy.linearize(nodes, 1, gradient); });
   const double multiply = best_microseconds(5, [&] { energy.multiply(gradient, product); });
-  gradient_us_per_cell = both / static_cast<double>(space.num_cells());
+  const double both_cpu = best_cpu_microseconds(5, [&] { energy.add_gradient(nodes, 1, gradient); });
+  gradient_us_per_cell = both_cpu / static_cast<double>(space.num_cells());
   std::printf("%s\n  {\"kind\": \"%s\", \"basis\": \"%s\", \"order\": %d, \"points_per_cell\": %.0f, "
               "\"value_ns_per_point\": %.1f, \"gradient_ns_per_point\": %.1f, \"second_derivative_ns_per_point\": "
               "%.1f, \"product_ns_per_point\": %.1f, \"gradient_us_per_cell\": %.1f, "
@@ -80,11 +95,14 @@ void print_certificate(const ElementSpace& space, const VolumeMesh& mesh, double
   for (const double amplitude : kAmplitudes) {
     const std::vector<Vec3> nodes = random_modes(space, mesh, amplitude);
     CertificateSummary summary;
-    const double time = best_microseconds(3, [&] { summary = certify(space, nodes); }) / cells;
-    std::printf(", \"certify_%g_us_per_cell\": %.2f, \"certify_%g_to_gradient\": %.2f, \"valid_%g\": %zu, "
+    const double first = best_cpu_microseconds(1, [&] { certify(space, nodes); }) / cells;
+    const double time = best_cpu_microseconds(5, [&] { summary = certify(space, nodes); }) / cells;
+    std::printf(", \"certify_%g_us_per_cell\": %.2f, \"certify_%g_to_gradient\": %.2f, "
+                "\"first_%g_us_per_cell\": %.2f, \"first_%g_to_gradient\": %.2f, \"valid_%g\": %zu, "
                 "\"invalid_%g\": %zu, \"undecided_%g\": %zu",
-                amplitude, time, amplitude, time / gradient_us_per_cell, amplitude, summary.certified, amplitude,
-                summary.invalid, amplitude, summary.undecided);
+                amplitude, time, amplitude, time / gradient_us_per_cell, amplitude, first, amplitude,
+                first / gradient_us_per_cell, amplitude, summary.certified, amplitude, summary.invalid, amplitude,
+                summary.undecided);
   }
 }
 

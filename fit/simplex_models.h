@@ -30,9 +30,11 @@ namespace subvol {
 /// models after every `halvings_between` halvings, `most_halvings` at most.
 ///
 /// Models are made when they are first asked for, up to the order i + j + k that is asked for, and kept for all
-/// threads. Where those of one kind, basis and order take more than 200 MB, all but the whole simplex's are dropped; these take
-/// 16 MB at most per tier. Cost of all of them at the highest tier, fourier tets of orders 2, 4, 8, 12, 16: about 0.05,
-/// 1, 50, 150, 300 ms; of prisms less.
+/// threads. Where those of one kind, basis and order take more than 200 MB, all but the whole simplex's are dropped;
+/// these take 16 MB at most per tier. Cost of all of them at the highest tier, fourier tets of orders 2, 4, 8, 12:
+/// about 0.05, 1, 50, 400 ms, of prisms less. Fourier tets above order 12 with coefficients of all orders are beyond
+/// what is of use: the models of one part take seconds, those of many parts more than is kept. Straight-sided ones are
+/// not.
 class SimplexModels {
  public:
   static constexpr int kMostTiers = kWide;
