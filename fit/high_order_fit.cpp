@@ -109,7 +109,6 @@ class HighOrderFit {
   int order_ = 1;            ///< the highest of any entity
   double lambda_ = 0;        ///< of the last stage
   std::vector<int> points_;  ///< of each cell per direction, at least: cells that stood in the way stay dense
-  bool on_the_way_ = true;   ///< in the first orders: cells that stand in the way become heavier
   std::vector<double> cell_weights_;  ///< in E_W; empty: all 1
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
@@ -177,7 +176,6 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
                           points_.empty() ? 0 : points_[c]});
   auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
   volume->set_distortion(options_.distortion);
-  if (!on_the_way_) volume->set_heaviest_weight(1);
   if (!cell_weights_.empty()) volume->set_cell_weights(cell_weights_);
   return volume;
 }
@@ -326,7 +324,6 @@ bool HighOrderFit::run_first_orders(int last) {
 }
 
 bool HighOrderFit::run_higher_orders() {
-  on_the_way_ = false;
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
   return lower_lambda() && lift_worst_cells();
@@ -349,7 +346,6 @@ bool HighOrderFit::raise_where_it_pays() {
 
 /// Orders rise where it pays; where it does not any more, lambda falls for the sake of the tolerance.
 bool HighOrderFit::run_adaptive_orders() {
-  on_the_way_ = false;
   while (!meets_tolerance() && raise_where_it_pays()) {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
