@@ -98,7 +98,8 @@ void print_certificate(const ElementSpace& space, const VolumeMesh& mesh, double
     const std::vector<Vec3> nodes = random_modes(space, mesh, amplitude);
     CertificateSummary summary;
     const double first = best_cpu_microseconds(1, [&] { certify(space, nodes); }) / cells;
-    const double time = best_cpu_microseconds(first * cells > kLong ? 1 : 5, [&] { summary = certify(space, nodes); }) / cells;
+    const double time =
+        best_cpu_microseconds(first * cells > kLong ? 1 : 5, [&] { summary = certify(space, nodes); }) / cells;
     std::printf(", \"certify_%g_us_per_cell\": %.2f, \"certify_%g_to_gradient\": %.2f, "
                 "\"first_%g_us_per_cell\": %.2f, \"first_%g_to_gradient\": %.2f, \"valid_%g\": %zu, "
                 "\"invalid_%g\": %zu, \"undecided_%g\": %zu",

@@ -25,21 +25,23 @@ namespace subvol {
 ///
 /// so that places that are far from the rim, or where S~ runs another way, are free.
 ///
-/// Where Voronoi cells hand every point of the target to one *sample*, here it pulls at the place of S~ that is closest,
-/// between the samples: the pull is spread over the corners, and cells are left better shaped at the same distance.
-/// Frozen: the barycentric coordinates of s(y_j), the points t(x_q), normals and areas. Same bits for any thread count.
+/// Where Voronoi cells hand every point of the target to one *sample*, here it pulls at the place of S~ that is
+/// closest, between the samples: the pull is spread over the corners, and cells are left better shaped at the same
+/// distance. Frozen: the barycentric coordinates of s(y_j), the points t(x_q), normals and areas. Same bits for any
+/// thread count.
 class ClosestPointEnergy final : public SurfaceTerm {
  public:
   /// target must outlive the energy. points_per_triangle: 1 or 3. InputError: as `SurfaceEnergy`.
   ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                      std::size_t num_samples, double tangential_weight, int points_per_triangle);
 
-  /// From the next `assign` on a tie of length d counts 1 + (d / length)^2 times: places that are far off are drawn more than
-  /// the mean asks for, which keeps the largest distance down. length > 0 in the target's unit, else InputError.
+  /// From the next `assign` on a tie of length d counts 1 + (d / length)^2 times: places that are far off are drawn
+  /// more than the mean asks for, which keeps the largest distance down. length > 0 in the target's unit, else
+  /// InputError.
   void emphasize_far(double length);
 
-  /// Six points, the corners among them, on each sample triangle with a 1, whatever `points_per_triangle` says: where S~
-  /// is farthest off is on edges. One entry per sample triangle, else InputError; to be called before `assign`.
+  /// Six points, the corners among them, on each sample triangle with a 1, whatever `points_per_triangle` says: where
+  /// S~ is farthest off is on edges. One entry per sample triangle, else InputError; to be called before `assign`.
   void refine(std::span<const std::uint8_t> triangles);
 
   /// Cost: one closest-point query per target sample and per quadrature point. The answers of the call before are where

@@ -23,13 +23,13 @@ struct FitProgress {
 
 /// Why a solve ended. Everything but `input` problems (those throw) is told here, never by an exception.
 enum class StopReason {
-  converged,        ///< all stages done, each to its stop test or the steps the schedule gives it; tolerance met, if any
-  tolerance_missed, ///< all stages done, but the distance asked for was not reached
-  iteration_limit,  ///< the last stage took all the steps that the options allow, and no tolerance tells that it may
+  converged,  ///< all stages done, each to its stop test or the steps the schedule gives it; tolerance met, if any
+  tolerance_missed,  ///< all stages done, but the distance asked for was not reached
+  iteration_limit,   ///< the last stage took all the steps that the options allow, and no tolerance tells that it may
   time_limit,
-  memory_limit,     ///< the next level, or order, would take more memory than is allowed
-  cancelled,        ///< the progress callback said so; the best state so far is returned
-  stalled           ///< a level or stage could not be started without inverting a cell
+  memory_limit,  ///< the next level, or order, would take more memory than is allowed
+  cancelled,     ///< the progress callback said so; the best state so far is returned
+  stalled        ///< a level or stage could not be started without inverting a cell
 };
 const char* to_string(StopReason reason);
 
@@ -55,7 +55,7 @@ struct StageRecord {
   MinimizerStop ended = MinimizerStop::converged;
   std::string stop;                ///< which test ended it, with its figure
   bool kept = true;                ///< false: undone (the boundary came to intersect itself more, shapes suffered, the
-                                   ///< fit was interrupted in one that was not asked for), or of a try that was given up
+                     ///< fit was interrupted in one that was not asked for), or of a try that was given up
   double seconds = 0;
   double mean_distance_percent = -1;  ///< after the stage, per cent of the diagonal; negative: not measured
 };

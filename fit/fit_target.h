@@ -46,8 +46,8 @@ struct FitTarget {
   SurfaceDistance distance(const TriangleMesh& fitted) const { return measure(fitted, true); }
   double mean_distance(const TriangleMesh& fitted) const { return measure(fitted, false).mean(); }
 
-  /// Notes how far a template's boundary is, the state of the target (`TargetReport`), and what no fit can change. Where
-  /// the target encloses nothing the boundary's volume is taken for the one wanted. Returns the mean distance.
+  /// Notes how far a template's boundary is, the state of the target (`TargetReport`), and what no fit can change.
+  /// Where the target encloses nothing the boundary's volume is taken for the one wanted. Returns the mean distance.
   double compare_start(const TriangleMesh& boundary, FitReport& report);
 
  private:

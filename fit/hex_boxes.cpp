@@ -70,7 +70,8 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
 }
 
 bool HexBoxes::is_hopeless(const Box& box) {
-  // The shifts of `determinant_bound` sum up to at least this, if the mean edges tell the mean matrix; each must be < 1.
+  // The shifts of `determinant_bound` sum up to at least this, if the mean edges tell the mean matrix; each must be
+  // < 1.
   return !models_.level(box.level).exact &&
          remainder(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum() > 2;
 }

@@ -188,8 +188,8 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
               local_.data() + group.local_begin + 3 * batch * group.num_modes * kLanes);
 }
 
-/// The energy at the nodes, by kernel(batches, count) at all points. With kBack, what the batches add to their modes stays in
-/// local_. Calls per_point(group number, batch, q, point) when a point is done.
+/// The energy at the nodes, by kernel(batches, count) at all points. With kBack, what the batches add to their modes
+/// stays in local_. Calls per_point(group number, batch, q, point) when a point is done.
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
@@ -338,16 +338,17 @@ bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3>
   constexpr double kStiffer = 10;
   const auto size = static_cast<std::size_t>(frozen_size(kernels_->coupled));
   std::atomic<bool> changed{false};
-  for_each_pair(nodes, direction, [&](std::size_t g, std::size_t b, std::size_t q, int l, const Mat3& j, const Mat3& d) {
-    if (StepLimit::safe(j, d, t)) return;
-    CellGroup& group = groups_[g];
-    Wide* frozen = &group.frozen[size * (b * group.num_points() + q)];
-    Wide more[kMostFrozen];
-    scale_frozen(frozen, size, l, kStiffer, more);
-    Wide* blocks = &group.mean_blocks[54 * b];
-    kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
-    changed = true;
-  });
+  for_each_pair(nodes, direction,
+                [&](std::size_t g, std::size_t b, std::size_t q, int l, const Mat3& j, const Mat3& d) {
+                  if (StepLimit::safe(j, d, t)) return;
+                  CellGroup& group = groups_[g];
+                  Wide* frozen = &group.frozen[size * (b * group.num_points() + q)];
+                  Wide more[kMostFrozen];
+                  scale_frozen(frozen, size, l, kStiffer, more);
+                  Wide* blocks = &group.mean_blocks[54 * b];
+                  kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
+                  changed = true;
+                });
   return changed;
 }
 

@@ -21,16 +21,16 @@ struct CellGroup;
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
 ///
-/// e is a distortion (`distortion.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map: edge
-/// length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an `ElementSpace`: vertex positions and the
-/// coefficients of edge, face and cell modes. Cells weigh equally unless weights are set, but those that were densified twice as much each
-/// time, up to 64: e grows too slowly towards inversion to keep them from it.
+/// e is a distortion (`distortion.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map:
+/// edge length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an
+/// `ElementSpace`: vertex positions and the coefficients of edge, face and cell modes. Cells weigh equally unless
+/// weights are set, but those that were densified twice as much each time, up to 64: e grows too slowly towards
+/// inversion to keep them from it.
 ///
-/// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for n
-/// modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept as
-/// 27 numbers per point (30 where
-/// stretches are coupled) and never assembled. Same bits for any number of threads; one caller at a time, const functions
-/// included, for they share a buffer.
+/// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for
+/// n modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept
+/// as 27 numbers per point (30 where stretches are coupled) and never assembled. Same bits for any number of threads;
+/// one caller at a time, const functions included, for they share a buffer.
 class HighOrderEnergy final : public VolumeTerm {
  public:
   /// space  must outlive the energy.
@@ -47,8 +47,8 @@ class HighOrderEnergy final : public VolumeTerm {
   double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
   double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override;
-  /// Of the diagonal that the mean of the second derivative over every cell's points gives. Every column of the map must
-  /// have at most one entry for it to be that of M^T H M; else what couples several nodes is left out.
+  /// Of the diagonal that the mean of the second derivative over every cell's points gives. Every column of the map
+  /// must have at most one entry for it to be that of M^T H M; else what couples several nodes is left out.
   void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                            std::span<Mat3> diagonal) const override;
   double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;

@@ -30,8 +30,8 @@ namespace {
 /// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is
 /// worth one.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-/// Lifting the worst cells: those below this multiple of the least scaled Jacobian, as long as it is not good, become so
-/// much heavier each time; how much the distances may grow in all.
+/// Lifting the worst cells: those below this multiple of the least scaled Jacobian, as long as it is not good, become
+/// so much heavier each time; how much the distances may grow in all.
 constexpr int kMostLifts = 8, kLiftSteps = 8;
 constexpr double kBadShare = 1.3, kGoodScaledJacobian = 0.5, kLiftWeight = 1.5, kMostDistanceGrowth = 1.2;
 
@@ -133,8 +133,8 @@ void HighOrderFit::look_over_template() {
   schedule_ = make_high_order_schedule(options_.lambda_close, distance / target_.surface.length());
 }
 
-/// Intervals along an edge: about as fine as the target, and as the curves need so that their chords do not matter; less
-/// for surfaces of many faces, where they matter less.
+/// Intervals along an edge: about as fine as the target, and as the curves need so that their chords do not matter;
+/// less for surfaces of many faces, where they matter less.
 int HighOrderFit::sample_intervals(int order) const {
   constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;
   constexpr double kMostTriangles = 60000;
@@ -353,8 +353,8 @@ bool HighOrderFit::run_adaptive_orders() {
   return report_.stop_reason != StopReason::memory_limit && lower_lambda() && lift_worst_cells();
 }
 
-/// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the surface
-/// intersect itself more, or is not done, is undone.
+/// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the
+/// surface intersect itself more, or is not done, is undone.
 bool HighOrderFit::lower_lambda() {
   if (!options_.tolerance_percent || meets_tolerance()) return true;
   std::size_t pairs = intersecting_pairs();
@@ -380,8 +380,8 @@ HighOrderFit::Outcome HighOrderFit::measured_outcome() {
           quality.cell_minima};
 }
 
-/// The last stage with more and more weight on the worst cells: E_W is a mean, to which few cells that are much worse than
-/// they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
+/// The last stage with more and more weight on the worst cells: E_W is a mean, to which few cells that are much worse
+/// than they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
 bool HighOrderFit::lift_worst_cells() {
   if (!options_.lift_worst_cells || options_.order < 2) return true;
   Outcome now = measured_outcome();

@@ -144,7 +144,8 @@ MeshCheck count_cells(const VolumeMesh& mesh) {
 
 /// Calls certify(cell) for the first cells that are refuted, and position(cell, canonical) for where.
 template <class Certify, class Position>
-std::vector<InversionWitness> witnesses(const QualityReport& quality, const Certify& certify, const Position& position) {
+std::vector<InversionWitness> witnesses(const QualityReport& quality, const Certify& certify,
+                                        const Position& position) {
   constexpr std::size_t kMostWitnesses = 10;
   std::vector<InversionWitness> result;
   for (const Index c : quality.certificate.invalid_cells) {
@@ -230,7 +231,8 @@ void append_distance(std::string& text, const MeshCheck& check) {
   const auto& extreme = check.distance->extreme();
   append(text, "distance%s mean %.6g (%.4f %%), max %.6g (%.4f %%) at (%.6g, %.6g, %.6g)\n",
          check.distance->one_sided ? " (of points)" : "           ", check.distance->mean(),
-         check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(), extreme.from[0], extreme.from[1], extreme.from[2]);
+         check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(), extreme.from[0],
+         extreme.from[1], extreme.from[2]);
 }
 
 void require_samples(int per_direction) {

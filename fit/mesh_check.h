@@ -83,8 +83,8 @@ struct MeshCheck {
   std::optional<SurfaceDistance> distance;                   ///< a: boundary, b: target
   double target_diagonal = 0;                                ///< of the target's bounding box: 100 per cent
 
-  /// Usable as it is: sound but for unused vertices, every cell certified, the boundary's triangles (those with an area)
-  /// free of self-intersection. False where one of these was not looked at; the distance has no part in it.
+  /// Usable as it is: sound but for unused vertices, every cell certified, the boundary's triangles (those with an
+  /// area) free of self-intersection. False where one of these was not looked at; the distance has no part in it.
   bool valid() const;
   double mean_distance_percent() const { return in_percent(distance ? distance->mean() : 0); }
   double max_distance_percent() const { return in_percent(distance ? distance->max() : 0); }

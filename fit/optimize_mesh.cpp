@@ -91,7 +91,8 @@ class MeshOptimizer {
         own_boundary_(!target),
         target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
         relief_(mesh.num_cells(), 1),
-        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
+        runner_(
+            {SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
     target_.normalisation.take_in(mesh_);
   }
   OptimizeResult run(const VolumeMesh& original);
@@ -289,8 +290,8 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   return going;
 }
 
-/// The cells beside places that are too far off count half as much from now on, and their faces are seen at more points.
-/// Lowering lambda for the sake of a few places would cost shape everywhere.
+/// The cells beside places that are too far off count half as much from now on, and their faces are seen at more
+/// points. Lowering lambda for the sake of a few places would cost shape everywhere.
 void MeshOptimizer::relieve_far_cells(std::span<const double> triangle_distances) {
   std::vector<std::uint8_t> far(mesh_.num_vertices(), 0);
   for (std::size_t t = 0; t < triangle_distances.size(); ++t) {
@@ -366,8 +367,8 @@ void MeshOptimizer::finish(bool going) {
   } else if (mean_percent_ > options_.mean_tolerance_percent || max_percent_ > options_.max_tolerance_percent) {
     report_.stop_reason = StopReason::tolerance_missed;
     report_.explanation =
-        formatted("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%", mean_percent_,
-               max_percent_);
+        formatted("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%",
+                  mean_percent_, max_percent_);
   } else {
     report_.explanation = formatted("all cells are valid and no longer gain; boundary within %.4g %% of its surface",
                                  max_percent_);

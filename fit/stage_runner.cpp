@@ -32,7 +32,8 @@ std::uint64_t start_of(const FitProblem& problem, const MinimizerOptions& minimi
 
 void require_closest(Correspondence correspondence) {
   if (correspondence != Correspondence::closest)
-    throw InputError("Correspondence::voronoi: a cloud has no surface to cut into cells; points pull at the closest places");
+    throw InputError(
+        "Correspondence::voronoi: a cloud has no surface to cut into cells; points pull at the closest places");
 }
 
 bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction,
@@ -97,7 +98,8 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
     report.stop_reason = StopReason::tolerance_missed;
     report.explanation =
         formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
-  } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit && options_.max_iterations > 0) {
+  } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit &&
+             options_.max_iterations > 0) {
     report.stop_reason = StopReason::iteration_limit;
     report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
                                    options_.max_iterations, mean_percent);

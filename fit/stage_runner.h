@@ -46,12 +46,12 @@ class StageRunner {
 
   explicit StageRunner(Options options) : options_(std::move(options)) {}
 
-  /// Minimises over x and appends the record, whose name, level or order, and cells are set, to the report. `fraction` is
-  /// told to whoever follows the progress. False, with the report's stop reason set, when the fit must end.
+  /// Minimises over x and appends the record, whose name, level or order, and cells are set, to the report. `fraction`
+  /// is told to whoever follows the progress. False, with the report's stop reason set, when the fit must end.
   ///
-  /// Where the log knows the result nothing is minimised, but the cells that were given a denser quadrature get it, so that
-  /// the same problem may be solved twice: correspondences are forgotten at the start. Who looks at them afterwards must
-  /// call `SurfaceTerm::forget` before.
+  /// Where the log knows the result nothing is minimised, but the cells that were given a denser quadrature get it, so
+  /// that the same problem may be solved twice: correspondences are forgotten at the start. Who looks at them
+  /// afterwards must call `SurfaceTerm::forget` before.
   bool run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction, std::vector<Vec3>& x,
            FitReport& report) const;
 

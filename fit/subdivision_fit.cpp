@@ -145,8 +145,9 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 }
 
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
-  std::unique_ptr<SurfaceTerm> term = make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(),
-                                                        stage.tangential_weight, options_.correspondence);
+  std::unique_ptr<SurfaceTerm> term =
+      make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
+                        options_.correspondence);
   if (!creases_.curves().empty())
     term->add_creases(creases_.energy(level_, kCreaseWidth * target_.surface.length(), stage.tangential_weight));
   return term;
@@ -171,7 +172,8 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   volume->set_distortion(options_.distortion);
   FitProblem problem(level_.nodes, level_.samples, std::move(volume), surface_term(stage), stage.lambda);
   const double begin = runner_.seconds();
-  const bool going = runner_.run(problem, stage, std::move(record), schedule_.fraction(number_), unknowns_, result_.report);
+  const bool going =
+      runner_.run(problem, stage, std::move(record), schedule_.fraction(number_), unknowns_, result_.report);
   seconds_["solve"] += runner_.seconds() - begin;
   mean_.reset();
   return going;
@@ -202,7 +204,8 @@ bool SubdivisionFit::start_level() {
     if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
     level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
     if (t == 1) return true;
-    if (!run_stage(stage, formatted("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda))) return false;
+    if (!run_stage(stage, formatted("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda)))
+      return false;
   }
   level_.nodes = blend(level_.safe_nodes, nodes, t);
   result_.report.stop_reason = StopReason::stalled;
@@ -269,8 +272,8 @@ void SubdivisionFit::go_back(FitSnapshot snapshot) {
   result_.report.undo_stages(snapshot.num_stages, result_.report.stages.size());
 }
 
-/// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself: thin
-/// walls that meet in a soft fit stay apart in a stiffer one. Kept where that leaves at most half of the pairs.
+/// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself:
+/// thin walls that meet in a soft fit stay apart in a stiffer one. Kept where that leaves at most half of the pairs.
 bool SubdivisionFit::unfold(const FitSnapshot& start, std::size_t& pairs) {
   for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= kMostUnfoldingLambda;
        lambda *= kUnfoldingFactor) {
@@ -291,13 +294,14 @@ bool SubdivisionFit::unfold(const FitSnapshot& start, std::size_t& pairs) {
   return true;
 }
 
-/// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without a
-/// tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
+/// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without
+/// a tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
 /// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too
 /// much of the shape in all, or is not done, is undone.
 bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
-  const double least = options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
+  const double least =
+      options_.lambda_close * (options_.tolerance_percent ? kLeastLambdaShare : kLeastDefaultLambdaShare);
   const auto distortion = [this] {
     const StageRecord* stage = result_.report.last_kept_stage();
     return !stage || stage->iterations.empty() ? 0 : stage->iterations.back().volume_energy;
@@ -456,7 +460,8 @@ const char* to_string(StopReason reason) {
   return "unknown";
 }
 
-FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh, const FitOptions& options) {
+FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
+                                 const FitOptions& options) {
   return SubdivisionFit(FitTarget(target), template_mesh, options).run();
 }
 

@@ -65,7 +65,8 @@ class SurfaceTerm {
   SurfaceTerm(std::vector<std::array<Index, 3>> sample_triangles, std::size_t num_samples);
 
   std::span<const Incidence> incidences(std::size_t sample) const {
-    return {incidences_.data() + incidence_offsets_[sample], incidence_offsets_[sample + 1] - incidence_offsets_[sample]};
+    return {incidences_.data() + incidence_offsets_[sample],
+            incidence_offsets_[sample + 1] - incidence_offsets_[sample]};
   }
   const std::vector<Vec3>& assigned() const { return assigned_; }
   double triangle_area(std::size_t t) const { return triangle_areas_[t]; }

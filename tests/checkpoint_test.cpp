@@ -243,7 +243,8 @@ TEST_CASE("A log of another run is refused where it first differs") {
   moved.positions[0].x() += 1e-9;
   again = reloaded(log, log.stages().size());
   options.lambda_close = FitOptions().lambda_close;
-  CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, moved, options), Catch::Contains("does not continue this run"));
+  CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, moved, options),
+                    Catch::Contains("does not continue this run"));
 }
 
 TEST_CASE("A checkpoint is read as it was written") {

@@ -151,7 +151,8 @@ TEST_CASE("L-BFGS decreases the energy as well and ends with certified cells") {
   CHECK(mesh_percent(result.mesh, sample.target) < 0.5 * result.report.initial_distance_mean_percent);
 }
 
-TEST_CASE("A fit whose boundary meets itself is tried again with stiffer cells, and kept as it was where that is no help") {
+TEST_CASE(
+    "A fit whose boundary meets itself is tried again with stiffer cells, and kept as it was where that is no help") {
   // Two blocks on the same place: no weight takes them apart.
   const samples::Sample ball = samples::ball_sample();
   VolumeMesh twice = ball.template_mesh;
@@ -222,7 +223,8 @@ TEST_CASE("A fit says when the steps allowed were not enough, and when its start
   CHECK(short_of_steps.stages.back().ended == MinimizerStop::iteration_limit);
   CHECK(short_of_steps.explanation.find("all of the 4 steps allowed") != std::string::npos);
   options.tolerance_percent = 50;  // met all the same
-  CHECK(fit_subdivision_volume(sample.target, sample.template_mesh, options).report.stop_reason == StopReason::converged);
+  CHECK(fit_subdivision_volume(sample.target, sample.template_mesh, options).report.stop_reason ==
+        StopReason::converged);
   const FitReport inverted = fit_subdivision_volume(sample.target, hex_inverted_inside(), quick(1)).report;
   CHECK(inverted.stop_reason == StopReason::stalled);
 }
