@@ -108,7 +108,8 @@ class HighOrderFit {
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< the highest of any entity
   double lambda_ = 0;        ///< of the last stage
-  std::vector<int> points_;  ///< of each cell per direction, at least: cells that stood in the way stay dense
+  std::vector<int> points_;  ///< of each cell per direction, in the last stage
+  bool stays_dense_ = false; ///< after the first orders: cells have at least so many
   std::vector<double> cell_weights_;  ///< in E_W; empty: all 1
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
@@ -173,7 +174,7 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
   std::vector<int> points(space.num_cells());
   for (std::size_t c = 0; c < points.size(); ++c)
     points[c] = std::max({kLeastPoints, points_for_order(space.pattern_order(space.pattern(c))),
-                          points_.empty() ? 0 : points_[c]});
+                          stays_dense_ ? points_[c] : 0});
   auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
   volume->set_distortion(options_.distortion);
   if (!cell_weights_.empty()) volume->set_cell_weights(cell_weights_);
@@ -265,7 +266,6 @@ void HighOrderFit::begin_try(const HighOrderTry& attempt) {
   ++try_;
   approach_ = attempt.approach;
   states_.clear();
-  points_.clear();
   mesh_ = HighOrderMesh(mesh_.space.with_orders(EntityOrders::uniform(mesh_.space.topology(), 1)), template_);
   ideal_boxes_ = ideal_boxes(template_, template_.positions, target_.surface.volume(), attempt.own_box_share);
 }
@@ -324,6 +324,7 @@ bool HighOrderFit::run_first_orders(int last) {
 }
 
 bool HighOrderFit::run_higher_orders() {
+  stays_dense_ = true;
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
   return lower_lambda() && lift_worst_cells();
@@ -346,6 +347,7 @@ bool HighOrderFit::raise_where_it_pays() {
 
 /// Orders rise where it pays; where it does not any more, lambda falls for the sake of the tolerance.
 bool HighOrderFit::run_adaptive_orders() {
+  stays_dense_ = true;
   while (!meets_tolerance() && raise_where_it_pays()) {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
