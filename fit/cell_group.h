@@ -31,12 +31,16 @@ struct CellGroup {
   std::vector<std::int8_t> signs;
   std::size_t local_begin = 0;                     ///< of the first batch in what the energy keeps of all groups
   std::vector<Wide> to_reference;  ///< A^-1: 9 per batch, or per point of each where cells have references
-  std::vector<Wide> cell_weights;                  ///< of each batch
+  std::vector<Wide> point_weights;                 ///< of every point of each batch; empty: all 1
   bool by_point = false;
   std::vector<Wide> frozen;                        ///< `frozen_size` per point of every batch
   std::vector<Wide> mean_blocks;                   ///< 54 per batch: `add_blocks` over all points
 
   std::size_t num_points() const { return weights.size(); }
+  /// Of a point in the mean over its cells.
+  Wide weight(std::size_t batch, std::size_t q) const {
+    return weights[q] * (point_weights.empty() ? Wide{} + 1.0 : point_weights[batch * num_points() + q]);
+  }
   const Wide* reference(std::size_t batch, std::size_t q) const {
     return to_reference.data() + 9 * (by_point ? batch * num_points() + q : batch);
   }

@@ -14,7 +14,7 @@ namespace subvol {
 
 namespace {
 
-constexpr std::string_view kFormat = "subvol checkpoint 2\n";
+constexpr std::string_view kFormat = "subvol checkpoint 3\n";
 constexpr std::size_t kFingerprintDigits = 16, kStepNumbers = 5;
 
 class Writer {
@@ -79,21 +79,26 @@ class Reader {
 };
 
 void write_stage(const SolvedStage& stage, Writer& writer) {
-  std::vector<double> steps, x;
+  const auto flat = [](std::span<const Vec3> points) {
+    std::vector<double> numbers;
+    for (const Vec3& p : points) numbers.insert(numbers.end(), {p.x(), p.y(), p.z()});
+    return numbers;
+  };
+  std::vector<double> steps;
   for (const IterationRecord& step : stage.result.iterations)
     steps.insert(steps.end(), {step.surface_energy, step.volume_energy, step.step_length,
                                static_cast<double>(step.linear_iterations), static_cast<double>(step.evaluations)});
-  for (const Vec3& p : stage.x) x.insert(x.end(), {p.x(), p.y(), p.z()});
   writer.text(stage.name);
   writer.number(stage.start);
   writer.number(static_cast<std::uint64_t>(stage.result.stop));
   writer.text(stage.result.explanation);
   writer.numbers(std::span(&stage.seconds, 1));
   writer.numbers(steps);
-  writer.numbers(x);
+  writer.numbers(flat(stage.x));
   writer.number(static_cast<std::uint64_t>(stage.result.small_steps));
   writer.number(stage.result.densified.size());
   for (const std::vector<Index>& cells : stage.result.densified) writer.indices(cells);
+  writer.numbers(flat(stage.result.densified_at));
 }
 
 MinimizerStop stop_of(std::uint64_t number) {
@@ -117,13 +122,20 @@ SolvedStage read_stage(Reader& reader) {
   const std::vector<double> seconds = reader.numbers(1);
   if (seconds.size() != 1 || seconds[0] < 0) throw InputError("a time is out of range");
   stage.seconds = seconds[0];
-  const std::vector<double> steps = reader.numbers(kStepNumbers), x = reader.numbers(3);
+  const auto points = [&reader] {
+    const std::vector<double> numbers = reader.numbers(3);
+    std::vector<Vec3> result;
+    for (std::size_t i = 0; i < numbers.size(); i += 3) result.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+    return result;
+  };
+  const std::vector<double> steps = reader.numbers(kStepNumbers);
+  stage.x = points();
   for (std::size_t i = 0; i < steps.size(); i += kStepNumbers)
     stage.result.iterations.push_back(
         {steps[i], steps[i + 1], steps[i + 2], count_of(steps[i + 3]), count_of(steps[i + 4])});
-  for (std::size_t i = 0; i < x.size(); i += 3) stage.x.emplace_back(x[i], x[i + 1], x[i + 2]);
   stage.result.small_steps = count_of(static_cast<double>(reader.number()));
   for (std::uint64_t left = reader.number(); left > 0; --left) stage.result.densified.push_back(reader.indices());
+  stage.result.densified_at = points();
   return stage;
 }
 

@@ -40,11 +40,13 @@ std::span<const std::array<double, 3>> triangle_points(std::size_t number) {
 }  // namespace
 
 ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
-                                       std::size_t num_samples, double tangential_weight, int points_per_triangle)
+                                       std::size_t num_samples, double tangential_weight, int points_per_triangle,
+                                       SurfacePull pull)
     : SurfaceTerm(std::move(sample_triangles), num_samples),
       target_(&target),
       tau_(tangential_weight),
-      scale_(1 / (2 * target.area() * target.length() * target.length())) {
+      scale_(1 / (2 * target.area() * target.length() * target.length())),
+      pull_(pull) {
   if (!(tau_ >= 0 && tau_ <= 1)) throw InputError("ClosestPointEnergy: tangential_weight must be in [0, 1]");
   if (points_per_triangle != 1 && points_per_triangle != 3)
     throw InputError("ClosestPointEnergy: points_per_triangle must be 1 or 3");
@@ -111,10 +113,12 @@ double ClosestPointEnergy::share_over_rim(const Link& link, const ClosestPoint::
 }
 
 void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
+  constexpr double kLeastOffset = 1e-6;  // below, what rounding leaves of x - t(x) may point anywhere
   if (!target_tree_) return;
   surface_links_.resize(surface_offsets_.back());
   surface_hints_.resize(surface_links_.size(), kNoIndex);
   surface_distances_.resize(surface_links_.size());
+  const bool straight = pull_ == SurfacePull::straight;
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < triangles().size(); ++t) {
     const auto& q = triangles()[t];
@@ -131,7 +135,10 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
               emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n), tau_};
       surface_distances_[begin + k] = hit.distance;
-      if (!over_rim(hit)) continue;
+      if (!over_rim(hit)) {
+        if (straight && hit.distance > kLeastOffset * target_->length()) link.normal = (x - hit.point) / hit.distance;
+        continue;
+      }
       link.weight *= share_over_rim(link, hit, samples);
       link.tangential = 0;
       surface_distances_[begin + k] = 0;

@@ -9,10 +9,19 @@
 
 namespace subvol {
 
+/// How places of the fitted surface are drawn to the target: n of the second sum below.
+///
+///   along_normals  the normal of the triangle that t(x_q) lies on. Where that is an edge or a corner of the target, the
+///                  way back may be square to it: only tau pulls, and what sticks out there stays out.
+///   straight       (x_q - t(x_q)) / |x_q - t(x_q)|, which is the normal where t(x_q) lies within a smooth face. Curved
+///                  cells get nearer with it: the largest distance of a bust of 7 cells fell from 1.1 to 0.7 % of the
+///                  diagonal, while that of a tangled mesh of 2,832 straight hexes rose from 0.49 to 0.50 %.
+enum class SurfacePull { along_normals, straight };
+
 /// The surface energy of Eq. 9 with exact closest points in place of Voronoi cells.
 ///
 ///   E_S = 1/(2 A L^2) (sum_j a_j (y_j - s(y_j))^T M (y_j - s(y_j)) + sum_q b_q (x_q - t(x_q))^T M (x_q - t(x_q)))
-///   M = n n^T + tau (I - n n^T),  n: unit normal of the target at y_j or t(x_q)
+///   M = n n^T + tau (I - n n^T),  n: unit normal of the target at y_j or t(x_q) (`SurfacePull`)
 ///
 /// y_j, a_j   samples of the target and the area each stands for;  s(y): closest point of the triangulated surface S~
 /// x_q, b_q   quadrature points of S~'s triangles with their areas;  t(x): closest point of the target
@@ -33,7 +42,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
  public:
   /// target must outlive the energy. points_per_triangle: 1 or 3. InputError: as `SurfaceEnergy`.
   ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
-                     std::size_t num_samples, double tangential_weight, int points_per_triangle);
+                     std::size_t num_samples, double tangential_weight, int points_per_triangle,
+                     SurfacePull pull = SurfacePull::along_normals);
 
   /// From the next `assign` on a tie of length d counts 1 + (d / length)^2 times: places that are far off are drawn
   /// more than the mean asks for, which keeps the largest distance down. length > 0 in the target's unit, else
@@ -81,6 +91,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 
   double tau_, scale_, inverse_far_ = 0;
+  SurfacePull pull_;
   std::vector<Link> target_links_;           ///< by sample triangle
   std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
   std::vector<Link> surface_links_;          ///< by sample triangle

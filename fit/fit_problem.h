@@ -43,8 +43,13 @@ struct MinimizerResult {
   std::string explanation;  ///< the test that fired, with its figure
   std::vector<IterationRecord> iterations;
   std::vector<std::vector<Index>> densified{};  ///< cells that were given more quadrature points, in this order
+  std::vector<Vec3> densified_at{};             ///< x when the last of them were; empty: none were
   int small_steps = 0;                          ///< how many of the last steps decreased E by next to nothing
 };
+
+/// Does to the problem's cells what was done to them on the way to this result, so that E is the same function again.
+/// InputError: `densified` and `densified_at` are not those of such a problem.
+void densify_again(FitProblem& problem, const MinimizerResult& result);
 
 struct MinimizerOptions {
   int max_iterations = 20;

@@ -45,7 +45,7 @@ HighOrderEnergy::HighOrderEnergy(const ElementSpace& space, CellReference refere
 
 void HighOrderEnergy::rebuild_groups() {
   const ElementSpace& space = *space_;
-  cell_weights_.resize(space.num_cells(), 1.0);
+  own_emphasis_.resize(space.num_cells(), 0.0);
   if (points_.size() != space.num_cells())
     throw InputError("HighOrderEnergy: points_per_direction must hold one entry per cell");
   std::map<std::array<int, 3>, std::vector<Index>> lists;
@@ -74,10 +74,8 @@ void HighOrderEnergy::rebuild_groups() {
       group.nodes.resize(group.nodes.size() + group.num_modes * kLanes, kNoIndex);
       group.signs.resize(group.nodes.size(), 0);
       const std::size_t first = (group.batches.size() - 1) * group.num_modes * kLanes;
-      Wide& weights = group.cell_weights.emplace_back();
       for (int l = 0; l < kLanes; ++l) {
         const Index c = batch[l] = cells[std::min(i + l, cells.size() - 1)];
-        weights[l] = cell_weights_[c];
         const auto modes = space.modes(c);
         for (std::size_t a = 0; a < modes.size(); ++a) {
           const std::size_t place = first + group.mode_number(modes[a]) * kLanes + l;
@@ -194,7 +192,6 @@ template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
-    const Wide cell_weight = group.cell_weights[b];
     DistortionBatch batches[CellSweep::kAtOnce];
     for (DistortionBatch& batch : batches) batch.floor = floor_;
     Wide sum{};
@@ -208,9 +205,10 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
       kernel(batches, count);
       for (int n = 0; n < count; ++n) {
         const std::size_t q = first + n;
-        sum += group.weights[q] * load_wide(batches[n].energy);
+        const Wide weight = group.weight(b, q);
+        sum += weight * load_wide(batches[n].energy);
         if constexpr (kBack) {
-          for (int e = 0; e < 9; ++e) f[e] = group.weights[q] * cell_weight * load_wide(batches[n].stress[e]);
+          for (int e = 0; e < 9; ++e) f[e] = weight * load_wide(batches[n].stress[e]);
           product_with_transpose(f, group.reference(b, q), j[n]);
         }
         per_point(g, b, q, batches[n]);
@@ -218,7 +216,7 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
     });
     if constexpr (kBack) keep(group, b, sweep.coefficients());
     double total = 0;
-    for (int l = 0; l < group.active[b]; ++l) total += cell_weight[l] * sum[l];
+    for (int l = 0; l < group.active[b]; ++l) total += sum[l];
     return total;
   });
 }
@@ -249,7 +247,7 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
   const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     CellGroup& group = groups_[g];
     Wide* frozen = &group.frozen[kSize * (b * group.num_points() + q)];
-    const Wide weight = scale * cell_share() * group.weights[q] * group.cell_weights[b];
+    const Wide weight = scale * cell_share() * group.weight(b, q);
     freeze<kCoupled>(batch, group.reference(b, q), weight, frozen);
     add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
   };
@@ -352,26 +350,57 @@ bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3>
   return changed;
 }
 
-void HighOrderEnergy::set_cell_weights(std::span<const double> weights) {
-  if (weights.size() != space_->num_cells()) throw InputError("HighOrderEnergy: weights must hold one entry per cell");
-  cell_weights_.assign(weights.begin(), weights.end());
-  rebuild_groups();
-}
-
 std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) const {
   return certify(*space_, nodes).not_certified;
 }
 
-void HighOrderEnergy::densify(std::span<const Index> cells) {
+void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasis) {
+  if (!(emphasis >= 0 && emphasis <= kMostEmphasis)) throw InputError("HighOrderEnergy: emphasis is out of range");
+  emphasis_ = emphasis;
+  weigh_points(nodes);
+}
+
+/// What the points weigh, by the shape of their cells at these nodes; 1 in the mean over all.
+void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
+  constexpr double kFairShape = 0.6;
+  for (CellGroup& group : groups_) group.point_weights.clear();
+  if (emphasis_ == 0 && std::ranges::all_of(own_emphasis_, [](double k) { return k == 0; })) return;
+  std::vector<std::vector<Wide>> weights;
+  for (const CellGroup& group : groups_) weights.emplace_back(group.num_points() * group.batches.size());
+  const auto weigh = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
+    Wide& weight = weights[g][b * groups_[g].num_points() + q];
+    for (int l = 0; l < kLanes; ++l) {
+      Mat3 f;
+      for (int e = 0; e < 9; ++e) f(e / 3, e % 3) = batch.jacobian[e][l];
+      const double shape = f.determinant() / (f.col(0).norm() * f.col(1).norm() * f.col(2).norm());
+      const double lack = shape > 0 ? std::max(0.0, 1 - shape / kFairShape) : 1;  // 1 where it is not a number, too
+      weight[l] = 1 + std::max(emphasis_, own_emphasis_[groups_[g].batches[b][l]]) * lack * lack;
+    }
+  };
+  integrate<false>(nodes, kernels_->energy, weigh);
+  double sum = 0;
+  for (std::size_t g = 0; g < groups_.size(); ++g)
+    for (std::size_t i = 0; i < weights[g].size(); ++i)
+      for (int l = 0; l < groups_[g].active[i / groups_[g].num_points()]; ++l)
+        sum += groups_[g].weights[i % groups_[g].num_points()] * weights[g][i][l];
+  const double inverse_mean = 1 / (cell_share() * sum);
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    for (Wide& weight : weights[g]) weight *= inverse_mean;
+    groups_[g].point_weights = std::move(weights[g]);
+  }
+}
+
+void HighOrderEnergy::densify(std::span<const Index> cells, std::span<const Vec3> nodes) {
   constexpr int kMostPoints = 33;
-  constexpr double kHeavier = 2;
+  constexpr double kFirstEmphasis = 4;
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())
       throw InputError("HighOrderEnergy: there is no cell " + std::to_string(c));
     points_[c] = std::min(std::max(points_[c], kMostPoints), 2 * points_[c] - 1);
-    cell_weights_[c] = std::max(cell_weights_[c], std::min(heaviest_weight_, kHeavier * cell_weights_[c]));
+    own_emphasis_[c] = std::min(most_own_emphasis_, std::max(kFirstEmphasis, 2 * own_emphasis_[c]));
   }
   rebuild_groups();
+  weigh_points(nodes);
 }
 
 }  // namespace subvol

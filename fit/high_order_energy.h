@@ -19,13 +19,18 @@ struct CellGroup;
 
 /// Mean distortion of a mesh of curved cells against ideal or given reference cells.
 ///
-///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
+///   E_W(x) = 1/n sum_c sum_q w_cq e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
 ///
 /// e is a distortion (`distortion.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map:
 /// edge length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an
-/// `ElementSpace`: vertex positions and the coefficients of edge, face and cell modes. Cells weigh equally unless
-/// weights are set, but those that were densified twice as much each time, up to 64: e grows too slowly towards
-/// inversion to keep them from it.
+/// `ElementSpace`: vertex positions and the coefficients of edge, face and cell modes. w_cq is the quadrature's weight.
+/// E_W is a mean, and e grows slowly towards inversion: few places that are much worse than they need be matter little
+/// to it. With an emphasis k > 0 points of poor shape weigh more, the mean of all weights staying what it was:
+///
+///   w_cq ~ w_q (1 + k_c max(0, 1 - s_cq / 0.6)^2),   s_cq = det J / (|J e1| |J e2| |J e3|) (at least 0)
+///
+/// with s_cq of the nodes when k was set, or cells were densified last; k_c is k, but in cells that were densified at
+/// least 4, and twice as much each time, up to 256.
 ///
 /// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for
 /// n modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept
@@ -58,15 +63,16 @@ class HighOrderEnergy final : public VolumeTerm {
   /// Of each cell; more than it was made with where it was densified.
   std::span<const int> points_per_direction() const { return points_; }
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
-  /// Cells that are in the way twice as dense, and twice as heavy up to `heaviest_weight`.
-  void densify(std::span<const Index> cells) override;
+  /// Cells that are in the way twice as dense, their points of poor shape heavier.
+  void densify(std::span<const Index> cells, std::span<const Vec3> nodes) override;
   /// e, Hencky's to begin with.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
-  /// What each cell weighs, > 0, before any is densified; 1 for all to begin with. InputError: not one entry per cell.
-  void set_cell_weights(std::span<const double> weights);
-  /// How much heavier than others a cell may become, >= 1 (default 64); 1: all weigh equally for good.
-  void set_heaviest_weight(double heaviest) { heaviest_weight_ = heaviest; }
+  static constexpr double kMostEmphasis = 1024;
+  /// k, by the shape that cells have at these nodes. InputError: not in [0, kMostEmphasis].
+  void emphasize_poor(std::span<const Vec3> nodes, double emphasis);
+  /// What cells that are densified reach, 256 at first; 0: nothing.
+  void set_most_own_emphasis(double most) { most_own_emphasis_ = most; }
 
  private:
   template <bool kCoupled>
@@ -74,6 +80,7 @@ class HighOrderEnergy final : public VolumeTerm {
   template <bool kCoupled>
   void multiply_as(std::span<const Vec3> in) const;
   void rebuild_groups();
+  void weigh_points(std::span<const Vec3> nodes);
   void fill_references(CellGroup& group) const;
   void find_incidences();
   template <bool kBack, class Kernel, class PerPoint>
@@ -93,8 +100,8 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<int> points_;
   const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
   double floor_ = kHessianFloor;
-  double heaviest_weight_ = 64;
-  std::vector<double> cell_weights_;
+  double emphasis_ = 0, most_own_emphasis_ = 256;
+  std::vector<double> own_emphasis_;  ///< of each cell that was densified
   std::vector<CellGroup> groups_;
   /// What every batch adds to its cells' modes, and where each node finds its parts: signed places, by node.
   mutable std::vector<double> local_;

@@ -30,10 +30,10 @@ namespace {
 /// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is
 /// worth one.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-/// Lifting the worst cells: those below this multiple of the least scaled Jacobian, as long as it is not good, become
-/// so much heavier each time; how much the distances may grow in all.
+/// Lifting the worst places: their emphasis at first, doubled each time, as long as the least scaled Jacobian is not
+/// good; how much the distances may grow in all.
 constexpr int kMostLifts = 8, kLiftSteps = 8;
-constexpr double kBadShare = 1.3, kGoodScaledJacobian = 0.5, kLiftWeight = 1.5, kMostDistanceGrowth = 1.2;
+constexpr double kFirstEmphasis = 4, kGoodScaledJacobian = 0.5, kMostDistanceGrowth = 1.2;
 
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
@@ -65,7 +65,6 @@ class HighOrderFit {
   struct Outcome {
     double least_scaled_jacobian, mean_percent, max_percent;
     std::size_t pairs;  ///< of faces that intersect
-    std::vector<double> cell_minima;
   };
   void look_over_template();
   int sample_intervals(int order) const;
@@ -86,7 +85,7 @@ class HighOrderFit {
   bool run_adaptive_orders();
   bool lower_lambda();
   Outcome measured_outcome();
-  bool lift_worst_cells();
+  bool lift_worst_places();
   bool meets_tolerance();
   void keep_state();
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
@@ -110,7 +109,7 @@ class HighOrderFit {
   double lambda_ = 0;        ///< of the last stage
   std::vector<int> points_;  ///< of each cell per direction, in the last stage
   bool stays_dense_ = false; ///< after the first orders: cells have at least so many
-  std::vector<double> cell_weights_;  ///< in E_W; empty: all 1
+  double emphasis_ = 0;      ///< of places of poor shape in E_W
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
   MemoryBudget memory_;
@@ -177,7 +176,6 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
                           stays_dense_ ? points_[c] : 0});
   auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
   volume->set_distortion(options_.distortion);
-  if (!cell_weights_.empty()) volume->set_cell_weights(cell_weights_);
   return volume;
 }
 
@@ -185,7 +183,7 @@ FitProblem HighOrderFit::problem(std::unique_ptr<HighOrderEnergy> volume, const 
                                  const Stage& stage) const {
   return {identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
           make_surface_term(target_.surface, samples.triangles, samples.points.size(), stage.tangential_weight,
-                            options_.correspondence),
+                            options_.correspondence, SurfacePull::straight),
           stage.lambda};
 }
 
@@ -202,14 +200,14 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   record.name = (try_ > 1 ? formatted("try %d, ", try_) : "") +
                 (least < order_ ? formatted("orders %d to %d", least, order_) : formatted("order %d", order_)) +
                 formatted(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
-  if (!cell_weights_.empty())
-    record.name += formatted(", worst cells up to %.3g times as heavy", std::ranges::max(cell_weights_));
+  if (emphasis_ > 0) record.name += formatted(", poor shape up to %g times as heavy", 1 + emphasis_);
   record.order = order_;
   record.cells = mesh_.space.num_cells();
   keep_state();
   lambda_ = stage.lambda;
   mean_.reset();
   std::unique_ptr<HighOrderEnergy> volume = volume_energy(mesh_.space);
+  volume->emphasize_poor(mesh_.coefficients, emphasis_);
   const HighOrderEnergy& energy = *volume;
   FitProblem stage_problem = problem(std::move(volume), samples_, stage);
   const double fraction = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_) + 1);
@@ -281,11 +279,11 @@ bool HighOrderFit::run_order(Approach approach, int order) {
 }
 
 /// The orders up to `last`, in the first way that gets near the target without folding its surface; else in the one of
-/// the tries that got nearest.
+/// the tries that ended with the least energy.
 bool HighOrderFit::run_first_orders(int last) {
   struct Arrival {
     std::size_t pairs;
-    double mean, distortion;
+    double mean, distortion, energy;
     HighOrderMesh mesh;
     std::vector<Vec3> ideal_boxes;
     std::vector<int> points;
@@ -304,9 +302,11 @@ bool HighOrderFit::run_first_orders(int last) {
     if (schedule_.tries.size() == 1) return true;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
-    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, mesh_, ideal_boxes_, points_, approach_, states_,
-                    try_, stages_begin, report_.stages.size()};
-    const bool better = !best || std::tuple(arrival.pairs > 0, arrival.mean) < std::tuple(best->pairs > 0, best->mean);
+    const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
+    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, energy, mesh_, ideal_boxes_, points_, approach_,
+                    states_, try_, stages_begin, report_.stages.size()};
+    const bool better =
+        !best || std::tuple(arrival.pairs > 0, arrival.energy) < std::tuple(best->pairs > 0, best->energy);
     if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
     if (best->pairs == 0 && fair) break;
@@ -327,7 +327,7 @@ bool HighOrderFit::run_higher_orders() {
   stays_dense_ = true;
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
-  return lower_lambda() && lift_worst_cells();
+  return lower_lambda() && lift_worst_places();
 }
 
 /// Raises the orders of what gains most. False where that is not worth its nodes, or they have no room.
@@ -352,7 +352,7 @@ bool HighOrderFit::run_adaptive_orders() {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
   }
-  return report_.stop_reason != StopReason::memory_limit && lower_lambda() && lift_worst_cells();
+  return report_.stop_reason != StopReason::memory_limit && lower_lambda() && lift_worst_places();
 }
 
 /// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the
@@ -378,25 +378,21 @@ bool HighOrderFit::lower_lambda() {
 HighOrderFit::Outcome HighOrderFit::measured_outcome() {
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance distance = target_.distance(measured_boundary());
-  return {quality.min_scaled_jacobian, keep_mean(distance.mean()), 100 * distance.max(), intersecting_pairs(),
-          quality.cell_minima};
+  return {quality.min_scaled_jacobian, keep_mean(distance.mean()), 100 * distance.max(), intersecting_pairs()};
 }
 
-/// The last stage with more and more weight on the worst cells: E_W is a mean, to which few cells that are much worse
-/// than they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
-bool HighOrderFit::lift_worst_cells() {
-  if (!options_.lift_worst_cells || options_.order < 2) return true;
+/// The last stage with more and more emphasis on places of poor shape: E_W is a mean, to which few places that are much
+/// worse than they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
+bool HighOrderFit::lift_worst_places() {
+  if (!options_.lift_worst_places || options_.order < 2) return true;
   Outcome now = measured_outcome();
   const double most_mean = options_.tolerance_percent ? std::max(now.mean_percent, *options_.tolerance_percent)
                                                       : kMostDistanceGrowth * now.mean_percent;
   const double most_max = kMostDistanceGrowth * now.max_percent;
-  cell_weights_.assign(mesh_.space.num_cells(), 1.0);
   const auto is_poor = [](double value) { return value > 0 && value < kGoodScaledJacobian; };
   for (int round = 0; round < kMostLifts && is_poor(now.least_scaled_jacobian); ++round) {
     FitSnapshot unlifted = snapshot();
-    const double bad = std::min(kGoodScaledJacobian, kBadShare * now.least_scaled_jacobian);
-    for (std::size_t c = 0; c < cell_weights_.size(); ++c)
-      if (now.cell_minima[c] < bad) cell_weights_[c] *= kLiftWeight;
+    emphasis_ = round == 0 ? kFirstEmphasis : 2 * emphasis_;
     Stage stage = schedule_.final_stage(lambda_);
     stage.max_iterations = kLiftSteps;
     if (!run_stage(stage)) {

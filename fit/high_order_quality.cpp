@@ -20,7 +20,7 @@ constexpr std::size_t kChunk = 512;  // points of a table, so that tables of hig
 
 /// What is kept of the samples of a cell.
 struct Sampled {
-  double least = 1, sum = 0;
+  double least = 1, mean = 0;
   std::size_t count = 0;
 };
 
@@ -34,7 +34,8 @@ double scaled_jacobian(const Mat3& jacobian, const Mat3& ideal_inverse) {
 void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<const Index> cells, int n,
                     const CellReference& reference, std::vector<Sampled>& samples) {
   const CellKind kind = mesh.space.pattern_kind(pattern);
-  const std::vector<Vec3> points = make_quadrature(kind, QuadratureRule::trapezoidal, n).points;
+  const Quadrature rule = make_quadrature(kind, QuadratureRule::trapezoidal, n);
+  const std::vector<Vec3>& points = rule.points;
   const Mat3 inverse = ideal_inverse(kind);
   for (std::size_t begin = 0; begin < points.size(); begin += kChunk) {
     const std::size_t size = std::min(kChunk, points.size() - begin);
@@ -51,7 +52,7 @@ void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<co
           const double value = scaled_jacobian(
               jacobians[q], reference ? Mat3(reference(cells[i], points[begin + q]).inverse()) : inverse);
           sampled.least = std::min(sampled.least, value);
-          sampled.sum += value;
+          sampled.mean += rule.weights[begin + q] * value;
         }
         sampled.count += size;
       }
@@ -85,7 +86,7 @@ QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_directi
   for (std::size_t c = 0; c < samples.size(); ++c) {
     report.add_cell(samples[c].least);
     report.num_samples += samples[c].count;
-    sum += samples[c].sum;
+    sum += static_cast<double>(samples[c].count) * samples[c].mean;
   }
   if (report.num_samples > 0) report.mean_scaled_jacobian = sum / static_cast<double>(report.num_samples);
   report.certificate = certify(mesh.space, mesh.coefficients);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/fit_problem.h"
 #include "fit/vector_math.h"
+#include "subvol/error.h"
 
 #include <Eigen/LU>
 
@@ -142,6 +143,16 @@ bool record_step(const IterationRecord& record, const MinimizerOptions& options,
   return false;
 }
 
+void densify_again(FitProblem& problem, const MinimizerResult& result) {
+  if (result.densified.empty()) return;
+  if (result.densified_at.size() != problem.nodes.num_cols)
+    throw InputError("cells were densified at a state of " + std::to_string(result.densified_at.size()) +
+                     " unknowns, expected " + std::to_string(problem.nodes.num_cols));
+  std::vector<Vec3> nodes(problem.nodes.num_rows());
+  problem.apply_nodes(result.densified_at, nodes);
+  for (const std::vector<Index>& cells : result.densified) problem.volume->densify(cells, nodes);
+}
+
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
   constexpr double kArmijo = 1e-4;
   constexpr int kMaxHalvings = 30, kPreconditionerLife = 4, kMaxStiffenings = 5;
@@ -149,7 +160,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
   MinimizerResult result{MinimizerStop::iteration_limit, "", {}};
   if (options.begun) result = *options.begun;
   result.stop = MinimizerStop::iteration_limit;
-  for (const std::vector<Index>& cells : result.densified) problem.volume->densify(cells);
+  densify_again(problem, result);
   const std::size_t n = x.size();
   std::vector<Vec3> y(problem.nodes.num_rows()), z(problem.samples.num_rows());
   problem.apply_nodes(x, y);
@@ -210,7 +221,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
 
     double trial = 0, trial_surface = 0, trial_volume = 0;
     std::vector<Index> blocking, trial_uncertified;
-    bool accepted = false;
+    bool accepted = false, drawn_back = false;
     for (int halving = 0; halving < kMaxHalvings && !accepted; ++halving, t *= accepted ? 1 : 0.5) {
       if (has_ended(options, result)) return result;
       for (std::size_t i = 0; i < y.size(); ++i) y_trial[i] = y[i] + t * dy[i];
@@ -222,12 +233,16 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       if (!(trial <= energy + kArmijo * t * slope)) continue;
       trial_uncertified = problem.volume->uncertified(y_trial);
       const std::vector<Index> failed = newly_failed(uncertified, trial_uncertified);
-      accepted = failed.empty();
+      // A cell that is certified at this length, but not at twice it, may be all but inverted here, and every direction
+      // from there leads out. With half of the length, its least determinant is at least about half of what it was.
+      accepted = failed.empty() && (blocking.empty() || drawn_back);
+      drawn_back = failed.empty();
       blocking.insert(blocking.end(), failed.begin(), failed.end());
     }
     if (!blocking.empty()) {
-      problem.volume->densify(blocking);
+      problem.volume->densify(blocking, y);
       result.densified.push_back(std::move(blocking));
+      result.densified_at = x;
     }
     if (!accepted) {
       result.stop = MinimizerStop::no_step;

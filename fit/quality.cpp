@@ -3,6 +3,7 @@
 
 #include "fit/bernstein.h"
 #include "fit/element_rule.h"
+#include "fit/quadrature.h"
 #include "subvol/error.h"
 
 #include <Eigen/LU>
@@ -17,11 +18,16 @@ namespace {
 
 using bernstein::Vector;
 
-/// What is kept of a cell's samples.
+/// What is kept of a cell's samples; the mean is that over the cell, by the trapezoidal rule's weights.
 template <class T>
 struct Sampled {
-  T least, sum;
+  T least, mean;
 };
+
+/// What samples count in the mean over a cell, in their order.
+std::vector<double> sample_weights(CellKind kind, int n) {
+  return make_quadrature(kind, QuadratureRule::trapezoidal, n).weights;
+}
 
 template <class T>
 Vector<T> blend(const Vector<T>& p, const Vector<T>& q, double t) {
@@ -84,7 +90,7 @@ template <class T>
 struct HexSampler {
   std::array<std::vector<Vector<T>>, 3> directions;
 
-  Sampled<T> run(const std::array<Vector<T>, 8>& x, int n) {
+  Sampled<T> run(const std::array<Vector<T>, 8>& x, int n, std::span<const double> weights) {
     for (int axis = 0; axis < 3; ++axis) edge_directions(x, axis, n, directions[axis]);
     const auto& [du, dv, dw] = directions;
     Sampled<T> result;
@@ -92,9 +98,10 @@ struct HexSampler {
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j)
         for (int k = 0; k < n; ++k, first = false) {
+          const double weight = weights[(i * n + j) * n + k];
           const T value = triple(du[n * j + k], dv[n * i + k], dw[n * i + j]);
           result.least = first ? value : smaller(value, result.least);
-          result.sum = first ? value : T(result.sum + value);
+          result.mean = first ? T(weight * value) : T(result.mean + weight * value);
         }
     return result;
   }
@@ -104,24 +111,25 @@ using Point = Vector<double>;
 
 Point to_point(const Vec3& p) { return {p[0], p[1], p[2]}; }
 
-Sampled<double> sample_prism(std::span<const Vec3> corners, int n) {
+Sampled<double> sample_prism(std::span<const Vec3> corners, int n, std::span<const double> weights) {
   std::array<Point, 6> x;
   for (int v = 0; v < 6; ++v) x[v] = to_point(corners[v]);
   Sampled<double> result{1, 0};
+  std::size_t q = 0;
   for (int k = 0; k < n; ++k) {
     const double w = k / (n - 1.0);
     const Point xu = blend(bernstein::difference(x[1], x[0]), bernstein::difference(x[4], x[3]), w);
     const Point xv = blend(bernstein::difference(x[2], x[0]), bernstein::difference(x[5], x[3]), w);
     const Point normal = bernstein::cross(direction(xu), direction(second_column(xu, xv)));
-    for (int i = 0; i < n; ++i)
-      for (int j = 0; i + j < n; ++j) {
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i + j < n; ++i) {
         const double u = i / (n - 1.0), v = j / (n - 1.0);
         Point up;
         for (int a = 0; a < 3; ++a)
           up[a] = (1 - u - v) * (x[3][a] - x[0][a]) + u * (x[4][a] - x[1][a]) + v * (x[5][a] - x[2][a]);
         const double value = bernstein::dot(normal, direction(up));
         result.least = smaller(value, result.least);
-        result.sum += value;
+        result.mean += weights[q++] * value;
       }
   }
   return result;
@@ -138,26 +146,28 @@ std::size_t num_samples(CellKind kind, std::size_t n) {
   return kind == CellKind::prism ? n * n * (n + 1) / 2 : n * (n + 1) * (n + 2) / 6;
 }
 
-Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n) {
-  if (kind == CellKind::prism) return sample_prism(corners, n);
+Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n, std::span<const double> weights) {
+  if (kind == CellKind::prism) return sample_prism(corners, n, weights);
   if (kind == CellKind::tet) {
     const double value = tet_value(corners);
-    return {value, value * static_cast<double>(num_samples(kind, n))};
+    return {value, value};
   }
   std::array<Point, 8> x;
   for (int v = 0; v < 8; ++v) x[v] = to_point(corners[v]);
-  return HexSampler<double>{}.run(x, n);
+  return HexSampler<double>{}.run(x, n, weights);
 }
 
 /// The points of a rule with the gradients of the shape functions by canonical coordinates; unused rows are 0.
 struct SamplePoints {
   using Gradients = Eigen::Matrix<double, kMaxCellVertices, 3>;
   std::vector<Vec3> points;
+  std::vector<double> weights;
   std::vector<Gradients> gradients;
 
   SamplePoints(CellKind kind, int n) {
     const ElementRule rule = make_element_rule(kind, n);
     points = rule.points;
+    weights = rule.weights;
     gradients.assign(points.size(), Gradients::Zero());
     const Mat3 ideal = ideal_matrix(kind);
     for (std::size_t q = 0; q < points.size(); ++q)
@@ -178,18 +188,17 @@ Sampled<double> sample_cell(std::span<const Vec3> corners, const SamplePoints& a
     const double squared = f.col(0).squaredNorm() * f.col(1).squaredNorm() * f.col(2).squaredNorm();
     const double value = squared > 0 ? f.determinant() / std::sqrt(squared) : 0;
     result.least = std::min(result.least, value);
-    result.sum += value;
+    result.mean += at.weights[q] * value;
   }
   return result;
 }
 
-/// Samples of every cell; a sum that is not a number means that comparisons have lost the least value too.
+/// Samples of every cell; a mean that is not a number means that comparisons have lost the least value too.
 std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const CellReference& reference) {
   std::vector<Sampled<double>> result(mesh.num_cells());
-  const auto keep = [&](std::size_t c, double least, double sum) {
-    const bool finite = std::isfinite(sum);
-    result[c] = {finite ? std::clamp(least, -1.0, 1.0) : -1,
-                 finite ? sum : -static_cast<double>(num_samples(mesh.kinds[c], n))};
+  const auto keep = [&](std::size_t c, double least, double mean) {
+    const bool finite = std::isfinite(mean);
+    result[c] = {finite ? std::clamp(least, -1.0, 1.0) : -1, finite ? mean : -1};
   };
   if (reference) {
     const SamplePoints points[] = {{CellKind::tet, n}, {CellKind::prism, n}, {CellKind::hex, n}};
@@ -199,21 +208,21 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
       const SamplePoints& at = points[static_cast<std::size_t>(mesh.kinds[c])];
       const Sampled<double> s =
           sample_cell({corners.data(), mesh.cell(c).size()}, at, reference, static_cast<Index>(c));
-      // A tet has one point only.
-      const double repeats = static_cast<double>(num_samples(mesh.kinds[c], n)) / static_cast<double>(at.points.size());
-      keep(c, s.least, repeats * s.sum);
+      keep(c, s.least, s.mean);
     }
     return result;
   }
+  const std::vector<double> of_prism = sample_weights(CellKind::prism, n), of_hex = sample_weights(CellKind::hex, n);
   const auto hexes = [&](std::size_t first) {
     thread_local HexSampler<Lanes> sampler;
-    const Sampled<Lanes> s = sampler.run(gather_hexes(mesh.positions, mesh.cell(first).data()), n);
-    for (int lane = 0; lane < kLanes; ++lane) keep(first + lane, s.least[lane], s.sum[lane]);
+    const Sampled<Lanes> s = sampler.run(gather_hexes(mesh.positions, mesh.cell(first).data()), n, of_hex);
+    for (int lane = 0; lane < kLanes; ++lane) keep(first + lane, s.least[lane], s.mean[lane]);
   };
   for_each_cell_block(mesh, hexes, [&](std::size_t c) {
     const auto corners = gather_cell(mesh.positions, mesh, c);
-    const Sampled<double> s = sample_cell(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, n);
-    keep(c, s.least, s.sum);
+    const Sampled<double> s = sample_cell(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, n,
+                                          mesh.kinds[c] == CellKind::prism ? of_prism : of_hex);
+    keep(c, s.least, s.mean);
   });
   return result;
 }
@@ -254,8 +263,9 @@ QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction,
   double sum = 0;
   for (std::size_t c = 0; c < samples.size(); ++c) {
     report.add_cell(samples[c].least);
-    report.num_samples += num_samples(mesh.kinds[c], n);
-    sum += samples[c].sum;
+    const std::size_t count = num_samples(mesh.kinds[c], n);
+    report.num_samples += count;
+    sum += static_cast<double>(count) * samples[c].mean;
   }
   if (report.num_samples > 0) report.mean_scaled_jacobian = sum / static_cast<double>(report.num_samples);
   report.certificate = certify(mesh);

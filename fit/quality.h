@@ -22,7 +22,10 @@ struct QualityReport {
     double value;  ///< its least scaled Jacobian
   };
   std::size_t num_cells = 0, num_samples = 0;
-  double min_scaled_jacobian = 1, mean_scaled_jacobian = 1;   ///< over all samples of all cells; 1 without cells
+  double min_scaled_jacobian = 1;   ///< of all samples of all cells; 1 without cells
+  /// Means over the cells, by the trapezoidal rule's weights (so that faces, which many samples lie on, count no more
+  /// than they are), then over all: a cell counts as often as it has samples. 1 without cells.
+  double mean_scaled_jacobian = 1;
   std::vector<double> cell_minima;                            ///< least scaled Jacobian of each cell
   std::array<std::size_t, kNumHistogramBins> histogram{};     ///< of cell_minima; equal bins over [-1, 1]
   std::size_t inverted_cells = 0;                             ///< with a sample <= 0, or refuted by the certificate

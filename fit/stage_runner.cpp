@@ -12,11 +12,11 @@ namespace subvol {
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
                                                std::size_t num_samples, double tangential_weight,
-                                               Correspondence correspondence) {
+                                               Correspondence correspondence, SurfacePull pull) {
   if (correspondence == Correspondence::voronoi)
     return std::make_unique<SurfaceEnergy>(target, sample_triangles, num_samples, tangential_weight);
   const int points = sample_triangles.size() > 2 * target.triangles().size() ? 1 : 3;
-  return std::make_unique<ClosestPointEnergy>(target, sample_triangles, num_samples, tangential_weight, points);
+  return std::make_unique<ClosestPointEnergy>(target, sample_triangles, num_samples, tangential_weight, points, pull);
 }
 
 namespace {
@@ -64,7 +64,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
     solve(problem, minimizer, solved);
     going = solved.is_over();
   } else {
-    for (const std::vector<Index>& cells : solved.result.densified) problem.volume->densify(cells);
+    densify_again(problem, solved.result);
     if (!solved.result.iterations.empty()) going = minimizer.progress(solved.result.iterations.back());
   }
   x = std::move(solved.x);

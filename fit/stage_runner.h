@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/closest_point_energy.h"
 #include "fit/fit_problem.h"
 #include "fit/fit_schedule.h"
 #include "fit/stage_log.h"
@@ -19,7 +20,8 @@ namespace subvol {
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
                                                std::size_t num_samples, double tangential_weight,
-                                               Correspondence correspondence);
+                                               Correspondence correspondence,
+                                               SurfacePull pull = SurfacePull::along_normals);
 
 /// InputError unless closest points are what pulls: Voronoi cells of points have no area.
 void require_closest(Correspondence correspondence);

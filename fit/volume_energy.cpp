@@ -88,7 +88,7 @@ void VolumeEnergy::find_pattern() {
   }
 }
 
-void VolumeEnergy::densify(std::span<const Index> cells) {
+void VolumeEnergy::densify(std::span<const Index> cells, std::span<const Vec3>) {
   constexpr int kDensePoints = 5;
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())

@@ -46,7 +46,7 @@ class VolumeEnergy final : public VolumeTerm {
                            std::span<Mat3> diagonal) const override;
   double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
-  void densify(std::span<const Index> cells) override;
+  void densify(std::span<const Index> cells, std::span<const Vec3> nodes = {}) override;
 
   /// e, Hencky's to begin with.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.

@@ -43,10 +43,10 @@ class VolumeTerm {
 
   /// Cells that are not proved to be nowhere inverted, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
-  /// Gives these cells more quadrature points from now on, for they invert between those they have. May weigh them
-  /// more.
+  /// Gives these cells more quadrature points from now on, for they invert between those they have. Points may weigh
+  /// otherwise from then on, by the shape of the cells at these nodes.
   /// InputError: there is no such cell.
-  virtual void densify(std::span<const Index> cells) = 0;
+  virtual void densify(std::span<const Index> cells, std::span<const Vec3> nodes) = 0;
 };
 
 }  // namespace subvol

@@ -126,7 +126,7 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
                                 std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
   auto energy =
       std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
-  energy->set_heaviest_weight(1);  // cells in creases end near inversion: they are not to outweigh all others
+  energy->set_most_own_emphasis(0);  // cells in creases end near inversion: they are not to outweigh all others
   FitProblem problem(std::move(nodes), select_rows(nodes, {}), std::move(energy), nullptr, 1);
   problem.fixed_nodes = std::move(fixed);
   return problem;

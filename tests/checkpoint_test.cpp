@@ -63,7 +63,7 @@ void check_that_it_resumes(const Run& run) {
 
 SolvedStage small_stage() {
   return {"level 1, lambda 0.5", 77, {Vec3(1, 2, 3), Vec3(0.1, -0.2, 1e-300)},
-          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}, {{4, 5}, {}, {4}}, 1}, 0.5};
+          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}, {{4, 5}, {}, {4}}, {Vec3(1, 2, 4), Vec3(0, 0, 7)}, 1}, 0.5};
 }
 
 }  // namespace
@@ -189,7 +189,8 @@ TEST_CASE("An optimisation whose boundary is far from its target goes on to the 
 TEST_CASE("A stage that comes from a log leaves its problem as one that was solved") {
   struct Cells : VolumeTerm {
     std::vector<std::vector<Index>>* densified;
-    explicit Cells(std::vector<std::vector<Index>>& to) : densified(&to) {}
+    std::vector<Vec3>* at;
+    Cells(std::vector<std::vector<Index>>& to, std::vector<Vec3>& nodes) : densified(&to), at(&nodes) {}
     double value(std::span<const Vec3>) const override { return 0; }
     double add_gradient(std::span<const Vec3>, double, std::span<Vec3>) const override { return 0; }
     double linearize(std::span<const Vec3>, double, std::span<Vec3>) override { return 0; }
@@ -197,7 +198,10 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
     void add_diagonal_blocks(const SparseMap&, const SparseMap&, std::span<Mat3>) const override {}
     double max_step(std::span<const Vec3>, std::span<const Vec3>, double) const override { return 1; }
     std::vector<Index> uncertified(std::span<const Vec3>) const override { return {}; }
-    void densify(std::span<const Index> cells) override { densified->emplace_back(cells.begin(), cells.end()); }
+    void densify(std::span<const Index> cells, std::span<const Vec3> nodes) override {
+      densified->emplace_back(cells.begin(), cells.end());
+      at->assign(nodes.begin(), nodes.end());
+    }
   };
   struct Surface : SurfaceTerm {
     int* forgotten;
@@ -206,9 +210,10 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
     void forget() override { ++*forgotten; }
   };
   std::vector<std::vector<Index>> densified;
+  std::vector<Vec3> densified_at;
   int forgotten = 0;
   const SparseMap identity{3, {0, 1, 2, 3}, {0, 1, 2}, {1, 1, 1}};
-  FitProblem problem(identity, identity, std::make_unique<Cells>(densified), std::make_unique<Surface>(forgotten), 0.5);
+  FitProblem problem(identity, identity, std::make_unique<Cells>(densified, densified_at), std::make_unique<Surface>(forgotten), 0.5);
   std::vector<Vec3> x(3, Vec3::Zero());
   FitReport report;
   StageRecord record;
@@ -220,13 +225,20 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
   CHECK(densified.empty());
   std::vector<SolvedStage> solved = first.stages();
   solved[0].result.densified = {{2, 1}, {0}};
+  solved[0].result.densified_at = {Vec3(1, 0, 0), Vec3(0, 2, 0), Vec3(0, 0, 3)};
   StageLog log(solved, "memory");
   forgotten = 0;
   x.assign(3, Vec3::Zero());
   CHECK(StageRunner({.log = &log}).run(problem, {0.5, 0, 2}, record, 0, x, report));
   CHECK(log.num_recalled() == 1);
   CHECK(densified == solved[0].result.densified);
+  CHECK(densified_at == solved[0].result.densified_at);
   CHECK(forgotten == 1);
+  solved[0].result.densified_at.pop_back();
+  StageLog wrong(solved, "memory");
+  x.assign(3, Vec3::Zero());
+  CHECK_THROWS_WITH(StageRunner({.log = &wrong}).run(problem, {0.5, 0, 2}, record, 0, x, report),
+                    Catch::Contains("2 unknowns, expected 3"));
 }
 
 TEST_CASE("A log of another run is refused where it first differs") {
@@ -265,6 +277,7 @@ TEST_CASE("A checkpoint is read as it was written") {
   CHECK(stage.seconds == 0.5);
   CHECK(stage.result.small_steps == 1);
   CHECK(stage.result.densified == small_stage().result.densified);
+  CHECK(same_bits(stage.result.densified_at, small_stage().result.densified_at));
   CHECK(checkpoint_bytes(read.identity, read.stages) == bytes);
 }
 

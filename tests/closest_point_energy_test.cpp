@@ -56,3 +56,19 @@ TEST_CASE("refined triangles of the closest-point energy see corners, and pull a
   refined.pop_back();
   CHECK_THROWS_AS(energy.refine(refined), InputError);
 }
+
+TEST_CASE("a straight pull draws back what sticks out beyond an edge, where normals do not", "[surface]") {
+  const TriangleMesh cube = cube_surface(4, false);
+  const TargetSurface target(cube);
+  const double high = std::ranges::max(cube.positions, {}, [](const Vec3& p) { return p.x(); }).x();
+  const std::vector<Vec3> samples = {{high + 0.1, high + 0.1, 0.2}, {high + 0.2, high + 0.1, 0.5}, {high + 0.1, high + 0.2, 0.3}};
+  const auto energy = [&](SurfacePull pull, double tau) {
+    ClosestPointEnergy result(target, {{0, 1, 2}}, samples.size(), tau, 3, pull);
+    result.assign(samples);
+    return result.surface_to_target();
+  };
+  const double full = energy(SurfacePull::straight, 1);
+  CHECK(full == Approx(energy(SurfacePull::along_normals, 1)));
+  CHECK(energy(SurfacePull::straight, 0) == Approx(full));
+  CHECK(energy(SurfacePull::along_normals, 0) < 0.8 * full);
+}

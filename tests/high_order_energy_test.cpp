@@ -145,43 +145,69 @@ TEST_CASE("an inverted curved cell costs infinity and leaves the gradient alone;
   CHECK((step > 0 && step < 1));
   CHECK(std::isfinite(energy.value(moved(x, d, step))));
   CHECK(energy.points_per_direction()[0] == 5);
-  energy.densify(std::vector<Index>{0});
+  energy.densify(std::vector<Index>{0}, x);
   CHECK(energy.points_per_direction()[0] == 9);
   CHECK(energy.num_points() == 9 * 9 * 9);
 }
 
-TEST_CASE("cells weigh what they are given, and more when they stand in the way, with derivatives to match",
-          "[elements]") {
+TEST_CASE("points of poor shape weigh more, the mean of all weights staying 1", "[elements]") {
+  // Two hexes, the second sheared to a scaled Jacobian of 0.3: it lacks half of 0.6, and weighs 1 + k / 4.
+  const VolumeMesh cube = single_cell(CellKind::hex);
+  VolumeMesh sheared = cube;
+  for (Vec3& p : sheared.positions) p = 1.1 * Vec3(p.x() + std::sqrt(1 - 0.3 * 0.3) * p.y(), 0.3 * p.y(), p.z());
+  VolumeMesh both = cube;
+  both.positions.insert(both.positions.end(), sheared.positions.begin(), sheared.positions.end());
+  for (const Index v : sheared.cell(0)) both.cell_vertices.push_back(v + static_cast<Index>(cube.num_vertices()));
+  both.cell_offsets.push_back(both.cell_vertices.size());
+  both.kinds.push_back(CellKind::hex);
+  const auto of_one = [](const VolumeMesh& mesh) {
+    const ElementSpace space(mesh, Basis::fourier, 2);
+    return HighOrderEnergy(space, std::vector{Vec3(0.9, 1, 1)}, points_of(space, 5))
+        .value(HighOrderMesh(space, mesh).coefficients);
+  };
+  const double good = of_one(cube), poor = of_one(sheared);
+  const auto weighed = [&](double k) {
+    const double mean = (2 + k / 4) / 2;
+    return (good + (1 + k / 4) * poor) / (2 * mean);
+  };
+  const ElementSpace space(both, Basis::fourier, 2);
+  HighOrderEnergy energy(space, std::vector(2, Vec3(0.9, 1, 1)), points_of(space, 5));
+  const std::vector<Vec3> x = HighOrderMesh(space, both).coefficients;
+  CHECK(energy.value(x) == Approx(weighed(0)));
+  energy.emphasize_poor(x, 8);
+  CHECK(energy.value(x) == Approx(weighed(8)));
+  energy.densify(std::vector<Index>{0}, x);  // finer, and of good shape
+  CHECK(energy.value(x) == Approx(weighed(8)));
+  energy.emphasize_poor(x, 0);
+  CHECK(energy.value(x) == Approx(weighed(0)));
+  for (const double k : {4, 8, 16}) {
+    energy.densify(std::vector<Index>{1}, x);
+    CHECK(energy.value(x) == Approx(weighed(k)));
+  }
+  HighOrderEnergy plain(space, std::vector(2, Vec3(0.9, 1, 1)), points_of(space, 5));
+  plain.set_most_own_emphasis(0);
+  plain.densify(std::vector<Index>{1}, x);
+  CHECK(plain.value(x) == Approx(weighed(0)));
+  for (const double k : {-1.0, 2000.0, std::numeric_limits<double>::quiet_NaN()})
+    CHECK_THROWS_AS(plain.emphasize_poor(x, k), InputError);
+}
+
+TEST_CASE("the derivatives of an energy with emphasis match it, and inverted points may be weighed", "[elements]") {
   PointSource source(6);
   const VolumeMesh mesh = mixed_cells();
   const ElementSpace space(mesh, Basis::fourier, 2);
   HighOrderEnergy energy(space, std::vector(space.num_cells(), Vec3(0.8, 0.8, 0.8)), points_of(space, 5));
   const std::vector<Vec3> x = bent(space, mesh, source, 0.01);
+  std::vector<Vec3> poor = x;
+  for (Vec3& p : poor) p.x() += 3 * p.y();  // other shapes for other kinds
   std::vector<Vec3> d(space.num_nodes());
   for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
   const double equal = energy.value(x);
-  SECTION("in the way") {
-    energy.densify(std::vector<Index>{0});
-    CHECK(energy.value(x) > 1.01 * equal);
-    CHECK(energy.value(x) < 2.2 * equal);
-  }
-  SECTION("weights") {
-    double sum = 0;
-    for (std::size_t c = 0; c < space.num_cells(); ++c) {
-      std::vector<double> weights(space.num_cells(), 1.0);
-      weights[c] = 3;
-      energy.set_cell_weights(weights);
-      sum += (energy.value(x) - equal) / 2;
-    }
-    CHECK(sum == Approx(equal));
-    CHECK_THROWS_AS(energy.set_cell_weights(std::vector(space.num_cells() + 1, 1.0)), InputError);
-  }
-  SECTION("heavy cells in the way are not made lighter") {
-    energy.set_cell_weights(std::vector(space.num_cells(), 100.0));
-    energy.densify(std::vector<Index>{0});
-    CHECK(energy.value(x) > 90 * equal);
-  }
+  energy.emphasize_poor(poor, 50);
+  CHECK(energy.value(x) != Approx(equal).epsilon(1e-6));
   check_derivatives(energy, x, d);
+  energy.emphasize_poor(std::vector<Vec3>(x.size(), Vec3::Zero()), 50);  // all alike
+  CHECK(energy.value(x) == Approx(equal));
 }
 
 TEST_CASE("points that would stop a step short are made stiffer, others are not", "[elements]") {

@@ -65,6 +65,15 @@ TEST_CASE("ideal cells have scaled Jacobian one wherever they lie", "[quality]")
   }
 }
 
+TEST_CASE("mean scaled Jacobians are those of the cells, whatever the number of samples", "[quality]") {
+  for (VolumeMesh mesh : {box(1, 1, 1), ideal_prism(1)}) {
+    mesh.positions.back() += Vec3(0.4, -0.3, 0.5);
+    const double fine = measure_quality(mesh, 81).mean_scaled_jacobian;
+    CHECK(fine < 0.98);
+    for (const int n : {5, 9}) CHECK(std::abs(measure_quality(mesh, n).mean_scaled_jacobian - fine) < 0.1 / (n * n));
+  }
+}
+
 TEST_CASE("scaled Jacobians of sheared and rectangular cells have their closed forms", "[quality]") {
   for (const double angle : {0.3, 1.0, 1.5, 2.5}) {
     Mat3 shear = Mat3::Identity();
