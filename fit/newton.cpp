@@ -221,7 +221,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
 
     double trial = 0, trial_surface = 0, trial_volume = 0;
     std::vector<Index> blocking, trial_uncertified;
-    bool accepted = false, drawn_back = false;
+    bool accepted = false, drawn_back = !problem.volume->keeps_off_inversion();
     for (int halving = 0; halving < kMaxHalvings && !accepted; ++halving, t *= accepted ? 1 : 0.5) {
       if (has_ended(options, result)) return result;
       for (std::size_t i = 0; i < y.size(); ++i) y_trial[i] = y[i] + t * dy[i];
@@ -233,10 +233,8 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       if (!(trial <= energy + kArmijo * t * slope)) continue;
       trial_uncertified = problem.volume->uncertified(y_trial);
       const std::vector<Index> failed = newly_failed(uncertified, trial_uncertified);
-      // A cell that is certified at this length, but not at twice it, may be all but inverted here, and every direction
-      // from there leads out. With half of the length, its least determinant is at least about half of what it was.
       accepted = failed.empty() && (blocking.empty() || drawn_back);
-      drawn_back = failed.empty();
+      drawn_back |= failed.empty();
       blocking.insert(blocking.end(), failed.begin(), failed.end());
     }
     if (!blocking.empty()) {

@@ -43,6 +43,8 @@ class VolumeTerm {
 
   /// Cells that are not proved to be nowhere inverted, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
+  /// Whether a step that was cut back until all cells are certified again is to be half of that.
+  virtual bool keeps_off_inversion() const { return false; }
   /// Gives these cells more quadrature points from now on, for they invert between those they have. Points may weigh
   /// otherwise from then on, by the shape of the cells at these nodes.
   /// InputError: there is no such cell.

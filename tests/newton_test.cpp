@@ -14,7 +14,9 @@ namespace {
 struct Wall final : VolumeTerm {
   const Vec3 wanted{1.5, 0, 0};
   std::vector<Vec3>* densified_at;
-  explicit Wall(std::vector<Vec3>& at) : densified_at(&at) {}
+  bool keeps_off;
+  Wall(std::vector<Vec3>& at, bool half) : densified_at(&at), keeps_off(half) {}
+  bool keeps_off_inversion() const override { return keeps_off; }
   double value(std::span<const Vec3> y) const override { return (y[0] - wanted).squaredNorm(); }
   double add_gradient(std::span<const Vec3> y, double scale, std::span<Vec3> gradient) const override {
     gradient[0] += 2 * scale * (y[0] - wanted);
@@ -39,10 +41,10 @@ struct Wall final : VolumeTerm {
 
 }  // namespace
 
-TEST_CASE("A step that a certificate has cut back goes half as far as the certificate would let it") {
+TEST_CASE("A step that a certificate has cut back may go half as far as the certificate would let it") {
   std::vector<Vec3> densified_at;
   const SparseMap identity{1, {0, 1}, {0}, {1}};
-  FitProblem problem(identity, select_rows(identity, {}), std::make_unique<Wall>(densified_at), nullptr, 1);
+  FitProblem problem(identity, select_rows(identity, {}), std::make_unique<Wall>(densified_at, true), nullptr, 1);
   std::vector<Vec3> x = {Vec3::Zero()};
   const MinimizerResult result = minimize_newton(problem, x, {.max_iterations = 1});
   // The whole step ends behind the wall, half of it at 0.75: the step is a quarter.
@@ -53,6 +55,10 @@ TEST_CASE("A step that a certificate has cut back goes half as far as the certif
   CHECK(result.densified.size() == 1);
   CHECK(result.densified_at == std::vector<Vec3>{Vec3::Zero()});
   CHECK(densified_at == result.densified_at);
+
+  FitProblem other(identity, select_rows(identity, {}), std::make_unique<Wall>(densified_at, false), nullptr, 1);
+  x = {Vec3::Zero()};
+  CHECK(minimize_newton(other, x, {.max_iterations = 1}).iterations[0].step_length == 0.5);
 
   densified_at.clear();
   MinimizerResult wrong = result;
