@@ -45,7 +45,7 @@ FitProblem last_stage(const HighOrderMesh& mesh, const VolumeMesh& cells, const 
       identity_map(mesh.space.num_nodes()), samples.positions,
       std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
       make_surface_term(target.surface, samples.triangles, samples.points.size(), kTangentialWeight,
-                        Correspondence::closest),
+                        Correspondence::closest, SurfacePull::straight),
       kLambda};
 }
 

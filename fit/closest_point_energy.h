@@ -11,8 +11,8 @@ namespace subvol {
 
 /// How places of the fitted surface are drawn to the target: n of the second sum below.
 ///
-///   along_normals  the normal of the triangle that t(x_q) lies on. Where that is an edge or a corner of the target, the
-///                  way back may be square to it: only tau pulls, and what sticks out there stays out.
+///   along_normals  the normal of the triangle that t(x_q) lies on. Where t(x_q) is on an edge or a corner, the way
+///                  back may be square to it: only tau pulls, and what sticks out there stays out.
 ///   straight       (x_q - t(x_q)) / |x_q - t(x_q)|, which is the normal where t(x_q) lies within a smooth face. Curved
 ///                  cells get nearer with it: the largest distance of a bust of 7 cells fell from 1.1 to 0.7 % of the
 ///                  diagonal, while that of a tangled mesh of 2,832 straight hexes rose from 0.49 to 0.50 %.

@@ -63,7 +63,8 @@ void check_that_it_resumes(const Run& run) {
 
 SolvedStage small_stage() {
   return {"level 1, lambda 0.5", 77, {Vec3(1, 2, 3), Vec3(0.1, -0.2, 1e-300)},
-          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}, {{4, 5}, {}, {4}}, {Vec3(1, 2, 4), Vec3(0, 0, 7)}, 1}, 0.5};
+          {MinimizerStop::no_step, "no step", {{1.5, 0.25, 1, 12, 3}}, {{4, 5}, {}, {4}},
+           {Vec3(1, 2, 4), Vec3(0, 0, 7)}, 1}, 0.5};
 }
 
 }  // namespace
@@ -213,7 +214,8 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
   std::vector<Vec3> densified_at;
   int forgotten = 0;
   const SparseMap identity{3, {0, 1, 2, 3}, {0, 1, 2}, {1, 1, 1}};
-  FitProblem problem(identity, identity, std::make_unique<Cells>(densified, densified_at), std::make_unique<Surface>(forgotten), 0.5);
+  FitProblem problem(identity, identity, std::make_unique<Cells>(densified, densified_at),
+                     std::make_unique<Surface>(forgotten), 0.5);
   std::vector<Vec3> x(3, Vec3::Zero());
   FitReport report;
   StageRecord record;

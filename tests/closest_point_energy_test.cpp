@@ -61,7 +61,8 @@ TEST_CASE("a straight pull draws back what sticks out beyond an edge, where norm
   const TriangleMesh cube = cube_surface(4, false);
   const TargetSurface target(cube);
   const double high = std::ranges::max(cube.positions, {}, [](const Vec3& p) { return p.x(); }).x();
-  const std::vector<Vec3> samples = {{high + 0.1, high + 0.1, 0.2}, {high + 0.2, high + 0.1, 0.5}, {high + 0.1, high + 0.2, 0.3}};
+  const std::vector<Vec3> samples = {
+      {high + 0.1, high + 0.1, 0.2}, {high + 0.2, high + 0.1, 0.5}, {high + 0.1, high + 0.2, 0.3}};
   const auto energy = [&](SurfacePull pull, double tau) {
     ClosestPointEnergy result(target, {{0, 1, 2}}, samples.size(), tau, 3, pull);
     result.assign(samples);
