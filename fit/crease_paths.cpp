@@ -144,11 +144,15 @@ class PathFinder {
     if (curve.length() < kLeastLength * graph_.mean_length) return std::nullopt;
     if (curve.closed()) return around(curve);
     std::optional<Found> best;
+    std::optional<std::vector<MiddlePlace>> middles;  // most curves need none
     for (Index from : end_vertices(curve.vertices.front(), curve.points.front()))
       for (Index to : end_vertices(curve.vertices.back(), curve.points.back())) {
         if (from == to) continue;
         auto found = judged(shortest_path(curve.points, from, to, {}), curve.points);
-        if (!found) found = judged(path_by_middle(curve.points, from, to), curve.points);
+        if (!found) {
+          if (!middles) middles = middle_places(curve.points);
+          found = judged(path_by_middle(curve.points, from, to, *middles), curve.points);
+        }
         if (found && (!best || found->gap < best->gap)) best = std::move(found);
       }
     return best;
@@ -202,24 +206,43 @@ class PathFinder {
     points.insert(points.end(), curve.points.begin() + first.triangle + 1, curve.points.end());
     points.insert(points.end(), curve.points.begin() + 1, curve.points.begin() + first.triangle + 1);
     points.push_back(first.point);
-    return judged(path_by_middle(points, start, start), points);
+    return judged(path_by_middle(points, start, start, middle_places(points)), points);
   }
 
-  /// By way of the vertex nearest to the curve's middle part: closed curves, and curves whose ends are close together.
-  std::vector<Index> path_by_middle(std::span<const Vec3> points, Index from, Index to) const {
+  /// A vertex, and where a curve is nearest to it.
+  struct MiddlePlace {
+    Index vertex;
+    ClosestPoint::Hit hit;
+  };
+
+  /// The vertices nearest to the curve's middle part, so many that one is left without any two.
+  std::vector<MiddlePlace> middle_places(std::span<const Vec3> points) const {
+    constexpr std::size_t kEnough = 3;
     std::vector<double> along = {0};
     for (std::size_t i = 1; i < points.size(); ++i) along.push_back(along.back() + (points[i] - points[i - 1]).norm());
     const ClosestPoint tree = polyline_tree(points);
-    Index middle = kNoIndex;
-    ClosestPoint::Hit meeting{Vec3::Zero(), kNoIndex, kInfinity};
+    std::vector<MiddlePlace> nearest;
     for (Index v : graph_.vertices) {
-      if (taken_[v] || v == from || v == to) continue;
+      if (taken_[v]) continue;
       const ClosestPoint::Hit hit = tree.closest(mesh_.positions[v]);
       const double at = along[hit.triangle] + (hit.point - points[hit.triangle]).norm();
-      if (at < along.back() / 4 || at > along.back() * 3 / 4 || hit.distance >= meeting.distance) continue;
-      meeting = hit, middle = v;
+      if (at < along.back() / 4 || at > along.back() * 3 / 4) continue;
+      const auto distance = [](const MiddlePlace& p) { return p.hit.distance; };
+      const auto place = std::ranges::upper_bound(nearest, hit.distance, {}, distance);
+      if (place == nearest.end() && nearest.size() == kEnough) continue;
+      nearest.insert(place, MiddlePlace{v, hit});
+      if (nearest.size() > kEnough) nearest.pop_back();
     }
-    if (middle == kNoIndex) return {};
+    return nearest;
+  }
+
+  /// By way of the vertex nearest to the curve's middle part: closed curves, and curves whose ends are close together.
+  std::vector<Index> path_by_middle(std::span<const Vec3> points, Index from, Index to,
+                                    std::span<const MiddlePlace> places) const {
+    const auto place =
+        std::ranges::find_if(places, [&](const MiddlePlace& p) { return p.vertex != from && p.vertex != to; });
+    if (place == places.end()) return {};
+    const auto& [middle, meeting] = *place;
     const std::size_t split = static_cast<std::size_t>(meeting.triangle) + 1;
     std::vector<Vec3> out(points.begin(), points.begin() + split), back(points.begin() + split, points.end());
     out.push_back(meeting.point);
