@@ -92,7 +92,9 @@ void FitRun::load() {
 
 void FitRun::load_template() {
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_,
-                                             {.crease_angle_degrees = arguments_.fit.crease_angle_degrees},
+                                             {.crease_angle_degrees = arguments_.fit.crease_angle_degrees,
+                                              .time_limit_seconds =
+                                                  kTrialsShareOfTime * arguments_.fit.time_limit_seconds},
                                              arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))

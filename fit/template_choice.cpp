@@ -16,12 +16,14 @@
 #include "subvol/mesh_topology.h"
 
 #include <algorithm>
+#include <chrono>
 
 namespace subvol {
 
 namespace {
 
 constexpr double kGoodMaxPercent = 1.5, kGoodMeanPercent = 0.15, kGoodShape = 0.9, kShapeWeight = 5;
+constexpr double kLeastSeconds = 1e-3;  // of a trial where the time is over
 
 class Chooser {
  public:
@@ -44,12 +46,22 @@ class Chooser {
   std::vector<AutoTemplate> candidates(std::size_t cells, bool pillow, std::size_t most);
   bool try_count(std::size_t cells);
   bool try_template(VolumeMesh mesh, bool pillowed);
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  /// For the next trial; 0: as long as it takes.
+  double time_left() const {
+    const double limit = options_.time_limit_seconds;
+    return limit > 0 ? std::max(kLeastSeconds, limit - seconds()) : 0;
+  }
+  bool is_over() const {
+    return !choice_.trials.empty() && options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds;
+  }
 
   const TriangleMesh& target_;
   const TemplateChoiceOptions& options_;
   ClosestPoint tree_;
   double diagonal_;
   TemplateChoice choice_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
 std::vector<AutoTemplate> Chooser::candidates(std::size_t cells, bool pillow, std::size_t most) {
@@ -82,6 +94,7 @@ Chooser::ShortFit Chooser::fit_subdivided(const VolumeMesh& mesh) {
   constexpr int kMostSteps = 10;  // enough to tell templates apart; the fit itself begins anew
   int steps = 0;
   FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
+  options.time_limit_seconds = time_left();
   options.progress = trial_progress([&] { return ++steps <= kMostSteps; });
   const FitResult fit = fit_subdivision_volume(target_, mesh, options);
   return {refined_triangles(boundary_surface(fit.mesh, MeshTopology(fit.mesh))),
@@ -93,6 +106,7 @@ Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
   HighOrderFitOptions options{.order = std::min(options_.order, kMostOrder), .basis = options_.basis};
   options.lift_worst_places = false;
   options.max_iterations = kMostSteps;
+  options.time_limit_seconds = time_left();
   options.progress = trial_progress();
   const HighOrderMesh fitted = fit_high_order(target_, mesh, options).mesh;
   BoundarySamples samples = make_boundary_samples(fitted.space, kIntervals);
@@ -134,7 +148,8 @@ bool Chooser::try_count(std::size_t cells) {
                                to_string(choice_.topology) + "; the template is made for " +
                                std::to_string(plain.front().cells_asked));
   for (AutoTemplate& candidate : plain)
-    if (!try_template(std::move(candidate.mesh), false)) return false;
+    if (!is_over() && !try_template(std::move(candidate.mesh), false)) return false;
+  if (is_over()) return true;
   std::vector<AutoTemplate> pillowed = candidates(cells, true, 1);
   if (choice_.cancelled) return false;
   if (pillowed.empty() || pillowed.front().cells_asked != cells || !has_thick_core(pillowed.front().mesh)) return true;
@@ -150,7 +165,7 @@ TemplateChoice Chooser::run() {
       break;
     }
     const TemplateTrial& best = choice_.trials[choice_.chosen];
-    if (best.self_intersections == 0 && best.max_percent <= kGoodMaxPercent) break;
+    if (is_over() || (best.self_intersections == 0 && best.max_percent <= kGoodMaxPercent)) break;
   }
   return std::move(choice_);
 }
@@ -159,6 +174,7 @@ TemplateChoice Chooser::run() {
 
 TemplateChoice choose_template(const TriangleMesh& target, const TemplateChoiceOptions& options) {
   require_in_range("TemplateChoiceOptions", "order", options.order, 0, kMaxOrder);
+  require_in_range("TemplateChoiceOptions", "time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   return Chooser(target, options).run();
 }
 

@@ -20,11 +20,15 @@ struct TemplateChoiceOptions {
   std::optional<double> crease_angle_degrees;  ///< as `FitOptions` has it; not for curved elements
   int order = 0;                 ///< of the curved elements that the template is for; 0: for a subdivision volume
   Basis basis = Basis::fourier;  ///< of these
+  double time_limit_seconds = 0; ///< of the trials; 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
 };
 
 /// Counts that are tried where none is asked for, until one fits well.
 inline constexpr std::size_t kFirstCells = 250, kSecondCells = 600, kLastCells = 1000;
+
+/// Of the time limit of a fit whose template is made: what goes to the trials at most.
+inline constexpr double kTrialsShareOfTime = 0.5;
 
 /// One template that was tried, and its fit after one subdivision or at order 2.
 struct TemplateTrial {
@@ -57,8 +61,10 @@ struct TemplateChoice {
 /// A pillowed candidate is tried where its core is several cells thick: on thin parts a pillow only takes cells away.
 /// Where the best candidate's max distance is above 1.5 % the next larger count is tried.
 ///
-/// InputError: as `auto_templates`; an order outside [0, kMaxOrder]; a target whose topology no grid carries.
-/// Deterministic.
+/// The trial during which the time runs out is judged where it stands and is the last one.
+///
+/// InputError: as `auto_templates`; options out of range; a target whose topology no grid carries.
+/// Deterministic, but for a time limit.
 TemplateChoice choose_template(const TriangleMesh& target, const TemplateChoiceOptions& options = {});
 
 }  // namespace subvol

@@ -54,8 +54,9 @@ class Fit {
     read_options(!template_mesh.is_none());
     target_ = target_from(target, "target");
     refuse_for_points(template_mesh.is_none());
-    template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     double& time_limit = curved_ ? high_order_.time_limit_seconds : subdivision_.time_limit_seconds;
+    choice_options_.time_limit_seconds = kTrialsShareOfTime * time_limit;
+    template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     untangle_template(time_limit);
     // What is left of it: a template may have been made.
     if (time_limit > 0) time_limit = std::max(1e-3, time_limit - work_.seconds());

@@ -192,8 +192,15 @@ TEST_CASE("Of several templates the one that fits best is chosen", "[templates]"
   CHECK(curved.trials[curved.chosen].max_percent < 3);
   // The trials are of what is asked for.
   CHECK(curved.trials.front().mean_percent != choice.trials.front().mean_percent);
+  options.time_limit_seconds = 1e-6;  // one trial, and that ends at once
+  const TemplateChoice hasty = choose_template(test::cube_surface(6, true), options);
+  CHECK(hasty.mesh.num_cells() > 0);
+  CHECK(hasty.trials.size() == 1);
+  CHECK_FALSE(hasty.cancelled);
   options.progress = [](const FitProgress&) { return false; };
   CHECK(choose_template(test::cube_surface(4, true), options).cancelled);
+  options.time_limit_seconds = -1;
+  CHECK_THROWS_AS(choose_template(test::cube_surface(4, true), options), InputError);
 }
 
 TEST_CASE("Real targets get templates of their topology", "[templates][data]") {
