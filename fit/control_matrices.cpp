@@ -64,7 +64,10 @@ double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder)
 
   Extremes x;
   const std::size_t count = matrices.size();
+  constexpr std::size_t kBetween = 8 * kWide;  // looks at whether all is lost
   for (std::size_t b = 0; b < count; b += kWide) {
+    if (b % kBetween == 0 && !(lowest_lane(x.first) > 0 && lowest_lane(x.second) > 0 && lowest_lane(x.third) > 0))
+      return 0;
     const std::size_t at = std::min(b, count - kWide);  // the last lanes overlap
     Wide m[3][3] = {};
     for (int c = 0; c < 3; ++c) {

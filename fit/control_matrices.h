@@ -19,11 +19,11 @@ class ControlMatrices {
   void resize(std::size_t count) {
     count_ = count;
     stride_ = (count + kWide - 1) / kWide * kWide;
-    if (entries_.size() < 9 * stride_ + kWide) entries_.resize(9 * stride_ + kWide);
+    if (entries_.size() < 9 * stride_ / kWide + 1) entries_.resize(9 * stride_ / kWide + 1);
   }
   std::size_t size() const { return count_; }
-  double* entries(int row, int column) { return entries_.data() + (3 * row + column) * stride_; }
-  const double* entries(int row, int column) const { return entries_.data() + (3 * row + column) * stride_; }
+  double* entries(int row, int column) { return data() + (3 * row + column) * stride_; }
+  const double* entries(int row, int column) const { return data() + (3 * row + column) * stride_; }
   Mat3 operator[](std::size_t b) const {
     Mat3 result;
     for (int r = 0; r < 3; ++r)
@@ -33,8 +33,11 @@ class ControlMatrices {
   Mat3 mean() const;
 
  private:
+  double* data() { return reinterpret_cast<double*>(entries_.data()); }
+  const double* data() const { return reinterpret_cast<const double*>(entries_.data()); }
+
   std::size_t count_ = 0, stride_ = 0;
-  std::vector<double> entries_;
+  std::vector<Wide> entries_;  // for its alignment
 };
 
 /// A lower bound of det J over the box, > 0; or 0 if none is found.

@@ -9,55 +9,85 @@ namespace subvol {
 
 namespace {
 
-/// out[o][m] = sum_k table[k][o] in[k][m], m < row. Runs over the end of rows by up to kWide - 1 entries.
-void contract_rows(const double* in, int n, int row, const double* table, int num_out, double* out) {
-  for (int o = 0; o < num_out; ++o)
-    for (int m = 0; m < row; m += kWide) {
-      Wide sum{};
-      for (int k = 0; k < n; ++k) sum += table[k * LineModels::kStride + o] * load_wide(in + k * row + m);
-      store_wide(sum, out + o * row + m);
-    }
+/// Share of the mean edges up to which errors of models are small as long as nothing is known of det J.
+constexpr double kSmallError = 0.15;
+/// Beyond this sum it does not pay to look: the shifts of `determinant_bound` sum up to at least that much, if the mean
+/// edges tell the mean matrix, and each must be < 1 (measured).
+constexpr double kHopelessError = 1;
+
+/// Columns of a contraction that are worked on at a time.
+constexpr int kSome = 4;
+
+/// Of the functions along u and w, ascending. Fewer than 5 gain nothing (measured).
+std::vector<int> model_degrees(Basis basis, int order) {
+  if (order == 1 || (basis == Basis::legendre && order < kWide)) return {order};
+  return {5, kWide - 1};
 }
 
-int power(int base, int exponent) {
-  int result = 1;
-  while (exponent-- > 0) result *= base;
-  return result;
+/// Lanes one place up (down); what comes into the first (last) one is of no use.
+Wide shifted_up(const Wide& x) { return __builtin_shufflevector(x, x, 0, 0, 1, 2, 3, 4, 5, 6); }
+Wide shifted_down(const Wide& x) { return __builtin_shufflevector(x, x, 1, 2, 3, 4, 5, 6, 7, 7); }
+
+/// out[o out_stride] = sum_k table[k kStride + o] in[k in_stride], o < num_out.
+template <int num_out>
+void contract_to(const double* table, const double* in, int in_stride, int n, double* out, int out_stride) {
+  Wide sums[num_out] = {};
+  for (int k = 0; k < n; ++k) {
+    const Wide x = load_wide(in + k * in_stride);
+    for (int o = 0; o < num_out; ++o) sums[o] += table[k * LineModels::kStride + o] * x;
+  }
+  for (int o = 0; o < num_out; ++o) store_wide(sums[o], out + o * out_stride);
+}
+
+using Contraction = void (*)(const double*, const double*, int, int, double*, int);
+/// The one for so many outputs.
+Contraction contraction(int num_out) {
+  static constexpr Contraction all[] = {nullptr,        contract_to<1>, contract_to<2>, contract_to<3>, contract_to<4>,
+                                        contract_to<5>, contract_to<6>, contract_to<7>, contract_to<8>};
+  return all[num_out];
+}
+
+double sum_of_lanes(const Wide& x) {
+  double sum = 0;
+  for (int lane = 0; lane < kWide; ++lane) sum += x[lane];
+  return sum;
 }
 
 }  // namespace
 
 HexBoxes::HexBoxes(Basis basis, int order)
-    : models_(LineModels::get(basis, order)), n_(order + 1), q1_(models_.degree() + 1) {
-  const int q = q1_ - 1, controls = power(q1_, 3);
+    : n_(order + 1), lanes_((n_ + kWide - 1) / kWide * kWide), row_((n_ * n_ + kWide - 1) / kWide * kWide) {
+  for (const int degree : model_degrees(basis, order)) tiers_[0].push_back(&LineModels::get(basis, order, degree));
+  tiers_[1] = {&LineModels::get(basis, order, kWide - 1)};
+  tiers_[2] = tiers_[0];
+  const int most = tiers_[0].back()->degree() + 1, face = n_ * n_;
   for (int d = 0; d < 3; ++d) {
-    modes_[d].assign(power(n_, 3) + kWide, 0);
-    absolute_[d] = modes_[d];
-    after_w_[d].assign(q1_ * n_ * n_ + kWide, 0);
-    after_v_[d].assign(n_ * q1_ * q1_ + kWide, 0);
-    control_[d].assign(controls + 2 * q1_ * q1_ + kWide, 0);
-    below_[d].assign(controls + kWide, 0);
-    above_[d] = below_[d];
+    modes_[d].assign(face * n_ + kWide, 0);
+    after_w_[d].assign(most * row_ + kWide, 0);
+    after_v_[d].assign((n_ + kSome) * most, Wide{});
+    control_[d].assign((most + 2) * most, Wide{});
+    for (auto& weights : weights_[d]) weights.resize(n_);
   }
-  const int strides[3] = {q1_ * q1_, 1, q1_};
-  for (int d = 0; d < 3; ++d)
-    for (int b = 0; b < controls; ++b) {
-      below_[d][b] = b / strides[d] % q1_;
-      above_[d][b] = q - below_[d][b];
-    }
-  matrices_.resize(controls);
+  bounds_.assign(lanes_, 0);
+  slope_bounds_.assign(lanes_, 0);
+  std::copy_n(tiers_[1][0]->bounds().begin(), n_, bounds_.begin());
+  std::copy_n(tiers_[1][0]->slope_bounds().begin(), n_, slope_bounds_.begin());
+  used_.resize((face + kWide - 1) / kWide);
+  sums_.resize(4 * n_ * lanes_);
 }
 
 void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
-  for (int d = 0; d < 3; ++d) std::fill_n(modes_[d].begin(), power(n_, 3), 0.0);
+  const int face = n_ * n_;
+  for (int d = 0; d < 3; ++d) std::fill(modes_[d].begin(), modes_[d].end(), 0.0);
+  std::fill(used_.begin(), used_.end(), 0);
   for (std::size_t a = 0; a < modes.size(); ++a) {
     const int at = (modes[a].k * n_ + modes[a].j) * n_ + modes[a].i;
     for (int d = 0; d < 3; ++d) modes_[d][at] = coefficients[a][d];
+    int& used = used_[at % face / kWide];
+    if (coefficients[a] != Vec3::Zero()) used = std::max(used, modes[a].k + 1);
   }
-  for (int d = 0; d < 3; ++d)
-    std::transform(modes_[d].begin(), modes_[d].end(), absolute_[d].begin(), [](double x) { return std::abs(x); });
   contracted_ = 0;
-  has_remainder_.fill(false);
+  ++cell_;
 
   Mat3 edges = Mat3::Zero();
   for (int corner = 0; corner < 8; ++corner)
@@ -67,149 +97,240 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
         edges(row, d) += corner >> d & 1 ? x : -x;
       }
   mean_edges_ = 0.25 * edges.colwise().norm().transpose();
+  make_weights();
 }
 
-bool HexBoxes::is_hopeless(const Box& box) {
-  // The shifts of `determinant_bound` sum up to at least this, if the mean edges tell the mean matrix; each must be
-  // < 1.
-  return !models_.level(box.level).exact &&
-         remainder(box).colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum() > 2;
+void HexBoxes::make_weights() {
+  const int face = n_ * lanes_;
+  for (int row = 0; row < 3; ++row) {
+    std::fill(sums_.begin(), sums_.end(), 0.0);
+    double *by_j = sums_.data(), *by_j_slope = by_j + face, *by_k = by_j_slope + face, *by_k_slope = by_k + face;
+    for (int k = 0; k < n_; ++k)
+      for (int j = 0; j < n_; ++j)
+        for (int i = 0; i < n_; i += kWide) {
+          Wide a = load_wide(modes_[row].data() + (k * n_ + j) * n_ + i);
+          a = a < 0 ? -a : a;
+          const auto add = [&](double* sums, int m, double factor) {
+            double* at = sums + m * lanes_ + i;
+            store_wide(load_wide(at) + factor * a, at);
+          };
+          add(by_j, j, bounds_[k]);
+          add(by_j_slope, j, slope_bounds_[k]);
+          add(by_k, k, bounds_[j]);
+          add(by_k_slope, k, slope_bounds_[j]);
+        }
+    const auto dot = [&](const double* sums, int m, const std::vector<double>& bounds) {
+      Wide sum{};
+      for (int i = 0; i < n_; i += kWide) sum += load_wide(sums + m * lanes_ + i) * load_wide(bounds.data() + i);
+      return sum_of_lanes(sum);
+    };
+    auto &of_u = weights_[0], &of_v = weights_[1], &of_w = weights_[2];
+    total_[row] = 0;
+    for (int m = 0; m < n_; ++m) {
+      of_v[0][m][row] = dot(by_j, m, slope_bounds_);
+      of_v[1][m][row] = dot(by_j, m, bounds_);
+      of_v[2][m][row] = dot(by_j_slope, m, bounds_);
+      of_w[0][m][row] = dot(by_k, m, slope_bounds_);
+      of_w[1][m][row] = dot(by_k_slope, m, bounds_);
+      of_w[2][m][row] = dot(by_k, m, bounds_);
+      total_[row] += bounds_[m] * of_w[2][m][row];
+      Vec3 sum = Vec3::Zero();
+      for (int k = 0; k < n_; ++k)
+        sum += Vec3(bounds_[k] * by_k[k * lanes_ + m], bounds_[k] * by_k_slope[k * lanes_ + m],
+                    slope_bounds_[k] * by_k[k * lanes_ + m]);
+      for (int column = 0; column < 3; ++column) of_u[column][m][row] = sum[column];
+    }
+  }
 }
 
-std::array<HexBoxes::Box, HexBoxes::kNumChildren> HexBoxes::children(const Box& box, double) {
-  std::array<Box, kNumChildren> result;
-  for (int c = 0; c < kNumChildren; ++c)
-    result[c] = {box.level + 1, {2 * box.index[0] + c % 2, 2 * box.index[1] + c / 2 % 2, 2 * box.index[2] + c / 4}};
+const HexBoxes::LineError& HexBoxes::line_error(int direction, int level, int tier) {
+  LineError& result = errors_[direction][level][tier];
+  if (result.cell == cell_) return result;
+  result.cell = cell_;
+  const LineModels::Level& line = tiers_[direction][tier]->level(level);
+  result.entries.setZero();
+  result.growth = result.inflation = 1;
+  for (int i = 0; i < n_; ++i) {
+    if (weights_[direction][direction][i] == Vec3::Zero()) continue;
+    for (int column = 0; column < 3; ++column)
+      result.entries.col(column) +=
+          (column == direction ? line.slope_error[i] : line.error[i]) * weights_[direction][column][i];
+    result.growth =
+        std::max({result.growth, 1 + line.error[i] / bounds_[i], 1 + line.slope_error[i] / slope_bounds_[i]});
+    result.inflation = std::max(result.inflation, line.largest_coefficient[i] / bounds_[i]);
+  }
+  result.size = line.exact ? 0 : result.entries.colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
+  return result;
+}
+
+bool HexBoxes::is_hopeless(Box& box) {
+  const double wanted = box.wanted < 0 ? kSmallError : box.wanted;
+  double sum = 0;
+  for (int d = 0; d < 3; ++d) {
+    const int last = static_cast<int>(tiers_[d].size()) - 1;
+    int& tier = box.tiers[d];
+    for (tier = 0; tier < last && !(line_error(d, box.levels[d], tier).size <= wanted);) ++tier;
+    sum += error_size(box, d);
+  }
+  return sum > kHopelessError;
+}
+
+void HexBoxes::choose_split(Box& box) {
+  Vec3 variation = Vec3::Zero();
+  for (int d = 0; d < 3; ++d) variation[d] = error_size(box, d);
+  if (contracted_ == 3 && current_.levels == box.levels && current_.index == box.index) {
+    const int num_u = q1(box, 0), num_w = q1(box, 2);
+    const double samples = kWide * (num_u - 1) * (num_w / 2);
+    const auto size = [](const Wide& x) { return x < 0 ? -x : x; };
+    for (int column = 0; column < 3; ++column)
+      for (int row = 0; row < 3; ++row) {
+        const double* entries = matrices_.entries(row, column);
+        Wide steps[3] = {};
+        for (int u = 0; u + 1 < num_u; ++u)
+          for (int w = 0; w + 1 < num_w; w += 2) {  // every second line along v is enough
+            const double* x = entries + (u * num_w + w) * kWide;
+            const Wide here = load_wide(x);
+            steps[0] += size(load_wide(x + num_w * kWide) - here);
+            steps[1] += size(shifted_down(here) - here);
+            steps[2] += size(load_wide(x + kWide) - here);
+          }
+        for (int d = 0; d < 3; ++d)
+          variation[d] += sum_of_lanes(steps[d]) / samples * (q1(box, d) - 1) / mean_edges_[column];
+      }
+  }
+  box.split = -1;
+  for (int d = 0; d < 3; ++d)
+    if (box.levels[d] < LineModels::kMaxLevel && (box.split < 0 || variation[d] > variation[box.split])) box.split = d;
+  if (box.split < 0) box.split = 0;  // the deepest box there is
+}
+
+std::array<HexBoxes::Box, 2> HexBoxes::children(const Box& box, double lowest) const {
+  constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
+  std::array<Box, 2> result;
+  for (int half = 0; half < 2; ++half) {
+    Box& child = result[half];
+    child = box;
+    ++child.level;
+    ++child.levels[box.split];
+    child.index[box.split] = 2 * box.index[box.split] + half;
+    if (lowest != -std::numeric_limits<double>::infinity())
+      child.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);
+  }
   return result;
 }
 
 Vec3 HexBoxes::corner_point(const Box& box, int corner) {
-  const double size = std::ldexp(1.0, -box.level);
-  return size * Vec3(box.index[0] + corner % 2, box.index[1] + corner / 2 % 2, box.index[2] + corner / 4);
+  Vec3 point;
+  for (int d = 0; d < 3; ++d) point[d] = std::ldexp(box.index[d] + (corner >> d & 1), -box.levels[d]);
+  return point;
 }
 
-std::size_t HexBoxes::corner_matrix(const Box&, int corner) const {
-  return static_cast<std::size_t>((q1_ - 1) * ((corner % 2 * q1_ + corner / 4) * q1_ + corner / 2 % 2));
+std::size_t HexBoxes::corner_matrix(const Box& box, int corner) const {
+  const int num_w = q1(box, 2);
+  const int u = (corner & 1) * (q1(box, 0) - 1), v = (corner >> 1 & 1) * (kWide - 1), w = (corner >> 2) * (num_w - 1);
+  return static_cast<std::size_t>((u * num_w + w) * kWide + v);
+}
+
+bool HexBoxes::shares(const Box& box, int d) const {
+  return current_.levels[d] == box.levels[d] && current_.index[d] == box.index[d] && current_.tiers[d] == box.tiers[d];
 }
 
 const ControlMatrices& HexBoxes::matrices(const Box& box) {
-  if (contracted_ == 0 || current_.level != box.level || current_.index[2] != box.index[2]) {
-    contract_w(box.level, box.index[2]);
-    contracted_ = 1;
+  if (contracted_ > 0 && !shares(box, 2)) contracted_ = 0;
+  if (contracted_ > 1 && !shares(box, 1)) contracted_ = 1;
+  if (contracted_ > 2 && !shares(box, 0)) contracted_ = 2;
+  if (contracted_ < 1) contract_w(box);
+  if (contracted_ < 2) contract_v(box);
+  if (contracted_ < 3) {
+    contract_u(box);
+    differences(box);
   }
-  if (contracted_ == 1 || current_.index[1] != box.index[1]) {
-    contract_v(box.level, box.index[1]);
-    contracted_ = 2;
-  }
-  if (contracted_ == 2 || current_.index[0] != box.index[0]) {
-    contract_u(box.level, box.index[0]);
-    contracted_ = 3;
-    differences(box.level);
-  }
+  contracted_ = 3;
   current_ = box;
   return matrices_;
 }
 
-void HexBoxes::contract_w(int level, int index) {
-  const double* table = models_.coefficients(models_.level(level), index);
-  for (int d = 0; d < 3; ++d) contract_rows(modes_[d].data(), n_, n_ * n_, table, q1_, after_w_[d].data());
+void HexBoxes::contract_w(const Box& box) {
+  const LineModels& line = models(box, 2);
+  const double* table = line.coefficients(line.level(box.levels[2]), box.index[2]);
+  const int face = n_ * n_;
+  const Contraction contract = contraction(q1(box, 2));
+  for (int d = 0; d < 3; ++d)
+    for (int m = 0; m < face; m += kWide)  // runs over the end of face
+      contract(table, modes_[d].data() + m, face, used_[m / kWide], after_w_[d].data() + m, row_);
 }
 
-void HexBoxes::contract_v(int level, int index) {
-  const double* table = models_.coefficients(models_.level(level), index);
+void HexBoxes::contract_v(const Box& box) {
+  const LineModels& line = models(box, 1);
+  const double* table = line.coefficients(line.level(box.levels[1]), box.index[1]);
+  const int num_w = q1(box, 2);
   for (int d = 0; d < 3; ++d)
-    for (int i = 0; i < n_; ++i)
-      for (int w = 0; w < q1_; ++w) {
-        const double* in = after_w_[d].data() + w * n_ * n_ + i;
-        double* out = after_v_[d].data() + (i * q1_ + w) * q1_;
-        for (int v = 0; v < q1_; v += kWide) {
-          Wide sum{};
-          for (int j = 0; j < n_; ++j) sum += in[j * n_] * load_wide(table + j * LineModels::kStride + v);
-          store_wide(sum, out + v);
+    for (int w = 0; w < num_w; ++w) {
+      const double* in = after_w_[d].data() + w * row_;
+      for (int i = 0; i < n_; i += kSome) {  // runs over the end: what comes from there is written over, or not used
+        Wide sums[kSome] = {};
+        for (int j = 0; j < n_; ++j) {
+          const Wide x = load_wide(table + j * LineModels::kStride);
+          for (int s = 0; s < kSome; ++s) sums[s] += in[j * n_ + i + s] * x;
         }
+        for (int s = 0; s < kSome; ++s) after_v_[d][(i + s) * num_w + w] = sums[s];
       }
+    }
 }
 
-void HexBoxes::contract_u(int level, int index) {
-  const double* table = models_.coefficients(models_.level(level), index);
-  const int margin = q1_ * q1_;
-  for (int d = 0; d < 3; ++d)
-    contract_rows(after_v_[d].data(), n_, margin, table, q1_, control_[d].data() + margin);
+void HexBoxes::contract_u(const Box& box) {
+  const LineModels& line = models(box, 0);
+  const double* table = line.coefficients(line.level(box.levels[0]), box.index[0]);
+  const int num_w = q1(box, 2), row = num_w * kWide;
+  const Contraction contract = contraction(q1(box, 0));
+  for (int d = 0; d < 3; ++d) {
+    const double* in = reinterpret_cast<const double*>(after_v_[d].data());
+    double* out = reinterpret_cast<double*>(control_[d].data() + num_w);
+    for (int m = 0; m < row; m += kWide) contract(table, in + m, row, n_, out + m, row);
+  }
 }
 
 /// J_b = (o (X_b - X_below) + (q - o) (X_above - X_b)) / h per direction: differences, raised to degree q again.
-void HexBoxes::differences(int level) {
-  const int margin = q1_ * q1_, controls = margin * q1_, strides[3] = {margin, 1, q1_};
-  const double per_side = std::ldexp(1.0, level);
+void HexBoxes::differences(const Box& box) {
+  constexpr Wide kPlace{0, 1, 2, 3, 4, 5, 6, 7};
+  const int num_w = q1(box, 2), num_u = q1(box, 0);
+  Vec3 per_side;
+  for (int d = 0; d < 3; ++d) per_side[d] = std::ldexp(1.0, box.levels[d]);
+  const Wide low_v = per_side[1] * kPlace, high_v = per_side[1] * (kWide - 1 - kPlace);
+  matrices_.resize(num_controls(box));
   for (int row = 0; row < 3; ++row) {
-    const double* x = control_[row].data() + margin;
-    for (int d = 0; d < 3; ++d) {
-      const int stride = strides[d];
-      double* out = matrices_.entries(row, d);
-      for (int b = 0; b < controls; b += kWide) {
-        const Wide here = load_wide(x + b), before = load_wide(x + b - stride), after = load_wide(x + b + stride);
-        const Wide low = load_wide(below_[d].data() + b), high = load_wide(above_[d].data() + b);
-        store_wide(per_side * (low * (here - before) + high * (after - here)), out + b);
+    const Wide* x = control_[row].data() + num_w;
+    double *by_u = matrices_.entries(row, 0), *by_v = matrices_.entries(row, 1), *by_w = matrices_.entries(row, 2);
+    for (int u = 0; u < num_u; ++u) {
+      const double low_u = per_side[0] * u, high_u = per_side[0] * (num_u - 1 - u);
+      for (int w = 0; w < num_w; ++w) {
+        const int at = u * num_w + w;
+        const double low_w = per_side[2] * w, high_w = per_side[2] * (num_w - 1 - w);
+        const Wide here = x[at];
+        store_wide(low_u * (here - x[at - num_w]) + high_u * (x[at + num_w] - here), by_u + at * kWide);
+        store_wide(low_v * (here - shifted_up(here)) + high_v * (shifted_down(here) - here), by_v + at * kWide);
+        store_wide(low_w * (here - x[at - 1]) + high_w * (x[at + 1] - here), by_w + at * kWide);
       }
     }
   }
 }
 
-const Mat3& HexBoxes::remainder(const Box& box) {
-  if (!has_remainder_[box.level]) {
-    remainders_[box.level] = make_remainder(box.level);
-    has_remainder_[box.level] = true;
-  }
-  return remainders_[box.level];
-}
-
-/// With P the models: N_i' N_j N_k - P_i' P_j P_k = (N_i' - P_i') N_j N_k + P_i' ((N_j - P_j) N_k + P_j (N_k - P_k)).
-Mat3 HexBoxes::make_remainder(int l) const {
-  const LineModels::Level& level = models_.level(l);
-  const auto &largest = level.largest_coefficient, &bound = models_.bounds(), &error = level.error,
-             &slope_error = level.slope_error;
-  LineModels::PerFunction model_bound, model_slope;
-  for (int i = 0; i < n_; ++i) {
-    model_bound[i] = bound[i] + error[i];
-    model_slope[i] = models_.slope_bounds()[i] + slope_error[i];
-  }
+/// With P the models: N_i N_j N_k - P_i P_j P_k = (N_i - P_i) N_j N_k + P_i (N_j - P_j) N_k + P_i P_j (N_k - P_k), and
+/// so with one of each three differentiated; |P| is at most `growth` times what bounds |N|.
+Mat3 HexBoxes::remainder(const Box& box) {
   Mat3 result = Mat3::Zero();
-  std::array<std::vector<double>, 4> sums;  // over k of |a_ijk| times bound, error, slope error, model slope
-  for (int row = 0; row < 3; ++row) {
-    const double* a = absolute_[row].data();
-    double size = 0;  // bounds the model's coefficients, before and after all roundings
-    for (int k = 0; k < n_; ++k)
-      for (int j = 0; j < n_; ++j) {
-        double sum = 0;
-        for (int i = 0; i < n_; ++i) sum += *a++ * largest[i];
-        size += sum * largest[j] * largest[k];
-      }
-    // Three contractions of n_ terms, tables good to 4 roundings each, the shift, differences, and the 16 asked for.
-    const double roundings = 3 * (n_ + 4) + 1 + 8 + 16;
-    const double rounding =
-        2 * (q1_ - 1) * std::ldexp(1.0, l) * roundings * (std::numeric_limits<double>::epsilon() / 2) * size;
-    result.row(row).setConstant(rounding);
-    if (level.exact) continue;
-
-    const int face = n_ * n_;
-    const LineModels::PerFunction* weights[4] = {&bound, &error, &slope_error, &model_slope};
-    for (int s = 0; s < 4; ++s) {
-      sums[s].assign(face, 0);
-      for (int k = 0; k < n_; ++k)
-        for (int m = 0; m < face; ++m) sums[s][m] += absolute_[row][k * face + m] * (*weights[s])[k];
-    }
-    for (int j = 0; j < n_; ++j)
-      for (int i = 0; i < n_; ++i) {
-        const double by_bound = sums[0][j * n_ + i], by_error = sums[1][j * n_ + i];
-        const double by_slope_error = sums[2][j * n_ + i], by_slope = sums[3][j * n_ + i];
-        result(row, 0) += slope_error[i] * bound[j] * by_bound +
-                          model_slope[i] * (error[j] * by_bound + model_bound[j] * by_error);
-        result(row, 1) += slope_error[j] * bound[i] * by_bound +
-                          model_slope[j] * (error[i] * by_bound + model_bound[i] * by_error);
-        result(row, 2) += by_slope_error * bound[i] * bound[j] +
-                          by_slope * (error[i] * bound[j] + model_bound[i] * error[j]);
-      }
+  double growth = 1, inflation = 1;
+  for (int d = 0; d < 3; ++d) {
+    const LineError& error = line_error(d, box.levels[d], box.tiers[d]);
+    result += growth * error.entries;
+    growth *= error.growth;
+    inflation *= error.inflation;
   }
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, differences, and the 16 asked for.
+  const double roundings = 3 * (n_ + 4) + 1 + 8 + 16;
+  for (int d = 0; d < 3; ++d)
+    result.col(d) += 2 * (q1(box, d) - 1) * std::ldexp(1.0, box.levels[d]) * roundings *
+                     (std::numeric_limits<double>::epsilon() / 2) * inflation * total_;
   return (1 + 1e-10) * result;
 }
 

@@ -11,18 +11,23 @@
 
 namespace subvol {
 
-/// Bernstein coefficients of the Jacobian dx/du of one high-order hex over its dyadic boxes.
+/// Bernstein coefficients of the Jacobian dx/du of one high-order hex over its dyadic boxes, got by halving them in the
+/// direction that pays most.
 ///
-/// On a box each of N_i(u), N_j(v), N_k(w) is replaced by its `LineModels`; the map's coefficients follow by three
-/// contractions, of which the boxes of one split share the first two, and J's by differences.
+/// On a box each of N_i(u), N_j(v), N_k(w) is replaced by `LineModels` of its direction: along u and w of the least
+/// degree with small errors by this cell's coefficients, along v always of degree kWide - 1, so that a row of
+/// coefficients is one `Wide`. The map's coefficients follow by three contractions, of which boxes of one place along
+/// w, or v and w, share the first ones, and J's by differences.
 class HexBoxes {
  public:
-  /// A cube of side 2^-level.
   struct Box {
-    int level = 0;
-    std::array<int, 3> index{0, 0, 0};
+    int level = 0;                         ///< halvings, of all directions
+    std::array<int, 3> levels{}, index{};  ///< per direction: side 2^-level, and place
+    std::array<int, 3> tiers{};            ///< of the models, by ascending degree
+    double wanted = -1;                    ///< errors of a direction's models, share of the mean edges; < 0: small ones
+    int split = 0;                         ///< direction to be halved
   };
-  static constexpr int kNumChildren = 8, kLevelsPerDepth = 1, kMaxDepth = LineModels::kMaxLevel;
+  static constexpr int kLevelsPerDepth = 3, kMaxDepth = LineModels::kMaxLevel;
 
   HexBoxes(Basis basis, int order);
 
@@ -31,45 +36,76 @@ class HexBoxes {
 
   static Box root() { return {}; }
   static int num_corners() { return 8; }
-  static std::array<Box, kNumChildren> children(const Box& box, double lowest = 0);
-  /// Models are as good as their level allows.
+  /// lowest: det of dx/du where it is least, as far as known: errors of models must be small beside it.
+  std::array<Box, 2> children(const Box& box, double lowest) const;
+  /// Models are chosen before a box is looked at.
   static bool improve(Box&, double) { return false; }
   static Vec3 corner_point(const Box& box, int corner);
 
-  /// J's coefficients on a box; valid until the next call. Boxes in the order of `children` cost least.
+  /// Chooses the box's models. Whether their errors are so large that no bound can be hoped for.
+  bool is_hopeless(Box& box);
+  /// J's coefficients on a box whose models have been chosen; valid until the next call.
   const ControlMatrices& matrices(const Box& box);
   /// Number of the matrix at a corner of the box: J there, by the model.
   std::size_t corner_matrix(const Box& box, int corner) const;
   /// Bounds of the errors of J's entries: modelling and rounding.
-  const Mat3& remainder(const Box& box);
-  /// Whether the modelling error is so large that no bound can be hoped for.
-  bool is_hopeless(const Box& box);
+  Mat3 remainder(const Box& box);
+  /// The direction along which J varies most, as far as looked at, and errors of models are largest.
+  void choose_split(Box& box);
   /// Whether no part of the box can be decided either: models get better with every level.
   static bool is_stuck(const Box&) { return false; }
   /// det of dx/du over that of `matrices`.
   static double determinant_scale(const Box&) { return 1; }
 
  private:
-  void contract_w(int level, int index);
-  void contract_v(int level, int index);
-  void contract_u(int level, int index);
-  void differences(int level);
-  Mat3 make_remainder(int level) const;
+  /// What modelling the functions of one direction does to J.
+  struct LineError {
+    std::size_t cell = 0;  ///< number of the cell that this is of
+    Mat3 entries;          ///< bounds of the errors, where the other directions' functions are exact
+    double size = 0;       ///< of these, share of the mean edges
+    // Of the functions that the cell uses, over the bounds of |N| and |N'|:
+    double growth = 1;     ///< bounds of |model| and |model'|
+    double inflation = 1;  ///< largest coefficients
+  };
+  const LineModels& models(const Box& box, int direction) const { return *tiers_[direction][box.tiers[direction]]; }
+  int q1(const Box& box, int direction) const { return models(box, direction).degree() + 1; }
+  std::size_t num_controls(const Box& box) const {
+    return static_cast<std::size_t>(q1(box, 0)) * q1(box, 2) * kWide;
+  }
+  /// Whether the buffers hold the same functions of a direction.
+  bool shares(const Box& box, int direction) const;
+  void make_weights();
+  const LineError& line_error(int direction, int level, int tier);
+  double error_size(const Box& box, int direction) {
+    return line_error(direction, box.levels[direction], box.tiers[direction]).size;
+  }
+  void contract_w(const Box& box);
+  void contract_v(const Box& box);
+  void contract_u(const Box& box);
+  void differences(const Box& box);
 
-  const LineModels& models_;
-  int n_, q1_;                                   // functions and coefficients per direction
+  static constexpr int kMostTiers = 2;
+
+  int n_;                                        // functions per direction
+  int lanes_, row_;                              // n_ and its square, to a multiple of kWide
+  std::array<std::vector<const LineModels*>, 3> tiers_;  // per direction, by ascending degree; along v there is one
   Box current_;                                  // what the buffers hold
   int contracted_ = 0;                           // and how many of its directions, from w on, are done
   std::array<std::vector<double>, 3> modes_;     // x, y, z of a_ijk at (k n + j) n + i
-  std::array<std::vector<double>, 3> absolute_;  // |a_ijk|
-  std::array<std::vector<double>, 3> after_w_;   // at (o_w n + j) n + i
-  std::array<std::vector<double>, 3> after_v_;   // at (i q1 + o_w) q1 + o_v
-  std::array<std::vector<double>, 3> control_;   // at (o_u q1 + o_w) q1 + o_v, behind a margin of q1^2
-  std::array<std::vector<double>, 3> below_, above_;  // per direction: o and q - o at each control point
+  std::vector<int> used_;                        // of every kWide numbers j n + i: first k from where on all are 0
+  std::array<std::vector<double>, 3> after_w_;   // at o_w row_ + j n + i
+  std::array<std::vector<Wide>, 3> after_v_;     // at i q1_w + o_w, lane o_v
+  std::array<std::vector<Wide>, 3> control_;     // at o_u q1_w + o_w, lane o_v, behind a margin of q1_w
   ControlMatrices matrices_;
-  Vec3 mean_edges_;  // lengths of the linear part's mean columns
-  std::array<Mat3, LineModels::kMaxLevel + 1> remainders_;
-  std::array<bool, LineModels::kMaxLevel + 1> has_remainder_{};
+  Vec3 mean_edges_;                              // lengths of the linear part's mean columns
+  // [direction][column] at i, x y z: sum over the other two numbers of |a_ijk| times what bounds their functions in
+  // that column of J
+  std::array<std::array<std::vector<Vec3>, 3>, 3> weights_;
+  Vec3 total_;                                   // sum of |a_ijk| times all three bounds
+  std::size_t cell_ = 0;                         // number of the current one, from 1
+  std::array<std::array<std::array<LineError, kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
+  std::vector<double> bounds_, slope_bounds_;    // of N_i and N_i', behind them zeros
+  std::vector<double> sums_;                     // scratch of make_weights
 };
 
 }  // namespace subvol

@@ -55,7 +55,7 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
 }
 
 /// Best-first search for the sign of det J over one cell: the box with the lowest corner comes next. A box is halved in
-/// each direction, or (simplices) one direction at a time.
+/// one direction at a time.
 template <class Boxes>
 class Search {
  public:
@@ -132,10 +132,11 @@ class Search {
       }
       if (lowest <= 0) lowest = try_witness(boxes_.corner_point(box, lowest_corner));
     } while (lowest > 0 && boxes_.improve(box, lowest));
-    if (lowest > 0 && boxes_.is_stuck(box))
+    if (lowest > 0 && boxes_.is_stuck(box)) {
       decided_ = false;
-    else
-      keep(std::move(box), lowest);
+      return;
+    }
+    keep(std::move(box), lowest);
   }
 
   /// The model's word does not count against a cell, its own functions' does.
@@ -150,6 +151,7 @@ class Search {
   }
 
   void keep(Box box, double lowest) {
+    boxes_.choose_split(box);
     open_.push_back({lowest, num_kept_++, std::move(box)});
     std::push_heap(open_.begin(), open_.end());
   }

@@ -13,7 +13,7 @@ namespace subvol {
 ///
 /// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
 /// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
-/// for legendre up to order 8, close for all others, and better with every halving. So are `SimplexModels`, of tets and
+/// for legendre up to order 7, close for all others, and better with every halving. So are `SimplexModels`, of tets and
 /// of the triangles of prisms. Rounding is bounded a priori, about 1e-13 of the product of the lengths of a hex of
 /// order 4, 1e-11 of a tet of order 8: cells that are closer to inversion end undecided, never wrong. A witness is a
 /// point where det J, computed from the shape functions themselves, is negative beyond its own rounding.
@@ -30,7 +30,7 @@ class HighOrderCertifier {
   /// coefficients  one per node of the space (asserted), any values: cells with one that is not finite, or so large or
   ///               small (beyond 1e+-50) that products overflow, end undecided.
   /// returns       as for linear cells: lower_bound > 0 exactly when valid, else -infinity; never a wrong `valid` or
-  ///               `invalid`. Cost of a well-shaped hex at orders 1, 2, 4, 8: about 1, 2 to 4, 5, 65 us, of a tet 0.6,
+  ///               `invalid`. Cost of a well-shaped hex at orders 1, 2, 4, 8: about 1, 2, 3 to 8, 65 us, of a tet 0.6,
   ///               0.8, 2.5, 55 us (fourier) or 0.6, 0.6, 1, 8 us; models first (`SimplexModels`).
   CellCertificate certify(std::span<const Vec3> coefficients, std::size_t cell);
 

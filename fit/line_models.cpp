@@ -62,17 +62,21 @@ std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree) {
   return rows;
 }
 
-const LineModels& LineModels::get(Basis basis, int order) {
-  assert(order >= 1 && order <= kMaxOrder);
-  static std::array<std::array<std::unique_ptr<const LineModels>, kMaxOrder + 1>, 2> models;
-  static std::array<std::array<std::once_flag, kMaxOrder + 1>, 2> made;
-  const auto b = static_cast<std::size_t>(basis);
-  std::call_once(made[b][order], [&] { models[b][order].reset(new LineModels(basis, order)); });
-  return *models[b][order];
+const LineModels& LineModels::get(Basis basis, int order) { return get(basis, order, model_degree(basis, order)); }
+
+const LineModels& LineModels::get(Basis basis, int order, int degree) {
+  assert(order >= 1 && order <= kMaxOrder && degree >= 1 && degree <= kMaxDegree);
+  struct Made {
+    std::unique_ptr<const LineModels> models;
+    std::once_flag once;
+  };
+  static std::array<std::array<std::array<Made, kMaxDegree + 1>, kMaxOrder + 1>, 2> all;
+  Made& made = all[static_cast<std::size_t>(basis)][order][degree];
+  std::call_once(made.once, [&] { made.models.reset(new LineModels(basis, order, degree)); });
+  return *made.models;
 }
 
-LineModels::LineModels(Basis basis, int order)
-    : basis_(basis), order_(order), degree_(model_degree(basis, order)) {
+LineModels::LineModels(Basis basis, int order, int degree) : basis_(basis), order_(order), degree_(degree) {
   bounds_[0] = bounds_[1] = slope_bounds_[0] = slope_bounds_[1] = 1;
   constexpr double kUp = 1 + 1e-14;
   for (int i = 1; i < order; ++i) {

@@ -31,10 +31,13 @@ class LineModels {
 
   /// The models of a basis and an order of 1 .. kMaxOrder: made once, each level when it is first asked for; for all
   /// threads. Cost of a level: about 10 us times 2^level at order 8.
+  static const LineModels& get(Basis basis, int order, int degree);
+  /// Of the degree that does for most.
   static const LineModels& get(Basis basis, int order);
 
   int order() const { return order_; }
   int degree() const { return degree_; }
+  bool is_exact() const { return order_ == 1 || (basis_ == Basis::legendre && order_ <= degree_); }
   /// Bounds of |N_i| and |N_i'| over [0, 1].
   const PerFunction& bounds() const { return bounds_; }
   const PerFunction& slope_bounds() const { return slope_bounds_; }
@@ -44,7 +47,7 @@ class LineModels {
   }
 
  private:
-  LineModels(Basis basis, int order);
+  LineModels(Basis basis, int order, int degree);
   Level make_level(int l) const;
 
   Basis basis_;

