@@ -94,7 +94,8 @@ TEST_CASE("the plane of a cutaway stands where it is told to") {
   const std::vector<double> minima(mesh.num_cells(), 1);
   const auto extent = [&](const CutPlane& plane) {
     Eigen::AlignedBox3d box;
-    for (const Vec3& p : cutaway_scene(mesh, minima, plane).nodes[0].primitive.positions) box.extend(p);
+    const Scene scene = cutaway_scene(mesh, minima, plane);
+    for (const Vec3& p : scene.nodes[0].primitive.positions) box.extend(p);
     return Vec3(box.sizes());
   };
   CHECK(extent({.axis = 0}).x() == Approx(2));
