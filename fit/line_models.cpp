@@ -39,7 +39,7 @@ double log_slope_derivative(Basis basis, int i, int k) {
   return 0.5 * std::numbers::ln2 + k * std::log(i * std::numbers::pi);
 }
 
-/// Models of degree 5 cost least for the first Fourier modes, 8 for many (measured).
+/// Along a prism's w: degree 5 costs least for the first Fourier modes, 8 for many (measured).
 int model_degree(Basis basis, int order) {
   if (basis == Basis::legendre) return std::min(order, LineModels::kMaxDegree);
   return order == 1 ? 1 : order <= 5 ? 5 : LineModels::kMaxDegree;

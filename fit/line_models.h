@@ -29,15 +29,14 @@ class LineModels {
     std::vector<double> coefficients;    ///< b_io at (index (order + 1) + i) kStride + o
   };
 
-  /// The models of a basis and an order of 1 .. kMaxOrder: made once, each level when it is first asked for; for all
-  /// threads. Cost of a level: about 10 us times 2^level at order 8.
+  /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it is
+  /// first asked for; for all threads. Cost of a level: about 10 us times 2^level at order 8.
   static const LineModels& get(Basis basis, int order, int degree);
-  /// Of the degree that does for most.
+  /// Of the degree that serves best along a prism's w.
   static const LineModels& get(Basis basis, int order);
 
   int order() const { return order_; }
   int degree() const { return degree_; }
-  bool is_exact() const { return order_ == 1 || (basis_ == Basis::legendre && order_ <= degree_); }
   /// Bounds of |N_i| and |N_i'| over [0, 1].
   const PerFunction& bounds() const { return bounds_; }
   const PerFunction& slope_bounds() const { return slope_bounds_; }
