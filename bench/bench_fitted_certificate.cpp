@@ -37,9 +37,8 @@ void measure(const char* path, bool last) {
   const HighOrderMesh mesh = read_high_order(path).mesh;
   const std::size_t num_cells = mesh.space.num_cells();
   HighOrderCertifier certifier(mesh.space);
-  double first = 0, later = 1e300;
+  double first = 0, later = 1e300, total = 0;
   std::size_t boxes = 0, not_valid = 0;
-  double total = 0;
   for (int pass = 0; pass < kPasses || total < kLeastMicroseconds; ++pass) {
     boxes = not_valid = 0;
     const double time = processor_microseconds([&] {

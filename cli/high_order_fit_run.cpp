@@ -111,7 +111,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   }
   const Clock::time_point template_start = Clock::now();
   LoadedTemplate loaded =
-      load_template(arguments.template_mesh, target, {.order = arguments.fit.order,
+      load_template(arguments.template_mesh, target,
+                    {.order = arguments.fit.order,
                      .basis = arguments.fit.basis,
                      .time_limit_seconds = kTrialsShareOfTime * arguments.fit.time_limit_seconds},
                     arguments.run, warnings);
