@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/control_matrices.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,87 +15,171 @@ namespace {
 constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
 
 Wide all(double x) { return Wide{} + x; }
-Wide absolute(const Wide& x) { return x < 0 ? -x : x; }
 
-/// Transposed rotation of the polar decomposition, by Newton's iteration, scaled while far from it (Higham).
-Mat3 unrotate(Mat3 m) {
+/// About the transposed rotation of m's polar decomposition, by Newton's iteration, scaled while far from it (Higham).
+/// As m comes closer to a singular matrix, better and better; and times m symmetric.
+Mat3 unrotate(const Mat3& m) {
+  const auto inverse_transposed = [](const Mat3& x) {
+    Mat3 result;
+    for (int d = 0; d < 3; ++d) result.col(d) = x.col((d + 1) % 3).cross(x.col((d + 2) % 3));
+    return Mat3(result / x.col(0).dot(result.col(0)));
+  };
+  const double near = m.determinant();
+  const Mat3 first_inverse = inverse_transposed(m);
+  Mat3 rotation = m, inverse = first_inverse;
   for (int step = 0; step < 12; ++step) {
-    const Mat3 inverse = m.inverse().transpose();
-    const double distance = (inverse - m).squaredNorm();
-    const double factor = distance > 0.1 ? std::sqrt(inverse.norm() / m.norm()) : 1;
-    m = 0.5 * (factor * m + inverse / factor);
-    if (distance < 1e-6) break;  // the next one would be below 1e-12
+    if (step > 0) inverse = inverse_transposed(rotation);
+    const double distance = (inverse - rotation).squaredNorm();
+    const double factor = distance > 1 ? std::sqrt(inverse.norm() / rotation.norm()) : 1;
+    rotation = 0.5 * (factor * rotation + inverse / factor);
+    if (distance < near) break;
   }
-  return m.transpose();
+  const Mat3 product = rotation.transpose() * m;
+  return rotation.transpose() - 0.5 * (product - product.transpose()) * first_inverse.transpose();
 }
 
-/// Extremes over all S_b, per lane.
-struct Extremes {
-  Wide first = all(std::numeric_limits<double>::infinity()), second = first, third = first;  // least leading minors
-  Wide largest = all(0);                                                                     // largest entry
+/// Mean square of the entries of rotation (J_b - mean) frame, over some of the matrices that are spread over all.
+Mat3 variation(const ControlMatrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3& frame) {
+  constexpr std::size_t kMost = 8;  // vectors of them; more make little difference (measured)
+  const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
+  Wide products[3][6] = {};  // of the columns of rotation (J - mean), by its rows
+  for (std::size_t i = 0; i < sampled; ++i) {
+    const std::size_t at = std::min(i == 0 ? 0 : i * (vectors - 1) / (sampled - 1) * kWide, matrices.size() - kWide);
+    Wide turned[3][3];
+    for (int c = 0; c < 3; ++c) {
+      Wide j[3];
+      for (int r = 0; r < 3; ++r) j[r] = load_wide(matrices.entries(r, c) + at) - mean(r, c);
+      for (int r = 0; r < 3; ++r)
+        turned[r][c] = rotation(r, 0) * j[0] + rotation(r, 1) * j[1] + rotation(r, 2) * j[2];
+    }
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0, pair = 0; c < 3; ++c)
+        for (int d = c; d < 3; ++d) products[r][pair++] += turned[r][c] * turned[r][d];
+  }
+  Mat3 result;
+  for (int r = 0; r < 3; ++r) {
+    Mat3 moments;
+    for (int c = 0, pair = 0; c < 3; ++c)
+      for (int d = c; d < 3; ++d) moments(c, d) = moments(d, c) = sum_of_lanes(products[r][pair++]);
+    for (int c = 0; c < 3; ++c) result(r, c) = frame.col(c).dot(moments * frame.col(c));
+  }
+  return result / static_cast<double>(kWide * sampled);
+}
+
+/// c, up to a factor. lengths: of the columns of M frame.
+Vec3 scales_by_variation(const Mat3& variation, const Vec3& lengths) {
+  constexpr double kLeast = 0.01;  // squared share of the lengths, beside which less variation does not count
+  const Mat3 v = variation + kLeast * Vec3::Ones() * lengths.cwiseAbs2().transpose();
+  Vec3 result;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    result[i] = std::cbrt(std::sqrt(v(i, j) / v(j, i) * (v(i, k) / v(k, i))));
+  }
+  return result;
+}
+
+struct Bound {
+  double value;   ///< of det J, 0: none
+  bool is_final;  ///< no other L finds one
 };
+
+/// The bound by one L.
+///
+/// scale  D
+Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrices& matrices, const Mat3& remainder) {
+  constexpr double kLeastDeterminant = 1e-3;  // of L, by its largest entry cubed: so it is good to 1e-11
+  l /= l.cwiseAbs().maxCoeff();
+  if (!(l.determinant() > kLeastDeterminant)) return {0, false};
+  const Mat3 g = l.cwiseAbs() * remainder * scale.asDiagonal();
+  Vec3 shift;
+  for (int i = 0; i < 3; ++i) shift[i] = 0.5 * (1 + 1e-12) * (g.row(i).sum() + g.col(i).sum());
+  if (!(((l * mean * scale.asDiagonal()).diagonal() - shift).minCoeff() > 0)) return {0, false};
+
+  // T_b = D^-1 S_b D^-1: what is scaled are the extremes over all b.
+  const Mat3 unscaled = scale.cwiseInverse().asDiagonal() * l, half = 0.5 * unscaled;
+  const Vec3 start = -shift.cwiseQuotient(scale.cwiseAbs2());
+  Wide first = all(std::numeric_limits<double>::infinity()), second = first, third = first;  // least leading minors
+  Wide sizes[6] = {};                                                                        // largest entries
+  const std::size_t count = matrices.size();
+  for (std::size_t b = 0; b < count; b += kWide) {
+    const std::size_t at = std::min(b, count - kWide);  // the last lanes overlap
+    Wide j[3][3];
+    for (int r = 0; r < 3; ++r)
+      for (int d = 0; d < 3; ++d) j[r][d] = load_wide(matrices.entries(r, d) + at);
+    const auto diagonal = [&](int i) {
+      return start[i] + unscaled(i, 0) * j[0][i] + unscaled(i, 1) * j[1][i] + unscaled(i, 2) * j[2][i];
+    };
+    const auto beside = [&](int i, int k) {
+      return half(i, 0) * j[0][k] + half(i, 1) * j[1][k] + half(i, 2) * j[2][k] + half(k, 0) * j[0][i] +
+             half(k, 1) * j[1][i] + half(k, 2) * j[2][i];
+    };
+    const Wide t00 = diagonal(0), t11 = diagonal(1), t22 = diagonal(2);
+    const Wide t01 = beside(0, 1), t02 = beside(0, 2), t12 = beside(1, 2);
+    const Wide minor = t00 * t11 - t01 * t01;
+    const Wide determinant = t22 * minor - t12 * (t00 * t12 - t01 * t02) + t02 * (t01 * t12 - t02 * t11);
+    Wide least = t00;
+    take_lower(least, minor);
+    take_lower(least, determinant);
+    if (lanes_within(least, 0)) {
+          const Wide own = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1]) -
+                       j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0]) +
+                       j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
+      return {0, lanes_within(own, 0) != 0};  // S_b > 0 has det J_b > 0
+    }
+    take_lower(first, t00);
+    take_lower(second, minor);
+    take_lower(third, determinant);
+    const Wide entries[6] = {t00, t11, t22, t01, t02, t12};
+    for (int e = 0; e < 6; ++e) take_higher_size(sizes[e], entries[e]);
+  }
+  const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes[e]) * scale[i] * scale[k]; };
+  const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
+                                   scaled_size(3, 0, 1), scaled_size(4, 0, 2), scaled_size(5, 1, 2)});
+  const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
+  // Products of two entries with at most 3 roundings each in a second minor, six of three with 5 to 6 in a third.
+  const double least_third = to_third * lowest_lane(third) - 100 * kRoundoff * largest * largest * largest;
+  if (!(largest < 1e30 && lowest_lane(first) > 0 &&
+        to_second * lowest_lane(second) > 9 * kRoundoff * largest * largest && least_third > 0))
+    return {0, false};
+  return {least_third * (1 - 1e-11) / (scale.prod() * l.determinant()), true};
+}
 
 }  // namespace
 
 Mat3 ControlMatrices::mean() const {
+  const std::size_t last = count_ - kWide, step = count_ > 16 * kWide ? 2 * kWide : kWide;
+  const double sampled = kWide * (static_cast<double>(last / step) + 2);
   Mat3 result;
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) {
       const double* x = entries(r, c);
-      Wide sum{};
-      std::size_t b = 0;
-      for (; b + kWide <= count_; b += kWide) sum += load_wide(x + b);
-      double total = 0;
-      for (; b < count_; ++b) total += x[b];
-      for (int lane = 0; lane < kWide; ++lane) total += sum[lane];
-      result(r, c) = total / static_cast<double>(count_);
+      Wide sum = load_wide(x + last);
+      for (std::size_t b = 0; b <= last; b += step) sum += load_wide(x + b);
+      result(r, c) = sum_of_lanes(sum) / sampled;
     }
   return result;
 }
 
-double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder) {
+double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder, const Mat3& frame) {
   const Mat3 mean = matrices.mean();
-  const Vec3 scale = mean.colwise().norm().cwiseInverse().transpose();
-  const Mat3 normalised = mean * scale.asDiagonal();
-  if (!(normalised.determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
-  const Mat3 l = unrotate(normalised);
-  const Mat3 g = l.cwiseAbs() * remainder * scale.asDiagonal();
-  Vec3 shift;
-  for (int i = 0; i < 3; ++i) shift[i] = 0.5 * (1 + 1e-12) * (g.row(i).sum() + g.col(i).sum());
-  if (!(shift.maxCoeff() < 1 && l.cwiseAbs().maxCoeff() < 2 && l.determinant() > 0.5)) return 0;
+  const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
+  if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
+  const auto bound = [&](const Mat3& l) { return bound_by(l, scale, mean, matrices, remainder); };
+  const bool is_framed = frame != Mat3::Identity();
 
-  Extremes x;
-  const std::size_t count = matrices.size();
-  constexpr std::size_t kBetween = 8 * kWide;  // looks at whether all is lost
-  for (std::size_t b = 0; b < count; b += kWide) {
-    if (b % kBetween == 0 && !(lowest_lane(x.first) > 0 && lowest_lane(x.second) > 0 && lowest_lane(x.third) > 0))
-      return 0;
-    const std::size_t at = std::min(b, count - kWide);  // the last lanes overlap
-    Wide m[3][3] = {};
-    for (int c = 0; c < 3; ++c) {
-      const Wide j0 = load_wide(matrices.entries(0, c) + at) * scale[c];
-      const Wide j1 = load_wide(matrices.entries(1, c) + at) * scale[c];
-      const Wide j2 = load_wide(matrices.entries(2, c) + at) * scale[c];
-      for (int i = 0; i < 3; ++i) m[i][c] = l(i, 0) * j0 + l(i, 1) * j1 + l(i, 2) * j2;
-    }
-    const Wide s00 = m[0][0] - shift[0], s11 = m[1][1] - shift[1], s22 = m[2][2] - shift[2];
-    const Wide s01 = 0.5 * (m[0][1] + m[1][0]), s02 = 0.5 * (m[0][2] + m[2][0]), s12 = 0.5 * (m[1][2] + m[2][1]);
-    const Wide second = s00 * s11 - s01 * s01;
-    const Wide third = s22 * second - s12 * (s00 * s12 - s01 * s02) + s02 * (s01 * s12 - s02 * s11);
-    take_lower(x.first, s00);
-    take_lower(x.second, second);
-    take_lower(x.third, third);
-    for (const Wide& entry : {s00, s11, s22, s01, s02, s12}) take_higher(x.largest, absolute(entry));
-  }
-  double largest = 0;
-  for (int lane = 0; lane < kWide; ++lane) largest = std::max(largest, x.largest[lane]);
-  // Products of two entries with at most 3 roundings each in a second minor, six of three with 5 to 6 in a third.
-  const double third = lowest_lane(x.third) - 96 * kRoundoff * largest * largest * largest;
-  if (!(largest < 1e30 && lowest_lane(x.first) > 0 && lowest_lane(x.second) > 8 * kRoundoff * largest * largest &&
-        third > 0))
-    return 0;
-  const double unscale = scale[0] * scale[1] * scale[2] * l.determinant();
-  return third * (1 - 1e-12) / unscale;
+  const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
+  const Vec3 framed_lengths = is_framed ? Vec3(framed.colwise().norm().transpose()) : lengths;
+  const Mat3 to_frame = scale.asDiagonal() * frame.inverse().transpose();
+  const Mat3 rotation = unrotate(framed * framed_lengths.cwiseInverse().asDiagonal());
+  Bound result = bound(to_frame * framed_lengths.asDiagonal() * rotation);
+  if (result.is_final) return result.value;
+
+  const Vec3 c = scales_by_variation(variation(matrices, mean, rotation, frame), framed_lengths);
+  const double size = std::cbrt(framed.determinant() * c.prod());
+  result = bound(to_frame * c.cwiseInverse().asDiagonal() * unrotate(framed * (c / size).asDiagonal()));
+  // The remainder is smallest by the box's own coordinates.
+  if (!result.is_final && is_framed) result = bound(unrotate(mean * scale.asDiagonal()));
+  return result.value;
 }
 
 }  // namespace subvol

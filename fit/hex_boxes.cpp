@@ -11,12 +11,12 @@ namespace {
 
 /// Share of the mean edges up to which errors of models are small as long as nothing is known of det J.
 constexpr double kSmallError = 0.15;
-/// Beyond this sum it does not pay to look: the shifts of `determinant_bound` sum up to at least that much, if the mean
-/// edges tell the mean matrix, and each must be < 1 (measured).
-constexpr double kHopelessError = 1;
+/// Beyond this sum it does not pay to look: the shifts of `determinant_bound` sum up to about that much, if the mean
+/// edges tell the mean matrix, and what they leave must be more than the variation of J (measured).
+constexpr double kHopelessError = 0.5;
 
 /// Columns of a contraction that are worked on at a time.
-constexpr int kSome = 4;
+constexpr int kSome = 5;
 
 /// Of the functions along u and w, ascending. Fewer than 5 gain nothing (measured).
 std::vector<int> model_degrees(Basis basis, int order) {
@@ -45,12 +45,6 @@ Contraction contraction(int num_out) {
   static constexpr Contraction all[] = {nullptr,        contract_to<1>, contract_to<2>, contract_to<3>, contract_to<4>,
                                         contract_to<5>, contract_to<6>, contract_to<7>, contract_to<8>};
   return all[num_out];
-}
-
-double sum_of_lanes(const Wide& x) {
-  double sum = 0;
-  for (int lane = 0; lane < kWide; ++lane) sum += x[lane];
-  return sum;
 }
 
 }  // namespace
@@ -134,11 +128,17 @@ void HexBoxes::make_weights() {
       of_w[1][m][row] = dot(by_k_slope, m, bounds_);
       of_w[2][m][row] = dot(by_k, m, bounds_);
       total_[row] += bounds_[m] * of_w[2][m][row];
-      Vec3 sum = Vec3::Zero();
-      for (int k = 0; k < n_; ++k)
-        sum += Vec3(bounds_[k] * by_k[k * lanes_ + m], bounds_[k] * by_k_slope[k * lanes_ + m],
-                    slope_bounds_[k] * by_k[k * lanes_ + m]);
-      for (int column = 0; column < 3; ++column) of_u[column][m][row] = sum[column];
+    }
+    for (int i = 0; i < n_; i += kWide) {
+      Wide sums[3] = {};
+      for (int k = 0; k < n_; ++k) {
+        const Wide value = load_wide(by_k + k * lanes_ + i);
+        sums[0] += bounds_[k] * value;
+        sums[1] += bounds_[k] * load_wide(by_k_slope + k * lanes_ + i);
+        sums[2] += slope_bounds_[k] * value;
+      }
+      for (int column = 0; column < 3; ++column)
+        for (int m = i; m < std::min(n_, i + kWide); ++m) of_u[column][m][row] = sums[column][m - i];
     }
   }
 }
@@ -176,18 +176,29 @@ bool HexBoxes::is_hopeless(Box& box) {
 }
 
 void HexBoxes::choose_split(Box& box) {
+  // Contractions along u cost least, and boxes next to one another share those along w, and v: what must be halved
+  // anyway along w comes first.
+  constexpr double kNeeded = 0.6;
+  constexpr double kCost[3] = {0.9, 1, 1.1};
+  const bool is_looked_at = contracted_ == 3 && current_.levels == box.levels && current_.index == box.index;
+  box.split = -1;
   Vec3 variation = Vec3::Zero();
-  for (int d = 0; d < 3; ++d) variation[d] = error_size(box, d);
-  if (contracted_ == 3 && current_.levels == box.levels && current_.index == box.index) {
+  for (int d = 2; d >= 0; --d) {
+    variation[d] = error_size(box, d);
+    if (!is_looked_at && box.split < 0 && variation[d] > kNeeded && box.levels[d] < LineModels::kMaxLevel)
+      box.split = d;
+  }
+  if (box.split >= 0) return;
+  if (is_looked_at) {
     const int num_u = q1(box, 0), num_w = q1(box, 2);
-    const double samples = kWide * (num_u - 1) * (num_w / 2);
+    const double samples = kWide * (num_u / 2) * (num_w / 2);
     const auto size = [](const Wide& x) { return x < 0 ? -x : x; };
     for (int column = 0; column < 3; ++column)
       for (int row = 0; row < 3; ++row) {
         const double* entries = matrices_.entries(row, column);
         Wide steps[3] = {};
-        for (int u = 0; u + 1 < num_u; ++u)
-          for (int w = 0; w + 1 < num_w; w += 2) {  // every second line along v is enough
+        for (int u = 0; u + 1 < num_u; u += 2)
+          for (int w = 0; w + 1 < num_w; w += 2) {  // a quarter of the lines along v is enough
             const double* x = entries + (u * num_w + w) * kWide;
             const Wide here = load_wide(x);
             steps[0] += size(load_wide(x + num_w * kWide) - here);
@@ -198,9 +209,10 @@ void HexBoxes::choose_split(Box& box) {
           variation[d] += sum_of_lanes(steps[d]) / samples * (q1(box, d) - 1) / mean_edges_[column];
       }
   }
-  box.split = -1;
   for (int d = 0; d < 3; ++d)
-    if (box.levels[d] < LineModels::kMaxLevel && (box.split < 0 || variation[d] > variation[box.split])) box.split = d;
+    if (box.levels[d] < LineModels::kMaxLevel &&
+        (box.split < 0 || variation[d] * kCost[box.split] > variation[box.split] * kCost[d]))
+      box.split = d;
   if (box.split < 0) box.split = 0;  // the deepest box there is
 }
 
@@ -296,20 +308,20 @@ void HexBoxes::differences(const Box& box) {
   const int num_w = q1(box, 2), num_u = q1(box, 0);
   Vec3 per_side;
   for (int d = 0; d < 3; ++d) per_side[d] = std::ldexp(1.0, box.levels[d]);
-  const Wide low_v = per_side[1] * kPlace, high_v = per_side[1] * (kWide - 1 - kPlace);
+  const Wide low_v = per_side[1] * kPlace, high_v = per_side[1] * (kWide - 1 - kPlace), own_v = low_v - high_v;
   matrices_.resize(num_controls(box));
   for (int row = 0; row < 3; ++row) {
     const Wide* x = control_[row].data() + num_w;
     double *by_u = matrices_.entries(row, 0), *by_v = matrices_.entries(row, 1), *by_w = matrices_.entries(row, 2);
     for (int u = 0; u < num_u; ++u) {
-      const double low_u = per_side[0] * u, high_u = per_side[0] * (num_u - 1 - u);
+      const double low_u = per_side[0] * u, high_u = per_side[0] * (num_u - 1 - u), own_u = low_u - high_u;
       for (int w = 0; w < num_w; ++w) {
         const int at = u * num_w + w;
-        const double low_w = per_side[2] * w, high_w = per_side[2] * (num_w - 1 - w);
+        const double low_w = per_side[2] * w, high_w = per_side[2] * (num_w - 1 - w), own_w = low_w - high_w;
         const Wide here = x[at];
-        store_wide(low_u * (here - x[at - num_w]) + high_u * (x[at + num_w] - here), by_u + at * kWide);
-        store_wide(low_v * (here - shifted_up(here)) + high_v * (shifted_down(here) - here), by_v + at * kWide);
-        store_wide(low_w * (here - x[at - 1]) + high_w * (x[at + 1] - here), by_w + at * kWide);
+        store_wide(own_u * here - low_u * x[at - num_w] + high_u * x[at + num_w], by_u + at * kWide);
+        store_wide(own_v * here - low_v * shifted_up(here) + high_v * shifted_down(here), by_v + at * kWide);
+        store_wide(own_w * here - low_w * x[at - 1] + high_w * x[at + 1], by_w + at * kWide);
       }
     }
   }

@@ -54,6 +54,10 @@ class HexBoxes {
   void choose_split(Box& box);
   /// Whether no part of the box can be decided either: models get better with every level.
   static bool is_stuck(const Box&) { return false; }
+  /// About the mean of det of dx/du over the cell.
+  double mean_determinant() const { return mean_edges_.prod(); }
+  /// Of `determinant_bound`.
+  static Mat3 frame(const Box&) { return Mat3::Identity(); }
   /// det of dx/du over that of `matrices`.
   static double determinant_scale(const Box&) { return 1; }
 

@@ -54,8 +54,8 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
   return {jacobian.determinant(), 2 * margin};
 }
 
-/// Best-first search for the sign of det J over one cell: the box with the lowest corner comes next. A box is halved in
-/// one direction at a time.
+/// Search for the sign of det J over one cell: the box with the lowest corner comes next, where that is low; else the
+/// last one seen, which shares most with its halves. A box is halved in one direction at a time.
 template <class Boxes>
 class Search {
  public:
@@ -72,13 +72,13 @@ class Search {
     look_at(boxes_.root(), -kInfinity);
     while (!refuted_ && !open_.empty()) {
       std::pop_heap(open_.begin(), open_.end());
-      const Open next = std::move(open_.back());
+      Open next = std::move(open_.back());
       open_.pop_back();
       if (next.box.level >= max_level_) {
         decided_ = false;
         continue;
       }
-      auto children = boxes_.children(next.box, next.lowest);
+      auto children = boxes_.children(std::move(next.box), next.lowest);
       if (result_.boxes + static_cast<int>(children.size()) > options_.max_boxes) {
         decided_ = false;
         break;
@@ -103,11 +103,11 @@ class Search {
 
  private:
   struct Open {
-    double lowest;
+    double lowest, urgency;
     std::size_t number;
     Box box;
     bool operator<(const Open& other) const {
-      return lowest != other.lowest ? lowest > other.lowest : number > other.number;
+      return urgency != other.urgency ? urgency < other.urgency : number < other.number;
     }
   };
 
@@ -119,7 +119,7 @@ class Search {
     do {
       const ControlMatrices& matrices = boxes_.matrices(box);
       const double scale = boxes_.determinant_scale(box);
-      const double bound = scale * determinant_bound(matrices, boxes_.remainder(box));
+      const double bound = scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box));
       if (bound > 0) {
         result_.lower_bound = std::min(result_.lower_bound, bound);
         return;
@@ -152,7 +152,8 @@ class Search {
 
   void keep(Box box, double lowest) {
     boxes_.choose_split(box);
-    open_.push_back({lowest, num_kept_++, std::move(box)});
+    constexpr double kCalm = 0.1;  // share of what det J is in the mean
+    open_.push_back({lowest, -std::min(lowest, kCalm * boxes_.mean_determinant()), num_kept_++, std::move(box)});
     std::push_heap(open_.begin(), open_.end());
   }
 
@@ -200,15 +201,14 @@ CellCertificate HighOrderCertifier::certify(std::span<const Vec3> coefficients, 
 
   const Vec3 origin = coefficients[space_->vertices(c)[0]];
   buffers_->coefficients.resize(nodes.size());
+  Vec3 total = Vec3::Zero();
   for (std::size_t a = 0; a < nodes.size(); ++a) {
-    Vec3& x = buffers_->coefficients[a];
-    x = coefficients[nodes[a]];
-    if (static_cast<std::size_t>(nodes[a]) < space_->num_vertices())
-      x -= origin;
-    else
-      x *= signs[a];
-    cell.total += x.cwiseAbs();
+    const bool is_vertex = static_cast<std::size_t>(nodes[a]) < space_->num_vertices();
+    const Vec3 x = is_vertex ? Vec3(coefficients[nodes[a]] - origin) : Vec3(signs[a] * coefficients[nodes[a]]);
+    buffers_->coefficients[a] = x;
+    total += x.cwiseAbs();
   }
+  cell.total = total;
   cell.coefficients = buffers_->coefficients;
   const double size = cell.total.maxCoeff();
   if (!(size >= 1e-50 && cell.total.sum() <= 1e50)) {

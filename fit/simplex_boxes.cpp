@@ -41,7 +41,7 @@ std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) 
 /// Share of the mean edges up to which errors of models are small as long as nothing is known of det J. At high orders
 /// low degrees cost more in boxes than they save (measured).
 double small_error(int order) { return order <= 4 ? 0.05 : 0.004; }
-/// Beyond this one nothing can be hoped for.
+/// Beyond this one nothing can be hoped for: the shifts of `determinant_bound` (see `HexBoxes`).
 constexpr double kHopelessError = 1;
 /// New models need not be closer than by this factor: the ones after them will be.
 constexpr double kFall = 0.05;
@@ -107,7 +107,7 @@ bool SimplexBoxes::is_stuck(const Box& box) {
   mean_.resize(kWide);
   for (int row = 0; row < 3; ++row)
     for (int d = 0; d < 3; ++d) std::fill_n(mean_.entries(row, d), kWide, mean(row, d));
-  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs()) == 0;
+  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs(), frame(box)) == 0;
 }
 
 SimplexBoxes::Box SimplexBoxes::root() {
@@ -200,8 +200,17 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
         for (int row = 0; row < 3; ++row) sums[row] += f.coefficient[row] * b;
       }
       double* out = box.control.data() + first * lanes_ + k;
-      for (int n = 0; n < kWide; ++n)
-        for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[row][n];
+      if (num_layers_ > 1) {
+        for (int n = 0; n < kWide; ++n)
+          for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[row][n];
+      } else {
+        for (int n = 0; n < kWide; n += kLanes) {
+          Lanes points[kLanes] = {};
+          for (int row = 0; row < 3; ++row) std::memcpy(&points[row], &sums[row][n], sizeof(Lanes));
+          transpose(points);
+          for (std::size_t i = 0; i < kLanes; ++i) store_lanes(points[i], out + (n + i) * kLanes);
+        }
+      }
     }
   }
 }
@@ -228,7 +237,7 @@ double SimplexBoxes::wanted_error(double lowest) const {
   return std::max(kShare * std::min(lowest, kGood), kLeast);
 }
 
-std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double lowest) {
+std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) {
   const Mat3 ideal = ideal_matrix(kind_);
   int a = 0, b = 1;
   double longest = 0;
@@ -237,27 +246,35 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(const Box& box, double l
       const double length = (ideal * (box.vertices[j] - box.vertices[i])).norm();
       if (length > longest * (1 + 1e-9)) longest = length, a = i, b = j;
     }
-  std::array<Box, 2> result{box, box};
-  for (Box& child : result) ++child.level;
+  ++box.level;
   if (kind_ == CellKind::prism && box.w_level < LineModels::kMaxLevel && std::ldexp(1.0, -box.w_level) > longest) {
-    for (int half = 0; half < 2; ++half) {
-      ++result[half].w_level;
-      result[half].w_index = 2 * box.w_index + half;
-    }
+    ++box.w_level;
+    box.w_index *= 2;
+    std::array<Box, 2> result{box, std::move(box)};
+    ++result[1].w_index;
     return result;
   }
-  result[0].vertices[b] = result[1].vertices[a] = 0.5 * (box.vertices[a] + box.vertices[b]);
-  const int halvings = box.halvings + 1;
-  const bool modelled = halvings <= simplex_.most_halvings() && halvings % simplex_.halvings_between() == 0 &&
-                        (box.tier < 0 || models_matter(box, lowest));
+  ++box.halvings;
+  const bool numbered = box.halvings <= simplex_.most_halvings();
+  const bool modelled =
+      numbered && box.halvings % simplex_.halvings_between() == 0 && (box.tier < 0 || models_matter(box, lowest));
   const double wanted = std::max(wanted_error(lowest / mean_edges_.prod()),
                                  modelled && box.tier >= 0 ? kFall * by_mean_edges(lasting_error(box)) : 0);
-  for (std::uint32_t half = 0; half < 2; ++half) {
-    result[half].halvings = halvings;
-    if (halvings <= simplex_.most_halvings()) result[half].part = 2 * box.part + half;
-    if (modelled) take_models(result[half], wanted, 0);
+  std::vector<double> control = std::move(box.control);
+  box.control.clear();
+  std::array<Box, 2> result{box, std::move(box)};
+  result[0].vertices[b] = result[1].vertices[a] = 0.5 * (result[0].vertices[a] + result[0].vertices[b]);
+  if (numbered) {
+    result[0].part *= 2;
+    result[1].part = result[0].part + 1;
   }
-  if (!modelled && box.tier >= 0) halve_control(tables(box).halving(a, b), result[0].control, result[1].control);
+  if (modelled) {
+    for (Box& half : result) take_models(half, wanted, 0);
+  } else if (result[0].tier >= 0) {
+    result[1].control = control;
+    result[0].control = std::move(control);
+    halve_control(tables(result[0]).halving(a, b), result[0].control, result[1].control);
+  }
   return result;
 }
 
@@ -309,8 +326,7 @@ void SimplexBoxes::tet_matrices(const Box& box) {
     }
 }
 
-/// Differences over the triangle and along w, both raised to the degrees of the map. Numbers along w are side by side;
-/// what is computed beyond their end is overwritten.
+/// Differences over the triangle and along w, both raised to the degrees of the map. Numbers along w are side by side.
 void SimplexBoxes::prism_matrices(const Box& box) {
   const double* table = line_.coefficients(line_.level(box.w_level), box.w_index);
   const SimplexTables& t = tables(box);
@@ -318,39 +334,42 @@ void SimplexBoxes::prism_matrices(const Box& box) {
   const std::size_t width = below_.size();
   matrices_.resize(static_cast<std::size_t>(size) * w_controls_);
   contracted_.resize(std::max(contracted_.size(), 3 * size * width + 2 * kWide));
-  difference_.resize(std::max(difference_.size(), (t.lower.size() + 1) * width));
-  std::fill_n(difference_.begin() + static_cast<std::ptrdiff_t>(t.lower.size() * width), width, 0.0);
-  for (int row = 0; row < 3; ++row) {
-    double* y = contracted_.data() + kWide + row * size * width;
-    for (int n = 0; n < size; ++n) {
+  difference_.resize(std::max(difference_.size(), 6 * static_cast<std::size_t>(t.lower.size() + 1)));
+  std::fill_n(difference_.begin() + 6 * t.lower.size(), 6, Wide{});
+  const auto contracted = [&](int n, int row) { return contracted_.data() + kWide + (n * 3 + row) * width; };
+  for (int n = 0; n < size; ++n)
+    for (int row = 0; row < 3; ++row) {
       const double* x = box.control.data() + n * lanes_ + row * num_layers_;
       for (std::size_t o = 0; o < width; o += kWide) {
         Wide sum{};
         for (int k = 0; k < num_layers_; ++k) sum += x[k] * load_wide(table + k * LineModels::kStride + o);
-        store_wide(sum, y + n * width + o);
+        store_wide(sum, contracted(n, row) + o);
       }
     }
-    for (int d = 0; d < 2; ++d) {
-      for (int n = 0; n < t.lower.size(); ++n)
-        for (std::size_t o = 0; o < width; o += kWide)
-          store_wide(load_wide(y + t.raised[d + 1][n] * width + o) - load_wide(y + t.raised[0][n] * width + o),
-                     difference_.data() + n * width + o);
-      for (int n = 0; n < size; ++n)
-        for (std::size_t o = 0; o < width; o += kWide) {
-          Wide sum{};
-          for (int c = 0; c < 3; ++c)
-            sum += t.exponents[c][n] * load_wide(difference_.data() + t.reduced[c][n] * width + o);
-          store_wide(sum, matrices_.entries(row, d) + n * w_controls_ + o);
-        }
-    }
-    for (int n = 0; n < size; ++n)
-      for (std::size_t o = 0; o < width; o += kWide) {
-        const double* at = y + n * width + o;
-        const Wide here = load_wide(at);
-        store_wide(load_wide(below_.data() + o) * (here - load_wide(at - 1)) +
-                       load_wide(above_.data() + o) * (load_wide(at + 1) - here),
-                   matrices_.entries(row, 2) + n * w_controls_ + o);
+  for (std::size_t o = width; o > 0;) {  // the last ones first: what they leave behind the end is overwritten
+    o -= kWide;
+    const Wide below = load_wide(below_.data() + o), above = load_wide(above_.data() + o);
+    for (int n = 0; n < t.lower.size(); ++n)
+      for (int row = 0; row < 3; ++row) {
+        const Wide origin = load_wide(contracted(t.raised[0][n], row) + o);
+        for (int d = 0; d < 2; ++d)
+          difference_[6 * n + 2 * row + d] = load_wide(contracted(t.raised[d + 1][n], row) + o) - origin;
       }
+    for (int n = 0; n < size; ++n) {
+      const std::size_t at = static_cast<std::size_t>(n) * w_controls_ + o;
+      Wide sums[6] = {};
+      for (int c = 0; c < 3; ++c) {
+        const Wide* reduced = difference_.data() + 6 * t.reduced[c][n];
+        for (int e = 0; e < 6; ++e) sums[e] += t.exponents[c][n] * reduced[e];
+      }
+      for (int row = 0; row < 3; ++row) {
+        for (int d = 0; d < 2; ++d) store_wide(sums[2 * row + d], matrices_.entries(row, d) + at);
+        const double* x = contracted(n, row) + o;
+        const Wide here = load_wide(x);
+        store_wide(below * (here - load_wide(x - 1)) + above * (load_wide(x + 1) - here),
+                   matrices_.entries(row, 2) + at);
+      }
+    }
   }
 }
 
@@ -360,6 +379,8 @@ Mat3 SimplexBoxes::sides(const Box& box) const {
   if (kind_ == CellKind::prism) result.col(2) = std::ldexp(1.0, -box.w_level) * Vec3::UnitZ();
   return result;
 }
+
+Mat3 SimplexBoxes::frame(const Box& box) const { return (ideal_matrix(kind_) * sides(box)).inverse(); }
 
 double SimplexBoxes::determinant_scale(const Box& box) const { return 1 / sides(box).determinant(); }
 
@@ -378,10 +399,9 @@ Mat3 SimplexBoxes::modelling_error(const Box& box) const {
 }
 
 bool SimplexBoxes::is_hopeless(const Box& box) const {
-  // Shifts of `determinant_bound`, each of which must be < 1 (see `HexBoxes`).
   if (box.tier < 0) return true;
   const double shifts = by_mean_edges(modelling_error(box));
-  return shifts > 2 && std::isfinite(shifts);
+  return shifts > kHopelessError && std::isfinite(shifts);
 }
 
 Mat3 SimplexBoxes::remainder(const Box& box) const {

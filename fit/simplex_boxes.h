@@ -45,7 +45,7 @@ class SimplexBoxes {
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
   Box root();
   /// lowest: det of dx/du where it is least, as far as known. New models are taken where the old ones' errors matter.
-  std::array<Box, 2> children(const Box& box, double lowest);
+  std::array<Box, 2> children(Box box, double lowest);
   /// Takes models of a higher tier where the errors of those there are matter. False: there are none.
   bool improve(Box& box, double lowest);
   /// Boxes are halved along their longest sides.
@@ -60,6 +60,10 @@ class SimplexBoxes {
   bool is_hopeless(const Box& box) const;
   /// Whether the last models of the simplex are too far from the map to prove anything near the box's mean.
   bool is_stuck(const Box& box);
+  /// About the mean of det of dx/du over the cell.
+  double mean_determinant() const { return mean_edges_.prod(); }
+  /// Of `determinant_bound`.
+  Mat3 frame(const Box& box) const;
   double determinant_scale(const Box& box) const;
 
  private:
@@ -82,7 +86,7 @@ class SimplexBoxes {
   Mat3 modelling_error(const Box& box) const;
   /// Of `matrices`.
   Mat3 rounding_error(const Box& box) const;
-  /// low: control points of the whole, those of one half when done; high: as many, those of the other.
+  /// Both hold the control points of the whole, and those of one half each when done.
   void halve_control(const SimplexHalving& halving, std::vector<double>& low, std::vector<double>& high) const;
 
   const SimplexTables& tables(const Box& box) const { return simplex_.tables(box.tier); }
@@ -103,7 +107,8 @@ class SimplexBoxes {
   Vec3 mean_edges_;                             // lengths of the linear part's mean columns
   std::shared_ptr<const SimplexModels::Part> whole_;  // what the whole simplex has been asked for
   std::vector<SimplexModels::Models> whole_models_;   // by tier
-  std::vector<double> contracted_, difference_, below_, above_;
+  std::vector<double> contracted_, below_, above_;
+  std::vector<Wide> difference_;
   ControlMatrices matrices_, mean_;
 };
 

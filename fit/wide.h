@@ -27,6 +27,16 @@ inline void store_wide(const Wide& value, double* to) { std::memcpy(to, &value, 
 inline void take_lower(Wide& a, const Wide& b) { a = b < a ? b : a; }
 inline void take_higher(Wide& a, const Wide& b) { a = b > a ? b : a; }
 
+/// Lane by lane |x| where that is higher than a >= 0, in a.
+inline void take_higher_size(Wide& a, const Wide& x) {
+#ifdef __AVX512DQ__
+  a = (Wide)_mm512_range_pd((__m512d)a, (__m512d)x, 0b1011);  // the higher of both sizes, without its sign
+#else
+  const Wide size = x < 0 ? -x : x;
+  a = size > a ? size : a;
+#endif
+}
+
 /// 1/x and 1/sqrt x for |x| in [1e-300, 1e300], up to two units in the last place.
 inline Wide reciprocal(const Wide& x) {
 #ifdef __AVX512F__
@@ -57,6 +67,12 @@ inline double lowest_lane(const Wide& v) {
   return lowest;
 }
 inline double highest_lane(const Wide& v) { return -lowest_lane(-v); }
+
+inline double sum_of_lanes(const Wide& v) {
+  using Half = double __attribute__((vector_size(kWide / 2 * sizeof(double))));
+  const Half sum = __builtin_shufflevector(v, v, 0, 1, 2, 3) + __builtin_shufflevector(v, v, 4, 5, 6, 7);
+  return (sum[0] + sum[2]) + (sum[1] + sum[3]);
+}
 
 /// Bit k tells whether v[k] <= limit.
 inline unsigned lanes_within(const Wide& v, double limit) {
