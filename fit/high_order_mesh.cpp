@@ -80,13 +80,17 @@ VolumeMesh HighOrderMesh::straight_sided() const {
   return mesh;
 }
 
-SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points) {
+void require_inside(const char* function, const ElementSpace& space, std::span<const CellPoint> points) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto& [c, point] = points[i];
     if (c < 0 || static_cast<std::size_t>(c) >= space.num_cells() || !is_inside(space.kind(c), point))
-      throw InputError("point_map: point " + std::to_string(i) + " does not lie in a cell of the mesh (cell " +
-                       std::to_string(c) + ')');
+      throw InputError(std::string(function) + ": point " + std::to_string(i) +
+                       " does not lie in a cell of the mesh (cell " + std::to_string(c) + ')');
   }
+}
+
+SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points) {
+  require_inside("point_map", space, points);
   return assemble_rows(points.size(), space.num_nodes(), [&](std::size_t i, RowBuilder& row) {
     const std::size_t c = points[i].cell;
     ShapeFunctions at(space.kind(c), space.basis(), space.pattern_order(space.pattern(c)));

@@ -36,9 +36,13 @@ struct CellPoint {
   Vec3 point;
 };
 
+/// InputError, in the name of `function`: a cell out of range, a point that is not finite or further than 1e-9 outside
+/// its cell.
+void require_inside(const char* function, const ElementSpace& space, std::span<const CellPoint> points);
+
 /// Nodes -> positions at points, one row per point. Weights within rounding of zero (1e-15) are left out.
 ///
-/// InputError: a cell out of range, a point that is not finite or further than 1e-9 outside its cell. Parallel.
+/// InputError: as `require_inside`. Parallel. For many products: `PointTables`.
 SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points);
 
 }  // namespace subvol
