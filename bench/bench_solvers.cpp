@@ -41,12 +41,14 @@ FitProblem last_stage(const HighOrderMesh& mesh, const VolumeMesh& cells, const 
                       const BoundarySamples& samples) {
   std::vector<int> points(mesh.space.num_cells(), points_for_order(mesh.space.max_order()));
   const auto vertices = std::span(mesh.coefficients).first(cells.num_vertices());
-  return {
+  FitProblem problem(
       identity_map(mesh.space.num_nodes()), samples.positions,
       std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
       make_surface_term(target.surface, samples.triangles, samples.points.size(), kTangentialWeight,
                         Correspondence::closest, SurfacePull::straight),
-      kLambda};
+      kLambda);
+  problem.tables.emplace(mesh.space, samples.points);
+  return problem;
 }
 
 template <class Minimizer>

@@ -2,12 +2,14 @@
 #pragma once
 
 #include "fit/fit_report.h"
+#include "fit/point_tables.h"
 #include "fit/surface_term.h"
 #include "fit/volume_term.h"
 #include "subvol/sparse_map.h"
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,10 +30,14 @@ struct FitProblem {
   void apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const;
   /// out = N x + z0.
   void apply_samples(std::span<const Vec3> x, std::span<Vec3> out) const;
+  /// out = N d, how the samples go with the unknowns; out = N^T g, a gradient by the samples pulled back.
+  void multiply_samples(std::span<const Vec3> d, std::span<Vec3> out) const;
+  void pull_back_samples(std::span<const Vec3> g, std::span<Vec3> out) const;
 
   SparseMap nodes, nodes_transposed;      ///< M, M^T
   std::vector<Vec3> fixed_nodes;          ///< y0, one per node; empty: none is fixed
   SparseMap samples, samples_transposed;  ///< N, N^T
+  std::optional<PointTables> tables;      ///< N once more, for all products with it; none: by `samples`
   std::vector<Vec3> fixed_samples;        ///< z0, one per sample; empty: none is fixed
   std::unique_ptr<VolumeTerm> volume;
   std::unique_ptr<SurfaceTerm> surface;   ///< null: none, N then has no rows

@@ -72,7 +72,8 @@ class HighOrderFit {
   bool end_for_memory(const std::string& why);
   void set_orders(const EntityOrders& orders);
   std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space) const;
-  FitProblem problem(std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples, const Stage& stage) const;
+  FitProblem problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
+                     const Stage& stage) const;
   bool run_stage(const Stage& stage);
   FitSnapshot snapshot() const;
   void go_back(FitSnapshot snapshot);
@@ -179,12 +180,14 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
   return volume;
 }
 
-FitProblem HighOrderFit::problem(std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
-                                 const Stage& stage) const {
-  return {identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
-          make_surface_term(target_.surface, samples.triangles, samples.points.size(), stage.tangential_weight,
-                            options_.correspondence, SurfacePull::straight),
-          stage.lambda};
+FitProblem HighOrderFit::problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume,
+                                 const BoundarySamples& samples, const Stage& stage) const {
+  FitProblem problem(identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
+                     make_surface_term(target_.surface, samples.triangles, samples.points.size(),
+                                       stage.tangential_weight, options_.correspondence, SurfacePull::straight),
+                     stage.lambda);
+  problem.tables.emplace(space, samples.points);
+  return problem;
 }
 
 /// Keeps where the mesh is, under the name of what it came from.
@@ -209,7 +212,7 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   std::unique_ptr<HighOrderEnergy> volume = volume_energy(mesh_.space);
   volume->emphasize_poor(mesh_.coefficients, emphasis_);
   const HighOrderEnergy& energy = *volume;
-  FitProblem stage_problem = problem(std::move(volume), samples_, stage);
+  FitProblem stage_problem = problem(mesh_.space, std::move(volume), samples_, stage);
   const double fraction = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_) + 1);
   const bool going = runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
   points_.assign(energy.points_per_direction().begin(), energy.points_per_direction().end());
@@ -337,7 +340,8 @@ bool HighOrderFit::raise_where_it_pays() {
   const HighOrderMesh raised = mesh_.with_orders(next);
   if (raised.space.num_nodes() == mesh_.space.num_nodes()) return false;
   const BoundarySamples samples = make_boundary_samples(raised.space, sample_intervals(raised.space.max_order()));
-  FitProblem raised_problem = problem(volume_energy(raised.space), samples, schedule_.final_stage(lambda_));
+  FitProblem raised_problem =
+      problem(raised.space, volume_energy(raised.space), samples, schedule_.final_stage(lambda_));
   const EntityValues gains = order_gains(raised_problem, raised.space, mesh_.space.orders(), raised.coefficients);
   const double surface = raised_problem.surface->target_to_surface() + raised_problem.surface->surface_to_target();
   if (!(gains.sum() > kLeastOrderGain * surface)) return false;

@@ -50,7 +50,7 @@ class Objective {
     problem_.surface->assign(samples_);
     std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
     problem_.surface->add_gradient(samples_, sample_gradient_);
-    problem_.samples_transposed.apply(sample_gradient_, from_samples_);
+    problem_.pull_back_samples(sample_gradient_, from_samples_);
     return problem_.surface->value(samples_);
   }
 

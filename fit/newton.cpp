@@ -28,8 +28,16 @@ void FitProblem::apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const
 }
 
 void FitProblem::apply_samples(std::span<const Vec3> x, std::span<Vec3> out) const {
-  samples.apply(x, out);
+  multiply_samples(x, out);
   if (!fixed_samples.empty()) add_scaled(1, fixed_samples, out);
+}
+
+void FitProblem::multiply_samples(std::span<const Vec3> d, std::span<Vec3> out) const {
+  tables ? tables->apply(d, out) : samples.apply(d, out);
+}
+
+void FitProblem::pull_back_samples(std::span<const Vec3> g, std::span<Vec3> out) const {
+  tables ? tables->apply_transposed(g, out) : samples_transposed.apply(g, out);
 }
 
 namespace {
@@ -64,9 +72,9 @@ class ReducedHessian {
     problem_.volume->multiply(node_in_, node_out_);
     problem_.nodes_transposed.apply(node_out_, out);
     if (!problem_.surface) return;
-    problem_.samples.apply(in, sample_in_);
+    problem_.multiply_samples(in, sample_in_);
     problem_.surface->hessian().multiply(sample_in_, sample_out_);
-    problem_.samples_transposed.apply(sample_out_, from_samples_);
+    problem_.pull_back_samples(sample_out_, from_samples_);
     add_scaled(1, from_samples_, out);
   }
 
@@ -193,7 +201,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
     problem.nodes_transposed.apply(node_gradient, gradient);
     if (problem.surface) {
       problem.surface->add_gradient(z, sample_gradient);
-      problem.samples_transposed.apply(sample_gradient, from_samples);
+      problem.pull_back_samples(sample_gradient, from_samples);
       add_scaled(1, from_samples, gradient);
     }
 
@@ -217,7 +225,7 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
       result.explanation = "the gradient vanishes";
       return result;
     }
-    problem.samples.apply(d, dz);
+    problem.multiply_samples(d, dz);
 
     double trial = 0, trial_surface = 0, trial_volume = 0;
     std::vector<Index> blocking, trial_uncertified;

@@ -72,7 +72,7 @@ EntityValues order_gains(FitProblem& problem, const ElementSpace& raised, const 
   problem.surface->assign(samples);
   if (!std::isfinite(problem.volume->linearize(coefficients, problem.lambda, gradient))) return gains;
   problem.surface->add_gradient(samples, sample_gradient);
-  problem.samples_transposed.apply(sample_gradient, from_samples);
+  problem.pull_back_samples(sample_gradient, from_samples);
   add_scaled(1, from_samples, gradient);
   problem.volume->add_diagonal_blocks(problem.nodes, problem.nodes_transposed, diagonal);
   add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), diagonal);

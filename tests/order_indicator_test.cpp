@@ -21,10 +21,13 @@ namespace {
 
 FitProblem ball_problem(const HighOrderMesh& mesh, const TargetSurface& target, double lambda) {
   const BoundarySamples samples = make_boundary_samples(mesh.space, 8);
-  return {identity_map(mesh.space.num_nodes()), samples.positions,
-          std::make_unique<HighOrderEnergy>(mesh.space, std::vector(mesh.space.num_cells(), Vec3(0.5, 0.5, 0.5)),
-                                            std::vector(mesh.space.num_cells(), 5)),
-          std::make_unique<ClosestPointEnergy>(target, samples.triangles, samples.points.size(), 0.1, 1), lambda};
+  FitProblem problem(
+      identity_map(mesh.space.num_nodes()), samples.positions,
+      std::make_unique<HighOrderEnergy>(mesh.space, std::vector(mesh.space.num_cells(), Vec3(0.5, 0.5, 0.5)),
+                                        std::vector(mesh.space.num_cells(), 5)),
+      std::make_unique<ClosestPointEnergy>(target, samples.triangles, samples.points.size(), 0.1, 1), lambda);
+  problem.tables.emplace(mesh.space, samples.points);
+  return problem;
 }
 
 }  // namespace
