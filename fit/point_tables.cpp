@@ -95,11 +95,7 @@ void gather_modes(const Wide* table, std::size_t num_modes, const Wide* parts, s
     for (int n = 0; n < kCount; ++n)
       for (int d = 0; d < 3; ++d) sum[n][d] += table[r * num_modes + n] * parts[3 * r + d];
   for (int n = 0; n < kCount; ++n)
-    for (int d = 0; d < 3; ++d) {
-      double total = 0;
-      for (int l = 0; l < kWide; ++l) total += sum[n][d][l];
-      out[n][d] = total;
-    }
+    for (int d = 0; d < 3; ++d) out[n][d] = sum_of_lanes(sum[n][d]);
 }
 
 }  // namespace

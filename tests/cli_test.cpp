@@ -85,11 +85,14 @@ TEST_CASE("A report becomes a page that needs nothing else", "[cli]") {
   const Run run = place.run("report report.json -o page.html");
   INFO(run.err);
   REQUIRE(run.status == 0);
-  const std::string page = content_of(place / "page.html");
+  std::string page = content_of(place / "page.html");
+  const std::string picture = "data:image/png;base64,";
   std::size_t pictures = 0;
-  for (std::size_t at = page.find("data:image/png;base64,"); at != std::string::npos;
-       at = page.find("data:image/png;base64,", at + 1))
+  for (std::size_t at = page.find(picture); at != std::string::npos; at = page.find(picture, at + 1)) {
+    at += picture.size();  // what follows may spell any word
+    page.erase(at, page.find('"', at) - at);
     ++pictures;
+  }
   CHECK(pictures == 4);
   for (const char* word : {"Valid", "converged", "<svg", "prefers-color-scheme: dark", "a&amp;b.mesh", "Worst cells"})
     CHECK(page.find(word) != std::string::npos);
