@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
 
   HighOrderFitOptions options;
   options.order = std::max(1, order / 2);
-  options.lift_worst_places = false;
+  options.improve_worst_places = false;
   HighOrderMesh mesh = fit_high_order(sample.target, sample.template_mesh, options).mesh;
   mesh = mesh.with_orders(EntityOrders::uniform(mesh.space.topology(), order));
   FitTarget target(sample.target);

@@ -33,6 +33,9 @@ constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
 /// Lifting the worst places: their emphasis at first, doubled each time, as long as the least scaled Jacobian is not
 /// good; how much the distances may grow in all.
 constexpr int kMostLifts = 8, kLiftSteps = 8;
+/// Farther off than so many times the mean is far; so many times the mean counts twice at first.
+constexpr double kFarShare = 8, kFirstFarLength = 8;
+constexpr int kMostDraws = 4, kDrawSteps = 20;
 constexpr double kFirstEmphasis = 4, kGoodScaledJacobian = 0.5, kMostDistanceGrowth = 1.2;
 
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {
@@ -86,7 +89,9 @@ class HighOrderFit {
   bool run_adaptive_orders();
   bool lower_lambda();
   Outcome measured_outcome();
-  bool lift_worst_places();
+  bool improve_worst_places();
+  bool draw_in_far_places(Outcome& now, double most_mean);
+  bool lift_worst_places(Outcome& now, double most_mean, double most_max);
   bool meets_tolerance();
   void keep_state();
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
@@ -111,6 +116,7 @@ class HighOrderFit {
   std::vector<int> points_;  ///< of each cell per direction, in the last stage
   bool stays_dense_ = false; ///< after the first orders: cells have at least so many
   double emphasis_ = 0;      ///< of places of poor shape in E_W
+  double far_length_ = 0;    ///< distance of places that count twice in E_S; 0: all count alike
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
   MemoryBudget memory_;
@@ -184,7 +190,8 @@ FitProblem HighOrderFit::problem(const ElementSpace& space, std::unique_ptr<High
                                  const BoundarySamples& samples, const Stage& stage) const {
   FitProblem problem(identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
                      make_surface_term(target_.surface, samples.triangles, samples.points.size(),
-                                       stage.tangential_weight, options_.correspondence, SurfacePull::straight),
+                                       stage.tangential_weight, options_.correspondence, SurfacePull::straight,
+                                       far_length_),
                      stage.lambda);
   problem.tables.emplace(space, samples.points);
   return problem;
@@ -203,6 +210,7 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   record.name = (try_ > 1 ? formatted("try %d, ", try_) : "") +
                 (least < order_ ? formatted("orders %d to %d", least, order_) : formatted("order %d", order_)) +
                 formatted(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
+  if (far_length_ > 0) record.name += formatted(", twice as heavy %.3g %% off", 100 * far_length_);
   if (emphasis_ > 0) record.name += formatted(", poor shape up to %g times as heavy", 1 + emphasis_);
   record.order = order_;
   record.cells = mesh_.space.num_cells();
@@ -330,7 +338,7 @@ bool HighOrderFit::run_higher_orders() {
   stays_dense_ = true;
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
-  return lower_lambda() && lift_worst_places();
+  return lower_lambda() && improve_worst_places();
 }
 
 /// Raises the orders of what gains most. False where that is not worth its nodes, or they have no room.
@@ -356,7 +364,7 @@ bool HighOrderFit::run_adaptive_orders() {
     take_own_boxes();
     if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
   }
-  return report_.stop_reason != StopReason::memory_limit && lower_lambda() && lift_worst_places();
+  return report_.stop_reason != StopReason::memory_limit && lower_lambda() && improve_worst_places();
 }
 
 /// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the
@@ -385,34 +393,62 @@ HighOrderFit::Outcome HighOrderFit::measured_outcome() {
   return {quality.min_scaled_jacobian, keep_mean(distance.mean()), 100 * distance.max(), intersecting_pairs()};
 }
 
-/// The last stage with more and more emphasis on places of poor shape: E_W is a mean, to which few places that are much
-/// worse than they need be matter little. Goes on while the least scaled Jacobian gains more than the distance loses.
-bool HighOrderFit::lift_worst_places() {
-  if (!options_.lift_worst_places || options_.order < 2) return true;
+/// The last stage again for the sake of few places, which matter little to the energies: both are means.
+bool HighOrderFit::improve_worst_places() {
+  if (!options_.improve_worst_places || options_.order < 2) return true;
   Outcome now = measured_outcome();
+  const double most_max = kMostDistanceGrowth * now.max_percent;
   const double most_mean = options_.tolerance_percent ? std::max(now.mean_percent, *options_.tolerance_percent)
                                                       : kMostDistanceGrowth * now.mean_percent;
-  const double most_max = kMostDistanceGrowth * now.max_percent;
+  return draw_in_far_places(now, most_mean) && lift_worst_places(now, most_mean, most_max);
+}
+
+/// With more and more emphasis on places that are much farther off than the mean. Goes on while the largest distance
+/// falls, and by more than the least scaled Jacobian where that is poor.
+bool HighOrderFit::draw_in_far_places(Outcome& now, double most_mean) {
+  if (options_.correspondence != Correspondence::closest) return true;
+  for (int round = 0; round < kMostDraws && now.max_percent > kFarShare * now.mean_percent; ++round) {
+    FitSnapshot before = snapshot();
+    const double length_before = far_length_;
+    far_length_ = round == 0 ? kFirstFarLength * now.mean_percent / 100 : far_length_ / 2;
+    Stage stage = schedule_.final_stage(lambda_);
+    stage.max_iterations = kDrawSteps;
+    const bool going = run_stage(stage);
+    const Outcome drawn = going ? measured_outcome() : now;
+    const double gain = now.max_percent / drawn.max_percent;
+    const double shape = std::min(now.least_scaled_jacobian, kGoodScaledJacobian);
+    if (!(going && gain > 1 && gain * drawn.least_scaled_jacobian >= shape && drawn.mean_percent <= most_mean &&
+          drawn.pairs <= now.pairs)) {
+      go_back(std::move(before));
+      far_length_ = length_before;
+      return going;
+    }
+    now = drawn;
+  }
+  return true;
+}
+
+/// With more and more emphasis on places of poor shape. Goes on while the least scaled Jacobian gains more than the
+/// distance loses.
+bool HighOrderFit::lift_worst_places(Outcome& now, double most_mean, double most_max) {
   const auto is_poor = [](double value) { return value > 0 && value < kGoodScaledJacobian; };
   for (int round = 0; round < kMostLifts && is_poor(now.least_scaled_jacobian); ++round) {
-    FitSnapshot unlifted = snapshot();
+    FitSnapshot before = snapshot();
+    const double emphasis_before = emphasis_;
     emphasis_ = round == 0 ? kFirstEmphasis : 2 * emphasis_;
     Stage stage = schedule_.final_stage(lambda_);
     stage.max_iterations = kLiftSteps;
-    if (!run_stage(stage)) {
-      go_back(std::move(unlifted));
-      return false;
-    }
-    Outcome lifted = measured_outcome();
+    const bool going = run_stage(stage);
+    const Outcome lifted = going ? measured_outcome() : now;
     const double gain = lifted.least_scaled_jacobian / now.least_scaled_jacobian;
     const double loss = std::max(lifted.mean_percent / now.mean_percent, lifted.max_percent / now.max_percent);
-    const bool worth_it = gain > std::max(1.0, loss) && lifted.mean_percent <= most_mean &&
-                          lifted.max_percent <= most_max && lifted.pairs <= now.pairs;
-    if (!worth_it) {
-      go_back(std::move(unlifted));
-      break;
+    if (!(going && gain > std::max(1.0, loss) && lifted.mean_percent <= most_mean && lifted.max_percent <= most_max &&
+          lifted.pairs <= now.pairs)) {
+      go_back(std::move(before));
+      emphasis_ = emphasis_before;
+      return going;
     }
-    now = std::move(lifted);
+    now = lifted;
   }
   return true;
 }

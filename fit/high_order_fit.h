@@ -21,7 +21,8 @@ struct HighOrderFitOptions {
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< of a point cloud
   Distortion distortion = Distortion::hencky;    ///< e of E_W
-  bool lift_worst_places = true;                  ///< after the last stage, where that costs little distance
+  /// After the last stage: places far from the target nearer, places of poor shape better, where that costs little.
+  bool improve_worst_places = true;
   int max_iterations = 0;                        ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it

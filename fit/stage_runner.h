@@ -17,11 +17,14 @@
 namespace subvol {
 
 /// E_S between samples of the fitted surface and a target, which must outlive it.
+///
+/// far_length  of `ClosestPointEnergy::emphasize_far`; 0: none. Voronoi cells have no such emphasis.
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
                                                std::size_t num_samples, double tangential_weight,
                                                Correspondence correspondence,
-                                               SurfacePull pull = SurfacePull::along_normals);
+                                               SurfacePull pull = SurfacePull::along_normals,
+                                               double far_length = 0);
 
 /// InputError unless closest points are what pulls: Voronoi cells of points have no area.
 void require_closest(Correspondence correspondence);

@@ -104,7 +104,7 @@ Chooser::ShortFit Chooser::fit_subdivided(const VolumeMesh& mesh) {
 Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
   constexpr int kMostOrder = 2, kMostSteps = 6, kIntervals = 6;
   HighOrderFitOptions options{.order = std::min(options_.order, kMostOrder), .basis = options_.basis};
-  options.lift_worst_places = false;
+  options.improve_worst_places = false;
   options.max_iterations = kMostSteps;
   options.time_limit_seconds = time_left();
   options.progress = trial_progress();

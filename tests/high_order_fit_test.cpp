@@ -85,7 +85,7 @@ TEST_CASE("a high-order fit says when the steps allowed were not enough, and whe
   const samples::Sample sample = samples::ball_sample();
   HighOrderFitOptions options = of_order(2);
   options.max_iterations = 1;
-  options.lift_worst_places = false;
+  options.improve_worst_places = false;
   CHECK(fit_high_order(sample.target, sample.template_mesh, options).report.stop_reason == StopReason::iteration_limit);
   const FitReport inverted = fit_high_order(sample.target, hex_inverted_inside(), of_order(2)).report;
   CHECK(inverted.stop_reason == StopReason::stalled);
@@ -140,7 +140,7 @@ TEST_CASE("the worst places of a fit are lifted where that costs little distance
     if (stage->kept) reached = stage->mean_distance_percent;
   CHECK(reached <= 1.2 * std::prev(first)->mean_distance_percent);
   HighOrderFitOptions without = of_order(2);
-  without.lift_worst_places = false;
+  without.improve_worst_places = false;
   const HighOrderFitResult plain = fit_high_order(torus.target, made.templates.front().mesh, without);
   CHECK(std::none_of(plain.report.stages.begin(), plain.report.stages.end(), is_lift));
   CHECK(measure_quality(result.mesh).min_scaled_jacobian > 1.05 * measure_quality(plain.mesh).min_scaled_jacobian);
