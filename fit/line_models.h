@@ -29,8 +29,8 @@ class LineModels {
     std::vector<double> coefficients;    ///< b_io at (index (order + 1) + i) kStride + o
   };
 
-  /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it is
-  /// first asked for; for all threads. Cost of a level: about 10 us times 2^level at order 8.
+  /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it
+  /// is first asked for; for all threads. Cost of a level: about 10 us times 2^level at order 8.
   static const LineModels& get(Basis basis, int order, int degree);
   /// Of the degree that serves best along a prism's w.
   static const LineModels& get(Basis basis, int order);

@@ -11,9 +11,9 @@ namespace subvol {
 
 /// The map of `point_map` for many products: positions at points as dense tables of shape functions that cells share.
 ///
-/// Points that follow one another in the same cell, inside the same vertex, edge, face or the cell itself, form a block:
-/// only the modes that do not vanish there count, and blocks of the same kind, modes and points have one table. A
-/// boundary sampled alike on every face has few, which stay in the cache; the sparse map's weights do not.
+/// Points that follow one another in the same cell, inside the same vertex, edge or face or the cell itself, form a
+/// block: only the modes that do not vanish there count, and blocks of the same kind, modes and points have one table.
+/// A boundary sampled alike on every face has few, which stay in the cache; the sparse map's weights do not.
 ///
 /// Same bits for any number of threads. Safe from one thread at a time: products share a buffer.
 class PointTables {
