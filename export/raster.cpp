@@ -54,6 +54,7 @@ class Canvas {
   }
 
   void draw_triangle(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& color) {
+    constexpr double kOnEdge = 1e-9;  // samples on an edge are of both triangles, else of none by chance
     const double area = (p[1] - p[0]).head<2>().x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
     if (!(std::abs(area) > 0) || !std::isfinite(area)) return;
     const auto range = [](double low, double high, int limit) {
@@ -69,7 +70,7 @@ class Canvas {
         const double dx = x + 0.5 - p[0].x(), dy = y + 0.5 - p[0].y();
         const double s = (dx * (p[2] - p[0]).y() - dy * (p[2] - p[0]).x()) / area;
         const double t = (dy * (p[1] - p[0]).x() - dx * (p[1] - p[0]).y()) / area;
-        if (s < 0 || t < 0 || s + t > 1) continue;
+        if (s < -kOnEdge || t < -kOnEdge || s + t > 1 + kOnEdge) continue;
         put(x, y, (1 - s - t) * p[0].z() + s * p[1].z() + t * p[2].z(),
             (1 - s - t) * color[0] + s * color[1] + t * color[2]);
       }

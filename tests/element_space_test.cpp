@@ -302,7 +302,7 @@ TEST_CASE("a smooth map is met at the rate of the basis", "[elements]") {
         const HighOrderMesh straight(ElementSpace(mesh, kBothBases[b], i ? 8 : 4), mesh);
         errors[b][i] = largest_error(
             project_map(straight.space, [&](std::size_t c, const Vec3& p) { return smooth(straight.position(c, p)); }),
-            straight, smooth, 200);
+            straight, smooth, 2000);
       }
     CAPTURE(kind, errors[0][0], errors[0][1], errors[1][0], errors[1][1]);
     CHECK(std::log2(errors[0][0] / errors[0][1]) > 1.8);

@@ -284,7 +284,7 @@ TEST_CASE("times of an animation start at 0 and rise, whatever the shapes are") 
     CHECK(times[0] == 0);
     for (std::size_t k = 0; k < num_shapes; ++k) CHECK(times[k] < times[k + 1]);
     const auto& accessor = file.json["accessors"][sampler["input"].get<int>()];
-    CHECK(accessor["min"] == nlohmann::json({0}));
+    CHECK(accessor["min"] == nlohmann::json::array({0}));
     CHECK(accessor["max"][0].get<float>() == times.back());
     CHECK(file.numbers<float>(sampler["output"]).size() == times.size() * num_shapes);
     const auto path = scratch("same.glb");
