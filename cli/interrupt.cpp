@@ -2,6 +2,7 @@
 #include "cli/interrupt.h"
 
 #include "cli/exit_status.h"
+#include "subvol/atomic_file.h"
 
 #include <atomic>
 #include <csignal>
@@ -25,7 +26,9 @@ void note(int) {
   const long long now = time.tv_sec * 1'000'000'000LL + time.tv_nsec + 1;
   long long before = 0;
   if (first.compare_exchange_strong(before, now)) return;
-  if (now - before > kOneSignalNanoseconds) _exit(kInterrupted);
+  if (now - before <= kOneSignalNanoseconds) return;
+  delete_temporaries();
+  _exit(kInterrupted);
 }
 
 }  // namespace

@@ -7,6 +7,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <random>
@@ -37,12 +40,51 @@ class Descriptor {
   int fd_;
 };
 
+/// The name of a temporary file that is there or about to be, where a signal handler finds it.
+struct Slot {
+  std::atomic<bool> is_taken{false}, is_named{false};
+  std::array<char, 4096> name{};
+};
+static_assert(std::atomic<bool>::is_always_lock_free);
+std::array<Slot, 16> slots;
+
 /// A name to delete again unless it was renamed.
-struct Temporary {
-  fs::path path;
+class Temporary {
+ public:
+  Temporary() = default;
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
   ~Temporary() {
-    if (!path.empty()) ::unlink(path.c_str());
+    if (!path_.empty()) ::unlink(path_.c_str());
+    forget();
   }
+  const fs::path& path() const { return path_; }
+  /// Before the file is made.
+  void set(fs::path path) {
+    forget();
+    path_ = std::move(path);
+    const std::string_view name = path_.native();
+    for (Slot& slot : slots) {
+      if (name.size() >= slot.name.size() || slot.is_taken.exchange(true)) continue;
+      std::copy(name.begin(), name.end(), slot.name.begin());
+      slot.name[name.size()] = 0;
+      slot.is_named = true;
+      slot_ = &slot;
+      break;
+    }
+  }
+  /// It is not there any more, or someone else's.
+  void forget() {
+    path_.clear();
+    if (slot_ == nullptr) return;
+    slot_->is_named = false;
+    slot_->is_taken = false;
+    slot_ = nullptr;
+  }
+
+ private:
+  fs::path path_;
+  Slot* slot_ = nullptr;
 };
 
 void write_all(int fd, std::string_view bytes, const fs::path& path) {
@@ -68,12 +110,12 @@ int create_temporary(const fs::path& target, Temporary& temporary) {
   std::random_device random;
   for (int attempt = 0; attempt < 100; ++attempt) {
     fs::path candidate = target.parent_path() / (".subvol-" + std::to_string(random()) + ".tmp");
-    const int fd = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd >= 0) {
-      temporary.path = std::move(candidate);
-      return fd;
-    }
-    if (errno != EEXIST) fail(target, "create a temporary file in its folder", errno);
+    temporary.set(std::move(candidate));
+    const int fd = ::open(temporary.path().c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0) return fd;
+    const int error = errno;
+    temporary.forget();
+    if (error != EEXIST) fail(target, "create a temporary file in its folder", error);
   }
   fail(target, "create a temporary file in its folder", EEXIST);
 }
@@ -105,9 +147,15 @@ void write_file_atomically(const fs::path& path, std::string_view bytes) {
   write_all(file.get(), bytes, path);
   if (::fsync(file.get()) != 0) fail(path, "flush to the disk", errno);
   if (!file.close()) fail(path, "close", errno);
-  if (::rename(temporary.path.c_str(), target.c_str()) != 0) fail(path, "rename the temporary file", errno);
-  temporary.path.clear();
+  if (::rename(temporary.path().c_str(), target.c_str()) != 0) fail(path, "rename the temporary file", errno);
+  temporary.forget();
   flush_folder(target);
+}
+
+// Only what a signal handler may call.
+void delete_temporaries() noexcept {
+  for (const Slot& slot : slots)
+    if (slot.is_named) (void)::unlink(slot.name.data());
 }
 
 }  // namespace subvol

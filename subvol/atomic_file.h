@@ -16,4 +16,8 @@ namespace subvol {
 /// is left as it was. Safe to call from several threads and processes at once: the last rename wins.
 void write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
 
+/// Deletes the temporaries of all writes under way (16 at a time at most, of names below 4096 bytes), which then fail.
+/// For signal handlers that end the process at once.
+void delete_temporaries() noexcept;
+
 }  // namespace subvol

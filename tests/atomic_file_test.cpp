@@ -6,6 +6,11 @@
 
 #include <catch2/catch.hpp>
 
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
 #include <thread>
 #include <vector>
 
@@ -29,6 +34,32 @@ TEST_CASE("a file written atomically holds exactly the bytes and leaves nothing 
   write_file_atomically(folder / "f", "");
   CHECK(content_of(folder / "f").empty());
   CHECK(num_files(folder) == 1);
+}
+
+TEST_CASE("a process that ends within a write can delete what it was writing") {
+  const TemporaryFolder folder;
+  folder.file("f", "old");
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    std::signal(SIGUSR1, [](int) {
+      delete_temporaries();
+      _exit(7);
+    });
+    const std::string bytes(1 << 26, 'x');
+    for (;;) write_file_atomically(folder / "g", bytes);
+  }
+  const auto is_writing = [&] {
+    return std::any_of(fs::directory_iterator(folder.path()), {},
+                       [](const fs::directory_entry& entry) { return entry.path().extension() == ".tmp"; });
+  };
+  while (!is_writing()) std::this_thread::yield();
+  kill(child, SIGUSR1);
+  int status = 0;
+  REQUIRE(waitpid(child, &status, 0) == child);
+  CHECK(WEXITSTATUS(status) == 7);
+  CHECK(!is_writing());
+  CHECK(content_of(folder / "f") == "old");
 }
 
 TEST_CASE("replacing a file keeps its permissions, and a symbolic link stays one") {
