@@ -121,7 +121,7 @@ Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrice
     take_lower(least, minor);
     take_lower(least, determinant);
     if (lanes_within(least, 0)) {
-          const Wide own = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1]) -
+      const Wide own = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1]) -
                        j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0]) +
                        j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
       return {0, lanes_within(own, 0) != 0};  // S_b > 0 has det J_b > 0
