@@ -40,7 +40,7 @@ std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) 
 
 /// Share of the mean edges up to which errors of models are small as long as nothing is known of det J. At high orders
 /// low degrees cost more in boxes than they save (measured).
-double small_error(int order) { return order <= 4 ? 0.05 : 0.004; }
+double small_error(int order) { return order <= 4 ? 0.08 : 0.004; }
 /// Beyond this one nothing can be hoped for: the shifts of `determinant_bound` (see `HexBoxes`).
 constexpr double kHopelessError = 1;
 /// New models need not be closer than by this factor: the ones after them will be.
@@ -181,35 +181,46 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
 
   const std::size_t stride = tables(box).stride;
   box.control.assign(stride * lanes_, 0);
-  struct Used {
-    const double* model;
-    Vec3 coefficient;
-  };
-  std::vector<Used> used;
+  constexpr int kAtOnce = 4;  // the sums of one vector alone wait for each other
+  std::vector<Weighted> used;
   for (int k = 0; k < num_layers_; ++k) {
     used.clear();
     for (const Term& term : layer_terms_[k]) {
       const auto& batch = *models[term.order];
       if (!part->functions[term.slot].is_left_out(box.tier))
-        used.push_back({batch.coefficients.data() + (term.slot - batch.first) * stride, term.coefficient});
+        used.push_back({batch.coefficients.data() + batch.address(term.slot, 0), batch.step(), term.coefficient});
     }
-    for (std::size_t first = 0; first < stride; first += kWide) {
-      Wide sums[3] = {};
-      for (const Used& f : used) {
-        const Wide b = load_wide(f.model + first);
-        for (int row = 0; row < 3; ++row) sums[row] += f.coefficient[row] * b;
+    std::size_t first = 0;
+    const std::size_t end = stride / kWide;
+    for (; first + kAtOnce <= end; first += kAtOnce) store_sums<kAtOnce>(used, first, box.control.data() + k);
+    for (; first < end; ++first) store_sums<1>(used, first, box.control.data() + k);
+  }
+}
+
+template <int count>
+void SimplexBoxes::store_sums(std::span<const Weighted> models, std::size_t first, double* control) const {
+  Wide sums[count][3] = {};
+  for (const Weighted& f : models)
+    for (int i = 0; i < count; ++i) {
+      const Wide b = load_wide(f.model + (first + i) * f.step);
+      for (int row = 0; row < 3; ++row) sums[i][row] += f.coefficient[row] * b;
+    }
+  double* out = control + first * kWide * lanes_;
+  for (int i = 0; i < count; ++i, out += kWide * lanes_) {
+    if (num_layers_ > 1) {
+      for (int n = 0; n < kWide; ++n)
+        for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[i][row][n];
+    } else {
+      Lanes low[kLanes] = {}, high[kLanes] = {};
+      for (int row = 0; row < 3; ++row) {
+        low[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 0, 1, 2, 3);
+        high[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 4, 5, 6, 7);
       }
-      double* out = box.control.data() + first * lanes_ + k;
-      if (num_layers_ > 1) {
-        for (int n = 0; n < kWide; ++n)
-          for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[row][n];
-      } else {
-        for (int n = 0; n < kWide; n += kLanes) {
-          Lanes points[kLanes] = {};
-          for (int row = 0; row < 3; ++row) std::memcpy(&points[row], &sums[row][n], sizeof(Lanes));
-          transpose(points);
-          for (std::size_t i = 0; i < kLanes; ++i) store_lanes(points[i], out + (n + i) * kLanes);
-        }
+      transpose(low);
+      transpose(high);
+      for (std::size_t n = 0; n < kLanes; ++n) {
+        store_lanes(low[n], out + n * kLanes);
+        store_lanes(high[n], out + (kLanes + n) * kLanes);
       }
     }
   }
@@ -315,15 +326,18 @@ void SimplexBoxes::tet_matrices(const Box& box) {
   matrices_.resize(t.lower.size());
   const double* x = box.control.data();
   const Lanes degree = Lanes{} + t.index.degree();
-  for (std::size_t first = 0; first < t.raised[0].size(); first += kLanes)
-    for (int d = 0; d < 3; ++d) {
-      Lanes columns[kLanes];
-      for (std::size_t n = 0; n < kLanes; ++n)
-        columns[n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kLanes) -
-                               load_lanes(x + t.raised[0][first + n] * kLanes));
-      transpose(columns);
-      for (int row = 0; row < 3; ++row) store_lanes(columns[row], matrices_.entries(row, d) + first);
+  for (std::size_t first = 0; first < t.raised[0].size(); first += kLanes) {
+    Lanes columns[3][kLanes];
+    for (std::size_t n = 0; n < kLanes; ++n) {
+      const Lanes origin = load_lanes(x + t.raised[0][first + n] * kLanes);
+      for (int d = 0; d < 3; ++d)
+        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kLanes) - origin);
     }
+    for (int d = 0; d < 3; ++d) {
+      transpose(columns[d]);
+      for (int row = 0; row < 3; ++row) store_lanes(columns[d][row], matrices_.entries(row, d) + first);
+    }
+  }
 }
 
 /// Differences over the triangle and along w, both raised to the degrees of the map. Numbers along w are side by side.

@@ -72,6 +72,15 @@ class SimplexBoxes {
   /// Takes models of the box's simplex: of the lowest tier from `least_tier` on with errors, measured by the mean
   /// edges, up to `wanted`; else of the highest, or none where that is hopeless and parts of it will have their own.
   void take_models(Box& box, double wanted, int least_tier);
+  struct Weighted {
+    const double* model;
+    std::size_t step;  // between its vectors
+    Vec3 coefficient;
+  };
+  /// Control points, `count` vectors of them from the first one on: models by their coefficients. control: where those
+  /// of the layer start.
+  template <int count>
+  void store_sums(std::span<const Weighted> models, std::size_t first, double* control) const;
   int choose_tier(const Box& box, const SimplexModels::Part& part, double wanted, int least_tier) const;
   double wanted_error(double lowest) const;
   bool models_matter(const Box& box, double lowest) const;

@@ -186,7 +186,7 @@ int highest_degree(Basis basis, int order) {
 std::vector<const SimplexTables*> make_tiers(CellKind kind, Basis basis, int order) {
   const int dimension = kind == CellKind::tet ? 3 : 2, highest = highest_degree(basis, order);
   std::vector<const SimplexTables*> tiers;
-  for (const int degree : {3, 4, 6, 8, 11, 14, 17})
+  for (const int degree : {3, 5, 7, 9, 11, 14, 17})
     if (degree < highest) tiers.push_back(&SimplexTables::get(dimension, degree));
   if (tiers.size() == SimplexModels::kMostTiers) tiers.erase(tiers.begin());
   tiers.push_back(&SimplexTables::get(dimension, highest));
@@ -456,9 +456,10 @@ SimplexModels::Batch SimplexModels::make_batch(int own_order, int tier, const Pa
   Batch batch;
   batch.first = first_slots_[own_order];
   const std::size_t end = own_order < kMaxOrder ? first_slots_[own_order + 1] : modes_.size();
+  batch.sizes.assign(end - batch.first, {0, 0});
   batch.coefficients.assign((end - batch.first) * t.stride, 0);
+  std::vector<double> own(t.stride, 0);
   for (std::size_t slot = batch.first; slot < end; ++slot) {
-    Batch::Size& size = batch.sizes.emplace_back(Batch::Size{0, 0});
     if (part.functions[slot].is_left_out(tier)) continue;
     const LocalMode& mode = modes_[slot];
     const std::vector<int> factors = bubble(mode);
@@ -470,8 +471,10 @@ SimplexModels::Batch SimplexModels::make_batch(int own_order, int tier, const Pa
     }
     for (const int v : factors) product = product.times_affine(barycentric[v]);
     for (; missing > 0; --missing) product = product.raised();
-    size = {product.bound(), product.rounding()};
-    product.bernstein(batch.coefficients.data() + (slot - batch.first) * t.stride);
+    batch.sizes[slot - batch.first] = {product.bound(), product.rounding()};
+    product.bernstein(own.data());
+    for (std::size_t alpha = 0; alpha < t.stride; alpha += kWide)
+      store_wide(load_wide(own.data() + alpha), batch.coefficients.data() + batch.address(slot, alpha));
   }
   return batch;
 }

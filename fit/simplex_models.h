@@ -58,9 +58,15 @@ class SimplexModels {
     struct Size {
       double largest_coefficient, rounding;  ///< bounds of |b_alpha| and of the b_alpha's own errors
     };
-    std::size_t first = 0;             ///< slot of the first function
-    std::vector<Size> sizes;           ///< by slot - first
-    std::vector<double> coefficients;  ///< b_alpha at (slot - first) stride + alpha, in the order of the tier's index
+    std::size_t first = 0;    ///< slot of the first function
+    std::vector<Size> sizes;  ///< by slot - first
+    /// b_alpha in the order of the tier's index, kWide at a time: of all functions the first ones, then the next ones.
+    std::vector<double> coefficients;
+    /// Of b_alpha. Next to it are the others up to a multiple of kWide; `step` further on is b_alpha+kWide.
+    std::size_t address(std::size_t slot, std::size_t alpha) const {
+      return alpha / kWide * step() + kWide * (slot - first) + alpha % kWide;
+    }
+    std::size_t step() const { return kWide * sizes.size(); }
   };
   using Models = std::array<std::shared_ptr<const Batch>, kMaxOrder>;  ///< by order i + j + k
 

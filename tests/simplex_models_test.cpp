@@ -161,7 +161,10 @@ TEST_CASE("models of functions on simplices are as close to them as they say", "
               for (const int tier : {repeat % models.num_tiers()}) {
                 const SimplexTables& tables = models.tables(tier);
                 const SimplexModels::Batch& batch = *made[tier][models.own_order(mode)];
-                const double* b = batch.coefficients.data() + (slot - batch.first) * tables.stride;
+                std::vector<double> coefficients(tables.index.size());
+                for (std::size_t alpha = 0; alpha < coefficients.size(); ++alpha)
+                  coefficients[alpha] = batch.coefficients[batch.address(slot, alpha)];
+                const double* b = coefficients.data();
                 Barycentric slopes;
                 const double modelled = bernstein_sum(tables.index, b, l, slopes);
                 Vec3 local = Vec3::Zero();
