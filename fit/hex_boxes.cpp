@@ -143,20 +143,23 @@ void HexBoxes::make_weights() {
   }
 }
 
-const HexBoxes::LineError& HexBoxes::line_error(int direction, int level, int tier) {
-  LineError& result = errors_[direction][level][tier];
+const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
+  const int level = box.levels[direction], tier = box.tiers[direction];
+  const int zone = LineModels::zone(level, box.index[direction]);
+  LineError& result = errors_[direction][level][tier][zone];
   if (result.cell == cell_) return result;
   result.cell = cell_;
   const LineModels::Level& line = tiers_[direction][tier]->level(level);
+  const LineModels::Errors& errors = line.errors[zone];
   result.entries.setZero();
   result.growth = result.inflation = 1;
   for (int i = 0; i < n_; ++i) {
     if (weights_[direction][direction][i] == Vec3::Zero()) continue;
     for (int column = 0; column < 3; ++column)
       result.entries.col(column) +=
-          (column == direction ? line.slope_error[i] : line.error[i]) * weights_[direction][column][i];
+          (column == direction ? errors.slope[i] : errors.value[i]) * weights_[direction][column][i];
     result.growth =
-        std::max({result.growth, 1 + line.error[i] / bounds_[i], 1 + line.slope_error[i] / slope_bounds_[i]});
+        std::max({result.growth, 1 + errors.value[i] / bounds_[i], 1 + errors.slope[i] / slope_bounds_[i]});
     result.inflation = std::max(result.inflation, line.largest_coefficient[i] / bounds_[i]);
   }
   result.size = line.exact ? 0 : result.entries.colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
@@ -169,7 +172,7 @@ bool HexBoxes::is_hopeless(Box& box) {
   for (int d = 0; d < 3; ++d) {
     const int last = static_cast<int>(tiers_[d].size()) - 1;
     int& tier = box.tiers[d];
-    for (tier = 0; tier < last && !(line_error(d, box.levels[d], tier).size <= wanted);) ++tier;
+    for (tier = 0; tier < last && !(error_size(box, d) <= wanted);) ++tier;
     sum += error_size(box, d);
   }
   return sum > kHopelessError;
@@ -333,7 +336,7 @@ Mat3 HexBoxes::remainder(const Box& box) {
   Mat3 result = Mat3::Zero();
   double growth = 1, inflation = 1;
   for (int d = 0; d < 3; ++d) {
-    const LineError& error = line_error(d, box.levels[d], box.tiers[d]);
+    const LineError& error = line_error(box, d);
     result += growth * error.entries;
     growth *= error.growth;
     inflation *= error.inflation;

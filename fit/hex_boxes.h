@@ -79,9 +79,9 @@ class HexBoxes {
   /// Whether the buffers hold the same functions of a direction.
   bool shares(const Box& box, int direction) const;
   void make_weights();
-  const LineError& line_error(int direction, int level, int tier);
+  const LineError& line_error(const Box& box, int direction);
   double error_size(const Box& box, int direction) {
-    return line_error(direction, box.levels[direction], box.tiers[direction]).size;
+    return line_error(box, direction).size;
   }
   void contract_w(const Box& box);
   void contract_v(const Box& box);
@@ -107,7 +107,8 @@ class HexBoxes {
   std::array<std::array<std::vector<Vec3>, 3>, 3> weights_;
   Vec3 total_;                                   // sum of |a_ijk| times all three bounds
   std::size_t cell_ = 0;                         // number of the current one, from 1
-  std::array<std::array<std::array<LineError, kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
+  using Zones = std::array<LineError, LineModels::kZones>;
+  std::array<std::array<std::array<Zones, kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
   std::vector<double> bounds_, slope_bounds_;    // of N_i and N_i', behind them zeros
   std::vector<double> sums_;                     // scratch of make_weights
 };

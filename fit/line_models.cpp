@@ -39,6 +39,16 @@ double log_slope_derivative(Basis basis, int i, int k) {
   return 0.5 * std::numbers::ln2 + k * std::log(i * std::numbers::pi);
 }
 
+/// About the largest |phi_i|, and not less: between samples next to one another a function is above the larger one by
+/// at most (distance^2 / 8) max |phi_i''|, and |P_i'| <= i (i + 1) / 2.
+double largest_integrated_legendre(int i) {
+  constexpr int kSamples = 2000;
+  long double largest = 0;
+  for (int k = 1; k < kSamples; ++k)
+    largest = std::max(largest, std::abs(mode_value(Basis::legendre, i, static_cast<long double>(k) / kSamples)));
+  return static_cast<double>(largest) + std::sqrt(2 * i + 1.0) * i * (i + 1) / (8.0 * kSamples * kSamples);
+}
+
 /// Along a prism's w: degree 5 costs least for the first Fourier modes, 8 for many (measured).
 int model_degree(Basis basis, int order) {
   if (basis == Basis::legendre) return std::min(order, LineModels::kMaxDegree);
@@ -81,7 +91,7 @@ LineModels::LineModels(Basis basis, int order, int degree) : basis_(basis), orde
   constexpr double kUp = 1 + 1e-14;
   for (int i = 1; i < order; ++i) {
     const bool fourier = basis == Basis::fourier;
-    bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : 1 / std::sqrt(2 * i + 1.0));
+    bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : largest_integrated_legendre(i));
     slope_bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 : std::sqrt(2 * i + 1.0));
   }
 }
@@ -114,9 +124,10 @@ LineModels::Level LineModels::make_level(int l) const {
   const auto to_bernstein = chebyshev_to_bernstein(q - 1);
   std::vector<long double> expanded(q), slope(q), value(q + 1);
   for (int i = 1; i < order_; ++i) {
-    double& error = level.error[i + 1];
-    double& slope_error = level.slope_error[i + 1];
     for (int part = 0; part < parts; ++part) {
+      Errors& errors = level.errors[zone(l, part)];
+      double& error = errors.value[i + 1];
+      double& slope_error = errors.slope[i + 1];
       const long double mid = (part + 0.5L) * size;
       double remainder = expansion.expand([&](long double x) { return mode_slope(basis_, i, x); }, mid, size / 2,
                                           log_slope_derivative(basis_, i, num_nodes), q, expanded.data());
@@ -124,6 +135,7 @@ LineModels::Level LineModels::make_level(int l) const {
       const bool constant = remainder >= slope_bounds_[i + 1];  // better none than that one
       if (constant) remainder = slope_bounds_[i + 1];
       slope_error = std::max(slope_error, remainder);
+      level.exact = level.exact && remainder == 0;
       error = std::max(error, constant ? std::min(remainder * static_cast<double>(size) / 2, 2 * bounds_[i + 1])
                                        : remainder * static_cast<double>(size) / 2);
 
@@ -140,7 +152,6 @@ LineModels::Level LineModels::make_level(int l) const {
       const long double shift = mode_value(basis_, i, mid) - middle;
       for (int o = 0; o <= q; ++o) row(part, i + 1)[o] = static_cast<double>(value[o] + shift);
     }
-    level.exact = level.exact && slope_error == 0;
   }
   for (int part = 0; part < parts; ++part)
     for (int i = 0; i <= order_; ++i)

@@ -3,6 +3,7 @@
 
 #include "fit/basis.h"
 
+#include <algorithm>
 #include <array>
 #include <mutex>
 #include <vector>
@@ -21,12 +22,21 @@ class LineModels {
   static constexpr int kStride = 16;  ///< from one function's coefficients to the next one's; unused entries are 0
   using PerFunction = std::array<double, kMaxOrder + 1>;
 
-  /// What holds on all parts of one level, and their coefficients.
+  /// Bounds of |N - model| and |N' - model'|.
+  struct Errors {
+    PerFunction value{}, slope{};
+  };
+  /// Parts of a level by their distance to the ends of [0, 1], near which Legendre polynomials change fastest: those at
+  /// the ends, those beside these, and so on; in the last zone all others.
+  static constexpr int kZones = 4;
+  static int zone(int level, int index) { return std::min({index, (1 << level) - 1 - index, kZones - 1}); }
+
+  /// The models of all parts of one level.
   struct Level {
-    PerFunction error{}, slope_error{};  ///< bounds of |N - model|, |N' - model'|
-    PerFunction largest_coefficient{};   ///< max_o |b_io|
-    bool exact = true;                   ///< there are no errors
-    std::vector<double> coefficients;    ///< b_io at (index (order + 1) + i) kStride + o
+    std::array<Errors, kZones> errors;  ///< by zone
+    PerFunction largest_coefficient{};  ///< max_o |b_io|
+    bool exact = true;                  ///< there are no errors
+    std::vector<double> coefficients;   ///< b_io at (index (order + 1) + i) kStride + o
   };
 
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it

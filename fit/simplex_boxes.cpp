@@ -400,11 +400,11 @@ double SimplexBoxes::determinant_scale(const Box& box) const { return 1 / sides(
 
 Mat3 SimplexBoxes::modelling_error(const Box& box) const {
   if (kind_ == CellKind::tet) return lasting_error(box);
-  const LineModels::Level& level = line_.level(box.w_level);
+  const LineModels::Errors& errors = line_.level(box.w_level).errors[LineModels::zone(box.w_level, box.w_index)];
   Mat3 result = Mat3::Zero();
   for (int k = 0; k < num_layers_; ++k) {
     const Layer& layer = (*box.layers)[k];
-    const double n = line_.bounds()[k], error = level.error[k], slope_error = level.slope_error[k];
+    const double n = line_.bounds()[k], error = errors.value[k], slope_error = errors.slope[k];
     const Vec3 across = layer.gradient_bound * error + layer.gradient_error * (n + error);
     const Vec3 along = layer.value_bound * slope_error + layer.error * (line_.slope_bounds()[k] + slope_error);
     result += (Mat3() << across, across, along).finished();
