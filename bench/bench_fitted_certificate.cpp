@@ -2,6 +2,7 @@
 // Usage: bench_fitted_certificate FILE.vtu ...  (curved meshes that `subvol fit --order P` has written)
 // Microseconds per cell, one thread, of an energy and gradient with the points of a fit, and by that the proof that no
 // cell is inverted: of the first pass, which makes the models that it needs, and of later ones.
+#include "bench/freed_memory.h"
 #include "export/high_order_file.h"
 #include "fit/high_order_certificate.h"
 #include "fit/high_order_energy.h"
@@ -14,10 +15,6 @@
 #include <ctime>
 #include <filesystem>
 #include <vector>
-
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 
 using namespace subvol;
 
@@ -80,10 +77,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   omp_set_num_threads(1);
-#ifdef __GLIBC__  // as the program: else the energy's time is that of fresh pages
-  mallopt(M_MMAP_THRESHOLD, 1 << 25);
-  mallopt(M_TRIM_THRESHOLD, 1 << 27);
-#endif
+  keep_freed_memory();
   try {
     std::printf("{\"bench\": \"fitted_certificate\", \"rows\": [\n");
     for (int i = 1; i < argc; ++i) measure(argv[i], i + 1 == argc);

@@ -3,6 +3,7 @@
 // threads are) and products with its Hessian, and microseconds per cell for the proof that none is inverted, beside
 // those of an energy and gradient: of the first pass, which makes the models that it needs (less those of the row's
 // amplitudes before), and of later ones. Times for the proof and what stands beside it are those of the processor.
+#include "bench/freed_memory.h"
 #include "bench/hex_grid.h"
 #include "fit/high_order_certificate.h"
 #include "fit/high_order_energy.h"
@@ -113,6 +114,7 @@ void print_certificate(const ElementSpace& space, const VolumeMesh& mesh, double
 
 int main() {
   omp_set_num_threads(1);
+  keep_freed_memory();
   std::printf("{\"bench\": \"high_order\", \"threads\": 1, \"rows\": [");
   const char* separator = "";
   for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet})

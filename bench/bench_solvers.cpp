@@ -2,6 +2,7 @@
 // Newton's method against plain L-BFGS on one problem: the last stage of a fit of curved elements, from the same start
 // with the same ideal cells. JSON to stdout: processor time until the energy is within 1 % of the least that either
 // finds. Usage: bench_solvers [TARGET TEMPLATE [ORDER]]; without arguments the torus sample, order 4. One thread.
+#include "bench/freed_memory.h"
 #include "fit/boundary_samples.h"
 #include "fit/fit_level.h"
 #include "fit/fit_target.h"
@@ -71,6 +72,7 @@ Run timed(Minimizer&& minimize, FitProblem problem, std::vector<Vec3> x) {
 
 int main(int argc, char** argv) {
   omp_set_num_threads(1);
+  keep_freed_memory();
   samples::Sample sample = samples::torus_sample();
   if (argc > 2) sample = {"", read_triangle_mesh(argv[1]), read_volume_mesh(argv[2])};
   const int order = argc > 3 ? std::atoi(argv[3]) : 4;

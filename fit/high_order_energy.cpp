@@ -332,22 +332,34 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
   return steps.step();
 }
 
-bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) {
+/// Ten times as stiff: P of the stress (`apply_frozen`), and the sum of blocks that it is part of.
+void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane) {
   constexpr double kStiffer = 10;
-  const auto size = static_cast<std::size_t>(frozen_size(kernels_->coupled));
+  const int size = frozen_size(kernels_->coupled);
+  Wide more[kMostFrozen];
+  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffer, more);
+  Wide* blocks = &group.mean_blocks[54 * batch];
+  kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
+}
+
+bool HighOrderEnergy::stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) {
   std::atomic<bool> changed{false};
   for_each_pair(nodes, direction,
                 [&](std::size_t g, std::size_t b, std::size_t q, int l, const Mat3& j, const Mat3& d) {
                   if (StepLimit::safe(j, d, t)) return;
-                  CellGroup& group = groups_[g];
-                  Wide* frozen = &group.frozen[size * (b * group.num_points() + q)];
-                  Wide more[kMostFrozen];
-                  scale_frozen(frozen, size, l, kStiffer, more);
-                  Wide* blocks = &group.mean_blocks[54 * b];
-                  kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
+                  stiffen_point(groups_[g], b, q, l);
                   changed = true;
                 });
   return changed;
+}
+
+bool HighOrderEnergy::stiffen(std::span<const Index> cells) {
+  for (CellGroup& group : groups_)
+    for (std::size_t b = 0; b < group.batches.size(); ++b)
+      for (int l = 0; l < group.active[b]; ++l)
+        if (std::binary_search(cells.begin(), cells.end(), group.batches[b][l]))
+          for (std::size_t q = 0; q < group.num_points(); ++q) stiffen_point(group, b, q, l);
+  return !cells.empty();
 }
 
 std::vector<Index> HighOrderEnergy::uncertified(std::span<const Vec3> nodes) const {

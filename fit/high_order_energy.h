@@ -58,6 +58,7 @@ class HighOrderEnergy final : public VolumeTerm {
                            std::span<Mat3> diagonal) const override;
   double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
   bool stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) override;
+  bool stiffen(std::span<const Index> cells) override;
   /// Number of quadrature points of all cells.
   std::size_t num_points() const;
   /// Of each cell; more than it was made with where it was densified.
@@ -87,6 +88,7 @@ class HighOrderEnergy final : public VolumeTerm {
   void weigh_points(std::span<const Vec3> nodes);
   void fill_references(CellGroup& group) const;
   void find_incidences();
+  void stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane);
   template <bool kBack, class Kernel, class PerPoint>
   double integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const;
   double cell_share() const { return 1.0 / static_cast<double>(space_->num_cells()); }

@@ -41,6 +41,9 @@ class VolumeTerm {
     return false;
   }
 
+  /// The same for all points of these cells (ascending), with which a step would not be certified.
+  virtual bool stiffen(std::span<const Index> /*cells*/) { return false; }
+
   /// Cells that are not proved to be nowhere inverted, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
   /// Whether a step that was cut back until all cells are certified again is to be half of that.

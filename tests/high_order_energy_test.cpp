@@ -229,6 +229,29 @@ TEST_CASE("points that would stop a step short are made stiffer, others are not"
   CHECK((ratio > 1 && ratio < 10));
 }
 
+TEST_CASE("cells are made stiffer as a whole, others are not", "[elements]") {
+  PointSource source(8);
+  const VolumeMesh mesh = mixed_cells();
+  const ElementSpace space(mesh, Basis::fourier, 2);
+  HighOrderEnergy energy(space, std::vector(space.num_cells(), Vec3(0.8, 0.8, 0.8)), points_of(space, 5));
+  const std::vector<Vec3> x = bent(space, mesh, source, 0.01);
+  std::vector<Vec3> d(x.size()), gradient(x.size(), Vec3::Zero()), soft(x.size()), stiff = soft;
+  for (Vec3& v : d) v = source.vector();
+  energy.linearize(x, 1, gradient);
+  energy.multiply(d, soft);
+  CHECK(!energy.stiffen(std::vector<Index>{}));
+  CHECK(energy.stiffen(std::vector<Index>{0}));
+  energy.multiply(d, stiff);
+  std::vector<bool> touched(x.size()), shared(x.size());
+  for (const Index node : space.nodes(0)) touched[node] = true;
+  for (std::size_t c = 1; c < space.num_cells(); ++c)
+    for (const Index node : space.nodes(c)) shared[node] = true;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!touched[i]) CHECK(stiff[i] == soft[i]);
+    if (touched[i] && !shared[i]) CHECK((stiff[i] - 10 * soft[i]).norm() < 1e-9 * stiff[i].norm());
+  }
+}
+
 TEST_CASE("the diagonal blocks of an affine mesh are those of its Hessian", "[elements]") {
   for (CellKind kind : kAllKinds) {
     const VolumeMesh mesh = single_cell(kind);
