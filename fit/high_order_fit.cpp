@@ -22,6 +22,7 @@
 #include <new>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 namespace subvol {
 
@@ -30,13 +31,15 @@ namespace {
 /// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is
 /// worth one.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-/// Lifting the worst places: their emphasis at first, doubled each time, as long as the least scaled Jacobian is not
-/// good; how much the distances may grow in all.
-constexpr int kMostLifts = 8, kLiftSteps = 8;
-/// Farther off than so many times the mean is far; so many times the mean counts twice at first.
+/// Places farther off than so many times the mean are far; so many times the mean counts twice at first.
 constexpr double kFarShare = 8, kFirstFarLength = 8;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
-constexpr double kFirstEmphasis = 4, kGoodScaledJacobian = 0.5, kMostDistanceGrowth = 1.2;
+/// Lifting places of poor shape: their emphasis, doubled each time, as long as the least scaled Jacobian is not good.
+constexpr double kFirstEmphasis = 4, kLastEmphasis = 512, kGoodScaledJacobian = 0.5;
+constexpr int kLiftSteps = 8;
+/// How often both are done; how much the distances may grow in all.
+constexpr int kMostImprovements = 3;
+constexpr double kMostDistanceGrowth = 1.2;
 
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
@@ -69,6 +72,9 @@ class HighOrderFit {
     double least_scaled_jacobian, mean_percent, max_percent;
     std::size_t pairs;  ///< of faces that intersect
   };
+  /// What became of a stage that was run again; ended: it was not done.
+  enum class Again { kept, undone, ended };
+
   void look_over_template();
   int sample_intervals(int order) const;
   bool has_room(const EntityOrders& orders);
@@ -90,8 +96,10 @@ class HighOrderFit {
   bool lower_lambda();
   Outcome measured_outcome();
   bool improve_worst_places();
-  bool draw_in_far_places(Outcome& now, double most_mean);
-  bool lift_worst_places(Outcome& now, double most_mean, double most_max);
+  bool is_better(const Outcome& next) const;
+  Again run_again(double& setting, double value, int steps);
+  Again draw_in_far_places();
+  Again lift_worst_places();
   bool meets_tolerance();
   void keep_state();
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
@@ -117,6 +125,8 @@ class HighOrderFit {
   bool stays_dense_ = false; ///< after the first orders: cells have at least so many
   double emphasis_ = 0;      ///< of places of poor shape in E_W
   double far_length_ = 0;    ///< distance of places that count twice in E_S; 0: all count alike
+  Outcome worst_{};          ///< while the worst places are improved: of the state that is kept
+  double most_mean_ = 0, most_max_ = 0;  ///< what that may cost
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
   MemoryBudget memory_;
@@ -396,61 +406,67 @@ HighOrderFit::Outcome HighOrderFit::measured_outcome() {
 /// The last stage again for the sake of few places, which matter little to the energies: both are means.
 bool HighOrderFit::improve_worst_places() {
   if (!options_.improve_worst_places || options_.order < 2) return true;
-  Outcome now = measured_outcome();
-  const double most_max = kMostDistanceGrowth * now.max_percent;
-  const double most_mean = options_.tolerance_percent ? std::max(now.mean_percent, *options_.tolerance_percent)
-                                                      : kMostDistanceGrowth * now.mean_percent;
-  return draw_in_far_places(now, most_mean) && lift_worst_places(now, most_mean, most_max);
-}
-
-/// With more and more emphasis on places that are much farther off than the mean. Goes on while the largest distance
-/// falls, and by more than the least scaled Jacobian where that is poor.
-bool HighOrderFit::draw_in_far_places(Outcome& now, double most_mean) {
-  if (options_.correspondence != Correspondence::closest) return true;
-  for (int round = 0; round < kMostDraws && now.max_percent > kFarShare * now.mean_percent; ++round) {
-    FitSnapshot before = snapshot();
-    const double length_before = far_length_;
-    far_length_ = round == 0 ? kFirstFarLength * now.mean_percent / 100 : far_length_ / 2;
-    Stage stage = schedule_.final_stage(lambda_);
-    stage.max_iterations = kDrawSteps;
-    const bool going = run_stage(stage);
-    const Outcome drawn = going ? measured_outcome() : now;
-    const double gain = now.max_percent / drawn.max_percent;
-    const double shape = std::min(now.least_scaled_jacobian, kGoodScaledJacobian);
-    if (!(going && gain > 1 && gain * drawn.least_scaled_jacobian >= shape && drawn.mean_percent <= most_mean &&
-          drawn.pairs <= now.pairs)) {
-      go_back(std::move(before));
-      far_length_ = length_before;
-      return going;
-    }
-    now = drawn;
-  }
-  return true;
-}
-
-/// With more and more emphasis on places of poor shape. Goes on while the least scaled Jacobian gains more than the
-/// distance loses.
-bool HighOrderFit::lift_worst_places(Outcome& now, double most_mean, double most_max) {
-  const auto is_poor = [](double value) { return value > 0 && value < kGoodScaledJacobian; };
-  for (int round = 0; round < kMostLifts && is_poor(now.least_scaled_jacobian); ++round) {
-    FitSnapshot before = snapshot();
+  worst_ = measured_outcome();
+  most_max_ = kMostDistanceGrowth * worst_.max_percent;
+  most_mean_ = options_.tolerance_percent ? std::max(worst_.mean_percent, *options_.tolerance_percent)
+                                          : kMostDistanceGrowth * worst_.mean_percent;
+  for (int round = 0; round < kMostImprovements; ++round) {
+    if (draw_in_far_places() == Again::ended) return false;
     const double emphasis_before = emphasis_;
-    emphasis_ = round == 0 ? kFirstEmphasis : 2 * emphasis_;
-    Stage stage = schedule_.final_stage(lambda_);
-    stage.max_iterations = kLiftSteps;
-    const bool going = run_stage(stage);
-    const Outcome lifted = going ? measured_outcome() : now;
-    const double gain = lifted.least_scaled_jacobian / now.least_scaled_jacobian;
-    const double loss = std::max(lifted.mean_percent / now.mean_percent, lifted.max_percent / now.max_percent);
-    if (!(going && gain > std::max(1.0, loss) && lifted.mean_percent <= most_mean && lifted.max_percent <= most_max &&
-          lifted.pairs <= now.pairs)) {
-      go_back(std::move(before));
-      emphasis_ = emphasis_before;
-      return going;
-    }
-    now = lifted;
+    if (lift_worst_places() == Again::ended) return false;
+    if (emphasis_ == emphasis_before) break;  // else cells may bear now what they could not before
   }
   return true;
+}
+
+/// Whether the least scaled Jacobian, as far as it is poor, the mean and the largest distance gain, taken together.
+bool HighOrderFit::is_better(const Outcome& next) const {
+  const auto shape = [](const Outcome& x) { return std::min(x.least_scaled_jacobian, kGoodScaledJacobian); };
+  const double gain = worst_.mean_percent / next.mean_percent * (worst_.max_percent / next.max_percent);
+  return shape(next) > 0 && gain * shape(next) > shape(worst_) && next.mean_percent <= most_mean_ &&
+         next.max_percent <= most_max_ && next.pairs <= worst_.pairs;
+}
+
+/// The last stage again with a setting changed; undone, with the setting, where that is no better.
+HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int steps) {
+  FitSnapshot before = snapshot();
+  const double setting_before = std::exchange(setting, value);
+  Stage stage = schedule_.final_stage(lambda_);
+  stage.max_iterations = steps;
+  const bool going = run_stage(stage);
+  if (going) {
+    const Outcome next = measured_outcome();
+    if (is_better(next)) {
+      worst_ = next;
+      return Again::kept;
+    }
+  }
+  go_back(std::move(before));
+  setting = setting_before;
+  return going ? Again::undone : Again::ended;
+}
+
+/// With more and more emphasis on places that are much farther off than the mean, as long as there are any.
+HighOrderFit::Again HighOrderFit::draw_in_far_places() {
+  Again last = Again::kept;
+  if (options_.correspondence != Correspondence::closest) return last;
+  for (int draw = 0; draw < kMostDraws && last == Again::kept; ++draw) {
+    if (!(worst_.max_percent > kFarShare * worst_.mean_percent)) break;
+    const double first = kFirstFarLength * worst_.mean_percent / 100;
+    last = run_again(far_length_, far_length_ == 0 ? first : far_length_ / 2, kDrawSteps);
+  }
+  return last;
+}
+
+/// With more and more emphasis on places of poor shape, as long as there are any.
+HighOrderFit::Again HighOrderFit::lift_worst_places() {
+  Again last = Again::kept;
+  const auto is_poor = [&] {
+    return worst_.least_scaled_jacobian > 0 && worst_.least_scaled_jacobian < kGoodScaledJacobian;
+  };
+  while (last == Again::kept && is_poor() && emphasis_ < kLastEmphasis)
+    last = run_again(emphasis_, emphasis_ == 0 ? kFirstEmphasis : 2 * emphasis_, kLiftSteps);
+  return last;
 }
 
 std::vector<Vec3> HighOrderFit::in_target_units(std::vector<Vec3> coefficients) const {
