@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdlib>  // tells the C library
+
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/control_matrices.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -78,10 +79,33 @@ Vec3 scales_by_variation(const Mat3& variation, const Vec3& lengths) {
   return result;
 }
 
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
 struct Bound {
-  double value;   ///< of det J, 0: none
-  bool is_final;  ///< no other L finds one
+  double value;                    ///< of det J, 0: none
+  bool is_final;                   ///< no other L finds one
+  std::size_t in_the_way = kNone;  ///< b of an S_b that is not positive definite, if one is known
 };
+
+int lowest_place(const Wide& x) {
+  int result = 0;
+  for (int k = 1; k < kWide; ++k)
+    if (x[k] < x[result]) result = k;
+  return result;
+}
+
+/// L + (margin - e) v (J_b D v)^T / |J_b D v|^2, where e <= 0 is the least eigenvalue of sym(L J_b D) and v its
+/// eigenvector: then v^T L J_b D v = margin. A step of the perceptron algorithm for an L that suits all b.
+Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
+  constexpr double kMargin = 0.06;  // against L's largest entry
+  l /= l.cwiseAbs().maxCoeff();
+  const Mat3 product = l * scaled_matrix;
+  Eigen::SelfAdjointEigenSolver<Mat3> solver;
+  solver.computeDirect(Mat3(0.5 * (product + product.transpose())));
+  const double least = std::min(0.0, solver.eigenvalues()[0]);
+  const Vec3 v = solver.eigenvectors().col(0), w = scaled_matrix * v;
+  return l + (kMargin - least) / w.squaredNorm() * v * w.transpose();
+}
 
 /// The bound by one L.
 ///
@@ -124,7 +148,7 @@ Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrice
       const Wide own = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1]) -
                        j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0]) +
                        j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
-      return {0, lanes_within(own, 0) != 0};  // S_b > 0 has det J_b > 0
+      return {0, lanes_within(own, 0) != 0, at + lowest_place(least)};  // S_b > 0 has det J_b > 0
     }
     take_lower(first, t00);
     take_lower(second, minor);
@@ -161,6 +185,7 @@ Mat3 ControlMatrices::mean() const {
 }
 
 double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder, const Mat3& frame) {
+  constexpr int kMostTurns = 3;  // more cost what they save (measured)
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
   if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
@@ -176,7 +201,12 @@ double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder,
 
   const Vec3 c = scales_by_variation(variation(matrices, mean, rotation, frame), framed_lengths);
   const double size = std::cbrt(framed.determinant() * c.prod());
-  result = bound(to_frame * c.cwiseInverse().asDiagonal() * unrotate(framed * (c / size).asDiagonal()));
+  Mat3 l = to_frame * c.cwiseInverse().asDiagonal() * unrotate(framed * (c / size).asDiagonal());
+  result = bound(l);
+  for (int turn = 0; turn < kMostTurns && !result.is_final && result.in_the_way != kNone; ++turn) {
+    l = turned(l, matrices[result.in_the_way] * scale.asDiagonal());
+    result = bound(l);
+  }
   // The remainder is smallest by the box's own coordinates.
   if (!result.is_final && is_framed) result = bound(unrotate(mean * scale.asDiagonal()));
   return result.value;

@@ -53,7 +53,8 @@ class ControlMatrices {
 ///
 /// that is, S_b > 0 means sym(Q^T J_b C) > 0. Tried one after the other are the c that make M C's columns 1; those with
 /// c_j / c_i = v_ji / v_ij in the mean over pairs, where v_ij is how much component i (by Q) of column j of J frame
-/// varies, for the terms of each entry off the diagonal are of one size then; and the first ones without the frame.
+/// varies, for the terms of each entry off the diagonal are of one size then. Then that L is turned, up to three times,
+/// towards a b whose S_b is not positive definite; and tried last are the first ones without the frame.
 ///
 /// remainder  R >= 0: bounds of the error of J's entries, and of the rounding errors in J_b's (each at least
 ///            16 units of roundoff of the entry). Entries at most 1e60 in size. Rounding here is accounted for.
