@@ -110,7 +110,9 @@ Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
 /// The bound by one L.
 ///
 /// scale  D
-Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrices& matrices, const Mat3& remainder) {
+/// begin  number of the matrix to begin with: one that another L failed at is likely to be in the way again
+Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrices& matrices, const Mat3& remainder,
+               std::size_t begin) {
   constexpr double kLeastDeterminant = 1e-3;  // of L, by its largest entry cubed: so it is good to 1e-11
   l /= l.cwiseAbs().maxCoeff();
   if (!(l.determinant() > kLeastDeterminant)) return {0, false};
@@ -125,8 +127,9 @@ Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrice
   Wide first = all(std::numeric_limits<double>::infinity()), second = first, third = first;  // least leading minors
   Wide sizes[6] = {};                                                                        // largest entries
   const std::size_t count = matrices.size();
-  for (std::size_t b = 0; b < count; b += kWide) {
-    const std::size_t at = std::min(b, count - kWide);  // the last lanes overlap
+  const std::size_t vectors = (count + kWide - 1) / kWide;
+  for (std::size_t n = 0, vector = begin / kWide; n < vectors; ++n, vector = vector + 1 < vectors ? vector + 1 : 0) {
+    const std::size_t at = std::min(vector * kWide, count - kWide);  // the last lanes overlap
     Wide j[3][3];
     for (int r = 0; r < 3; ++r)
       for (int d = 0; d < 3; ++d) j[r][d] = load_wide(matrices.entries(r, d) + at);
@@ -189,7 +192,9 @@ double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder,
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
   if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
-  const auto bound = [&](const Mat3& l) { return bound_by(l, scale, mean, matrices, remainder); };
+  const auto bound = [&](const Mat3& l, std::size_t start = 0) {
+    return bound_by(l, scale, mean, matrices, remainder, start == kNone ? 0 : start);
+  };
   const bool is_framed = frame != Mat3::Identity();
 
   const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
@@ -202,13 +207,13 @@ double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder,
   const Vec3 c = scales_by_variation(variation(matrices, mean, rotation, frame), framed_lengths);
   const double size = std::cbrt(framed.determinant() * c.prod());
   Mat3 l = to_frame * c.cwiseInverse().asDiagonal() * unrotate(framed * (c / size).asDiagonal());
-  result = bound(l);
+  result = bound(l, result.in_the_way);
   for (int turn = 0; turn < kMostTurns && !result.is_final && result.in_the_way != kNone; ++turn) {
     l = turned(l, matrices[result.in_the_way] * scale.asDiagonal());
-    result = bound(l);
+    result = bound(l, result.in_the_way);
   }
   // The remainder is smallest by the box's own coordinates.
-  if (!result.is_final && is_framed) result = bound(unrotate(mean * scale.asDiagonal()));
+  if (!result.is_final && is_framed) result = bound(unrotate(mean * scale.asDiagonal()), result.in_the_way);
   return result.value;
 }
 

@@ -125,7 +125,7 @@ class HighOrderFit {
   bool stays_dense_ = false; ///< after the first orders: cells have at least so many
   double emphasis_ = 0;      ///< of places of poor shape in E_W
   double far_length_ = 0;    ///< distance of places that count twice in E_S; 0: all count alike
-  Outcome worst_{};          ///< while the worst places are improved: of the state that is kept
+  Outcome outcome_{};        ///< while the worst places are improved: of the state that is kept
   double most_mean_ = 0, most_max_ = 0;  ///< what that may cost
   std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
@@ -406,10 +406,10 @@ HighOrderFit::Outcome HighOrderFit::measured_outcome() {
 /// The last stage again for the sake of few places, which matter little to the energies: both are means.
 bool HighOrderFit::improve_worst_places() {
   if (!options_.improve_worst_places || options_.order < 2) return true;
-  worst_ = measured_outcome();
-  most_max_ = kMostDistanceGrowth * worst_.max_percent;
-  most_mean_ = options_.tolerance_percent ? std::max(worst_.mean_percent, *options_.tolerance_percent)
-                                          : kMostDistanceGrowth * worst_.mean_percent;
+  outcome_ = measured_outcome();
+  most_max_ = kMostDistanceGrowth * outcome_.max_percent;
+  most_mean_ = options_.tolerance_percent ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
+                                          : kMostDistanceGrowth * outcome_.mean_percent;
   for (int round = 0; round < kMostImprovements; ++round) {
     if (draw_in_far_places() == Again::ended) return false;
     const double emphasis_before = emphasis_;
@@ -422,9 +422,9 @@ bool HighOrderFit::improve_worst_places() {
 /// Whether the least scaled Jacobian, as far as it is poor, the mean and the largest distance gain, taken together.
 bool HighOrderFit::is_better(const Outcome& next) const {
   const auto shape = [](const Outcome& x) { return std::min(x.least_scaled_jacobian, kGoodScaledJacobian); };
-  const double gain = worst_.mean_percent / next.mean_percent * (worst_.max_percent / next.max_percent);
-  return shape(next) > 0 && gain * shape(next) > shape(worst_) && next.mean_percent <= most_mean_ &&
-         next.max_percent <= most_max_ && next.pairs <= worst_.pairs;
+  const double gain = outcome_.mean_percent / next.mean_percent * (outcome_.max_percent / next.max_percent);
+  return shape(next) > 0 && gain * shape(next) > shape(outcome_) && next.mean_percent <= most_mean_ &&
+         next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
 }
 
 /// The last stage again with a setting changed; undone, with the setting, where that is no better.
@@ -437,7 +437,7 @@ HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int s
   if (going) {
     const Outcome next = measured_outcome();
     if (is_better(next)) {
-      worst_ = next;
+      outcome_ = next;
       return Again::kept;
     }
   }
@@ -451,8 +451,8 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   Again last = Again::kept;
   if (options_.correspondence != Correspondence::closest) return last;
   for (int draw = 0; draw < kMostDraws && last == Again::kept; ++draw) {
-    if (!(worst_.max_percent > kFarShare * worst_.mean_percent)) break;
-    const double first = kFirstFarLength * worst_.mean_percent / 100;
+    if (!(outcome_.max_percent > kFarShare * outcome_.mean_percent)) break;
+    const double first = kFirstFarLength * outcome_.mean_percent / 100;
     last = run_again(far_length_, far_length_ == 0 ? first : far_length_ / 2, kDrawSteps);
   }
   return last;
@@ -462,7 +462,7 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
 HighOrderFit::Again HighOrderFit::lift_worst_places() {
   Again last = Again::kept;
   const auto is_poor = [&] {
-    return worst_.least_scaled_jacobian > 0 && worst_.least_scaled_jacobian < kGoodScaledJacobian;
+    return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < kGoodScaledJacobian;
   };
   while (last == Again::kept && is_poor() && emphasis_ < kLastEmphasis)
     last = run_again(emphasis_, emphasis_ == 0 ? kFirstEmphasis : 2 * emphasis_, kLiftSteps);
