@@ -64,11 +64,11 @@ class HighOrderEnergy final : public VolumeTerm {
   /// Of each cell; more than it was made with where it was densified.
   std::span<const int> points_per_direction() const { return points_; }
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
-  /// Cells that are in the way twice as dense, their points of poor shape heavier.
   /// A curved cell that is certified at one length of a step, but not at twice it, may be all but inverted between its
   /// points, and then no direction goes on from there. With half of it, its least determinant is at least about half of
   /// what it was.
   bool keeps_off_inversion() const override { return true; }
+  /// Cells that are in the way twice as dense, up to 25 points a direction, their points of poor shape heavier.
   void densify(std::span<const Index> cells, std::span<const Vec3> nodes) override;
   /// e, Hencky's to begin with.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
