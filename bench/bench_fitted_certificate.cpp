@@ -2,7 +2,7 @@
 // Usage: bench_fitted_certificate FILE.vtu ...  (curved meshes that `subvol fit --order P` has written)
 // Microseconds per cell, one thread, of an energy and gradient with the points of a fit, and by that the proof that no
 // cell is inverted: of the first pass, which makes the models that it needs, and of later ones.
-#include "cli/freed_memory.h"
+#include "bench/freed_memory.h"
 #include "export/high_order_file.h"
 #include "fit/high_order_certificate.h"
 #include "fit/high_order_energy.h"

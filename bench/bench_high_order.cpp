@@ -3,8 +3,8 @@
 // threads are) and products with its Hessian, and microseconds per cell for the proof that none is inverted, beside
 // those of an energy and gradient: of the first pass, which makes the models that it needs (less those of the row's
 // amplitudes before), and of later ones. Times for the proof and what stands beside it are those of the processor.
+#include "bench/freed_memory.h"
 #include "bench/hex_grid.h"
-#include "cli/freed_memory.h"
 #include "fit/high_order_certificate.h"
 #include "fit/high_order_energy.h"
 

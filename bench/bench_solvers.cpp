@@ -2,7 +2,7 @@
 // Newton's method against plain L-BFGS on one problem: the last stage of a fit of curved elements, from the same start
 // with the same ideal cells. JSON to stdout: processor time until the energy is within 1 % of the least that either
 // finds. Usage: bench_solvers [TARGET TEMPLATE [ORDER]]; without arguments the torus sample, order 4. One thread.
-#include "cli/freed_memory.h"
+#include "bench/freed_memory.h"
 #include "fit/boundary_samples.h"
 #include "fit/fit_level.h"
 #include "fit/fit_target.h"

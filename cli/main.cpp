@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/commands.h"
 #include "cli/exit_status.h"
-#include "cli/freed_memory.h"
 #include "cli/report.h"
 #include "cli/standard_output.h"
 #include "subvol/error.h"
@@ -13,6 +12,9 @@
 #include <iostream>
 #include <new>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <unistd.h>
 
 namespace subvol::cli {
@@ -52,6 +54,16 @@ void require_known_verb(const CLI::App& app, int argc, char** argv) {
   std::_Exit(kFailed);
 }
 
+/// Arrays of one step are asked for again in the next: they are not handed back to the system each time, which would
+/// have to clear their pages anew (a tenth of the time of `optimize`).
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  constexpr int kMegabyte = 1 << 20;
+  mallopt(M_MMAP_THRESHOLD, 32 * kMegabyte);
+  mallopt(M_TRIM_THRESHOLD, 128 * kMegabyte);
+#endif
+}
+
 int run(int argc, char** argv) {
   remember_command_line(argc, argv);
   CLI::App app{"Fits volume meshes to surfaces: subdivision volumes and shells.", "subvol"};
@@ -86,7 +98,7 @@ int run_to_status(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace subvol::cli;
-  subvol::keep_freed_memory();
+  keep_freed_memory();
   std::set_terminate(end_in_order);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   prepare_standard_output();
