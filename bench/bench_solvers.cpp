@@ -8,6 +8,7 @@
 #include "fit/fit_target.h"
 #include "fit/high_order_energy.h"
 #include "fit/high_order_fit.h"
+#include "fit/high_order_schedule.h"
 #include "fit/stage_runner.h"
 #include "samples/shapes.h"
 #include "subvol/mesh_io.h"
@@ -24,7 +25,7 @@ using namespace subvol;
 
 namespace {
 
-constexpr double kLambda = 0.05, kTangentialWeight = 0.003, kNear = 1.01;
+constexpr double kLambda = 0.05, kNear = 1.01;
 constexpr int kIntervals = 16, kMaxSteps = 2000;
 
 struct Run {
@@ -45,8 +46,9 @@ FitProblem last_stage(const HighOrderMesh& mesh, const VolumeMesh& cells, const 
   FitProblem problem(
       identity_map(mesh.space.num_nodes()), samples.positions,
       std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
-      make_surface_term(target.surface, samples.triangles, samples.points.size(), kTangentialWeight,
-                        Correspondence::closest, SurfacePull::straight),
+      make_surface_term(target.surface, samples.triangles, samples.points.size(),
+                        HighOrderSchedule().final_stage(kLambda).tangential_weight, Correspondence::closest,
+                        SurfacePull::straight),
       kLambda);
   problem.tables.emplace(mesh.space, samples.points);
   return problem;

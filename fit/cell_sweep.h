@@ -4,6 +4,7 @@
 #include "fit/cell_group.h"
 
 #include <algorithm>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,9 +16,10 @@ class CellSweep {
   explicit CellSweep(const CellGroup& group)
       : group_(group), m_(group.order + 1), n_(group.points_per_direction), coefficients_(3 * group.num_modes) {
     if (group.kind != CellKind::hex) return;
-    lines_.resize(static_cast<std::size_t>(m_) * m_ * n_ * 6);
-    planes_.resize(static_cast<std::size_t>(m_) * n_ * n_ * 9);
-    plane_sums_.resize(planes_.size());
+    const std::size_t lines = static_cast<std::size_t>(m_) * m_ * n_ * 6, planes = num_planes();
+    lines_ = std::make_unique_for_overwrite<Wide[]>(lines);
+    planes_ = std::make_unique_for_overwrite<Wide[]>(planes);
+    plane_sums_ = std::make_unique_for_overwrite<Wide[]>(planes);
   }
 
   static constexpr int kAtOnce = 2;
@@ -34,21 +36,71 @@ class CellSweep {
       run_dense<kBack>(op);
   }
 
-  /// The same with op(q, J), point by point.
-  template <bool kBack, class Op>
+  /// The same point by point with op(q, J), and no sums.
+  template <class Op>
   void run(Op&& op) {
-    run_several<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
+    run_several<false>([&](std::size_t first, int count, const Wide (*j)[9]) {
       for (int n = 0; n < count; ++n) op(first + n, j[n]);
     });
+  }
+
+  /// Calls op(place, J) for all points, in the order of `CellGroup::frozen_place`, and sums as with kBack: what a column
+  /// of points needs stays in the fastest cache.
+  template <class Op>
+  void run_columns(Op&& op) {
+    if (group_.kind != CellKind::hex)
+      return run_dense<true>([&](std::size_t first, int count, Wide (*j)[9]) {
+        for (int n = 0; n < count; ++n) op(first + n, j[n]);
+      });
+    to_lines();
+    to_planes();
+    const std::size_t plane = static_cast<std::size_t>(n_) * n_;
+    for (std::size_t column = 0; column < plane; ++column) {
+      for (int k = 0; k < m_; ++k) std::fill_n(&plane_sums_[9 * (k * plane + column)], 9, Wide{});
+      for (int q3 = 0; q3 < n_; ++q3) {
+        Wide j[9] = {};
+        from_column(q3, column, j);
+        op(column * n_ + q3, j);
+        to_column(q3, column, j);
+      }
+    }
+    from_planes();
+    from_lines();
   }
 
   const std::vector<Wide>& coefficients() const { return coefficients_; }
 
  private:
+  std::size_t num_planes() const { return static_cast<std::size_t>(m_) * n_ * n_ * 9; }
+
+  /// J at point q3 of a column, from the planes; and back into their sums.
+  void from_column(int q3, std::size_t column, Wide* j) const {
+    const double *v = &group_.values[q3 * m_], *d = &group_.derivatives[q3 * m_];
+    for (int k = 0; k < m_; ++k) {
+      const Wide* b = &planes_[9 * (static_cast<std::size_t>(k) * n_ * n_ + column)];
+      for (int r = 0; r < 3; ++r) {
+        j[3 * r] += v[k] * b[r];
+        j[3 * r + 1] += v[k] * b[3 + r];
+        j[3 * r + 2] += d[k] * b[6 + r];
+      }
+    }
+  }
+  void to_column(int q3, std::size_t column, const Wide* j) {
+    const double *v = &group_.values[q3 * m_], *d = &group_.derivatives[q3 * m_];
+    for (int k = 0; k < m_; ++k) {
+      Wide* b = &plane_sums_[9 * (static_cast<std::size_t>(k) * n_ * n_ + column)];
+      for (int r = 0; r < 3; ++r) {
+        b[r] += v[k] * j[3 * r];
+        b[3 + r] += v[k] * j[3 * r + 1];
+        b[6 + r] += d[k] * j[3 * r + 2];
+      }
+    }
+  }
+
   template <bool kBack, class Op>
   void run_dense(Op&& op) {
     const std::size_t num_modes = group_.num_modes;
-    std::vector<Wide>& sums = plane_sums_;
+    std::vector<Wide>& sums = dense_sums_;
     if constexpr (kBack) sums.assign(coefficients_.size(), Wide{});
     const std::size_t num_points = group_.num_points();
     for (std::size_t first = 0; first < num_points; first += kAtOnce) {
@@ -78,35 +130,17 @@ class CellSweep {
   void run_tensor(Op&& op) {
     to_lines();
     to_planes();
-    if constexpr (kBack) std::fill(plane_sums_.begin(), plane_sums_.end(), Wide{});
+    if constexpr (kBack) std::fill_n(plane_sums_.get(), num_planes(), Wide{});
     const std::size_t plane = static_cast<std::size_t>(n_) * n_;
-    for (int q3 = 0; q3 < n_; ++q3) {
-      const double *v = &group_.values[q3 * m_], *d = &group_.derivatives[q3 * m_];
+    for (int q3 = 0; q3 < n_; ++q3)
       for (std::size_t first = 0; first < plane; first += kAtOnce) {
         const int count = static_cast<int>(std::min<std::size_t>(kAtOnce, plane - first));
         Wide j[kAtOnce][9] = {};
-        for (int n = 0; n < count; ++n)
-          for (int k = 0; k < m_; ++k) {
-            const Wide* b = &planes_[9 * (k * plane + first + n)];
-            for (int r = 0; r < 3; ++r) {
-              j[n][3 * r] += v[k] * b[r];
-              j[n][3 * r + 1] += v[k] * b[3 + r];
-              j[n][3 * r + 2] += d[k] * b[6 + r];
-            }
-          }
+        for (int n = 0; n < count; ++n) from_column(q3, first + n, j[n]);
         op(q3 * plane + first, count, j);
         if constexpr (kBack)
-          for (int n = 0; n < count; ++n)
-            for (int k = 0; k < m_; ++k) {
-              Wide* b = &plane_sums_[9 * (k * plane + first + n)];
-              for (int r = 0; r < 3; ++r) {
-                b[r] += v[k] * j[n][3 * r];
-                b[3 + r] += v[k] * j[n][3 * r + 1];
-                b[6 + r] += d[k] * j[n][3 * r + 2];
-              }
-            }
+          for (int n = 0; n < count; ++n) to_column(q3, first + n, j[n]);
       }
-    }
     if constexpr (kBack) {
       from_planes();
       from_lines();
@@ -125,7 +159,8 @@ class CellSweep {
 
   const CellGroup& group_;
   int m_, n_;
-  std::vector<Wide> coefficients_, lines_, planes_, plane_sums_;
+  std::vector<Wide> coefficients_, dense_sums_;
+  std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not filled with zeros first
 };
 
 }  // namespace subvol

@@ -28,18 +28,23 @@ std::vector<int> model_degrees(Basis basis, int order) {
 Wide shifted_up(const Wide& x) { return __builtin_shufflevector(x, x, 0, 0, 1, 2, 3, 4, 5, 6); }
 Wide shifted_down(const Wide& x) { return __builtin_shufflevector(x, x, 1, 2, 3, 4, 5, 6, 7, 7); }
 
-/// out[o out_stride] = sum_k table[k kStride + o] in[k in_stride], o < num_out.
+/// out[o out_stride + m] = sum_k table[k kStride + o] in[k in_stride + m], o < num_out, for `length` numbers m, rounded
+/// up to whole vectors; k < n[m / kWide].
 template <int num_out>
-void contract_to(const double* table, const double* in, int in_stride, int n, double* out, int out_stride) {
-  Wide sums[num_out] = {};
-  for (int k = 0; k < n; ++k) {
-    const Wide x = load_wide(in + k * in_stride);
-    for (int o = 0; o < num_out; ++o) sums[o] += table[k * LineModels::kStride + o] * x;
+void contract_to(const double* table, const double* in, int in_stride, const int* n, int length, double* out,
+                 int out_stride) {
+  for (int m = 0; m < length; m += kWide) {
+    Wide sums[num_out] = {};
+    const int end = n[m / kWide];
+    for (int k = 0; k < end; ++k) {
+      const Wide x = load_wide(in + k * in_stride + m);
+      for (int o = 0; o < num_out; ++o) sums[o] += table[k * LineModels::kStride + o] * x;
+    }
+    for (int o = 0; o < num_out; ++o) store_wide(sums[o], out + o * out_stride + m);
   }
-  for (int o = 0; o < num_out; ++o) store_wide(sums[o], out + o * out_stride);
 }
 
-using Contraction = void (*)(const double*, const double*, int, int, double*, int);
+using Contraction = void (*)(const double*, const double*, int, const int*, int, double*, int);
 /// The one for so many outputs.
 Contraction contraction(int num_out) {
   static constexpr Contraction all[] = {nullptr,        contract_to<1>, contract_to<2>, contract_to<3>, contract_to<4>,
@@ -67,6 +72,7 @@ HexBoxes::HexBoxes(Basis basis, int order)
   std::copy_n(tiers_[1][0]->bounds().begin(), n_, bounds_.begin());
   std::copy_n(tiers_[1][0]->slope_bounds().begin(), n_, slope_bounds_.begin());
   used_.resize((face + kWide - 1) / kWide);
+  all_used_.assign(kWide, n_);
   sums_.resize(4 * n_ * lanes_);
 }
 
@@ -270,9 +276,8 @@ void HexBoxes::contract_w(const Box& box) {
   const double* table = line.coefficients(line.level(box.levels[2]), box.index[2]);
   const int face = n_ * n_;
   const Contraction contract = contraction(q1(box, 2));
-  for (int d = 0; d < 3; ++d)
-    for (int m = 0; m < face; m += kWide)  // runs over the end of face
-      contract(table, modes_[d].data() + m, face, used_[m / kWide], after_w_[d].data() + m, row_);
+  for (int d = 0; d < 3; ++d)  // runs over the end of face
+    contract(table, modes_[d].data(), face, used_.data(), face, after_w_[d].data(), row_);
 }
 
 void HexBoxes::contract_v(const Box& box) {
@@ -301,7 +306,7 @@ void HexBoxes::contract_u(const Box& box) {
   for (int d = 0; d < 3; ++d) {
     const double* in = reinterpret_cast<const double*>(after_v_[d].data());
     double* out = reinterpret_cast<double*>(control_[d].data() + num_w);
-    for (int m = 0; m < row; m += kWide) contract(table, in + m, row, n_, out + m, row);
+    contract(table, in, row, all_used_.data(), row, out, row);
   }
 }
 

@@ -97,6 +97,7 @@ class HexBoxes {
   int contracted_ = 0;                           // and how many of its directions, from w on, are done
   std::array<std::vector<double>, 3> modes_;     // x, y, z of a_ijk at (k n + j) n + i
   std::vector<int> used_;                        // of every kWide numbers j n + i: first k from where on all are 0
+  std::vector<int> all_used_;                    // n_ for every kWide numbers of a row
   std::array<std::vector<double>, 3> after_w_;   // at o_w row_ + j n + i
   std::array<std::vector<Wide>, 3> after_v_;     // at i q1_w + o_w, lane o_v
   std::array<std::vector<Wide>, 3> control_;     // at o_u q1_w + o_w, lane o_v, behind a margin of q1_w

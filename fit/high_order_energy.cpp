@@ -246,7 +246,7 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
   }
   const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     CellGroup& group = groups_[g];
-    Wide* frozen = &group.frozen[kSize * (b * group.num_points() + q)];
+    Wide* frozen = &group.frozen[kSize * group.frozen_place(b, q)];
     const Wide weight = scale * cell_share() * group.weight(b, q);
     freeze<kCoupled>(batch, group.reference(b, q), weight, frozen);
     add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
@@ -267,7 +267,7 @@ void HighOrderEnergy::multiply_as(std::span<const Vec3> in) const {
     const CellGroup& group = groups_[g];
     const Wide* frozen = &group.frozen[kSize * b * group.num_points()];
     sweep.load(b, in);
-    sweep.template run<true>([&](std::size_t q, Wide* j) { apply_frozen<kCoupled>(frozen + kSize * q, j); });
+    sweep.run_columns([&](std::size_t place, Wide* j) { apply_frozen<kCoupled>(frozen + kSize * place, j); });
     keep(group, b, sweep.coefficients());
     return 0.0;
   });
@@ -308,9 +308,9 @@ void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const
     std::vector<Wide>& kept = jacobians[omp_get_thread_num()];
     kept.resize(9 * group.num_points());
     sweep.load(b, nodes);
-    sweep.template run<false>([&](std::size_t q, const Wide* j) { std::copy_n(j, 9, &kept[9 * q]); });
+    sweep.run([&](std::size_t q, const Wide* j) { std::copy_n(j, 9, &kept[9 * q]); });
     sweep.load(b, direction);
-    sweep.template run<false>([&](std::size_t q, const Wide* d) {
+    sweep.run([&](std::size_t q, const Wide* d) {
       for (int l = 0; l < group.active[b]; ++l) {
         Mat3 j, e;
         for (int k = 0; k < 9; ++k) {
@@ -337,7 +337,7 @@ void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::si
   constexpr double kStiffer = 10;
   const int size = frozen_size(kernels_->coupled);
   Wide more[kMostFrozen];
-  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffer, more);
+  scale_frozen(&group.frozen[size * group.frozen_place(batch, q)], size, lane, kStiffer, more);
   Wide* blocks = &group.mean_blocks[54 * batch];
   kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
 }
