@@ -9,7 +9,15 @@ void CellGroup::make_tables(Basis basis, QuadratureRule rule) {
   Quadrature quadrature = make_quadrature(kind, rule, n);
   points = std::move(quadrature.points);
   weights = std::move(quadrature.weights);
-  if (kind != CellKind::hex) {
+  if (kind == CellKind::hex) {
+    const std::size_t num_columns = static_cast<std::size_t>(n) * n;
+    const Quadrature by_layers{points, weights};
+    for (std::size_t q = 0; q < num_points(); ++q) {
+      const std::size_t column = q / n, layer = q % n;
+      points[q] = by_layers.points[layer * num_columns + column];
+      weights[q] = by_layers.weights[layer * num_columns + column];
+    }
+  } else {
     num_modes = modes.size();
     ShapeFunctions functions(kind, basis, order);
     products.assign(num_modes, {});

@@ -17,7 +17,7 @@ namespace subvol {
 struct CellGroup {
   CellKind kind;
   int order, points_per_direction;
-  std::vector<Vec3> points;
+  std::vector<Vec3> points;  ///< hex: w fastest, then u, then v: column by column
   std::vector<double> weights;
   std::size_t num_modes = 0;
   std::vector<double> values, derivatives;  ///< hex: of the order + 1 line functions at every point of a line
@@ -33,18 +33,13 @@ struct CellGroup {
   std::vector<Wide> to_reference;  ///< A^-1: 9 per batch, or per point of each where cells have references
   std::vector<Wide> point_weights;                 ///< of every point of each batch; empty: all 1
   bool by_point = false;
-  std::vector<Wide> frozen;                        ///< `frozen_size` per point of every batch, at `frozen_place`
+  std::vector<Narrow> frozen;                      ///< `frozen_size` per point of every batch
   std::vector<Wide> mean_blocks;                   ///< 54 per batch: `add_blocks` over all points
 
   std::size_t num_points() const { return weights.size(); }
   /// Of a point in the mean over its cells.
   Wide weight(std::size_t batch, std::size_t q) const {
     return weights[q] * (point_weights.empty() ? Wide{} + 1.0 : point_weights[batch * num_points() + q]);
-  }
-  /// Hexes: along w first, so that a column of points is together.
-  std::size_t frozen_place(std::size_t batch, std::size_t q) const {
-    const std::size_t n = points_per_direction, first = batch * num_points();
-    return first + (kind == CellKind::hex ? q % (n * n) * n + q / (n * n) : q);
   }
   const Wide* reference(std::size_t batch, std::size_t q) const {
     return to_reference.data() + 9 * (by_point ? batch * num_points() + q : batch);

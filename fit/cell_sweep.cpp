@@ -5,6 +5,16 @@
 
 namespace subvol {
 
+namespace {
+
+/// One by one, so that sums need not be in memory before.
+template <int kCount>
+[[gnu::always_inline]] inline void put(const Wide (&sums)[kCount], Wide* to) {
+  for (int i = 0; i < kCount; ++i) to[i] = sums[i];
+}
+
+}  // namespace
+
 void CellSweep::load(std::size_t batch, std::span<const Vec3> nodes) {
   const std::size_t first = batch * group_.num_modes * kLanes;
   for (std::size_t a = 0; a < group_.num_modes; ++a)
@@ -27,7 +37,7 @@ void CellSweep::to_lines() {
           sum[3 + r] += d * c[r];
         }
       }
-      std::copy_n(sum, 6, &lines_[6 * (static_cast<std::size_t>(kj) * n_ + q)]);
+      put(sum, &lines_[6 * (static_cast<std::size_t>(kj) * n_ + q)]);
     }
 }
 
@@ -45,8 +55,39 @@ void CellSweep::to_planes() {
             sum[6 + r] += v * a[r];
           }
         }
-        std::copy_n(sum, 9, &planes_[9 * ((static_cast<std::size_t>(k) * n_ + q2) * n_ + q1)]);
+        put(sum, &planes_[9 * ((static_cast<std::size_t>(k) * n_ + q2) * n_ + q1)]);
       }
+}
+
+void CellSweep::to_points(std::size_t column, Wide (*j)[9]) const {
+  for (int q = 0; q < n_; ++q) {
+    const double *v = &group_.values[q * m_], *d = &group_.derivatives[q * m_];
+    Wide sum[9] = {};
+    for (int k = 0; k < m_; ++k) {
+      const Wide* b = &planes_[plane_place(k, column)];
+      for (int r = 0; r < 3; ++r) {
+        sum[3 * r] += v[k] * b[r];
+        sum[3 * r + 1] += v[k] * b[3 + r];
+        sum[3 * r + 2] += d[k] * b[6 + r];
+      }
+    }
+    put(sum, j[q]);
+  }
+}
+
+void CellSweep::from_points(std::size_t column, const Wide (*j)[9]) {
+  for (int k = 0; k < m_; ++k) {
+    Wide sum[9] = {};
+    for (int q = 0; q < n_; ++q) {
+      const double v = group_.values[q * m_ + k], d = group_.derivatives[q * m_ + k];
+      for (int r = 0; r < 3; ++r) {
+        sum[r] += v * j[q][3 * r];
+        sum[3 + r] += v * j[q][3 * r + 1];
+        sum[6 + r] += d * j[q][3 * r + 2];
+      }
+    }
+    put(sum, &plane_sums_[plane_place(k, column)]);
+  }
 }
 
 void CellSweep::from_planes() {
@@ -62,7 +103,7 @@ void CellSweep::from_planes() {
             sum[3 + r] += v * b[r];
           }
         }
-        std::copy_n(sum, 6, &lines_[6 * (static_cast<std::size_t>(k * m_ + j) * n_ + q1)]);
+        put(sum, &lines_[6 * (static_cast<std::size_t>(k * m_ + j) * n_ + q1)]);
       }
 }
 
@@ -75,7 +116,7 @@ void CellSweep::from_lines() {
         const double v = group_.values[q * m_ + i], d = group_.derivatives[q * m_ + i];
         for (int r = 0; r < 3; ++r) sum[r] += v * a[r] + d * a[3 + r];
       }
-      std::copy_n(sum, 3, &coefficients_[3 * (kj * m_ + i)]);
+      put(sum, &coefficients_[3 * (kj * m_ + i)]);
     }
 }
 

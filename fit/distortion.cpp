@@ -39,86 +39,165 @@ SUBVOL_INLINE Wide log_positive(const Wide& x) {
   return 2 * s * series + k * 0.6931471805599453;
 }
 
-/// One Jacobi rotation that annihilates a_pq of a symmetric 3x3 matrix with entries of at most 1; r is the third index.
-/// By the half angle: cos 2t = |d| / sqrt(d^2 + b^2), d = a_qq - a_pp, b = 2 a_pq.
-template <bool kVectors>
-SUBVOL_INLINE void rotate(Wide& app, Wide& aqq, Wide& apq, Wide& arp, Wide& arq, Wide* vp, Wide* vq) {
-  const Wide d = aqq - app, b = 2 * apq, size = absolute(d) + 1e-150;  // never 0
-  const Wide inverse = reciprocal_square_root(size * size + b * b);
-  const Wide c2 = 0.5 + 0.5 * size * inverse, inverse_c = reciprocal_square_root(c2);
-  const Wide c = c2 * inverse_c, half = 0.5 * b * inverse * inverse_c, s = d < 0 ? -half : half;
-  const Wide shift = s * inverse_c * apq;
-  app -= shift;
-  aqq += shift;
-  apq = Wide{};
-  const Wide rp = c * arp - s * arq;
-  arq = s * arp + c * arq;
-  arp = rp;
-  if constexpr (kVectors)
+/// The 2x2 rotation that makes a symmetric matrix [[p, o], [o, q]] with entries of at most 1 diagonal, by the half angle:
+/// cos 2t = |d| / sqrt(d^2 + b^2), d = q - p, b = 2 o.
+struct Rotation {
+  Wide c, s;
+
+  SUBVOL_INLINE Rotation(const Wide& p, const Wide& q, const Wide& o) {
+    const Wide d = q - p, b = 2 * o, size = absolute(d) + 1e-150;  // never 0
+    const Wide inverse = reciprocal_square_root(size * size + b * b);
+    const Wide c2 = 0.5 + 0.5 * size * inverse, inverse_c = reciprocal_square_root(c2);
+    const Wide half = 0.5 * b * inverse * inverse_c;
+    c = c2 * inverse_c;
+    s = d < 0 ? -half : half;
+  }
+  SUBVOL_INLINE void turn(Wide* x, Wide* y) const {
     for (int k = 0; k < 3; ++k) {
-      const Wide p = c * vp[k] - s * vq[k];
-      vq[k] = s * vp[k] + c * vq[k];
-      vp[k] = p;
-    }
-}
-
-/// A symmetric matrix on its way to diagonal form; v: its eigenvectors, columns.
-struct Symmetric {
-  Wide diagonal[3], coupled[3];  ///< coupled: entries (0,1), (1,2), (2,0)
-  Wide v[3][3];
-};
-
-/// Eigenvalues, on the diagonals, and vectors of kMany matrices with entries of at most 1, side by side: a rotation
-/// waits for the one before, not for that of another matrix. Four cyclic sweeps reach rounding.
-template <bool kVectors, int kMany>
-SUBVOL_INLINE void diagonalise(Symmetric* m) {
-  for (int n = 0; n < kMany; ++n)
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) m[n].v[i][k] = wide(i == k);
-  for (int sweep = 0; sweep < 4; ++sweep) {
-    for (int n = 0; n < kMany; ++n) {
-      Symmetric& a = m[n];
-      rotate<kVectors>(a.diagonal[0], a.diagonal[1], a.coupled[0], a.coupled[2], a.coupled[1], a.v[0], a.v[1]);
-    }
-    for (int n = 0; n < kMany; ++n) {
-      Symmetric& a = m[n];
-      rotate<kVectors>(a.diagonal[1], a.diagonal[2], a.coupled[1], a.coupled[0], a.coupled[2], a.v[1], a.v[2]);
-    }
-    for (int n = 0; n < kMany; ++n) {
-      Symmetric& a = m[n];
-      rotate<kVectors>(a.diagonal[0], a.diagonal[2], a.coupled[2], a.coupled[0], a.coupled[1], a.v[0], a.v[2]);
+      const Wide turned = c * x[k] - s * y[k];
+      y[k] = s * x[k] + c * y[k];
+      x[k] = turned;
     }
   }
+};
+
+/// A symmetric matrix; coupled: entries (0,1), (1,2), (2,0).
+struct Symmetric {
+  Wide diagonal[3], coupled[3];
+};
+
+SUBVOL_INLINE Wide determinant(const Symmetric& a) {
+  const Wide *d = a.diagonal, *o = a.coupled;
+  return d[0] * (d[1] * d[2] - o[1] * o[1]) - o[0] * (o[0] * d[2] - o[1] * o[2]) + o[2] * (o[0] * o[1] - d[1] * o[2]);
 }
 
-/// J^T J by its trace, which is returned.
-SUBVOL_INLINE Wide right_gram(const Wide* j, Symmetric& a) {
+/// cos(acos(r) / 3) for r in [0, 1], the largest root c of 4 c^3 - 3 c = r: interpolated to 1.3e-8 (at the zeros of a
+/// Chebyshev polynomial), then one step of Newton's method, to rounding.
+SUBVOL_INLINE Wide cosine_of_third(const Wide& r) {
+  const Wide c =
+      0.866025416 +
+      r * (0.166665043 +
+           r * (-0.0480773503 +
+                r * (0.0243923838 +
+                     r * (-0.0142895648 + r * (0.00766430175 + r * (-0.0029228305 + r * 0.000542607712))))));
+  const Wide c2 = c * c;
+  return c - (c * (4 * c2 - 3) - r) * reciprocal(12 * c2 - 3);
+}
+
+/// The eigenvector of a symmetric matrix whose eigenvalue is the farthest from both others, of length 1. Entries are at
+/// most 1; where they are all but those of a multiple of the identity, any vector.
+///
+/// With q = tr A / 3, 6 p^2 = |A - q I|^2, C = (A - q I)/p: C has the eigenvalues 2 cos(t + 2 pi k/3), cos 3t = r =
+/// det C / 2. With the sign that makes r >= 0 the first of them is apart from the others by p sqrt 3 at least, so that
+/// it is well-conditioned, and the adjugate of C - 2 cos t I is v v^T times 6 to 9.
+SUBVOL_INLINE void isolated_eigenvector(const Symmetric& a, Wide* vector) {
+  constexpr double kLeast = 1e-60;
+  Symmetric m = a;
+  const Wide mean = (1.0 / 3) * (a.diagonal[0] + a.diagonal[1] + a.diagonal[2]);
+  Wide square = Wide{}, mixed = Wide{};
+  for (int i = 0; i < 3; ++i) {
+    m.diagonal[i] -= mean;
+    square += m.diagonal[i] * m.diagonal[i];
+    mixed += m.coupled[i] * m.coupled[i];
+  }
+  const Wide inverse = reciprocal_square_root((1.0 / 6) * square + (1.0 / 3) * mixed + kLeast);
+  const Wide r = 0.5 * determinant(m) * (inverse * inverse * inverse);
+  const Wide scale = r < 0 ? -inverse : inverse, eigenvalue = 2 * cosine_of_third(absolute(r));
+  for (int i = 0; i < 3; ++i) {
+    m.diagonal[i] = m.diagonal[i] * scale - eigenvalue;
+    m.coupled[i] *= scale;
+  }
+  Symmetric adjugate;
+  for (int i = 0; i < 3; ++i) {
+    const int j = i == 2 ? 0 : i + 1, k = i == 0 ? 2 : i - 1;
+    adjugate.diagonal[i] = m.diagonal[j] * m.diagonal[k] - m.coupled[j] * m.coupled[j];
+    adjugate.coupled[i] = m.coupled[j] * m.coupled[k] - m.coupled[i] * m.diagonal[k];
+  }
+  // Its column with the largest entry on the diagonal.
+  const Wide *d = adjugate.diagonal, *o = adjugate.coupled;
+  const auto second = d[1] > d[0];
+  const Wide larger = second ? d[1] : d[0];
+  const auto third = d[2] > larger;
+  vector[0] = third ? o[2] : second ? o[0] : d[0];
+  vector[1] = third ? o[1] : second ? d[1] : o[0];
+  vector[2] = third ? d[2] : second ? o[1] : o[2];
+  const Wide normalise =
+      reciprocal_square_root(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+  for (int k = 0; k < 3; ++k) vector[k] *= normalise;
+}
+
+/// Two vectors that make an orthonormal basis with n, |n| = 1.                  Duff et al., JCGT 6(1), 2017
+SUBVOL_INLINE void complete_basis(const Wide* n, Wide* u, Wide* v) {
+  const Wide sign = n[2] < 0 ? wide(-1) : wide(1), a = -reciprocal(sign + n[2]), b = n[0] * n[1] * a;
+  u[0] = 1 + sign * n[0] * n[0] * a;
+  u[1] = sign * b;
+  u[2] = -sign * n[0];
+  v[0] = b;
+  v[1] = sign + n[1] * n[1] * a;
+  v[2] = -n[1];
+}
+
+SUBVOL_INLINE Wide dot(const Wide* a, const Wide* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// J^T J by its trace.
+SUBVOL_INLINE Symmetric right_gram(const Wide* j, Wide& inverse_trace) {
+  Symmetric a;
   for (int i = 0; i < 3; ++i) {
     const int k = i == 2 ? 0 : i + 1;
     a.diagonal[i] = j[i] * j[i] + j[3 + i] * j[3 + i] + j[6 + i] * j[6 + i];
     a.coupled[i] = j[i] * j[k] + j[3 + i] * j[3 + k] + j[6 + i] * j[6 + k];
   }
-  const Wide trace = a.diagonal[0] + a.diagonal[1] + a.diagonal[2], scale = reciprocal(trace);
-  for (int i = 0; i < 3; ++i) a.diagonal[i] *= scale, a.coupled[i] *= scale;
-  return trace;
+  inverse_trace = reciprocal(a.diagonal[0] + a.diagonal[1] + a.diagonal[2]);
+  for (int i = 0; i < 3; ++i) a.diagonal[i] *= inverse_trace, a.coupled[i] *= inverse_trace;
+  return a;
 }
 
-/// Raises the eigenvalues of a symmetric matrix to the floor; `coupled` are its entries (0,1), (1,2), (2,0).
-SUBVOL_INLINE void clamp_symmetric(Wide* diagonal, Wide* coupled, const Wide& floor) {
+/// Right singular vectors v_i of J, J v_i, and the squares of the singular values.
+struct Singular {
+  Wide v[3][3], jv[3][3], square[3];
+};
+
+/// One v_i is the eigenvector of J^T J that stands apart; the others are found from J's action across it, not from
+/// J^T J: small singular values are as accurate as J.
+SUBVOL_INLINE void decompose(const Wide* j, Singular& result) {
+  Wide inverse_trace;
+  auto& [v, jv, square] = result;
+  isolated_eigenvector(right_gram(j, inverse_trace), v[0]);
+  complete_basis(v[0], v[1], v[2]);
+  for (int i = 0; i < 3; ++i)
+    for (int r = 0; r < 3; ++r) jv[i][r] = dot(j + 3 * r, v[i]);
+  const Rotation rotation(inverse_trace * dot(jv[1], jv[1]), inverse_trace * dot(jv[2], jv[2]),
+                          inverse_trace * dot(jv[1], jv[2]));
+  rotation.turn(v[1], v[2]);
+  rotation.turn(jv[1], jv[2]);
+  for (int i = 0; i < 3; ++i) square[i] = dot(jv[i], jv[i]);
+}
+
+/// Raises the eigenvalues of a symmetric matrix to the floor.
+SUBVOL_INLINE void clamp_symmetric(Symmetric& a, const Wide& floor) {
   Wide sum = wide(1e-300);
-  for (int i = 0; i < 3; ++i) sum += absolute(diagonal[i]) + absolute(coupled[i]);
+  for (int i = 0; i < 3; ++i) sum += absolute(a.diagonal[i]) + absolute(a.coupled[i]);
   const Wide scale = reciprocal(sum);
-  Symmetric scaled;
-  for (int i = 0; i < 3; ++i) scaled.diagonal[i] = scale * diagonal[i], scaled.coupled[i] = scale * coupled[i];
-  diagonalise<true, 1>(&scaled);
-  const auto& v = scaled.v;
-  for (int i = 0; i < 3; ++i) diagonal[i] = coupled[i] = Wide{};
+  for (int i = 0; i < 3; ++i) a.diagonal[i] *= scale, a.coupled[i] *= scale;
+  Wide v[3][3], av[3][3];
+  isolated_eigenvector(a, v[0]);
+  complete_basis(v[0], v[1], v[2]);
+  const auto apply = [&](const Wide* x, Wide* ax) {
+    ax[0] = a.diagonal[0] * x[0] + a.coupled[0] * x[1] + a.coupled[2] * x[2];
+    ax[1] = a.coupled[0] * x[0] + a.diagonal[1] * x[1] + a.coupled[1] * x[2];
+    ax[2] = a.coupled[2] * x[0] + a.coupled[1] * x[1] + a.diagonal[2] * x[2];
+  };
+  for (int e = 0; e < 3; ++e) apply(v[e], av[e]);
+  const Rotation rotation(dot(v[1], av[1]), dot(v[2], av[2]), dot(v[1], av[2]));
+  rotation.turn(v[1], v[2]);
+  rotation.turn(av[1], av[2]);
+  a = {};
   for (int e = 0; e < 3; ++e) {
-    Wide value = sum * scaled.diagonal[e];
+    Wide value = sum * dot(v[e], av[e]);
     value = value > floor ? value : floor;
     for (int i = 0; i < 3; ++i) {
-      diagonal[i] += value * v[e][i] * v[e][i];
-      coupled[i] += value * v[e][i] * v[e][i == 2 ? 0 : i + 1];
+      a.diagonal[i] += value * v[e][i] * v[e][i];
+      a.coupled[i] += value * v[e][i] * v[e][i == 2 ? 0 : i + 1];
     }
   }
 }
@@ -184,11 +263,12 @@ template <Distortion kDistortion>
 SUBVOL_INLINE void store_second(const LogModel& f, const Wide* lambda, const Wide* inverse_s, const Wide& on,
                                 DistortionBatch& batch) {
   const Wide floor = wide(batch.floor);
-  Wide s[3], g[3], stretch[3], coupling[3];
+  Wide s[3], g[3];
+  Symmetric stretch;  // coupled: how those couple
   for (int i = 0; i < 3; ++i) {
     s[i] = lambda[i] * inverse_s[i];
     g[i] = f.first[i] * inverse_s[i];
-    stretch[i] = (f.second[i] - f.first[i]) * inverse_s[i] * inverse_s[i];
+    stretch.diagonal[i] = (f.second[i] - f.first[i]) * inverse_s[i] * inverse_s[i];
   }
   for (int i = 0; i < 3; ++i) {
     const int k = i == 2 ? 0 : i + 1;
@@ -202,51 +282,51 @@ SUBVOL_INLINE void store_second(const LogModel& f, const Wide* lambda, const Wid
     twist = twist > floor ? twist : floor;
     store(on * 0.5 * (flip + twist), batch.pair_same[i]);
     store(on * 0.5 * (flip - twist), batch.pair_cross[i]);
-    coupling[i] = f.mixed[i] * inverse_s[i] * inverse_s[k];
+    stretch.coupled[i] = f.mixed[i] * inverse_s[i] * inverse_s[k];
   }
   if constexpr (kDistortion == Distortion::hencky) {
-    for (int i = 0; i < 3; ++i) store(on * (stretch[i] > floor ? stretch[i] : floor), batch.stretch[i]);
-  } else {
-    clamp_symmetric(stretch, coupling, floor);
     for (int i = 0; i < 3; ++i) {
-      store(on * stretch[i], batch.stretch[i]);
-      store(on * coupling[i], batch.coupling[i]);
+      const Wide& value = stretch.diagonal[i];
+      store(on * (value > floor ? value : floor), batch.stretch[i]);
+    }
+  } else {
+    clamp_symmetric(stretch, floor);
+    for (int i = 0; i < 3; ++i) {
+      store(on * stretch.diagonal[i], batch.stretch[i]);
+      store(on * stretch.coupled[i], batch.coupling[i]);
     }
   }
 }
 
-/// Energy and derivatives from the eigenvalues and vectors of J^T J.
+/// Energy and derivatives from the singular values and vectors of J.
 template <Distortion kDistortion, Order kOrder>
-SUBVOL_INLINE void evaluate_at(const Wide* j, const WideBits& feasible, const Wide& trace, const Symmetric& eigen,
-                               DistortionBatch& batch) {
+SUBVOL_INLINE void evaluate_at(const Singular& singular, const WideBits& feasible, DistortionBatch& batch) {
   Wide lambda[3], log_s[3];
-  const auto& v = eigen.v;
+  const auto &v = singular.v, &jv = singular.jv;
   for (int i = 0; i < 3; ++i) {
-    // Rounding may leave an eigenvalue at or below zero when J is nearly singular.
-    lambda[i] = trace * eigen.diagonal[i];
-    lambda[i] = lambda[i] > 1e-280 ? lambda[i] : wide(1e-280);
+    // Rounding may leave nothing of a small singular value.
+    lambda[i] = singular.square[i] > 1e-280 ? singular.square[i] : wide(1e-280);
     log_s[i] = 0.5 * log_positive(lambda[i]);
   }
   const LogModel f = log_model<kDistortion>(lambda, log_s);
   store(feasible ? f.value : wide(std::numeric_limits<double>::infinity()), batch.energy);
   if constexpr (kOrder != Order::energy) {
     const Wide on = feasible ? wide(1) : wide(0);
-    Wide inverse_s[3], w[3], jv[3][3];
-    for (int i = 0; i < 3; ++i) {
-      inverse_s[i] = reciprocal_square_root(lambda[i]);
-      w[i] = on * f.first[i] * inverse_s[i] * inverse_s[i];
-      for (int r = 0; r < 3; ++r) jv[i][r] = j[3 * r] * v[i][0] + j[3 * r + 1] * v[i][1] + j[3 * r + 2] * v[i][2];
-    }
+    Wide w[3];
+    for (int i = 0; i < 3; ++i) w[i] = on * f.first[i] * reciprocal(lambda[i]);
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c)
         store(w[0] * jv[0][r] * v[0][c] + w[1] * jv[1][r] * v[1][c] + w[2] * jv[2][r] * v[2][c],
               batch.stress[3 * r + c]);
     if constexpr (kOrder == Order::hessian) {
-      for (int i = 0; i < 3; ++i)
+      Wide inverse_s[3];
+      for (int i = 0; i < 3; ++i) {
+        inverse_s[i] = reciprocal_square_root(lambda[i]);
         for (int r = 0; r < 3; ++r) {
           store(jv[i][r] * inverse_s[i], batch.u[3 * r + i]);
           store(v[i][r], batch.v[3 * r + i]);
         }
+      }
       store_second<kDistortion>(f, lambda, inverse_s, on, batch);
     }
   }
@@ -254,18 +334,17 @@ SUBVOL_INLINE void evaluate_at(const Wide* j, const WideBits& feasible, const Wi
 
 template <Distortion kDistortion, Order kOrder, int kMany>
 SUBVOL_INLINE void evaluate_some(DistortionBatch* batches) {
-  Wide j[kMany][9], trace[kMany];
   WideBits feasible[kMany];
-  Symmetric eigen[kMany];
+  Singular singular[kMany];
   for (int n = 0; n < kMany; ++n) {
-    for (int k = 0; k < 9; ++k) j[n][k] = load(batches[n].jacobian[k]);
+    Wide j[9];
+    for (int k = 0; k < 9; ++k) j[k] = load(batches[n].jacobian[k]);
     // Infeasible lanes are computed as if J were the identity, so that nothing in them can overflow or trap.
-    feasible[n] = determinant(j[n]) > 0;
-    for (int k = 0; k < 9; ++k) j[n][k] = feasible[n] ? j[n][k] : wide(k % 4 == 0 ? 1.0 : 0.0);
-    trace[n] = right_gram(j[n], eigen[n]);
+    feasible[n] = determinant(j) > 0;
+    for (int k = 0; k < 9; ++k) j[k] = feasible[n] ? j[k] : wide(k % 4 == 0 ? 1.0 : 0.0);
+    decompose(j, singular[n]);
   }
-  diagonalise<kOrder != Order::energy, kMany>(eigen);
-  for (int n = 0; n < kMany; ++n) evaluate_at<kDistortion, kOrder>(j[n], feasible[n], trace[n], eigen[n], batches[n]);
+  for (int n = 0; n < kMany; ++n) evaluate_at<kDistortion, kOrder>(singular[n], feasible[n], batches[n]);
 }
 
 template <Distortion kDistortion, Order kOrder>

@@ -60,7 +60,7 @@ struct DistortionKernels {
 };
 const DistortionKernels& kernels_of(Distortion distortion);
 
-/// Hencky's. Fills `energy`. Cost: one symmetric 3x3 eigenvalue computation per lane.
+/// Hencky's. Fills `energy`. Cost: the singular values of one 3x3 matrix per lane.
 void hencky_energy(DistortionBatch& batch);
 /// Fills `energy` and `stress`.
 void hencky_gradient(DistortionBatch& batch);

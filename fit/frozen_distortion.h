@@ -7,8 +7,9 @@ namespace subvol {
 
 /// The second derivative of a distortion at points of eight cells, as numbers that are kept while conjugate gradients
 /// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), and where stretches are
-/// coupled coupling (3), as in `distortion.h`, R being A^-1 and all after it multiplied by the point's weight. Inlined
-/// everywhere: kept in memory between its steps, a product takes several times as long.
+/// coupled coupling (3), as in `distortion.h`, R being A^-1 and all after it multiplied by the point's weight. Kept in
+/// single precision (`keep_frozen`): a product is as fast as they are read. Inlined everywhere: in memory between its
+/// steps, a product takes several times as long.
 inline constexpr int frozen_size(bool coupled) { return coupled ? 30 : 27; }
 inline constexpr int kMostFrozen = frozen_size(true);
 /// Symmetric 3x3 blocks of a second derivative by pairs (0,0) (1,1) (2,2) (0,1) (1,2) (2,0) of directions.
@@ -30,20 +31,33 @@ template <bool kCoupled>
   }
 }
 
+/// Keeps a point's numbers; those that single precision has no room for as the largest.
+inline void keep_frozen(const Wide* frozen, int size, Narrow* kept) {
+  constexpr double kMost = 1e30;
+  for (int k = 0; k < size; ++k) {
+    Wide x = frozen[k];
+    take_lower(x, Wide{} + kMost);
+    take_higher(x, Wide{} - kMost);
+    kept[k] = narrow(x);
+  }
+}
+
 /// Makes the second derivative of one lane `factor` times as large; `more` receives the numbers of what was added.
-inline void scale_frozen(Wide* frozen, int size, int lane, double factor, Wide* more) {
-  std::copy_n(frozen, size, more);
+inline void scale_frozen(Narrow* kept, int size, int lane, double factor, Wide* more) {
+  for (int k = 0; k < 18; ++k) more[k] = widen(kept[k]);
   for (int k = 18; k < size; ++k) {
     more[k] = Wide{};
-    more[k][lane] = (factor - 1) * frozen[k][lane];
-    frozen[k][lane] *= factor;
+    more[k][lane] = (factor - 1) * kept[k][lane];
+    kept[k][lane] *= static_cast<float>(factor);
   }
 }
 
 /// A change G of the Jacobian, by canonical coordinates, becomes the change U P (R V)^T of the stress:
 ///   W = U^T G R V,  P_ii = stretch_i W_ii + sum_{j != i} coupling_ij W_jj,  P_ij = same_ij W_ij + cross_ij W_ji.
 template <bool kCoupled>
-[[gnu::always_inline]] inline void apply_frozen(const Wide* frozen, Wide* g) {
+[[gnu::always_inline]] inline void apply_frozen(const Narrow* kept, Wide* g) {
+  Wide frozen[kMostFrozen];
+  for (int k = 0; k < frozen_size(kCoupled); ++k) frozen[k] = widen(kept[k]);
   const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;
   Wide t[9], w[9], p[9];
   product(g, rv, t);

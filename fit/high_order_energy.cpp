@@ -190,13 +190,13 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
 /// stays in local_. Calls per_point(group number, batch, q, point) when a point is done.
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
+  constexpr int kAtOnce = 2;
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
-    DistortionBatch batches[CellSweep::kAtOnce];
+    DistortionBatch batches[kAtOnce];
     for (DistortionBatch& batch : batches) batch.floor = floor_;
     Wide sum{};
-    sweep.load(b, nodes);
-    sweep.template run_several<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
+    const auto evaluate = [&](std::size_t first, int count, Wide (*j)[9]) {
       Wide f[9];
       for (int n = 0; n < count; ++n) {
         product(j[n], group.reference(b, first + n), f);
@@ -213,6 +213,10 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
         }
         per_point(g, b, q, batches[n]);
       }
+    };
+    sweep.load(b, nodes);
+    sweep.template run<kBack>([&](std::size_t first, int count, Wide (*j)[9]) {
+      for (int n = 0; n < count; n += kAtOnce) evaluate(first + n, std::min(kAtOnce, count - n), j + n);
     });
     if constexpr (kBack) keep(group, b, sweep.coefficients());
     double total = 0;
@@ -246,10 +250,11 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
   }
   const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     CellGroup& group = groups_[g];
-    Wide* frozen = &group.frozen[kSize * group.frozen_place(b, q)];
+    Wide frozen[kSize];
     const Wide weight = scale * cell_share() * group.weight(b, q);
     freeze<kCoupled>(batch, group.reference(b, q), weight, frozen);
     add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
+    keep_frozen(frozen, kSize, &group.frozen[kSize * (b * group.num_points() + q)]);
   };
   const double energy = integrate<true>(nodes, kernels_->hessian, keep_point);
   gather_nodes(scale * cell_share(), gradient);
@@ -265,9 +270,11 @@ void HighOrderEnergy::multiply_as(std::span<const Vec3> in) const {
   constexpr int kSize = frozen_size(kCoupled);
   sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
-    const Wide* frozen = &group.frozen[kSize * b * group.num_points()];
+    const Narrow* frozen = &group.frozen[kSize * b * group.num_points()];
     sweep.load(b, in);
-    sweep.run_columns([&](std::size_t place, Wide* j) { apply_frozen<kCoupled>(frozen + kSize * place, j); });
+    sweep.run<true>([&](std::size_t first, int count, Wide (*j)[9]) {
+      for (int n = 0; n < count; ++n) apply_frozen<kCoupled>(frozen + kSize * (first + n), j[n]);
+    });
     keep(group, b, sweep.coefficients());
     return 0.0;
   });
@@ -308,17 +315,20 @@ void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const
     std::vector<Wide>& kept = jacobians[omp_get_thread_num()];
     kept.resize(9 * group.num_points());
     sweep.load(b, nodes);
-    sweep.run([&](std::size_t q, const Wide* j) { std::copy_n(j, 9, &kept[9 * q]); });
+    sweep.run<false>([&](std::size_t first, int count, const Wide (*j)[9]) {
+      std::copy_n(j[0], 9 * count, &kept[9 * first]);
+    });
     sweep.load(b, direction);
-    sweep.run([&](std::size_t q, const Wide* d) {
-      for (int l = 0; l < group.active[b]; ++l) {
-        Mat3 j, e;
-        for (int k = 0; k < 9; ++k) {
-          j(k / 3, k % 3) = kept[9 * q + k][l];
-          e(k / 3, k % 3) = d[k][l];
+    sweep.run<false>([&](std::size_t first, int count, const Wide (*d)[9]) {
+      for (int n = 0; n < count; ++n)
+        for (int l = 0; l < group.active[b]; ++l) {
+          Mat3 j, e;
+          for (int k = 0; k < 9; ++k) {
+            j(k / 3, k % 3) = kept[9 * (first + n) + k][l];
+            e(k / 3, k % 3) = d[n][k][l];
+          }
+          per_point(g, b, first + n, l, j, e);
         }
-        per_point(g, b, q, l, j, e);
-      }
     });
     return 0.0;
   });
@@ -337,7 +347,7 @@ void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::si
   constexpr double kStiffer = 10;
   const int size = frozen_size(kernels_->coupled);
   Wide more[kMostFrozen];
-  scale_frozen(&group.frozen[size * group.frozen_place(batch, q)], size, lane, kStiffer, more);
+  scale_frozen(&group.frozen[size * (batch * group.num_points() + q)], size, lane, kStiffer, more);
   Wide* blocks = &group.mean_blocks[54 * batch];
   kernels_->coupled ? add_blocks<true>(more, blocks) : add_blocks<false>(more, blocks);
 }

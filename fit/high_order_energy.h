@@ -51,6 +51,7 @@ class HighOrderEnergy final : public VolumeTerm {
   double value(std::span<const Vec3> nodes) const override;
   double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
   double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
+  /// H is kept in single precision: entries are good to 1e-6 of the largest.
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override;
   /// Of the diagonal that the mean of the second derivative over every cell's points gives. Every column of the map
   /// must have at most one entry for it to be that of M^T H M; else what couples several nodes is left out.

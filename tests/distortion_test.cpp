@@ -12,6 +12,7 @@
 #include "samples/shapes.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <catch2/catch.hpp>
@@ -145,6 +146,34 @@ void check_derivatives(Energy& energy, Distortion distortion, const std::vector<
 }
 
 }  // namespace
+
+TEST_CASE("Singular vectors and stress are as accurate as the Jacobian, with singular values equal, close or far apart") {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  const auto rotation = [&] {
+    return Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+        .normalized()
+        .toRotationMatrix();
+  };
+  const Vec3 values[] = {{1, 1, 1},       {2, 2, 1},       {2, 1, 1},          {3, 2, 1},
+                         {1, 1e-3, 1e-6}, {1, 1, 1e-7},    {1e4, 1, 1},        {1, 1 + 1e-9, 1 + 2e-9},
+                         {5, 5, 5 + 1e-12}, {7e5, 8e5, 9e5}, {1e-5, 2e-5, 4e-5}, {1, 2, 2 + 1e-8}};
+  for (const Vec3& s : values)
+    for (int k = 0; k < 100; ++k) {
+      const Mat3 left = k == 0 ? Mat3(Mat3::Identity()) : rotation(), right = k < 2 ? Mat3::Identity() : rotation();
+      const Mat3 j = left * s.asDiagonal() * right.transpose();
+      const DistortionBatch batch = evaluated(Distortion::hencky, j);
+      const Mat3 u = matrix(batch.u), v = matrix(batch.v);
+      const Vec3 logs = s.array().log();
+      const double error = 1e-14 * s.maxCoeff() / s.minCoeff();  // what rounding J does to the least singular value
+      CAPTURE(s.transpose(), k);
+      CHECK(std::abs(batch.energy[0] - 0.5 * logs.squaredNorm()) <= error * (error + logs.norm()));
+      CHECK((v.transpose() * v - Mat3::Identity()).norm() < 1e-14);
+      CHECK((u.transpose() * u - Mat3::Identity()).norm() < 1e-14 + error);
+      const Mat3 expected = left * logs.cwiseQuotient(s).asDiagonal() * right.transpose();
+      CHECK((matrix(batch.stress) - expected).norm() <= error * ((1 + logs.cwiseAbs().maxCoeff()) / s.minCoeff()));
+    }
+}
 
 TEST_CASE("Distortions are what their definitions say, 0 where cells are ideal, infinite where they are inverted") {
   for (Distortion distortion : kAll) {

@@ -252,6 +252,7 @@ TEST_CASE("cells are made stiffer as a whole, others are not", "[elements]") {
   }
 }
 
+/// Products are with numbers kept in single precision, the blocks are not.
 TEST_CASE("the diagonal blocks of an affine mesh are those of its Hessian", "[elements]") {
   for (CellKind kind : kAllKinds) {
     const VolumeMesh mesh = single_cell(kind);
@@ -268,7 +269,7 @@ TEST_CASE("the diagonal blocks of an affine mesh are those of its Hessian", "[el
         unit[i][r] = 1;
         energy.multiply(unit, column);
         unit[i][r] = 0;
-        CHECK((column[i] - diagonal[i].col(r)).norm() < 1e-10 * (1 + column[i].norm()));
+        CHECK((column[i] - diagonal[i].col(r)).norm() < 1e-6 * (1 + column[i].norm()));
       }
   }
 }
