@@ -48,7 +48,7 @@ FitProblem last_stage(const HighOrderMesh& mesh, const VolumeMesh& cells, const 
       std::make_unique<HighOrderEnergy>(mesh.space, ideal_boxes(cells, vertices, target.surface.volume(), 1), points),
       make_surface_term(target.surface, samples.triangles, samples.points.size(),
                         HighOrderSchedule().final_stage(kLambda).tangential_weight, Correspondence::closest,
-                        SurfacePull::straight),
+                        SurfacePull::straight, 0, samples.at_edges),
       kLambda);
   problem.tables.emplace(mesh.space, samples.points);
   return problem;

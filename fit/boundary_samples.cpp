@@ -91,9 +91,10 @@ class BoundarySampler {
     return step == n_ ? vertex_samples_[high] : edge_samples_[e] + step - 1;
   }
 
-  void add_triangle(Index f, Index a, Index b, Index c) {
+  void add_triangle(Index f, Index a, Index b, Index c, bool at_edge) {
     samples_.triangles.push_back({a, b, c});
     samples_.triangle_faces.push_back(f);
+    samples_.at_edges.push_back(at_edge);
   }
 
   Index& grid(int s, int t) { return grid_[t * (n_ + 1) + s]; }
@@ -110,8 +111,9 @@ class BoundarySampler {
       for (int s = 1; s < n_; ++s) grid(s, t) = add(point(s, t));
     for (int t = 0; t < n_; ++t)
       for (int s = 0; s < n_; ++s) {
-        add_triangle(f, grid(s, t), grid(s + 1, t), grid(s + 1, t + 1));
-        add_triangle(f, grid(s, t), grid(s + 1, t + 1), grid(s, t + 1));
+        const bool at_edge = s == 0 || t == 0 || s == n_ - 1 || t == n_ - 1;
+        add_triangle(f, grid(s, t), grid(s + 1, t), grid(s + 1, t + 1), at_edge);
+        add_triangle(f, grid(s, t), grid(s + 1, t + 1), grid(s, t + 1), at_edge);
       }
   }
 
@@ -126,8 +128,10 @@ class BoundarySampler {
       for (int s = 1; s + t < n_; ++s) grid(s, t) = add(point(s, t));
     for (int t = 0; t < n_; ++t)
       for (int s = 0; s + t < n_; ++s) {
-        add_triangle(f, grid(s, t), grid(s + 1, t), grid(s, t + 1));
-        if (s + t + 1 < n_) add_triangle(f, grid(s + 1, t), grid(s + 1, t + 1), grid(s, t + 1));
+        const bool at_edge = s == 0 || t == 0;
+        add_triangle(f, grid(s, t), grid(s + 1, t), grid(s, t + 1), at_edge || s + t == n_ - 1);
+        if (s + t + 1 < n_)
+          add_triangle(f, grid(s + 1, t), grid(s + 1, t + 1), grid(s, t + 1), at_edge || s + t == n_ - 2);
       }
   }
 

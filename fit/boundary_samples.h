@@ -5,6 +5,7 @@
 #include "subvol/feature_tags.h"
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct BoundarySamples {
   SparseMap positions;            ///< nodes -> samples
   std::vector<std::array<Index, 3>> triangles;
   std::vector<Index> triangle_faces;             ///< the boundary face of each, as MeshTopology numbers it
+  std::vector<std::uint8_t> at_edges;            ///< of each: whether a corner is on an edge of its face
   std::vector<std::array<Index, 2>> crease_edges;///< `intervals` for each crease, in their order, from v0 to v1
 };
 

@@ -196,12 +196,14 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
   return volume;
 }
 
+/// Edges of cells can stand out of the surface as fins, which are too thin to count if only what is beside them is
+/// looked at.
 FitProblem HighOrderFit::problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume,
                                  const BoundarySamples& samples, const Stage& stage) const {
   FitProblem problem(identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
                      make_surface_term(target_.surface, samples.triangles, samples.points.size(),
                                        stage.tangential_weight, options_.correspondence, SurfacePull::straight,
-                                       far_length_),
+                                       far_length_, samples.at_edges),
                      stage.lambda);
   problem.tables.emplace(space, samples.points);
   return problem;

@@ -8,6 +8,7 @@
 #include "fit/target_surface.h"
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -18,13 +19,16 @@ namespace subvol {
 
 /// E_S between samples of the fitted surface and a target, which must outlive it.
 ///
-/// far_length  of `ClosestPointEnergy::emphasize_far`; 0: none. Voronoi cells have no such emphasis.
+/// Voronoi cells have neither of these:
+/// far_length  of `ClosestPointEnergy::emphasize_far`; 0: none
+/// refined     of `ClosestPointEnergy::refine`; empty: none
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
                                                std::size_t num_samples, double tangential_weight,
                                                Correspondence correspondence,
                                                SurfacePull pull = SurfacePull::along_normals,
-                                               double far_length = 0);
+                                               double far_length = 0,
+                                               std::span<const std::uint8_t> refined = {});
 
 /// InputError unless closest points are what pulls: Voronoi cells of points have no area.
 void require_closest(Correspondence correspondence);
