@@ -229,6 +229,7 @@ TEST_CASE("points that would stop a step short are made stiffer, others are not"
   CHECK((ratio > 1 && ratio < 10));
 }
 
+/// Products are with numbers kept in single precision.
 TEST_CASE("cells are made stiffer as a whole, others are not", "[elements]") {
   PointSource source(8);
   const VolumeMesh mesh = mixed_cells();
@@ -248,7 +249,7 @@ TEST_CASE("cells are made stiffer as a whole, others are not", "[elements]") {
     for (const Index node : space.nodes(c)) shared[node] = true;
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (!touched[i]) CHECK(stiff[i] == soft[i]);
-    if (touched[i] && !shared[i]) CHECK((stiff[i] - 10 * soft[i]).norm() < 1e-9 * stiff[i].norm());
+    if (touched[i] && !shared[i]) CHECK((stiff[i] - 10 * soft[i]).norm() < 1e-6 * stiff[i].norm());
   }
 }
 
