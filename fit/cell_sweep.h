@@ -25,8 +25,8 @@ class CellSweep {
 
   void load(std::size_t batch, std::span<const Vec3> nodes);
 
-  /// Calls op(first, count, J) for all points, some at a time: first, first + 1, ... with the 9 entries of J = dx/du for
-  /// each. With kBack, op leaves there what is summed into the coefficients: out_a = sum_q J_q grad N_a(q).
+  /// Calls op(first, count, J) for all points, some at a time: first, first + 1, ... with the 9 entries of J = dx/du
+  /// for each. With kBack, op leaves there what is summed into the coefficients: out_a = sum_q J_q grad N_a(q).
   template <bool kBack, class Op>
   void run(Op&& op) {
     if (group_.kind == CellKind::hex)
