@@ -25,6 +25,40 @@ void CellSweep::load(std::size_t batch, std::span<const Vec3> nodes) {
     }
 }
 
+template <int kCount>
+void CellSweep::to_dense(std::size_t first, Wide (*j)[9]) const {
+  const Vec3* gradients = group_.gradients.data() + first * group_.num_modes;
+  Wide sums[kCount][9] = {};
+  for (std::size_t a = 0; a < group_.num_modes; ++a)
+    for (int n = 0; n < kCount; ++n)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          sums[n][3 * r + c] += gradients[n * group_.num_modes + a][c] * coefficients_[3 * a + r];
+  for (int n = 0; n < kCount; ++n) put(sums[n], j[n]);
+}
+
+template <int kCount>
+void CellSweep::from_dense(std::size_t first, const Wide (*j)[9]) {
+  const Vec3* gradients = group_.gradients.data() + first * group_.num_modes;
+  Wide own[kCount][9];  // in registers: j might be among the sums, for all that is known
+  for (int n = 0; n < kCount; ++n)
+    for (int e = 0; e < 9; ++e) own[n][e] = j[n][e];
+  for (std::size_t a = 0; a < group_.num_modes; ++a) {
+    Wide sums[3];
+    for (int r = 0; r < 3; ++r) sums[r] = dense_sums_[3 * a + r];
+    for (int n = 0; n < kCount; ++n) {
+      const Vec3& g = gradients[n * group_.num_modes + a];
+      for (int r = 0; r < 3; ++r) sums[r] += g[0] * own[n][3 * r] + g[1] * own[n][3 * r + 1] + g[2] * own[n][3 * r + 2];
+    }
+    put(sums, &dense_sums_[3 * a]);
+  }
+}
+
+template void CellSweep::to_dense<1>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::to_dense<CellSweep::kPoints>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::from_dense<1>(std::size_t, const Wide (*)[9]);
+template void CellSweep::from_dense<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
+
 void CellSweep::to_lines() {
   for (int kj = 0; kj < m_ * m_; ++kj)
     for (int q = 0; q < n_; ++q) {

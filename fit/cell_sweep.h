@@ -46,30 +46,16 @@ class CellSweep {
 
   template <bool kBack, class Op>
   void run_dense(Op&& op) {
-    const std::size_t num_modes = group_.num_modes;
-    std::vector<Wide>& sums = dense_sums_;
-    if constexpr (kBack) sums.assign(coefficients_.size(), Wide{});
+    if constexpr (kBack) dense_sums_.assign(coefficients_.size(), Wide{});
     const std::size_t num_points = group_.num_points();
     for (std::size_t first = 0; first < num_points; first += kPoints) {
-      const int count = static_cast<int>(std::min<std::size_t>(kPoints, num_points - first));
-      Wide j[kPoints][9] = {};
-      for (int n = 0; n < count; ++n) {
-        const Vec3* gradients = group_.gradients.data() + (first + n) * num_modes;
-        for (std::size_t a = 0; a < num_modes; ++a)
-          for (int r = 0; r < 3; ++r)
-            for (int c = 0; c < 3; ++c) j[n][3 * r + c] += gradients[a][c] * coefficients_[3 * a + r];
-      }
-      op(first, count, j);
-      if constexpr (kBack)
-        for (int n = 0; n < count; ++n) {
-          const Vec3* gradients = group_.gradients.data() + (first + n) * num_modes;
-          for (std::size_t a = 0; a < num_modes; ++a)
-            for (int r = 0; r < 3; ++r)
-              sums[3 * a + r] += gradients[a][0] * j[n][3 * r] + gradients[a][1] * j[n][3 * r + 1] +
-                                 gradients[a][2] * j[n][3 * r + 2];
-        }
+      const bool all = first + kPoints <= num_points;
+      Wide j[kPoints][9];
+      all ? to_dense<kPoints>(first, j) : to_dense<1>(first, j);
+      op(first, all ? kPoints : 1, j);
+      if constexpr (kBack) all ? from_dense<kPoints>(first, j) : from_dense<1>(first, j);
     }
-    if constexpr (kBack) coefficients_.swap(sums);
+    if constexpr (kBack) coefficients_.swap(dense_sums_);
   }
 
   /// One direction at a time: coefficients (k, j, i) -> lines (k, j, q1) -> planes (k, q2, q1) -> points, column by
@@ -90,6 +76,12 @@ class CellSweep {
       from_lines();
     }
   }
+
+  /// J at some points of a cell that is no hex; and back into the sums of its modes.
+  template <int kCount>
+  void to_dense(std::size_t first, Wide (*j)[9]) const;
+  template <int kCount>
+  void from_dense(std::size_t first, const Wide (*j)[9]);
 
   /// lines: values along u, then derivatives.
   void to_lines();
