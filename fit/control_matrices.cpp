@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/control_matrices.h"
 
-#include <Eigen/Eigenvalues>
+#include "fit/hex_matrices.h"
+#include "fit/prism_matrices.h"
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <type_traits>
 
 namespace subvol {
 
 namespace {
 
-constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
-
-Wide all(double x) { return Wide{} + x; }
+/// Vectors of matrices between two looks at what they are.
+constexpr std::size_t kBlock = 4;
 
 /// About the transposed rotation of m's polar decomposition, by Newton's iteration, scaled while far from it (Higham).
 /// As m comes closer to a singular matrix, better and better; and times m symmetric.
@@ -23,7 +26,7 @@ Mat3 unrotate(const Mat3& m) {
   const auto inverse_transposed = [](const Mat3& x) {
     Mat3 result;
     for (int d = 0; d < 3; ++d) result.col(d) = x.col((d + 1) % 3).cross(x.col((d + 2) % 3));
-    return Mat3(result / x.col(0).dot(result.col(0)));
+    return Mat3(result * (1 / x.col(0).dot(result.col(0))));
   };
   const double near = m.determinant();
   const Mat3 first_inverse = inverse_transposed(m);
@@ -33,25 +36,26 @@ Mat3 unrotate(const Mat3& m) {
     const double distance = (inverse - rotation).squaredNorm();
     const double factor = distance > 1 ? std::sqrt(inverse.norm() / rotation.norm()) : 1;
     rotation = 0.5 * (factor * rotation + inverse / factor);
-    if (distance < near) break;
+    if (distance < 4 * near) break;
   }
   const Mat3 product = rotation.transpose() * m;
   return rotation.transpose() - 0.5 * (product - product.transpose()) * first_inverse.transpose();
 }
 
 /// Mean square of the entries of rotation (J_b - mean) frame, over some of the matrices that are spread over all.
-Mat3 variation(const ControlMatrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3& frame) {
-  constexpr std::size_t kMost = 8;  // vectors of them; more make little difference (measured)
+template <class Matrices>
+Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3& frame) {
+  constexpr std::size_t kMost = 4;  // vectors of them; more make little difference (measured)
   const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
   Wide products[3][6] = {};  // of the columns of rotation (J - mean), by its rows
   for (std::size_t i = 0; i < sampled; ++i) {
     const std::size_t at = std::min(i == 0 ? 0 : i * (vectors - 1) / (sampled - 1) * kWide, matrices.size() - kWide);
-    Wide turned[3][3];
+    WideMatrix j, turned;
+    matrices.load(at, j);
     for (int c = 0; c < 3; ++c) {
-      Wide j[3];
-      for (int r = 0; r < 3; ++r) j[r] = load_wide(matrices.entries(r, c) + at) - mean(r, c);
+      for (int r = 0; r < 3; ++r) j[r][c] -= mean(r, c);
       for (int r = 0; r < 3; ++r)
-        turned[r][c] = rotation(r, 0) * j[0] + rotation(r, 1) * j[1] + rotation(r, 2) * j[2];
+        turned[r][c] = rotation(r, 0) * j[0][c] + rotation(r, 1) * j[1][c] + rotation(r, 2) * j[2][c];
     }
     for (int r = 0; r < 3; ++r)
       for (int c = 0, pair = 0; c < 3; ++c)
@@ -87,11 +91,26 @@ struct Bound {
   std::size_t in_the_way = kNone;  ///< b of an S_b that is not positive definite, if one is known
 };
 
-int lowest_place(const Wide& x) {
+template <class Vector>
+int lowest_place(const Vector& x) {
   int result = 0;
-  for (int k = 1; k < kWide; ++k)
+  for (int k = 1; k < static_cast<int>(sizeof x / sizeof x[0]); ++k)
     if (x[k] < x[result]) result = k;
   return result;
+}
+
+/// A unit vector near the eigenvector of a symmetric matrix's least eigenvalue: of the adjugate of s + m, where m makes
+/// all eigenvalues positive. Closer ones serve no better (measured).
+Vec3 near_least_eigenvector(const Mat3& s) {
+  Mat3 shifted = s - s.trace() / 3 * Mat3::Identity();
+  const double half_size = std::sqrt(shifted.squaredNorm() / 6);  // eigenvalues of that are within twice as much
+  if (!(half_size > 0)) return Vec3::UnitX();
+  shifted = shifted / half_size + 2 * Mat3::Identity();
+  Mat3 adjugate;
+  for (int d = 0; d < 3; ++d) adjugate.col(d) = shifted.col((d + 1) % 3).cross(shifted.col((d + 2) % 3));
+  int largest;
+  adjugate.diagonal().maxCoeff(&largest);
+  return adjugate.col(largest).normalized();
 }
 
 /// L + (margin - e) v (J_b D v)^T / |J_b D v|^2, where e <= 0 is the least eigenvalue of sym(L J_b D) and v its
@@ -100,75 +119,184 @@ Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
   constexpr double kMargin = 0.06;  // against L's largest entry
   l /= l.cwiseAbs().maxCoeff();
   const Mat3 product = l * scaled_matrix;
-  Eigen::SelfAdjointEigenSolver<Mat3> solver;
-  solver.computeDirect(Mat3(0.5 * (product + product.transpose())));
-  const double least = std::min(0.0, solver.eigenvalues()[0]);
-  const Vec3 v = solver.eigenvectors().col(0), w = scaled_matrix * v;
+  const Mat3 s = 0.5 * (product + product.transpose());
+  const Vec3 v = near_least_eigenvector(s);
+  const double least = std::min(0.0, v.dot(s * v));
+  const Vec3 w = scaled_matrix * v;
   return l + (kMargin - least) / w.squaredNorm() * v * w.transpose();
+}
+
+/// The lowest of the leading minors and largest entries of many symmetric matrices T_b = sym(m_b) - diag(shift).
+template <class Vector>
+struct Extremes {
+  explicit Extremes(const Vec3& shift)
+      : start0(number(-shift[0])), start1(number(-shift[1])), start2(number(-shift[2])) {
+    first = second = third = Vector{} + std::numeric_limits<Number>::infinity();
+  }
+  void take(const MatrixOf<Vector>& m) {
+    constexpr Number kHalf = 0.5;
+    const Vector t00 = m[0][0] + start0, t11 = m[1][1] + start1, t22 = m[2][2] + start2;
+    const Vector t01 = kHalf * (m[0][1] + m[1][0]), t02 = kHalf * (m[0][2] + m[2][0]),
+                 t12 = kHalf * (m[1][2] + m[2][1]);
+    const Vector minor = t00 * t11 - t01 * t01;
+    take_lower(first, t00);
+    take_lower(second, minor);
+    take_lower(third, t22 * minor - t12 * (t00 * t12 - t01 * t02) + t02 * (t01 * t12 - t02 * t11));
+    take_higher_size(sizes[0], t00);
+    take_higher_size(sizes[1], t11);
+    take_higher_size(sizes[2], t22);
+    take_higher_size(sizes[3], t02);
+    take_higher_size(sizes[4], t12);
+  }
+  bool are_positive() const { return !lanes_within(lowest_minor(), 0); }
+  Vector lowest_minor() const {
+    Vector result = first;
+    take_lower(result, second);
+    take_lower(result, third);
+    return result;
+  }
+  /// A lower bound of det S_b, S_b = D T_b D, if all are positive definite for certain; else 0. scale: D.
+  double determinant(const Vec3& scale) const {
+    constexpr double kRoundoff = std::numeric_limits<Number>::epsilon() / 2;
+    const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes[e]) * scale[i] * scale[k]; };
+    const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
+                                     scaled_size(3, 0, 2), scaled_size(4, 1, 2)});
+    const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
+    // Products of two entries with at most 3 roundings each in a second minor, six of three with 5 to 6 in a third.
+    const double least = to_third * lowest_lane(third) - 100 * kRoundoff * largest * largest * largest;
+    return largest < 1e30 && lowest_lane(first) > 0 &&
+                   to_second * lowest_lane(second) > 9 * kRoundoff * largest * largest && least > 0
+               ? least
+               : 0;
+  }
+
+ private:
+  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
+  static Number number(double x) { return static_cast<Number>(x); }
+
+  Number start0, start1, start2;
+  Vector first, second, third;
+  Vector sizes[5] = {};  // without t01, which is less than t00 or t11 where the second minor is positive
+};
+
+/// What is known of a box when some of these T_b are not positive definite. begin: number of the first one.
+Bound failed_at(std::size_t begin, const WideMatrix& m, const Extremes<Wide>& own) {
+  const Wide det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                   m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                   m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  return {0, lanes_within(det, 0) != 0, begin + lowest_place(own.lowest_minor())};  // S_b > 0 has det J_b > 0
+}
+
+/// Twice what must be taken from the diagonal of S_b, where |error of L J D| <= g.
+Vec3 sums_of_both(const Mat3& g) { return g.rowwise().sum() + g.colwise().sum().transpose(); }
+
+/// The bound of det S_b in single precision, or 0; in_the_way: where it failed, if so.
+///
+/// S_b = D T_b D, T_b = sym(unscaled J_b) - ..., where T_b is about 1 at the most.
+template <class Matrices>
+double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift, const Vec3& scale,
+                    std::size_t& in_the_way) {
+  if constexpr (!requires { typename Matrices::NarrowProduct; }) {
+    return 0;
+  } else {
+    constexpr double kMostScale = 1e3, kMostShift = 1e10;  // far from underflow and overflow
+    if (!(scale.maxCoeff() < kMostScale)) return 0;
+    using Vector = typename Matrices::NarrowProduct::Vector;
+    constexpr std::size_t kLanes = sizeof(Vector) / sizeof(float);
+    const auto product = matrices.narrow_product(unscaled);
+    const Mat3 g = scale.cwiseProduct(product.errors()) * scale.transpose();
+    const Vec3 more = (1 + 1e-5) * (shift + 0.5 * sums_of_both(g)).cwiseQuotient(scale.cwiseAbs2());
+    if (!(product.errors().maxCoeff() <= kMostError && more.maxCoeff() <= kMostShift)) return 0;
+    Extremes<Vector> extremes(more);
+    MatrixOf<Vector> m;
+    const std::size_t count = matrices.size();
+    for (std::size_t block = 0; block < count; block += kBlock * kLanes) {
+      const std::size_t end = std::min(count, block + kBlock * kLanes);
+      for (std::size_t b = block; b < end; b += kLanes) {
+        product.load(std::min(b, count - kLanes), m);
+        extremes.take(m);
+      }
+      if (extremes.are_positive()) continue;
+      for (std::size_t b = block; b < end; b += kLanes) {
+        const std::size_t begin = std::min(b, count - kLanes);
+        Extremes<Vector> own(more);
+        product.load(begin, m);
+        own.take(m);
+        if (own.are_positive()) continue;
+        in_the_way = begin + lowest_place(own.lowest_minor());
+        return 0;
+      }
+    }
+    return extremes.determinant(scale);
+  }
 }
 
 /// The bound by one L.
 ///
-/// scale  D
-/// begin  number of the matrix to begin with: one that another L failed at is likely to be in the way again
-Bound bound_by(Mat3 l, const Vec3& scale, const Mat3& mean, const ControlMatrices& matrices, const Mat3& remainder,
-               std::size_t begin) {
+/// lengths     of the mean's columns: 1 over D
+/// in_the_way  number of the matrix to begin with: one that another L failed at is likely to be in the way again
+template <class Matrices>
+Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices, const Mat3& remainder,
+               BoundPrecision precision, std::size_t in_the_way) {
   constexpr double kLeastDeterminant = 1e-3;  // of L, by its largest entry cubed: so it is good to 1e-11
   l /= l.cwiseAbs().maxCoeff();
   if (!(l.determinant() > kLeastDeterminant)) return {0, false};
-  const Mat3 g = l.cwiseAbs() * remainder * scale.asDiagonal();
-  Vec3 shift;
-  for (int i = 0; i < 3; ++i) shift[i] = 0.5 * (1 + 1e-12) * (g.row(i).sum() + g.col(i).sum());
-  if (!(((l * mean * scale.asDiagonal()).diagonal() - shift).minCoeff() > 0)) return {0, false};
+  // D is taken times the largest length: no entry of T_b below is much above 1.
+  const double longest = lengths.maxCoeff();
+  const Vec3 scale = longest * lengths.cwiseInverse();
+  const Mat3 own_remainder = remainder / longest;
+  const Vec3 shift = 0.5 * (1 + 1e-12) * sums_of_both(l.cwiseAbs() * own_remainder * scale.asDiagonal());
+  for (int i = 0; i < 3; ++i)
+    if (!(l.row(i).dot(mean.col(i)) > shift[i] * lengths[i])) return {0, false};
 
-  // T_b = D^-1 S_b D^-1: what is scaled are the extremes over all b.
-  const Mat3 unscaled = scale.cwiseInverse().asDiagonal() * l, half = 0.5 * unscaled;
-  const Vec3 start = -shift.cwiseQuotient(scale.cwiseAbs2());
-  Wide first = all(std::numeric_limits<double>::infinity()), second = first, third = first;  // least leading minors
-  Wide sizes[6] = {};                                                                        // largest entries
+  // T_b = D^-1 S_b D^-1 = sym(D^-1 L J_b) - ...: what is scaled are the extremes over all b.
+  const Mat3 unscaled = (longest * scale).cwiseInverse().asDiagonal() * l;
+  const Vec3 unscaled_shift = shift.cwiseQuotient(scale.cwiseAbs2());
   const std::size_t count = matrices.size();
-  const std::size_t vectors = (count + kWide - 1) / kWide;
-  for (std::size_t n = 0, vector = begin / kWide; n < vectors; ++n, vector = vector + 1 < vectors ? vector + 1 : 0) {
-    const std::size_t at = std::min(vector * kWide, count - kWide);  // the last lanes overlap
-    Wide j[3][3];
-    for (int r = 0; r < 3; ++r)
-      for (int d = 0; d < 3; ++d) j[r][d] = load_wide(matrices.entries(r, d) + at);
-    const auto diagonal = [&](int i) {
-      return start[i] + unscaled(i, 0) * j[0][i] + unscaled(i, 1) * j[1][i] + unscaled(i, 2) * j[2][i];
-    };
-    const auto beside = [&](int i, int k) {
-      return half(i, 0) * j[0][k] + half(i, 1) * j[1][k] + half(i, 2) * j[2][k] + half(k, 0) * j[0][i] +
-             half(k, 1) * j[1][i] + half(k, 2) * j[2][i];
-    };
-    const Wide t00 = diagonal(0), t11 = diagonal(1), t22 = diagonal(2);
-    const Wide t01 = beside(0, 1), t02 = beside(0, 2), t12 = beside(1, 2);
-    const Wide minor = t00 * t11 - t01 * t01;
-    const Wide determinant = t22 * minor - t12 * (t00 * t12 - t01 * t02) + t02 * (t01 * t12 - t02 * t11);
-    Wide least = t00;
-    take_lower(least, minor);
-    take_lower(least, determinant);
-    if (lanes_within(least, 0)) {
-      const Wide own = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1]) -
-                       j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0]) +
-                       j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
-      return {0, lanes_within(own, 0) != 0, at + lowest_place(least)};  // S_b > 0 has det J_b > 0
-    }
-    take_lower(first, t00);
-    take_lower(second, minor);
-    take_lower(third, determinant);
-    const Wide entries[6] = {t00, t11, t22, t01, t02, t12};
-    for (int e = 0; e < 6; ++e) take_higher_size(sizes[e], entries[e]);
+  WideMatrix m;
+  const auto failed = [&](std::size_t begin) -> std::optional<Bound> {
+    Extremes<Wide> own(unscaled_shift);
+    own.take(m);
+    if (own.are_positive()) return {};
+    return failed_at(begin, m, own);
+  };
+  const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
+    if (b == kNone) return {};
+    const std::size_t begin = std::min(b / kWide * kWide, count - kWide);
+    matrices.load(begin, m);
+    multiply(unscaled, m);
+    return failed(begin);
+  };
+  const auto bound = [&](double determinant) {
+    return Bound{determinant * (1 - 1e-11) * lengths.prod() / l.determinant(), true};
+  };
+  if (const auto fails = failed_near(in_the_way)) return *fails;
+  for (const std::size_t corner : matrices.corners())
+    if (const auto fails = failed_near(corner)) return *fails;
+  in_the_way = kNone;
+  if (precision == BoundPrecision::single_first) {
+    if (const double determinant = narrow_bound(matrices, unscaled, shift, scale, in_the_way); determinant > 0)
+      return bound(determinant);
+    if (const auto fails = failed_near(in_the_way)) return *fails;
   }
-  const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes[e]) * scale[i] * scale[k]; };
-  const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
-                                   scaled_size(3, 0, 1), scaled_size(4, 0, 2), scaled_size(5, 1, 2)});
-  const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
-  // Products of two entries with at most 3 roundings each in a second minor, six of three with 5 to 6 in a third.
-  const double least_third = to_third * lowest_lane(third) - 100 * kRoundoff * largest * largest * largest;
-  if (!(largest < 1e30 && lowest_lane(first) > 0 &&
-        to_second * lowest_lane(second) > 9 * kRoundoff * largest * largest && least_third > 0))
-    return {0, false};
-  return {least_third * (1 - 1e-11) / (scale.prod() * l.determinant()), true};
+
+  const auto product = matrices.times(unscaled);
+  Extremes<Wide> extremes(unscaled_shift);
+  for (std::size_t block = 0; block < count; block += kBlock * kWide) {
+    const std::size_t end = std::min(count, block + kBlock * kWide);
+    const auto place = [&](std::size_t b) { return std::min(b, count - kWide); };  // the last lanes overlap
+    for (std::size_t b = block; b < end; b += kWide) {
+      product.load(place(b), m);
+      extremes.take(m);
+    }
+    if (extremes.are_positive()) continue;
+    for (std::size_t b = block; b < end; b += kWide) {
+      product.load(place(b), m);
+      if (const auto fails = failed(place(b))) return *fails;
+    }
+  }
+  const double determinant = extremes.determinant(scale);
+  return determinant > 0 ? bound(determinant) : Bound{0, false};
 }
 
 }  // namespace
@@ -187,13 +315,14 @@ Mat3 ControlMatrices::mean() const {
   return result;
 }
 
-double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder, const Mat3& frame) {
+template <class Matrices>
+double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, BoundPrecision precision) {
   constexpr int kMostTurns = 3;  // more cost what they save (measured)
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
   if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
-  const auto bound = [&](const Mat3& l, std::size_t start = 0) {
-    return bound_by(l, scale, mean, matrices, remainder, start == kNone ? 0 : start);
+  const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
+    return bound_by(l, lengths, mean, matrices, remainder, precision, in_the_way);
   };
   const bool is_framed = frame != Mat3::Identity();
 
@@ -216,5 +345,9 @@ double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder,
   if (!result.is_final && is_framed) result = bound(unrotate(mean * scale.asDiagonal()), result.in_the_way);
   return result.value;
 }
+
+template double determinant_bound(ControlMatrices&, const Mat3&, const Mat3&, BoundPrecision);
+template double determinant_bound(HexMatrices&, const Mat3&, const Mat3&, BoundPrecision);
+template double determinant_bound(PrismMatrices&, const Mat3&, const Mat3&, BoundPrecision);
 
 }  // namespace subvol

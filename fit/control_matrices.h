@@ -4,10 +4,30 @@
 #include "fit/wide.h"
 #include "subvol/types.h"
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
 namespace subvol {
+
+/// Entries [row][column] of eight matrices, of sixteen in single precision.
+template <class Vector>
+using MatrixOf = std::array<std::array<Vector, 3>, 3>;
+using WideMatrix = MatrixOf<Wide>;
+
+/// Errors of L J_b in single precision beyond this one say that it does not serve. Entries, of which no more than a
+/// millionth is error, then are far from overflow, as are products of three of them.
+inline constexpr double kMostError = 1e4;
+/// Coefficients and entries of L from this size on are not kept in single precision.
+inline constexpr double kMostNarrow = 1e30;
+
+/// l times each of them.
+inline void multiply(const Mat3& l, WideMatrix& matrices) {
+  for (int c = 0; c < 3; ++c) {
+    const Wide x = matrices[0][c], y = matrices[1][c], z = matrices[2][c];
+    for (int r = 0; r < 3; ++r) matrices[r][c] = l(r, 0) * x + l(r, 1) * y + l(r, 2) * z;
+  }
+}
 
 /// Coefficients J_b of a 3x3 matrix function on a box: J(u) = sum_b B_b(u) J_b + error, B_b >= 0, sum_b B_b = 1.
 ///
@@ -23,6 +43,27 @@ class ControlMatrices {
   std::size_t size() const { return count_; }
   double* entries(int row, int column) { return data() + (3 * row + column) * stride_; }
   const double* entries(int row, int column) const { return data() + (3 * row + column) * stride_; }
+  /// Entries of kWide matrices from number `first` on.
+  void load(std::size_t first, WideMatrix& result) const {
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) result[r][c] = load_wide(entries(r, c) + first);
+  }
+  /// Numbers of some to look at first: none.
+  static std::array<std::size_t, 0> corners() { return {}; }
+  /// Lets the matrices L J_b be loaded.
+  class Product {
+   public:
+    Product(const ControlMatrices& matrices, const Mat3& l) : matrices_(&matrices), l_(l) {}
+    void load(std::size_t first, WideMatrix& result) const {
+      matrices_->load(first, result);
+      multiply(l_, result);
+    }
+
+   private:
+    const ControlMatrices* matrices_;
+    Mat3 l_;
+  };
+  Product times(const Mat3& l) const { return {*this, l}; }
   Mat3 operator[](std::size_t b) const {
     Mat3 result;
     for (int r = 0; r < 3; ++r)
@@ -39,6 +80,8 @@ class ControlMatrices {
   std::size_t count_ = 0, stride_ = 0;
   std::vector<Wide> entries_;  // for its alignment
 };
+
+enum class BoundPrecision { single_first, full };
 
 /// A lower bound of det J over the box, > 0; or 0 if none is found.
 ///
@@ -59,6 +102,10 @@ class ControlMatrices {
 /// remainder  R >= 0: bounds of the error of J's entries, and of the rounding errors in J_b's (each at least
 ///            16 units of roundoff of the entry). Entries at most 1e60 in size. Rounding here is accounted for.
 /// frame      regular: takes J to coordinates in which a cell without distortion has orthogonal columns.
-double determinant_bound(const ControlMatrices& matrices, const Mat3& remainder, const Mat3& frame = Mat3::Identity());
+/// precision  single_first: a bound may be found in single precision, which takes half as long, and be lower by 1e-5
+///            of it or more.
+/// Matrices   ControlMatrices, HexMatrices or PrismMatrices (not const: they keep what is worked with).
+template <class Matrices>
+double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, BoundPrecision precision);
 
 }  // namespace subvol

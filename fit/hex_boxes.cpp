@@ -13,7 +13,10 @@ namespace {
 constexpr double kSmallError = 0.15;
 /// Beyond this sum it does not pay to look: the shifts of `determinant_bound` sum up to about that much, if the mean
 /// edges tell the mean matrix, and what they leave must be more than the variation of J (measured).
-constexpr double kHopelessError = 0.5;
+constexpr double kHopelessError = 0.55;
+
+/// Boxes that keep their coefficients (15 KB) until they are halved.
+constexpr int kMostKept = 64;
 
 /// Columns of a contraction that are worked on at a time.
 constexpr int kSome = 5;
@@ -23,10 +26,6 @@ std::vector<int> model_degrees(Basis basis, int order) {
   if (order == 1 || (basis == Basis::legendre && order < kWide)) return {order};
   return {5, kWide - 1};
 }
-
-/// Lanes one place up (down); what comes into the first (last) one is of no use.
-Wide shifted_up(const Wide& x) { return __builtin_shufflevector(x, x, 0, 0, 1, 2, 3, 4, 5, 6); }
-Wide shifted_down(const Wide& x) { return __builtin_shufflevector(x, x, 1, 2, 3, 4, 5, 6, 7, 7); }
 
 /// out[o out_stride + m] = sum_k table[k kStride + o] in[k in_stride + m], o < num_out, for `length` numbers m, rounded
 /// up to whole vectors; k < n[m / kWide].
@@ -64,28 +63,44 @@ HexBoxes::HexBoxes(Basis basis, int order)
     modes_[d].assign(face * n_ + kWide, 0);
     after_w_[d].assign(most * row_ + kWide, 0);
     after_v_[d].assign((n_ + kSome) * most, Wide{});
-    control_[d].assign((most + 2) * most, Wide{});
-    for (auto& weights : weights_[d]) weights.resize(n_);
+    is_used_[d].assign(lanes_, 0);
   }
-  bounds_.assign(lanes_, 0);
-  slope_bounds_.assign(lanes_, 0);
-  std::copy_n(tiers_[1][0]->bounds().begin(), n_, bounds_.begin());
-  std::copy_n(tiers_[1][0]->slope_bounds().begin(), n_, slope_bounds_.begin());
+  bounds_ = tiers_[1][0]->bounds();
+  slope_bounds_ = tiers_[1][0]->slope_bounds();
+  lane_bounds_.assign(lanes_, 0);
+  inverse_bounds_ = inverse_slope_bounds_ = is_mode_ = mode_slope_bounds_ = mode_bounds_ = lane_bounds_;
+  weights_.assign(27 * lanes_, 0);
+  std::copy_n(bounds_.begin(), n_, lane_bounds_.begin());
+  std::copy_n(bounds_.begin() + 2, n_ - 2, mode_bounds_.begin() + 2);
+  std::copy_n(slope_bounds_.begin() + 2, n_ - 2, mode_slope_bounds_.begin() + 2);
+  for (int i = 2; i < n_; ++i) {
+    is_mode_[i] = 1;
+    inverse_bounds_[i] = 1 / bounds_[i];
+    inverse_slope_bounds_[i] = 1 / slope_bounds_[i];
+  }
   used_.resize((face + kWide - 1) / kWide);
   all_used_.assign(kWide, n_);
-  sums_.resize(4 * n_ * lanes_);
+  sums_.assign((5 * n_ + 1) * lanes_, 0);
+}
+
+void HexBoxes::set_modes(std::span<const LocalMode> modes) {
+  of_modes_ = modes.data();
+  num_modes_ = modes.size();
+  for (int d = 0; d < 3; ++d) std::fill(modes_[d].begin(), modes_[d].end(), 0.0);
+  std::fill(used_.begin(), used_.end(), 0);
+  places_.clear();
+  for (const LocalMode& mode : modes) {
+    const int at = (mode.k * n_ + mode.j) * n_ + mode.i;
+    places_.push_back(at);
+    int& used = used_[at % (n_ * n_) / kWide];
+    used = std::max(used, mode.k + 1);
+  }
 }
 
 void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
-  const int face = n_ * n_;
-  for (int d = 0; d < 3; ++d) std::fill(modes_[d].begin(), modes_[d].end(), 0.0);
-  std::fill(used_.begin(), used_.end(), 0);
-  for (std::size_t a = 0; a < modes.size(); ++a) {
-    const int at = (modes[a].k * n_ + modes[a].j) * n_ + modes[a].i;
-    for (int d = 0; d < 3; ++d) modes_[d][at] = coefficients[a][d];
-    int& used = used_[at % face / kWide];
-    if (coefficients[a] != Vec3::Zero()) used = std::max(used, modes[a].k + 1);
-  }
+  if (modes.data() != of_modes_ || modes.size() != num_modes_) set_modes(modes);
+  for (std::size_t a = 0; a < modes.size(); ++a)
+    for (int d = 0; d < 3; ++d) modes_[d][places_[a]] = coefficients[a][d];
   contracted_ = 0;
   ++cell_;
 
@@ -100,80 +115,125 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   make_weights();
 }
 
+/// |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i|, |sum_i x_i N_i'| <= |x_1 - x_0| + ...: that for
+/// two directions, one after the other. Numbers i are in lanes.
 void HexBoxes::make_weights() {
-  const int face = n_ * lanes_;
+  const auto size = [](const Wide& x) { return x < 0 ? -x : x; };
+  const auto larger = [](Wide x, const Wide& y) {
+    take_higher(x, y);
+    return x;
+  };
+  // Of the numbers in lanes.
+  const auto modes_along = [&](const double* x, const std::vector<double>& bounds) {
+    Wide sum{};
+    for (int i = 0; i < lanes_; i += kWide) sum += load_wide(x + i) * load_wide(bounds.data() + i);
+    return sum_of_lanes(sum);
+  };
+  const auto along = [&](const double* x) { return std::max(x[0], x[1]) + modes_along(x, mode_bounds_); };
+  const int line = n_ * lanes_;
+  double *by_j = sums_.data(), *by_j_slope = by_j + line, *by_k = by_j_slope + line, *by_k_slope = by_k + line,
+         *steps = by_k_slope + line, *steps_by_j = steps + line;
+  const double *value = bounds_.data(), *slope = slope_bounds_.data();
   for (int row = 0; row < 3; ++row) {
-    std::fill(sums_.begin(), sums_.end(), 0.0);
-    double *by_j = sums_.data(), *by_j_slope = by_j + face, *by_k = by_j_slope + face, *by_k_slope = by_k + face;
-    for (int k = 0; k < n_; ++k)
-      for (int j = 0; j < n_; ++j)
-        for (int i = 0; i < n_; i += kWide) {
-          Wide a = load_wide(modes_[row].data() + (k * n_ + j) * n_ + i);
-          a = a < 0 ? -a : a;
-          const auto add = [&](double* sums, int m, double factor) {
-            double* at = sums + m * lanes_ + i;
-            store_wide(load_wide(at) + factor * a, at);
-          };
-          add(by_j, j, bounds_[k]);
-          add(by_j_slope, j, slope_bounds_[k]);
-          add(by_k, k, bounds_[j]);
-          add(by_k_slope, k, slope_bounds_[j]);
+    const double* modes = modes_[row].data();
+    Wide all{};
+    for (int first = 0; first < lanes_; first += kWide) {
+      const auto at = [&](int j, int k) { return load_wide(modes + (k * n_ + j) * n_ + first); };
+      const Wide bounds = load_wide(lane_bounds_.data() + first);
+      for (int j = 0; j < n_; ++j) {
+        const Wide x0 = at(j, 0), x1 = at(j, 1);
+        Wide sum = larger(size(x0), size(x1)), slopes = size(x1 - x0), total = size(x0) + size(x1);
+        for (int k = 2; k < n_; ++k) {
+          const Wide x = size(at(j, k));
+          sum += value[k] * x, slopes += slope[k] * x, total += value[k] * x;
         }
-    const auto dot = [&](const double* sums, int m, const std::vector<double>& bounds) {
-      Wide sum{};
-      for (int i = 0; i < n_; i += kWide) sum += load_wide(sums + m * lanes_ + i) * load_wide(bounds.data() + i);
-      return sum_of_lanes(sum);
-    };
-    auto &of_u = weights_[0], &of_v = weights_[1], &of_w = weights_[2];
-    total_[row] = 0;
-    for (int m = 0; m < n_; ++m) {
-      of_v[0][m][row] = dot(by_j, m, slope_bounds_);
-      of_v[1][m][row] = dot(by_j, m, bounds_);
-      of_v[2][m][row] = dot(by_j_slope, m, bounds_);
-      of_w[0][m][row] = dot(by_k, m, slope_bounds_);
-      of_w[1][m][row] = dot(by_k_slope, m, bounds_);
-      of_w[2][m][row] = dot(by_k, m, bounds_);
-      total_[row] += bounds_[m] * of_w[2][m][row];
-    }
-    for (int i = 0; i < n_; i += kWide) {
-      Wide sums[3] = {};
-      for (int k = 0; k < n_; ++k) {
-        const Wide value = load_wide(by_k + k * lanes_ + i);
-        sums[0] += bounds_[k] * value;
-        sums[1] += bounds_[k] * load_wide(by_k_slope + k * lanes_ + i);
-        sums[2] += slope_bounds_[k] * value;
+        store_wide(sum, by_j + j * lanes_ + first);
+        store_wide(slopes, by_j_slope + j * lanes_ + first);
+        all += value[j] * bounds * total;
       }
-      for (int column = 0; column < 3; ++column)
-        for (int m = i; m < std::min(n_, i + kWide); ++m) of_u[column][m][row] = sums[column][m - i];
+      for (int k = 0; k < n_; ++k) {
+        const Wide x0 = at(0, k), x1 = at(1, k);
+        Wide sum = larger(size(x0), size(x1)), slopes = size(x1 - x0);
+        for (int j = 2; j < n_; ++j) {
+          const Wide x = size(at(j, k));
+          sum += value[j] * x, slopes += slope[j] * x;
+        }
+        store_wide(sum, by_k + k * lanes_ + first);
+        store_wide(slopes, by_k_slope + k * lanes_ + first);
+      }
+      const double* const sums[3] = {by_k, by_k_slope, by_j_slope};
+      for (int column = 0; column < 3; ++column) {
+        const auto of = [&](int m) { return load_wide(sums[column] + m * lanes_ + first); };
+        Wide sum = larger(of(0), of(1));
+        for (int m = 2; m < n_; ++m) sum += value[m] * of(m);
+        store_wide(sum * load_wide(is_mode_.data() + first), weights(0, row, column) + first);
+      }
+    }
+    total_[row] = sum_of_lanes(all);
+
+    // |a_1jk - a_0jk|, by k and j, and these numbers' sum over k.
+    for (int k = 0; k < n_; ++k)
+      for (int j = 0; j < n_; ++j) {
+        const double* x = modes + (k * n_ + j) * n_;
+        steps[k * lanes_ + j] = std::abs(x[1] - x[0]);
+      }
+    for (int first = 0; first < lanes_; first += kWide) {
+      const auto of = [&](int k) { return load_wide(steps + k * lanes_ + first); };
+      Wide sum = larger(of(0), of(1));
+      for (int k = 2; k < n_; ++k) sum += value[k] * of(k);
+      store_wide(sum, steps_by_j + first);
+    }
+    for (int m = 2; m < n_; ++m) {
+      weights(1, row, 0)[m] = modes_along(by_j + m * lanes_, mode_slope_bounds_) + steps_by_j[m];
+      weights(1, row, 1)[m] = along(by_j + m * lanes_);
+      weights(1, row, 2)[m] = along(by_j_slope + m * lanes_);
+      weights(2, row, 0)[m] = modes_along(by_k + m * lanes_, mode_slope_bounds_) + along(steps + m * lanes_);
+      weights(2, row, 1)[m] = along(by_k_slope + m * lanes_);
+      weights(2, row, 2)[m] = along(by_k + m * lanes_);
     }
   }
+  for (int d = 0; d < 3; ++d)
+    for (int i = 0; i < lanes_; i += kWide) {
+      Wide all{};
+      for (int row = 0; row < 3; ++row) all += load_wide(weights(d, row, d) + i);
+      store_wide(all > 0 ? Wide{} + 1 : Wide{}, is_used_[d].data() + i);
+    }
 }
 
 const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
-  const int level = box.levels[direction], tier = box.tiers[direction];
-  const int zone = LineModels::zone(level, box.index[direction]);
+  const int level = box.modelled_levels[direction], tier = box.tiers[direction];
+  const int zone = LineModels::zone(level, box.modelled_index[direction]);
   LineError& result = errors_[direction][level][tier][zone];
   if (result.cell == cell_) return result;
   result.cell = cell_;
   const LineModels::Level& line = tiers_[direction][tier]->level(level);
   const LineModels::Errors& errors = line.errors[zone];
-  result.entries.setZero();
-  result.growth = result.inflation = 1;
-  for (int i = 0; i < n_; ++i) {
-    if (weights_[direction][direction][i] == Vec3::Zero()) continue;
-    for (int column = 0; column < 3; ++column)
-      result.entries.col(column) +=
-          (column == direction ? errors.slope[i] : errors.value[i]) * weights_[direction][column][i];
-    result.growth =
-        std::max({result.growth, 1 + errors.value[i] / bounds_[i], 1 + errors.slope[i] / slope_bounds_[i]});
-    result.inflation = std::max(result.inflation, line.largest_coefficient[i] / bounds_[i]);
+  const double* used = is_used_[direction].data();
+  Wide sums[3][3] = {}, growth{}, inflation{};
+  for (int i = 0; i < lanes_; i += kWide) {
+    const Wide value = load_wide(errors.value.data() + i), slope = load_wide(errors.slope.data() + i);
+    const Wide is_used = load_wide(used + i), inverse_bound = load_wide(inverse_bounds_.data() + i);
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column)
+        sums[row][column] +=
+            (column == direction ? slope : value) * load_wide(weights(direction, row, column) + i);
+    take_higher(growth, is_used * value * inverse_bound);
+    take_higher(growth, is_used * slope * load_wide(inverse_slope_bounds_.data() + i));
+    take_higher(inflation, is_used * load_wide(line.largest_coefficient.data() + i) * inverse_bound);
   }
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) result.entries(row, column) = sum_of_lanes(sums[row][column]);
+  result.growth = 1 + highest_lane(growth);
+  result.inflation = std::max(1.0, highest_lane(inflation));
   result.size = line.exact ? 0 : result.entries.colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
   return result;
 }
 
 bool HexBoxes::is_hopeless(Box& box) {
+  if (box.coefficients) return false;
   const double wanted = box.wanted < 0 ? kSmallError : box.wanted;
+  box.modelled_levels = box.levels, box.modelled_index = box.index;
+  box.halved = 0;
   double sum = 0;
   for (int d = 0; d < 3; ++d) {
     const int last = static_cast<int>(tiers_[d].size()) - 1;
@@ -189,7 +249,7 @@ void HexBoxes::choose_split(Box& box) {
   // anyway along w comes first.
   constexpr double kNeeded = 0.6;
   constexpr double kCost[3] = {0.9, 1, 1.1};
-  const bool is_looked_at = contracted_ == 3 && current_.levels == box.levels && current_.index == box.index;
+  const bool is_looked_at = box.coefficients != nullptr;
   box.split = -1;
   Vec3 variation = Vec3::Zero();
   for (int d = 2; d >= 0; --d) {
@@ -199,43 +259,42 @@ void HexBoxes::choose_split(Box& box) {
   }
   if (box.split >= 0) return;
   if (is_looked_at) {
-    const int num_u = q1(box, 0), num_w = q1(box, 2);
-    const double samples = kWide * (num_u / 2) * (num_w / 2);
-    const auto size = [](const Wide& x) { return x < 0 ? -x : x; };
-    for (int column = 0; column < 3; ++column)
-      for (int row = 0; row < 3; ++row) {
-        const double* entries = matrices_.entries(row, column);
-        Wide steps[3] = {};
-        for (int u = 0; u + 1 < num_u; u += 2)
-          for (int w = 0; w + 1 < num_w; w += 2) {  // a quarter of the lines along v is enough
-            const double* x = entries + (u * num_w + w) * kWide;
-            const Wide here = load_wide(x);
-            steps[0] += size(load_wide(x + num_w * kWide) - here);
-            steps[1] += size(shifted_down(here) - here);
-            steps[2] += size(load_wide(x + kWide) - here);
-          }
-        for (int d = 0; d < 3; ++d)
-          variation[d] += sum_of_lanes(steps[d]) / samples * (q1(box, d) - 1) / mean_edges_[column];
-      }
+    matrices_.set(*box.coefficients);
+    const Mat3 varies = matrices_.variation();
+    for (int d = 0; d < 3; ++d)
+      for (int column = 0; column < 3; ++column)
+        variation[d] += varies(d, column) * parts(box.levels[column]) / mean_edges_[column];
   }
   for (int d = 0; d < 3; ++d)
     if (box.levels[d] < LineModels::kMaxLevel &&
         (box.split < 0 || variation[d] * kCost[box.split] > variation[box.split] * kCost[d]))
       box.split = d;
   if (box.split < 0) box.split = 0;  // the deepest box there is
+  if (num_coefficients_ - static_cast<int>(spare_.size()) > kMostKept) box.coefficients.reset();
 }
 
-std::array<HexBoxes::Box, 2> HexBoxes::children(const Box& box, double lowest) const {
+std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
   constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
+  if (lowest != -std::numeric_limits<double>::infinity())
+    box.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);
+  auto low = std::move(box.coefficients);
+  for (int d = 0; d < 3; ++d)
+    if (low && !(error_size(box, d) <= box.wanted)) low.reset();
   std::array<Box, 2> result;
   for (int half = 0; half < 2; ++half) {
     Box& child = result[half];
-    child = box;
-    ++child.level;
+    child.levels = box.levels, child.index = box.index, child.tiers = box.tiers;
+    child.modelled_levels = box.modelled_levels, child.modelled_index = box.modelled_index;
+    child.wanted = box.wanted;
+    child.halved = box.halved + 1;
+    child.level = box.level + 1;
     ++child.levels[box.split];
     child.index[box.split] = 2 * box.index[box.split] + half;
-    if (lowest != -std::numeric_limits<double>::infinity())
-      child.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);
+  }
+  if (low) {
+    result[1].coefficients = new_coefficients();
+    low->halve(box.split, *result[1].coefficients);
+    result[0].coefficients = std::move(low);
   }
   return result;
 }
@@ -252,22 +311,33 @@ std::size_t HexBoxes::corner_matrix(const Box& box, int corner) const {
   return static_cast<std::size_t>((u * num_w + w) * kWide + v);
 }
 
-bool HexBoxes::shares(const Box& box, int d) const {
-  return current_.levels[d] == box.levels[d] && current_.index[d] == box.index[d] && current_.tiers[d] == box.tiers[d];
+PooledCoefficients HexBoxes::new_coefficients() {
+  if (spare_.empty()) {
+    spare_.reserve(++num_coefficients_);  // so that returning them never allocates
+    spare_.push_back(std::make_unique<HexCoefficients>());
+  }
+  PooledCoefficients result(spare_.back().release(), ReturnToSpare{&spare_});
+  spare_.pop_back();
+  return result;
 }
 
-const ControlMatrices& HexBoxes::matrices(const Box& box) {
-  if (contracted_ > 0 && !shares(box, 2)) contracted_ = 0;
-  if (contracted_ > 1 && !shares(box, 1)) contracted_ = 1;
-  if (contracted_ > 2 && !shares(box, 0)) contracted_ = 2;
-  if (contracted_ < 1) contract_w(box);
-  if (contracted_ < 2) contract_v(box);
-  if (contracted_ < 3) {
-    contract_u(box);
-    differences(box);
+bool HexBoxes::shares(const Box& box, int d) const {
+  return contracted_levels_[d] == box.levels[d] && contracted_index_[d] == box.index[d] &&
+         contracted_tiers_[d] == box.tiers[d];
+}
+
+HexMatrices& HexBoxes::matrices(Box& box) {
+  if (!box.coefficients) {
+    if (contracted_ > 0 && !shares(box, 2)) contracted_ = 0;
+    if (contracted_ > 1 && !shares(box, 1)) contracted_ = 1;
+    if (contracted_ < 1) contract_w(box);
+    if (contracted_ < 2) contract_v(box);
+    contracted_ = 2;
+    contracted_levels_ = box.levels, contracted_index_ = box.index, contracted_tiers_ = box.tiers;
+    box.coefficients = new_coefficients();
+    contract_u(box, *box.coefficients);
   }
-  contracted_ = 3;
-  current_ = box;
+  matrices_.set(*box.coefficients);
   return matrices_;
 }
 
@@ -298,40 +368,16 @@ void HexBoxes::contract_v(const Box& box) {
     }
 }
 
-void HexBoxes::contract_u(const Box& box) {
+void HexBoxes::contract_u(const Box& box, HexCoefficients& result) {
   const LineModels& line = models(box, 0);
   const double* table = line.coefficients(line.level(box.levels[0]), box.index[0]);
   const int num_w = q1(box, 2), row = num_w * kWide;
   const Contraction contract = contraction(q1(box, 0));
+  result.resize(q1(box, 0), num_w);
   for (int d = 0; d < 3; ++d) {
     const double* in = reinterpret_cast<const double*>(after_v_[d].data());
-    double* out = reinterpret_cast<double*>(control_[d].data() + num_w);
+    double* out = reinterpret_cast<double*>(result.coordinate(d));
     contract(table, in, row, all_used_.data(), row, out, row);
-  }
-}
-
-/// J_b = (o (X_b - X_below) + (q - o) (X_above - X_b)) / h per direction: differences, raised to degree q again.
-void HexBoxes::differences(const Box& box) {
-  constexpr Wide kPlace{0, 1, 2, 3, 4, 5, 6, 7};
-  const int num_w = q1(box, 2), num_u = q1(box, 0);
-  Vec3 per_side;
-  for (int d = 0; d < 3; ++d) per_side[d] = std::ldexp(1.0, box.levels[d]);
-  const Wide low_v = per_side[1] * kPlace, high_v = per_side[1] * (kWide - 1 - kPlace), own_v = low_v - high_v;
-  matrices_.resize(num_controls(box));
-  for (int row = 0; row < 3; ++row) {
-    const Wide* x = control_[row].data() + num_w;
-    double *by_u = matrices_.entries(row, 0), *by_v = matrices_.entries(row, 1), *by_w = matrices_.entries(row, 2);
-    for (int u = 0; u < num_u; ++u) {
-      const double low_u = per_side[0] * u, high_u = per_side[0] * (num_u - 1 - u), own_u = low_u - high_u;
-      for (int w = 0; w < num_w; ++w) {
-        const int at = u * num_w + w;
-        const double low_w = per_side[2] * w, high_w = per_side[2] * (num_w - 1 - w), own_w = low_w - high_w;
-        const Wide here = x[at];
-        store_wide(own_u * here - low_u * x[at - num_w] + high_u * x[at + num_w], by_u + at * kWide);
-        store_wide(own_v * here - low_v * shifted_up(here) + high_v * shifted_down(here), by_v + at * kWide);
-        store_wide(own_w * here - low_w * x[at - 1] + high_w * x[at + 1], by_w + at * kWide);
-      }
-    }
   }
 }
 
@@ -346,11 +392,14 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, differences, and the 16 asked for.
-  const double roundings = 3 * (n_ + 4) + 1 + 8 + 16;
-  for (int d = 0; d < 3; ++d)
-    result.col(d) += 2 * (q1(box, d) - 1) * std::ldexp(1.0, box.levels[d]) * roundings *
-                     (std::numeric_limits<double>::epsilon() / 2) * inflation * total_;
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, halvings, L, differences, and the 16
+  // asked for.
+  const double roundings = 3 * (n_ + 4) + 1 + kWide * box.halved + 3 + 8 + 16;
+  const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
+  for (int d = 0; d < 3; ++d) {
+    result.col(d) *= 1 / parts(box.levels[d]);
+    result.col(d) += 2 * (q1(box, d) - 1) * rounding * total_;
+  }
   return (1 + 1e-10) * result;
 }
 

@@ -117,9 +117,12 @@ class Search {
     if (boxes_.is_hopeless(box)) return keep(std::move(box), parent_lowest);
     double lowest;
     do {
-      const ControlMatrices& matrices = boxes_.matrices(box);
+      auto& matrices = boxes_.matrices(box);
       const double scale = boxes_.determinant_scale(box);
-      const double bound = scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box));
+      // A bound by the whole cell may be very close to det J, those by parts are not by far.
+      const auto precision = box.level == 0 ? BoundPrecision::full : BoundPrecision::single_first;
+      const double bound =
+          scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box), precision);
       if (bound > 0) {
         result_.lower_bound = std::min(result_.lower_bound, bound);
         return;
@@ -180,7 +183,8 @@ struct HighOrderCertifier::Buffers {
   std::vector<Vec3> coefficients;
   std::map<std::pair<CellKind, int>, ShapeFunctions> shapes;  // by kind and order
   std::map<int, HexBoxes> hexes;                              // by order
-  std::map<std::pair<CellKind, int>, SimplexBoxes> simplices;
+  std::map<int, TetBoxes> tets;
+  std::map<int, PrismBoxes> prisms;
 };
 
 HighOrderCertifier::HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options)
@@ -217,15 +221,14 @@ CellCertificate HighOrderCertifier::certify(std::span<const Vec3> coefficients, 
     return result;
   }
   cell.shapes = &buffers_->shapes.try_emplace({kind, order}, kind, space_->basis(), order).first->second;
-  if (kind == CellKind::hex) {
-    HexBoxes& boxes = buffers_->hexes.try_emplace(order, space_->basis(), order).first->second;
+  const auto search = [&](auto& all) {
+    auto& boxes = all.try_emplace(order, space_->basis(), order).first->second;
     boxes.set_cell(cell.modes, cell.coefficients);
-    return Search<HexBoxes>(boxes, cell, options_).run();
-  }
-  SimplexBoxes& boxes =
-      buffers_->simplices.try_emplace({kind, order}, kind, space_->basis(), order).first->second;
-  boxes.set_cell(cell.modes, cell.coefficients);
-  return Search<SimplexBoxes>(boxes, cell, options_).run();
+    return Search(boxes, cell, options_).run();
+  };
+  return kind == CellKind::hex     ? search(buffers_->hexes)
+         : kind == CellKind::prism ? search(buffers_->prisms)
+                                   : search(buffers_->tets);
 }
 
 CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,

@@ -49,12 +49,6 @@ double largest_integrated_legendre(int i) {
   return static_cast<double>(largest) + std::sqrt(2 * i + 1.0) * i * (i + 1) / (8.0 * kSamples * kSamples);
 }
 
-/// Along a prism's w: degree 5 costs least for the first Fourier modes, 8 for many (measured).
-int model_degree(Basis basis, int order) {
-  if (basis == Basis::legendre) return std::min(order, LineModels::kMaxDegree);
-  return order == 1 ? 1 : order <= 5 ? 5 : LineModels::kMaxDegree;
-}
-
 }  // namespace
 
 std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree) {
@@ -71,8 +65,6 @@ std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree) {
   }
   return rows;
 }
-
-const LineModels& LineModels::get(Basis basis, int order) { return get(basis, order, model_degree(basis, order)); }
 
 const LineModels& LineModels::get(Basis basis, int order, int degree) {
   assert(order >= 1 && order <= kMaxOrder && degree >= 1 && degree <= kMaxDegree);

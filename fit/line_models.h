@@ -20,7 +20,7 @@ class LineModels {
  public:
   static constexpr int kMaxDegree = 8, kMaxLevel = 12;
   static constexpr int kStride = 16;  ///< from one function's coefficients to the next one's; unused entries are 0
-  using PerFunction = std::array<double, kMaxOrder + 1>;
+  using PerFunction = std::array<double, (kMaxOrder + 1 + 7) / 8 * 8>;  ///< behind the last one 0: for whole vectors
 
   /// Bounds of |N - model| and |N' - model'|.
   struct Errors {
@@ -42,8 +42,6 @@ class LineModels {
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it
   /// is first asked for; for all threads. Cost of a level: about 10 us times 2^level at order 8.
   static const LineModels& get(Basis basis, int order, int degree);
-  /// Of the degree that serves best along a prism's w.
-  static const LineModels& get(Basis basis, int order);
 
   int order() const { return order_; }
   int degree() const { return degree_; }

@@ -48,17 +48,13 @@ constexpr double kFall = 0.05;
 
 }  // namespace
 
+/// Along a prism's w models are of the degree whose coefficients are one `Wide`.
 SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
-    : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order)),
-      num_layers_(kind == CellKind::tet ? 1 : order + 1), w_controls_(kind == CellKind::tet ? 1 : line_.degree() + 1),
+    : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order, kWide - 1)),
+      num_layers_(kind == CellKind::tet ? 1 : order + 1),
       lanes_(rounded_up(3 * num_layers_, kLanes)), small_error_(small_error(order)),
       whole_models_(simplex_.num_tiers()) {
   layer_terms_.resize(num_layers_);
-  const std::size_t width = rounded_up(w_controls_, kWide);
-  for (std::size_t o = 0; o < width; ++o) {
-    below_.push_back(static_cast<double>(o));
-    above_.push_back(w_controls_ - 1 - static_cast<double>(o));
-  }
 }
 
 void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
@@ -99,15 +95,14 @@ Mat3 SimplexBoxes::lasting_error(const Box& box) const {
   return result;
 }
 
-bool SimplexBoxes::is_stuck(const Box& box) {
-  if (box.halvings < simplex_.most_halvings() || box.tier < 0) return false;
+bool SimplexBoxes::is_stuck_at(const Box& box, const Mat3& mean) {
   const Mat3 lasting = lasting_error(box);
   if (lasting.maxCoeff() == 0) return false;
-  const Mat3 mean = matrices(box).mean();
   mean_.resize(kWide);
   for (int row = 0; row < 3; ++row)
     for (int d = 0; d < 3; ++d) std::fill_n(mean_.entries(row, d), kWide, mean(row, d));
-  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs(), frame(box)) == 0;
+  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs(), frame(box),
+                                                         BoundPrecision::full) == 0;
 }
 
 SimplexBoxes::Box SimplexBoxes::root() {
@@ -308,20 +303,18 @@ Vec3 SimplexBoxes::corner_point(const Box& box, int corner) const {
   return box.vertices[corner % 3] + std::ldexp(box.w_index + corner / 3, -box.w_level) * Vec3::UnitZ();
 }
 
-std::size_t SimplexBoxes::corner_matrix(const Box& box, int corner) const {
+std::size_t TetBoxes::corner_matrix(const Box& box, int corner) const {
   SimplexIndex::Exponents e{};
-  const SimplexIndex& index = kind_ == CellKind::tet ? tables(box).lower : tables(box).index;
-  e[kind_ == CellKind::tet ? corner : corner % 3] = static_cast<std::int8_t>(index.degree());
-  const int layer = kind_ == CellKind::tet ? 0 : corner / 3 * (w_controls_ - 1);
-  return static_cast<std::size_t>(index.find(e) * w_controls_ + layer);
+  const SimplexIndex& index = tables(box).lower;
+  e[corner] = static_cast<std::int8_t>(index.degree());
+  return static_cast<std::size_t>(index.find(e));
 }
 
-const ControlMatrices& SimplexBoxes::matrices(const Box& box) {
-  kind_ == CellKind::tet ? tet_matrices(box) : prism_matrices(box);
-  return matrices_;
+std::size_t PrismBoxes::corner_matrix(const Box&, int corner) const {
+  return matrices_.corners()[corner % 3] + static_cast<std::size_t>(corner / 3 * (kWide - 1));
 }
 
-void SimplexBoxes::tet_matrices(const Box& box) {
+ControlMatrices& TetBoxes::matrices(const Box& box) {
   const SimplexTables& t = tables(box);
   matrices_.resize(t.lower.size());
   const double* x = box.control.data();
@@ -338,53 +331,24 @@ void SimplexBoxes::tet_matrices(const Box& box) {
       for (int row = 0; row < 3; ++row) store_lanes(columns[d][row], matrices_.entries(row, d) + first);
     }
   }
+  return matrices_;
 }
 
-/// Differences over the triangle and along w, both raised to the degrees of the map. Numbers along w are side by side.
-void SimplexBoxes::prism_matrices(const Box& box) {
+PrismMatrices& PrismBoxes::matrices(const Box& box) {
   const double* table = line_.coefficients(line_.level(box.w_level), box.w_index);
-  const SimplexTables& t = tables(box);
-  const int size = t.index.size();
-  const std::size_t width = below_.size();
-  matrices_.resize(static_cast<std::size_t>(size) * w_controls_);
-  contracted_.resize(std::max(contracted_.size(), 3 * size * width + 2 * kWide));
-  difference_.resize(std::max(difference_.size(), 6 * static_cast<std::size_t>(t.lower.size() + 1)));
-  std::fill_n(difference_.begin() + 6 * t.lower.size(), 6, Wide{});
-  const auto contracted = [&](int n, int row) { return contracted_.data() + kWide + (n * 3 + row) * width; };
-  for (int n = 0; n < size; ++n)
-    for (int row = 0; row < 3; ++row) {
-      const double* x = box.control.data() + n * lanes_ + row * num_layers_;
-      for (std::size_t o = 0; o < width; o += kWide) {
-        Wide sum{};
-        for (int k = 0; k < num_layers_; ++k) sum += x[k] * load_wide(table + k * LineModels::kStride + o);
-        store_wide(sum, contracted(n, row) + o);
-      }
+  const SimplexIndex& index = tables(box).index;
+  matrices_.resize(index.degree());
+  Wide* const result[3] = {matrices_.coordinate(0), matrices_.coordinate(1), matrices_.coordinate(2)};
+  for (int n = 0; n < index.size(); ++n) {
+    const double *x = box.control.data() + n * lanes_, *y = x + num_layers_, *z = y + num_layers_;
+    Wide sums[3] = {};
+    for (int k = 0; k < num_layers_; ++k) {
+      const Wide b = load_wide(table + k * LineModels::kStride);
+      sums[0] += x[k] * b, sums[1] += y[k] * b, sums[2] += z[k] * b;
     }
-  for (std::size_t o = width; o > 0;) {  // the last ones first: what they leave behind the end is overwritten
-    o -= kWide;
-    const Wide below = load_wide(below_.data() + o), above = load_wide(above_.data() + o);
-    for (int n = 0; n < t.lower.size(); ++n)
-      for (int row = 0; row < 3; ++row) {
-        const Wide origin = load_wide(contracted(t.raised[0][n], row) + o);
-        for (int d = 0; d < 2; ++d)
-          difference_[6 * n + 2 * row + d] = load_wide(contracted(t.raised[d + 1][n], row) + o) - origin;
-      }
-    for (int n = 0; n < size; ++n) {
-      const std::size_t at = static_cast<std::size_t>(n) * w_controls_ + o;
-      Wide sums[6] = {};
-      for (int c = 0; c < 3; ++c) {
-        const Wide* reduced = difference_.data() + 6 * t.reduced[c][n];
-        for (int e = 0; e < 6; ++e) sums[e] += t.exponents[c][n] * reduced[e];
-      }
-      for (int row = 0; row < 3; ++row) {
-        for (int d = 0; d < 2; ++d) store_wide(sums[2 * row + d], matrices_.entries(row, d) + at);
-        const double* x = contracted(n, row) + o;
-        const Wide here = load_wide(x);
-        store_wide(below * (here - load_wide(x - 1)) + above * (load_wide(x + 1) - here),
-                   matrices_.entries(row, 2) + at);
-      }
-    }
+    for (int row = 0; row < 3; ++row) result[row][n] = sums[row];
   }
+  return matrices_;
 }
 
 Mat3 SimplexBoxes::sides(const Box& box) const {
@@ -431,11 +395,12 @@ Mat3 SimplexBoxes::rounding_error(const Box& box) const {
     size += along * layer.largest_coefficient;
     rounding += along * layer.rounding;
   }
-  // Sums over modes and along w, tables, the shift, halvings of `degree` averages each, differences, the 16 asked for.
+  // Sums over modes and along w, tables, the shift, halvings of `degree` averages each, L, differences, the 16 asked
+  // for.
   const int degree = tables(box).index.degree();
-  const double roundings = num_modes_ + num_layers_ + 4 + 1 + degree * box.level + degree + 8 + 16;
+  const double roundings = num_modes_ + num_layers_ + 4 + 1 + degree * box.level + 3 + degree + 8 + 16;
   const Vec3 control = rounding + roundings * (std::numeric_limits<double>::epsilon() / 2) * size;
-  const double differences = 2 * std::max(degree, w_controls_ - 1);
+  const double differences = 2 * std::max(degree, kind_ == CellKind::tet ? 1 : kWide - 1);
   return differences * control * Eigen::RowVector3d::Ones();
 }
 

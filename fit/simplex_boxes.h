@@ -3,6 +3,7 @@
 
 #include "fit/control_matrices.h"
 #include "fit/line_models.h"
+#include "fit/prism_matrices.h"
 #include "fit/simplex_models.h"
 
 #include <array>
@@ -18,7 +19,7 @@ namespace subvol {
 /// Over the simplex (a prism's triangle) the map is modelled by `SimplexModels` of the lowest tier whose errors, by
 /// this cell's coefficients, are small; anew for a part where errors of the last ones matter. Parts between follow by
 /// de Casteljau. Along a prism's w each part has `LineModels` of its own. Jacobians are by local coordinates: along
-/// the part's sides.
+/// the part's sides. What they are made of differs: `TetBoxes`, `PrismBoxes`.
 class SimplexBoxes {
  public:
   /// Sums over the functions with one N_k along w (tets: all of them) of what `SimplexModels::Function` says of them,
@@ -40,8 +41,6 @@ class SimplexBoxes {
   };
   static constexpr int kLevelsPerDepth = 3, kMaxDepth = 20;
 
-  SimplexBoxes(CellKind kind, Basis basis, int order);
-
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
   Box root();
   /// lowest: det of dx/du where it is least, as far as known. New models are taken where the old ones' errors matter.
@@ -50,23 +49,29 @@ class SimplexBoxes {
   bool improve(Box& box, double lowest);
   /// Boxes are halved along their longest sides.
   static void choose_split(Box&) {}
-  int num_corners() const { return kind_ == CellKind::tet ? 4 : 6; }
   Vec3 corner_point(const Box& box, int corner) const;
 
-  const ControlMatrices& matrices(const Box& box);
-  std::size_t corner_matrix(const Box& box, int corner) const;
   Mat3 remainder(const Box& box) const;
   /// Whether the modelling error is so large that no bound can be hoped for.
   bool is_hopeless(const Box& box) const;
-  /// Whether the last models of the simplex are too far from the map to prove anything near the box's mean.
-  bool is_stuck(const Box& box);
   /// About the mean of det of dx/du over the cell.
   double mean_determinant() const { return mean_edges_.prod(); }
   /// Of `determinant_bound`.
   Mat3 frame(const Box& box) const;
   double determinant_scale(const Box& box) const;
 
+ protected:
+  SimplexBoxes(CellKind kind, Basis basis, int order);
+  /// Whether the last models of the simplex are too far from the map to prove anything near the mean of these matrices.
+  template <class Matrices>
+  bool is_stuck(const Box& box, const Matrices& matrices) {
+    return has_last_models(box) && is_stuck_at(box, matrices.mean());
+  }
+  const SimplexTables& tables(const Box& box) const { return simplex_.tables(box.tier); }
+
  private:
+  bool has_last_models(const Box& box) const { return box.halvings >= simplex_.most_halvings() && box.tier >= 0; }
+  bool is_stuck_at(const Box& box, const Mat3& mean);
   /// Columns are the sides of a part.
   Mat3 sides(const Box& box) const;
   /// Takes models of the box's simplex: of the lowest tier from `least_tier` on with errors, measured by the mean
@@ -84,8 +89,6 @@ class SimplexBoxes {
   int choose_tier(const Box& box, const SimplexModels::Part& part, double wanted, int least_tier) const;
   double wanted_error(double lowest) const;
   bool models_matter(const Box& box, double lowest) const;
-  void tet_matrices(const Box& box);
-  void prism_matrices(const Box& box);
   /// What of the errors of the simplex's models stays with every part, by canonical coordinates.
   Mat3 lasting_error(const Box& box) const;
   double by_mean_edges(const Mat3& error) const {
@@ -98,13 +101,15 @@ class SimplexBoxes {
   /// Both hold the control points of the whole, and those of one half each when done.
   void halve_control(const SimplexHalving& halving, std::vector<double>& low, std::vector<double>& high) const;
 
-  const SimplexTables& tables(const Box& box) const { return simplex_.tables(box.tier); }
-
   CellKind kind_;
   const SimplexModels& simplex_;
+
+ protected:
   const LineModels& line_;  // along w
-  int num_layers_, w_controls_;
+  int num_layers_;
   std::size_t lanes_;       // numbers per control point: a multiple of SimplexTables::kLanes
+
+ private:
   double small_error_;      // share of the mean edges
   int num_modes_ = 0, highest_ = 0;  // of the coefficients that are not 0: how many, and the highest order i + j + k
   struct Term {
@@ -116,9 +121,37 @@ class SimplexBoxes {
   Vec3 mean_edges_;                             // lengths of the linear part's mean columns
   std::shared_ptr<const SimplexModels::Part> whole_;  // what the whole simplex has been asked for
   std::vector<SimplexModels::Models> whole_models_;   // by tier
-  std::vector<double> contracted_, below_, above_;
-  std::vector<Wide> difference_;
-  ControlMatrices matrices_, mean_;
+  ControlMatrices mean_;
+};
+
+class TetBoxes : public SimplexBoxes {
+ public:
+  TetBoxes(Basis basis, int order) : SimplexBoxes(CellKind::tet, basis, order) {}
+  static int num_corners() { return 4; }
+  /// J's coefficients on a box with models; valid until the next call.
+  ControlMatrices& matrices(const Box& box);
+  /// Number of the matrix at a corner of the box: J there, by the model.
+  std::size_t corner_matrix(const Box& box, int corner) const;
+  /// Whether no model is good enough for a box whose matrices are there.
+  bool is_stuck(const Box& box) { return SimplexBoxes::is_stuck(box, matrices_); }
+
+ private:
+  ControlMatrices matrices_;
+};
+
+class PrismBoxes : public SimplexBoxes {
+ public:
+  PrismBoxes(Basis basis, int order) : SimplexBoxes(CellKind::prism, basis, order) {}
+  static int num_corners() { return 6; }
+  /// J's coefficients on a box with models; valid until the next call.
+  PrismMatrices& matrices(const Box& box);
+  /// Number of the matrix at a corner of the box whose matrices are there: J there, by the model.
+  std::size_t corner_matrix(const Box& box, int corner) const;
+  /// Whether no model is good enough for a box whose matrices are there.
+  bool is_stuck(const Box& box) { return SimplexBoxes::is_stuck(box, matrices_); }
+
+ private:
+  PrismMatrices matrices_;
 };
 
 }  // namespace subvol

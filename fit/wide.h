@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #ifdef __AVX512F__
 #include <immintrin.h>
@@ -25,19 +26,40 @@ inline void store_wide(const Wide& value, double* to) { std::memcpy(to, &value, 
 
 /// The same in single precision, for what is kept: half the memory to go through.
 using Narrow = float __attribute__((vector_size(kWide * sizeof(float))));
+inline void store_wide(const Narrow& value, float* to) { std::memcpy(to, &value, sizeof value); }
 inline Narrow narrow(const Wide& x) { return __builtin_convertvector(x, Narrow); }
 inline Wide widen(const Narrow& x) { return __builtin_convertvector(x, Wide); }
 
+/// Sixteen numbers of single precision.
+inline constexpr int kWideFloats = 16;
+using WideFloats = float __attribute__((vector_size(kWideFloats * sizeof(float))));
+inline WideFloats load_wide(const float* from) {
+  WideFloats result;
+  std::memcpy(&result, from, sizeof result);
+  return result;
+}
+inline void store_wide(const WideFloats& value, float* to) { std::memcpy(to, &value, sizeof value); }
+
 /// Lane by lane the lower (higher) of a and b, in a.
-inline void take_lower(Wide& a, const Wide& b) { a = b < a ? b : a; }
-inline void take_higher(Wide& a, const Wide& b) { a = b > a ? b : a; }
+template <class Vector>
+void take_lower(Vector& a, const Vector& b) {
+  a = b < a ? b : a;
+}
+template <class Vector>
+void take_higher(Vector& a, const Vector& b) {
+  a = b > a ? b : a;
+}
 
 /// Lane by lane |x| where that is higher than a >= 0, in a.
-inline void take_higher_size(Wide& a, const Wide& x) {
-#ifdef __AVX512DQ__
-  a = (Wide)_mm512_range_pd((__m512d)a, (__m512d)x, 0b1011);  // the higher of both sizes, without its sign
+template <class Vector>
+void take_higher_size(Vector& a, const Vector& x) {
+#if defined __AVX512DQ__ && defined __AVX512VL__
+  constexpr int kWithoutSign = 0b1011;  // the higher of both sizes
+  if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_range_pd((__m512d)a, (__m512d)x, kWithoutSign);
+  else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_range_ps((__m256)a, (__m256)x, kWithoutSign);
+  else a = (Vector)_mm512_range_ps((__m512)a, (__m512)x, kWithoutSign);
 #else
-  const Wide size = x < 0 ? -x : x;
+  const Vector size = x < 0 ? -x : x;
   a = size > a ? size : a;
 #endif
 }
@@ -67,11 +89,26 @@ inline Wide reciprocal_square_root(const Wide& x) {
 }
 
 inline double lowest_lane(const Wide& v) {
-  double lowest = v[0];
-  for (int k = 1; k < kWide; ++k) lowest = std::min(lowest, v[k]);
-  return lowest;
+  using Half = double __attribute__((vector_size(kWide / 2 * sizeof(double))));
+  Half lowest = __builtin_shufflevector(v, v, 0, 1, 2, 3);
+  take_lower(lowest, __builtin_shufflevector(v, v, 4, 5, 6, 7));
+  return std::min(std::min(lowest[0], lowest[1]), std::min(lowest[2], lowest[3]));
 }
-inline double highest_lane(const Wide& v) { return -lowest_lane(-v); }
+inline double lowest_lane(const Narrow& v) {
+  using Half = float __attribute__((vector_size(kWide / 2 * sizeof(float))));
+  Half lowest = __builtin_shufflevector(v, v, 0, 1, 2, 3);
+  take_lower(lowest, __builtin_shufflevector(v, v, 4, 5, 6, 7));
+  return std::min(std::min(lowest[0], lowest[1]), std::min(lowest[2], lowest[3]));
+}
+inline double lowest_lane(const WideFloats& v) {
+  Narrow lowest = __builtin_shufflevector(v, v, 0, 1, 2, 3, 4, 5, 6, 7);
+  take_lower(lowest, __builtin_shufflevector(v, v, 8, 9, 10, 11, 12, 13, 14, 15));
+  return lowest_lane(lowest);
+}
+template <class Vector>
+double highest_lane(const Vector& v) {
+  return -lowest_lane(-v);
+}
 
 inline double sum_of_lanes(const Wide& v) {
   using Half = double __attribute__((vector_size(kWide / 2 * sizeof(double))));
@@ -80,12 +117,16 @@ inline double sum_of_lanes(const Wide& v) {
 }
 
 /// Bit k tells whether v[k] <= limit.
-inline unsigned lanes_within(const Wide& v, double limit) {
-#ifdef __AVX512F__
-  return _mm512_cmp_pd_mask(_mm512_loadu_pd(reinterpret_cast<const double*>(&v)), _mm512_set1_pd(limit), _CMP_LE_OQ);
+template <class Vector>
+unsigned lanes_within(const Vector& v, std::remove_cvref_t<decltype(v[0])> limit) {
+#if defined __AVX512F__ && defined __AVX512VL__
+  if constexpr (std::is_same_v<Vector, Wide>) return _mm512_cmp_pd_mask((__m512d)v, _mm512_set1_pd(limit), _CMP_LE_OQ);
+  else if constexpr (std::is_same_v<Vector, Narrow>)
+    return _mm256_cmp_ps_mask((__m256)v, _mm256_set1_ps(limit), _CMP_LE_OQ);
+  else return _mm512_cmp_ps_mask((__m512)v, _mm512_set1_ps(limit), _CMP_LE_OQ);
 #else
   unsigned lanes = 0;
-  for (int k = 0; k < kWide; ++k) lanes |= static_cast<unsigned>(v[k] <= limit) << k;
+  for (int k = 0; k < static_cast<int>(sizeof v / sizeof v[0]); ++k) lanes |= static_cast<unsigned>(v[k] <= limit) << k;
   return lanes;
 #endif
 }

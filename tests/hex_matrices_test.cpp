@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/hex_matrices.h"
+
+#include "fit/prism_matrices.h"
+#include "fit/simplex_tables.h"
+
+#include <Eigen/LU>
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+using namespace subvol;
+
+namespace {
+
+using Random = std::mt19937_64;
+double uniform(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+double bernstein(int degree, int o, double x) {
+  double result = std::pow(x, o) * std::pow(1 - x, degree - o);
+  for (int k = 0; k < o; ++k) result = result * (degree - k) / (k + 1);
+  return result;
+}
+
+/// Near a straight cell of these edges, bent by a share of them.
+HexCoefficients random_hex(Random& random, int num_u, int num_w, const Mat3& edges, double bent) {
+  HexCoefficients result;
+  result.resize(num_u, num_w);
+  for (int u = 0; u < num_u; ++u)
+    for (int w = 0; w < num_w; ++w)
+      for (int v = 0; v < kWide; ++v) {
+        const Vec3 place(u / (num_u - 1.0), v / (kWide - 1.0), w / (num_w - 1.0));
+        const Vec3 off(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+        const Vec3 x = edges * (place + bent * off);
+        for (int row = 0; row < 3; ++row) result.coordinate(row)[u * num_w + w][v] = x[row];
+      }
+  return result;
+}
+
+Vec3 value(const HexCoefficients& hex, const Vec3& at) {
+  Vec3 result = Vec3::Zero();
+  for (int u = 0; u < hex.num_u(); ++u)
+    for (int w = 0; w < hex.num_w(); ++w)
+      for (int v = 0; v < kWide; ++v)
+        for (int row = 0; row < 3; ++row)
+          result[row] += bernstein(hex.num_u() - 1, u, at[0]) * bernstein(kWide - 1, v, at[1]) *
+                         bernstein(hex.num_w() - 1, w, at[2]) * hex.coordinate(row)[u * hex.num_w() + w][v];
+  return result;
+}
+
+/// What the matrices say that J is at a point.
+Mat3 jacobian(const HexMatrices& matrices, const HexCoefficients& hex, const Vec3& at) {
+  Mat3 result = Mat3::Zero();
+  for (std::size_t b = 0; b < matrices.size(); ++b) {
+    const int vector = static_cast<int>(b) / kWide, v = static_cast<int>(b) % kWide;
+    result += bernstein(hex.num_u() - 1, vector / hex.num_w(), at[0]) * bernstein(kWide - 1, v, at[1]) *
+              bernstein(hex.num_w() - 1, vector % hex.num_w(), at[2]) * matrices[b];
+  }
+  return result;
+}
+
+template <class Map>
+Mat3 differences(const Map& map, const Vec3& at) {
+  constexpr double kStep = 1e-5;
+  Mat3 result;
+  for (int d = 0; d < 3; ++d)
+    result.col(d) = (map(at + kStep * Vec3::Unit(d)) - map(at - kStep * Vec3::Unit(d))) / (2 * kStep);
+  return result;
+}
+
+/// All ways to the entries of the matrices agree, those in single precision up to their bounds.
+template <class Matrices>
+void check_loads(Matrices& matrices, const Mat3& l) {
+  using Vector = typename Matrices::NarrowProduct::Vector;
+  constexpr std::size_t kLanes = sizeof(Vector) / sizeof(float);
+  const auto product = matrices.times(l);
+  const auto narrow = matrices.narrow_product(l);
+  REQUIRE(narrow.errors().maxCoeff() <= kMostError);
+  WideMatrix entries, product_entries;
+  MatrixOf<Vector> narrow_entries;
+  double largest = 0;
+  for (std::size_t first = 0; first < matrices.size(); first += kWide) {
+    matrices.load(first, entries);
+    product.load(first, product_entries);
+    const std::size_t narrow_first = std::min(first, matrices.size() - kLanes);
+    narrow.load(narrow_first, narrow_entries);
+    for (int k = 0; k < kWide; ++k) {
+      const Mat3 j = matrices[first + static_cast<std::size_t>(k)], lj = l * j;
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) {
+          CHECK(entries[row][column][k] == Approx(j(row, column)).margin(1e-13));
+          CHECK(product_entries[row][column][k] == Approx(lj(row, column)).margin(1e-12));
+          const std::size_t lane = first - narrow_first + static_cast<std::size_t>(k);
+          const double error = std::abs(narrow_entries[row][column][lane] - lj(row, column));
+          CHECK(error <= narrow.errors()[row]);
+          largest = std::max(largest, error);
+        }
+    }
+  }
+  CHECK(largest > 0);
+}
+
+const Mat3 kEdges = (Mat3() << 1, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 3).finished();
+const Mat3 kAny = (Mat3() << 0.9, -0.3, 0.2, 0.4, 1.1, -0.1, 0.1, 0.5, 0.7).finished();
+
+}  // namespace
+
+TEST_CASE("Halves of a map of a hex are the map", "[hex_matrices]") {
+  Random random(1);
+  for (const int num_u : {2, 3, 6, 8})
+    for (const int num_w : {2, 5, 8})
+      for (int direction = 0; direction < 3; ++direction) {
+        const HexCoefficients whole = random_hex(random, num_u, num_w, kEdges, 0.2);
+        HexCoefficients low = whole, high;
+        low.halve(direction, high);
+        for (int repeat = 0; repeat < 5; ++repeat) {
+          const Vec3 at(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
+          Vec3 in_low = at, in_high = at;
+          in_low[direction] = 0.5 * at[direction];
+          in_high[direction] = 0.5 + 0.5 * at[direction];
+          CHECK((value(low, at) - value(whole, in_low)).norm() < 1e-13);
+          CHECK((value(high, at) - value(whole, in_high)).norm() < 1e-13);
+        }
+      }
+}
+
+TEST_CASE("Matrices of a hex are the Jacobian of its map, in either precision", "[hex_matrices]") {
+  Random random(2);
+  HexMatrices matrices;
+  for (const int num_u : {2, 3, 6, 8})
+    for (const int num_w : {2, 5, 8}) {
+      const HexCoefficients hex = random_hex(random, num_u, num_w, kEdges, 0.2);
+      matrices.set(hex);
+      const Vec3 at(uniform(random, 0.1, 0.9), uniform(random, 0.1, 0.9), uniform(random, 0.1, 0.9));
+      const auto map = [&](const Vec3& x) { return value(hex, x); };
+      CHECK((jacobian(matrices, hex, at) - differences(map, at)).norm() < 1e-8);
+      check_loads(matrices, kAny);
+
+      Mat3 mean = Mat3::Zero();
+      for (std::size_t b = 0; b < matrices.size(); ++b) mean += matrices[b] / static_cast<double>(matrices.size());
+      CHECK((matrices.mean() - mean).col(0).norm() < 1e-12);
+      CHECK((matrices.mean() - mean).col(2).norm() < 1e-12);
+      CHECK((matrices.mean() - mean).norm() < 0.5 * mean.norm());
+    }
+}
+
+TEST_CASE("How J of a hex varies is told by direction", "[hex_matrices]") {
+  HexCoefficients hex;
+  HexMatrices matrices;
+  for (const int num : {2, 6, 8}) {
+    hex.resize(num, num);
+    const auto set = [&](const std::function<Vec3(const Vec3&)>& map) {
+      for (int u = 0; u < num; ++u)
+        for (int w = 0; w < num; ++w)
+          for (int v = 0; v < kWide; ++v) {
+            const Vec3 x = map(Vec3(u / (num - 1.0), v / (kWide - 1.0), w / (num - 1.0)));
+            for (int row = 0; row < 3; ++row) hex.coordinate(row)[u * num + w][v] = x[row];
+          }
+      matrices.set(hex);
+    };
+    set([](const Vec3& x) { return Vec3(kEdges * x); });
+    CHECK(matrices.variation().cwiseAbs().maxCoeff() < 1e-12);
+    set([](const Vec3& x) { return Vec3(x[0], x[1] + 0.5 * x[0] * x[2], x[2]); });  // the slope along w goes with u
+    const Mat3 varies = matrices.variation();
+    CHECK(varies(0, 2) > 0.2);
+    CHECK(varies(2, 0) == Approx(varies(0, 2)));
+    CHECK(varies.cwiseAbs().sum() == Approx(2 * varies(0, 2)));
+  }
+}
+
+TEST_CASE("Matrices of a prism are the Jacobian of its map, in either precision", "[hex_matrices]") {
+  Random random(3);
+  PrismMatrices matrices;
+  for (const int degree : {1, 2, 5, 9, 14}) {
+    const SimplexIndex& index = SimplexTables::get(2, degree).index;
+    matrices.resize(degree);
+    for (int n = 0; n < index.size(); ++n)
+      for (int w = 0; w < kWide; ++w) {
+        const auto e = index.exponents(n);
+        const Vec3 place(e[1] / static_cast<double>(degree), e[2] / static_cast<double>(degree), w / (kWide - 1.0));
+        const Vec3 off(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+        const Vec3 x = kEdges * (place + 0.1 * off);
+        for (int row = 0; row < 3; ++row) matrices.coordinate(row)[n][w] = x[row];
+      }
+    const auto weight = [&](int n, int w, const Vec3& at) {
+      const auto e = index.exponents(n);
+      double result = std::tgamma(degree + 1.0) * bernstein(kWide - 1, w, at[2]);
+      const double l[3] = {1 - at[0] - at[1], at[0], at[1]};
+      for (int c = 0; c < 3; ++c) result *= std::pow(l[c], e[c]) / std::tgamma(e[c] + 1.0);
+      return result;
+    };
+    const auto map = [&](const Vec3& at) {
+      Vec3 result = Vec3::Zero();
+      for (int n = 0; n < index.size(); ++n)
+        for (int w = 0; w < kWide; ++w)
+          for (int row = 0; row < 3; ++row) result[row] += weight(n, w, at) * matrices.coordinate(row)[n][w];
+      return result;
+    };
+    const Vec3 at(0.3, 0.45, 0.6);
+    Mat3 j = Mat3::Zero(), mean = Mat3::Zero();
+    for (std::size_t b = 0; b < matrices.size(); ++b) {
+      j += weight(static_cast<int>(b) / kWide, static_cast<int>(b) % kWide, at) * matrices[b];
+      mean += matrices[b] / static_cast<double>(matrices.size());
+    }
+    CHECK((j - differences(map, at)).norm() < 1e-8);
+    CHECK((matrices.mean() - mean).leftCols(2).norm() < 1e-12);
+    for (const std::size_t corner : matrices.corners()) CHECK(corner % kWide == 0);
+    check_loads(matrices, kAny);
+  }
+}
+
+TEST_CASE("Bounds of det J hold in either precision, at any size", "[hex_matrices]") {
+  Random random(4);
+  HexMatrices matrices;
+  int found = 0, far_apart = 0;
+  for (int repeat = 0; repeat < 400; ++repeat) {
+    const double size = std::pow(10.0, uniform(random, -45, 45)), flat = std::pow(10.0, uniform(random, -5, 0));
+    const Mat3 edges = size * kEdges * Vec3(1, 1, flat).asDiagonal();
+    const HexCoefficients hex =
+        random_hex(random, repeat % 2 ? 6 : 8, repeat % 3 ? 6 : 8, edges, uniform(random, 0, 0.02));
+    matrices.set(hex);
+    const Mat3 remainder = 1e-14 * edges.cwiseAbs().rowwise().sum().replicate(1, 3);
+    const double full = determinant_bound(matrices, remainder, Mat3::Identity(), BoundPrecision::full);
+    const double single = determinant_bound(matrices, remainder, Mat3::Identity(), BoundPrecision::single_first);
+    CAPTURE(repeat, size, flat, full, single);
+    CHECK((full > 0) == (single > 0));
+    if (!(full > 0)) continue;
+    ++found;
+    far_apart += std::abs(single - full) > 0.01 * full;  // another L was the first to prove it
+    for (int sample = 0; sample < 20; ++sample) {
+      const Vec3 at(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
+      CHECK(jacobian(matrices, hex, at).determinant() >= std::max(full, single));
+    }
+  }
+  CHECK(found > 100);
+  CHECK(far_apart < found / 10);
+}
+
+TEST_CASE("What is too large or too small for single precision is left to double", "[hex_matrices]") {
+  Random random(5);
+  HexMatrices matrices;
+  const HexCoefficients fine = random_hex(random, 6, 6, kEdges, 0.005);
+  const auto bound = [&] {
+    return determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), BoundPrecision::single_first);
+  };
+  matrices.set(fine);
+  const double before = bound();
+  CHECK(before > 0);
+  for (const double size : {1e-48, 1e-39, 1e39, 1e48}) {
+    const HexCoefficients other = random_hex(random, 8, 8, size * kEdges, 0.005);
+    matrices.set(other);
+    CHECK(bound() > 0);
+    HexCoefficients folded = other;  // what was of another box, or is infinite in single precision, must not count
+    for (int n = 0; n < folded.num_vectors(); ++n) folded.coordinate(0)[n] *= -1;
+    matrices.set(folded);
+    CHECK(bound() == 0);
+    matrices.set(fine);
+    CHECK(bound() == before);
+  }
+}
