@@ -147,7 +147,7 @@ void check_derivatives(Energy& energy, Distortion distortion, const std::vector<
 
 }  // namespace
 
-TEST_CASE("Singular vectors and stress are as accurate as the Jacobian, with singular values equal, close or far apart") {
+TEST_CASE("Singular vectors and stress are as accurate as the Jacobian, be singular values equal, close or far apart") {
   std::mt19937 random(6);
   std::normal_distribution<double> normal;
   const auto rotation = [&] {

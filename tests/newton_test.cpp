@@ -63,7 +63,8 @@ struct StifferWall final : Wall {
 TEST_CASE("A cell in the way of a step is made stiffer, until it is not") {
   std::vector<Vec3> densified_at;
   const SparseMap identity{1, {0, 1}, {0}, {1}};
-  FitProblem problem(identity, select_rows(identity, {}), std::make_unique<StifferWall>(densified_at, true), nullptr, 1);
+  FitProblem problem(identity, select_rows(identity, {}), std::make_unique<StifferWall>(densified_at, true), nullptr,
+                     1);
   std::vector<Vec3> x = {Vec3::Zero()};
   const MinimizerResult result = minimize_newton(problem, x, {.max_iterations = 1});
   // 1.5 and 1.5 / 1.25 are behind the wall, 1.5 / 1.25^2 is not.
