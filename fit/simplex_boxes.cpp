@@ -57,20 +57,14 @@ SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
   layer_terms_.resize(num_layers_);
 }
 
-void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
-  num_modes_ = highest_ = 0;
-  for (auto& layer : layer_terms_) layer.clear();
-  for (std::size_t a = 0; a < modes.size(); ++a) {
-    if (coefficients[a] == Vec3::Zero()) continue;
-    ++num_modes_;
-    highest_ = std::max(highest_, simplex_.own_order(modes[a]));
-    layer_terms_[kind_ == CellKind::prism ? modes[a].k : 0].push_back(
-        {simplex_.slot(modes[a]), simplex_.own_order(modes[a]), coefficients[a]});
-  }
+void SimplexBoxes::set_modes(std::span<const LocalMode> modes) {
+  of_modes_ = modes;
+  places_.clear();
+  linear_modes_.clear();
   const bool prism = kind_ == CellKind::prism;
-  Mat3 edges = Mat3::Zero();
   for (std::size_t a = 0; a < modes.size(); ++a) {
     const LocalMode& mode = modes[a];
+    places_.push_back({prism ? mode.k : 0, simplex_.slot(mode), simplex_.own_order(mode)});
     if (mode.edge >= 0 || (prism && mode.k > 1)) continue;
     Eigen::RowVector3d gradient = Eigen::RowVector3d::Zero();
     if (mode.vertex > 0)
@@ -78,8 +72,22 @@ void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Ve
     else
       gradient.head(simplex_.dimension()).setConstant(prism ? -0.5 : -1);
     if (prism) gradient[2] = (mode.k == 1 ? 1 : -1) / 3.0;
-    edges += coefficients[a] * gradient;
+    linear_modes_.push_back({a, gradient});
   }
+}
+
+void SimplexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
+  if (modes.data() != of_modes_.data() || modes.size() != of_modes_.size()) set_modes(modes);
+  num_modes_ = highest_ = 0;
+  for (auto& layer : layer_terms_) layer.clear();
+  for (std::size_t a = 0; a < modes.size(); ++a) {
+    if (coefficients[a] == Vec3::Zero()) continue;
+    ++num_modes_;
+    highest_ = std::max(highest_, places_[a].order);
+    layer_terms_[places_[a].layer].push_back({places_[a].slot, places_[a].order, coefficients[a]});
+  }
+  Mat3 edges = Mat3::Zero();
+  for (const LinearMode& mode : linear_modes_) edges += coefficients[mode.number] * mode.gradient;
   mean_edges_ = edges.colwise().norm().transpose();
 }
 
@@ -177,18 +185,17 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
   const std::size_t stride = tables(box).stride;
   box.control.assign(stride * lanes_, 0);
   constexpr int kAtOnce = 4;  // the sums of one vector alone wait for each other
-  std::vector<Weighted> used;
   for (int k = 0; k < num_layers_; ++k) {
-    used.clear();
+    used_.clear();
     for (const Term& term : layer_terms_[k]) {
       const auto& batch = *models[term.order];
       if (!part->functions[term.slot].is_left_out(box.tier))
-        used.push_back({batch.coefficients.data() + batch.address(term.slot, 0), batch.step(), term.coefficient});
+        used_.push_back({batch.coefficients.data() + batch.address(term.slot, 0), batch.step(), term.coefficient});
     }
     std::size_t first = 0;
     const std::size_t end = stride / kWide;
-    for (; first + kAtOnce <= end; first += kAtOnce) store_sums<kAtOnce>(used, first, box.control.data() + k);
-    for (; first < end; ++first) store_sums<1>(used, first, box.control.data() + k);
+    for (; first + kAtOnce <= end; first += kAtOnce) store_sums<kAtOnce>(used_, first, box.control.data() + k);
+    for (; first < end; ++first) store_sums<1>(used_, first, box.control.data() + k);
   }
 }
 

@@ -70,6 +70,7 @@ class SimplexBoxes {
   const SimplexTables& tables(const Box& box) const { return simplex_.tables(box.tier); }
 
  private:
+  void set_modes(std::span<const LocalMode> modes);
   bool has_last_models(const Box& box) const { return box.halvings >= simplex_.most_halvings() && box.tier >= 0; }
   bool is_stuck_at(const Box& box, const Mat3& mean);
   /// Columns are the sides of a part.
@@ -117,10 +118,23 @@ class SimplexBoxes {
     int order;
     Vec3 coefficient;
   };
+  struct Place {
+    int layer;
+    std::size_t slot;
+    int order;
+  };
+  struct LinearMode {
+    std::size_t number;
+    Eigen::RowVector3d gradient;  // about the mean
+  };
+  std::span<const LocalMode> of_modes_;         // what the next two are of
+  std::vector<Place> places_;                   // where each mode goes
+  std::vector<LinearMode> linear_modes_;
   std::vector<std::vector<Term>> layer_terms_;  // by the number of N_k along w; a tet's are all in one layer
   Vec3 mean_edges_;                             // lengths of the linear part's mean columns
   std::shared_ptr<const SimplexModels::Part> whole_;  // what the whole simplex has been asked for
   std::vector<SimplexModels::Models> whole_models_;   // by tier
+  std::vector<Weighted> used_;                        // scratch of take_models
   ControlMatrices mean_;
 };
 
