@@ -2,7 +2,6 @@
 #include "fit/hex_matrices.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 
 namespace subvol {
