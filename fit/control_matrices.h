@@ -10,16 +10,16 @@
 
 namespace subvol {
 
-/// Entries [row][column] of eight matrices, of sixteen in single precision.
+/// Entries [row][column] of as many matrices as a vector has lanes.
 template <class Vector>
 using MatrixOf = std::array<std::array<Vector, 3>, 3>;
 using WideMatrix = MatrixOf<Wide>;
 
-/// Errors of L J_b in single precision beyond this one say that it does not serve. Entries, of which no more than a
-/// millionth is error, then are far from overflow, as are products of three of them.
+/// Bounds of the errors of L J_b in single precision beyond this one say that it does not serve. At least half a
+/// millionth of an entry is counted as its error: so entries are far from overflow, as are products of three of them.
 inline constexpr double kMostError = 1e4;
 /// Coefficients and entries of L from this size on are not kept in single precision.
-inline constexpr double kMostNarrow = 1e30;
+inline constexpr double kMostNarrow = 1e20;
 
 /// l times each of them.
 inline void multiply(const Mat3& l, WideMatrix& matrices) {
@@ -100,10 +100,12 @@ enum class BoundPrecision { single_first, full };
 /// towards a b whose S_b is not positive definite; and tried last are the first ones without the frame.
 ///
 /// remainder  R >= 0: bounds of the error of J's entries, and of the rounding errors in J_b's (each at least
-///            16 units of roundoff of the entry). Entries at most 1e60 in size. Rounding here is accounted for.
+///            16 units of roundoff of the entry; with HexMatrices and PrismMatrices also three units of the
+///            coefficients' size, times 2 q for their differences, as L is taken to the coefficients). Entries at most
+///            1e60 in size. Rounding here is accounted for.
 /// frame      regular: takes J to coordinates in which a cell without distortion has orthogonal columns.
 /// precision  single_first: a bound may be found in single precision, which takes half as long, and be lower by 1e-5
-///            of it or more.
+///            of it or more. ControlMatrices have none.
 /// Matrices   ControlMatrices, HexMatrices or PrismMatrices (not const: they keep what is worked with).
 template <class Matrices>
 double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, BoundPrecision precision);

@@ -59,10 +59,11 @@ class HexBoxes {
   static bool improve(Box&, double) { return false; }
   static Vec3 corner_point(const Box& box, int corner);
 
-  /// Chooses the box's models. Whether their errors are so large that no bound can be hoped for.
+  /// Chooses the box's models, unless it has coefficients. Whether their errors are so large that no bound can be hoped
+  /// for.
   bool is_hopeless(Box& box);
   /// The coefficients of J's, dx by the box's own coordinates, on a box whose models have been chosen; valid until the
-  /// next call.
+  /// next call, and as long as the box has its coefficients.
   HexMatrices& matrices(Box& box);
   /// Number of the matrix at a corner of the box: J there, by the model.
   std::size_t corner_matrix(const Box& box, int corner) const;

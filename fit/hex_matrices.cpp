@@ -166,6 +166,7 @@ void HexMatrices::make_narrow() {
       take_higher_size(size, relative);
       store_wide(narrow(relative), narrow_[row].data() + n * kWide);
     }
+    if (count % 2 != 0) store_wide(Narrow{}, narrow_[row].data() + count * kWide);  // the rest of the last kWideFloats
     narrow_sizes_[row] = highest_lane(size);
     if (!(narrow_sizes_[row] < kMostNarrow)) {  // no number must be infinite, even if it counts 0 times
       narrow_[row].fill(0);
@@ -185,7 +186,7 @@ HexMatrices::NarrowProduct HexMatrices::narrow_product(const Mat3& l) {
   if (!(narrow_errors_.maxCoeff() <= kMostError)) return NarrowProduct(*this);
   const Eigen::Matrix3f factors = l.cast<float>();
   const int count = num_u_ * num_w_ * kWide;
-  for (int n = 0; n < count; n += kWideFloats) {  // what is behind the end is not used
+  for (int n = 0; n < count; n += kWideFloats) {  // what is behind the end is 0, and counts 0 times
     const WideFloats x = load_wide(narrow_[0].data() + n), y = load_wide(narrow_[1].data() + n),
                      z = load_wide(narrow_[2].data() + n);
     for (int row = 0; row < 3; ++row)

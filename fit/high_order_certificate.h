@@ -22,7 +22,8 @@ namespace subvol {
 /// Holds buffers: one object per thread.
 class HighOrderCertifier {
  public:
-  /// `space` must outlive it. InputError: options out of range. max_depth above 12 (hexes) or 20 counts as that.
+  /// `space` must outlive it, and stay as it is. InputError: options out of range. max_depth above 12 (hexes) or 20
+  /// counts as that.
   explicit HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options = {});
   ~HighOrderCertifier();
   HighOrderCertifier(HighOrderCertifier&&) noexcept;

@@ -26,14 +26,11 @@ const SimplexTables& SimplexTables::get(int dimension, int degree) {
 SimplexTables::SimplexTables(int dimension, int degree)
     : index(dimension, degree), lower(dimension, degree - 1), stride(rounded_up(index.size(), kWide)) {
   for (int c = 0; c <= dimension; ++c) {
-    reduced[c].assign(index.size(), lower.size());
     for (int n = 0; n < lower.size(); ++n) {
       SimplexIndex::Exponents e = lower.exponents(n);
       ++e[c];
       raised[c].push_back(index.find(e));
-      reduced[c][raised[c].back()] = n;
     }
-    for (int n = 0; n < index.size(); ++n) exponents[c].push_back(index.exponents(n)[c]);
     raised[c].resize(rounded_up(lower.size(), kLanes));
   }
 }

@@ -19,8 +19,6 @@ class SimplexTables {
   SimplexIndex index, lower;                      ///< of the degree, and of the one below
   std::size_t stride;                             ///< a multiple of kWide, at least index.size()
   std::array<std::vector<int>, 4> raised;         ///< per index of lower: with one exponent more; filled up to kLanes
-  std::array<std::vector<int>, 4> reduced;        ///< per index: in lower with one exponent less; else lower.size()
-  std::array<std::vector<double>, 4> exponents;   ///< per index
 
   /// Of the side from vertex a to b > a. Made when first asked for.
   const SimplexHalving& halving(int a, int b) const;

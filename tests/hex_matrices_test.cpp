@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/hex_matrices.h"
 
+#include "fit/hex_boxes.h"
 #include "fit/prism_matrices.h"
 #include "fit/simplex_tables.h"
 
@@ -10,7 +11,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
+#include <vector>
 
 using namespace subvol;
 
@@ -262,4 +265,77 @@ TEST_CASE("What is too large or too small for single precision is left to double
     matrices.set(fine);
     CHECK(bound() == before);
   }
+  // An odd number of vectors: what is behind the last one must not be that of a larger box.
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const HexCoefficients large = random_hex(random, 8, 8, 1e18 * kEdges, 0.005);
+    matrices.set(large);
+    CHECK(bound() > 0);
+    HexCoefficients small = random_hex(random, 3, 3, 1e-18 * kEdges, 0.001);
+    matrices.set(small);
+    CHECK(bound() > 0);
+    const int vector = repeat % 9, lane = repeat % kWide;
+    small.coordinate(0)[vector][lane] += 1e-18 * (vector < 3 ? 8 : -8);  // J is folded there
+    matrices.set(small);
+    CHECK(bound() == 0);
+  }
+}
+
+TEST_CASE("Boxes of a hex have the Jacobian of the cell, by models and by halves of coefficients", "[hex_matrices]") {
+  Random random(6);
+  for (const Basis basis : {Basis::fourier, Basis::legendre})
+    for (const int order : {1, 3, 4, 8, 12}) {
+      std::vector<LocalMode> modes;
+      std::vector<Vec3> coefficients;
+      for (int k = 0; k <= order; ++k)
+        for (int j = 0; j <= order; ++j)
+          for (int i = 0; i <= order; ++i) {
+            LocalMode mode;
+            mode.i = static_cast<std::uint8_t>(i), mode.j = static_cast<std::uint8_t>(j);
+            mode.k = static_cast<std::uint8_t>(k);
+            modes.push_back(mode);
+            const double size = 0.03 / (1 + i * i + j * j + k * k);
+            Vec3 x = size * Vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+            if (i < 2 && j < 2 && k < 2) x += kEdges * Vec3(i, j, k);
+            coefficients.push_back(x);
+          }
+      ShapeFunctions shapes(CellKind::hex, basis, order);
+      const auto exact = [&](const Vec3& at) {
+        shapes.set_point(at);
+        Mat3 result = Mat3::Zero();
+        Vec3 gradient;
+        for (std::size_t a = 0; a < modes.size(); ++a) {
+          shapes.value(modes[a], gradient);
+          result += coefficients[a] * gradient.transpose();
+        }
+        return result;
+      };
+      HexBoxes boxes(basis, order);
+      boxes.set_cell(modes, coefficients);
+      int halved = 0, looked_at = 0;
+      for (int walk = 0; walk < 20; ++walk) {
+        HexBoxes::Box box = boxes.root();
+        for (int level = 0; level < 9; ++level) {
+          double lowest = -std::numeric_limits<double>::infinity();
+          if (!boxes.is_hopeless(box)) {
+            ++looked_at;
+            halved += box.halved > 0 && box.coefficients;
+            const HexMatrices& matrices = boxes.matrices(box);
+            const Mat3 remainder = boxes.remainder(box);
+            const Vec3 local(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
+            const Vec3 low = HexBoxes::corner_point(box, 0), high = HexBoxes::corner_point(box, 7);
+            const Mat3 wanted = exact(low + local.cwiseProduct(high - low)) * (high - low).asDiagonal();
+            const Mat3 error = (jacobian(matrices, *box.coefficients, local) - wanted).cwiseAbs();
+            CAPTURE(basis, order, level, box.halved);
+            CHECK((error.array() <= remainder.array() + 1e-14).all());
+            CHECK(boxes.determinant_scale(box) * (high - low).prod() == Approx(1));
+            lowest = walk % 2 ? 0.3 * boxes.mean_determinant() : 1e-3 * boxes.mean_determinant();
+          }
+          boxes.choose_split(box);
+          auto children = boxes.children(std::move(box), lowest);
+          box = std::move(children[uniform(random, 0, 1) < 0.5 ? 0 : 1]);
+        }
+      }
+      CHECK(looked_at > 20);
+      CHECK(halved > 10);
+    }
 }
