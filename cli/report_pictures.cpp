@@ -148,13 +148,14 @@ class Painter {
 
   std::optional<Shown> load_result() {
     const Json quality = report_.value("quality", Json::object());
-    const auto num_cells = quality.value("cells", std::size_t{0});
+    const double num_cells = quality.value("cells", 0.0);  // a report may say anything, 1e77 as well
     bool any = false;
     for (const Json& output : report_.value("outputs", Json::array())) {
       const std::string name = output.is_string() ? output.get<std::string>() : std::string();
       if (!is_volume_file(name) && !is_high_order_file(name)) continue;
       any = true;
-      if (std::optional<Shown> found = load(name); found && found->num_cells == num_cells) return found;
+      if (std::optional<Shown> found = load(name); found && static_cast<double>(found->num_cells) == num_cells)
+        return found;
     }
     notes_.push_back(any ? "the result is not shown: no output holds as many cells as the report says"
                          : "the result is not shown: there is no output with cells that can be read (.mesh, .vtk, or "

@@ -100,6 +100,14 @@ TEST_CASE("A report becomes a page that needs nothing else", "[cli]") {
 
   CHECK(place.run("report report.json -o page.html").status == 2);
   CHECK(place.run("report report.json -o page.htm").status == 2);
+
+  auto other = place.json("report.json");
+  other["quality"]["cells"] = 2.9e76;  // no integer of ours
+  place.file("other.json", other.dump());
+  const Run with_other = place.run("report other.json -o other.html");
+  CHECK(with_other.status == 0);
+  CHECK(with_other.err.find("no output holds as many cells as the report says") != std::string::npos);
+
   std::filesystem::remove(place / "a&b.mesh");
   const Run without = place.run("report report.json -o page.html --force");
   CHECK(without.status == 0);
