@@ -126,18 +126,17 @@ Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
   return l + (kMargin - least) / w.squaredNorm() * v * w.transpose();
 }
 
-/// The lowest of the leading minors and largest entries of many symmetric matrices T_b = sym(m_b) - diag(shift).
+/// The lowest of the leading minors and largest entries of many symmetric matrices 2 T_b, T_b = sym(m_b) - diag(shift).
 template <class Vector>
 struct Extremes {
   explicit Extremes(const Vec3& shift)
-      : start0(number(-shift[0])), start1(number(-shift[1])), start2(number(-shift[2])) {
+      : start0(number(-2 * shift[0])), start1(number(-2 * shift[1])), start2(number(-2 * shift[2])) {
     first = second = third = Vector{} + std::numeric_limits<Number>::infinity();
   }
   void take(const MatrixOf<Vector>& m) {
-    constexpr Number kHalf = 0.5;
-    const Vector t00 = m[0][0] + start0, t11 = m[1][1] + start1, t22 = m[2][2] + start2;
-    const Vector t01 = kHalf * (m[0][1] + m[1][0]), t02 = kHalf * (m[0][2] + m[2][0]),
-                 t12 = kHalf * (m[1][2] + m[2][1]);
+    const Vector t00 = (m[0][0] + m[0][0]) + start0, t11 = (m[1][1] + m[1][1]) + start1,
+                 t22 = (m[2][2] + m[2][2]) + start2;
+    const Vector t01 = m[0][1] + m[1][0], t02 = m[0][2] + m[2][0], t12 = m[1][2] + m[2][1];
     const Vector minor = t00 * t11 - t01 * t01;
     take_lower(first, t00);
     take_lower(second, minor);
@@ -166,7 +165,7 @@ struct Extremes {
     const double least = to_third * lowest_lane(third) - 100 * kRoundoff * largest * largest * largest;
     return largest < 1e30 && lowest_lane(first) > 0 &&
                    to_second * lowest_lane(second) > 9 * kRoundoff * largest * largest && least > 0
-               ? least
+               ? least / 8
                : 0;
   }
 
@@ -187,6 +186,30 @@ Bound failed_at(std::size_t begin, const WideMatrix& m, const Extremes<Wide>& ow
   return {0, lanes_within(det, 0) != 0, begin + lowest_place(own.lowest_minor())};  // S_b > 0 has det J_b > 0
 }
 
+/// Takes the T_b of `count` matrices in. The number of one that is not positive definite, at which it ends, or kNone.
+template <class Vector, class Product>
+std::size_t take_until_failure(const Product& product, std::size_t count, const Vec3& shift,
+                               Extremes<Vector>& extremes) {
+  constexpr std::size_t kLanes = sizeof(Vector) / sizeof(Vector{}[0]);
+  MatrixOf<Vector> m;
+  const auto place = [&](std::size_t b) { return std::min(b, count - kLanes); };  // the last lanes overlap
+  for (std::size_t block = 0; block < count; block += kBlock * kLanes) {
+    const std::size_t end = std::min(count, block + kBlock * kLanes);
+    for (std::size_t b = block; b < end; b += kLanes) {
+      product.load(place(b), m);
+      extremes.take(m);
+    }
+    if (extremes.are_positive()) continue;
+    for (std::size_t b = block; b < end; b += kLanes) {
+      Extremes<Vector> own(shift);
+      product.load(place(b), m);
+      own.take(m);
+      if (!own.are_positive()) return place(b) + lowest_place(own.lowest_minor());
+    }
+  }
+  return kNone;
+}
+
 /// Twice what must be taken from the diagonal of S_b, where |error of L J D| <= g.
 Vec3 sums_of_both(const Mat3& g) { return g.rowwise().sum() + g.colwise().sum().transpose(); }
 
@@ -201,33 +224,13 @@ double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift,
   } else {
     constexpr double kMostScale = 1e3, kMostShift = 1e10;  // far from underflow and overflow
     if (!(scale.maxCoeff() < kMostScale)) return 0;
-    using Vector = typename Matrices::NarrowProduct::Vector;
-    constexpr std::size_t kLanes = sizeof(Vector) / sizeof(float);
     const auto product = matrices.narrow_product(unscaled);
     const Mat3 g = scale.cwiseProduct(product.errors()) * scale.transpose();
     const Vec3 more = (1 + 1e-5) * (shift + 0.5 * sums_of_both(g)).cwiseQuotient(scale.cwiseAbs2());
     if (!(product.errors().maxCoeff() <= kMostError && more.maxCoeff() <= kMostShift)) return 0;
-    Extremes<Vector> extremes(more);
-    MatrixOf<Vector> m;
-    const std::size_t count = matrices.size();
-    for (std::size_t block = 0; block < count; block += kBlock * kLanes) {
-      const std::size_t end = std::min(count, block + kBlock * kLanes);
-      for (std::size_t b = block; b < end; b += kLanes) {
-        product.load(std::min(b, count - kLanes), m);
-        extremes.take(m);
-      }
-      if (extremes.are_positive()) continue;
-      for (std::size_t b = block; b < end; b += kLanes) {
-        const std::size_t begin = std::min(b, count - kLanes);
-        Extremes<Vector> own(more);
-        product.load(begin, m);
-        own.take(m);
-        if (own.are_positive()) continue;
-        in_the_way = begin + lowest_place(own.lowest_minor());
-        return 0;
-      }
-    }
-    return extremes.determinant(scale);
+    Extremes<typename Matrices::NarrowProduct::Vector> extremes(more);
+    in_the_way = take_until_failure(product, matrices.size(), more, extremes);
+    return in_the_way == kNone ? extremes.determinant(scale) : 0;
   }
 }
 
@@ -237,7 +240,7 @@ double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift,
 /// in_the_way  number of the matrix to begin with: one that another L failed at is likely to be in the way again
 template <class Matrices>
 Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices, const Mat3& remainder,
-               BoundPrecision precision, std::size_t in_the_way) {
+               const BoundOptions& options, std::size_t in_the_way) {
   constexpr double kLeastDeterminant = 1e-3;  // of L, by its largest entry cubed: so it is good to 1e-11
   l /= l.cwiseAbs().maxCoeff();
   if (!(l.determinant() > kLeastDeterminant)) return {0, false};
@@ -253,48 +256,34 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
   const Mat3 unscaled = (longest * scale).cwiseInverse().asDiagonal() * l;
   const Vec3 unscaled_shift = shift.cwiseQuotient(scale.cwiseAbs2());
   const std::size_t count = matrices.size();
-  WideMatrix m;
-  const auto failed = [&](std::size_t begin) -> std::optional<Bound> {
+  const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
+    if (b == kNone) return {};
+    const std::size_t begin = std::min(b / kWide * kWide, count - kWide);
+    WideMatrix m;
+    matrices.load(begin, m);
+    multiply(unscaled, m);
     Extremes<Wide> own(unscaled_shift);
     own.take(m);
     if (own.are_positive()) return {};
     return failed_at(begin, m, own);
   };
-  const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
-    if (b == kNone) return {};
-    const std::size_t begin = std::min(b / kWide * kWide, count - kWide);
-    matrices.load(begin, m);
-    multiply(unscaled, m);
-    return failed(begin);
-  };
   const auto bound = [&](double determinant) {
     return Bound{determinant * (1 - 1e-11) * lengths.prod() / l.determinant(), true};
   };
   if (const auto fails = failed_near(in_the_way)) return *fails;
-  for (const std::size_t corner : matrices.corners())
-    if (const auto fails = failed_near(corner)) return *fails;
+  if (in_the_way != kNone || options.corners_first)
+    for (const std::size_t corner : matrices.corners())
+      if (const auto fails = failed_near(corner)) return *fails;
   in_the_way = kNone;
-  if (precision == BoundPrecision::single_first) {
+  if (options.single_first) {
     if (const double determinant = narrow_bound(matrices, unscaled, shift, scale, in_the_way); determinant > 0)
       return bound(determinant);
     if (const auto fails = failed_near(in_the_way)) return *fails;
   }
 
-  const auto product = matrices.times(unscaled);
   Extremes<Wide> extremes(unscaled_shift);
-  for (std::size_t block = 0; block < count; block += kBlock * kWide) {
-    const std::size_t end = std::min(count, block + kBlock * kWide);
-    const auto place = [&](std::size_t b) { return std::min(b, count - kWide); };  // the last lanes overlap
-    for (std::size_t b = block; b < end; b += kWide) {
-      product.load(place(b), m);
-      extremes.take(m);
-    }
-    if (extremes.are_positive()) continue;
-    for (std::size_t b = block; b < end; b += kWide) {
-      product.load(place(b), m);
-      if (const auto fails = failed(place(b))) return *fails;
-    }
-  }
+  in_the_way = take_until_failure(matrices.times(unscaled), count, unscaled_shift, extremes);
+  if (in_the_way != kNone) return failed_near(in_the_way).value_or(Bound{0, false});
   const double determinant = extremes.determinant(scale);
   return determinant > 0 ? bound(determinant) : Bound{0, false};
 }
@@ -316,19 +305,19 @@ Mat3 ControlMatrices::mean() const {
 }
 
 template <class Matrices>
-double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, BoundPrecision precision) {
-  constexpr int kMostTurns = 3;  // more cost what they save (measured)
+double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, const BoundOptions& options) {
+  constexpr int kMostTurns = 3;  // more cost what they save, and so does an end as soon as e is low (measured)
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
   if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
   const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
-    return bound_by(l, lengths, mean, matrices, remainder, precision, in_the_way);
+    return bound_by(l, lengths, mean, matrices, remainder, options, in_the_way);
   };
   const bool is_framed = frame != Mat3::Identity();
 
   const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
   const Vec3 framed_lengths = is_framed ? Vec3(framed.colwise().norm().transpose()) : lengths;
-  const Mat3 to_frame = scale.asDiagonal() * frame.inverse().transpose();
+  const Mat3 to_frame = is_framed ? Mat3(scale.asDiagonal() * frame.inverse().transpose()) : Mat3(scale.asDiagonal());
   const Mat3 rotation = unrotate(framed * framed_lengths.cwiseInverse().asDiagonal());
   Bound result = bound(to_frame * framed_lengths.asDiagonal() * rotation);
   if (result.is_final) return result.value;
@@ -346,8 +335,8 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   return result.value;
 }
 
-template double determinant_bound(ControlMatrices&, const Mat3&, const Mat3&, BoundPrecision);
-template double determinant_bound(HexMatrices&, const Mat3&, const Mat3&, BoundPrecision);
-template double determinant_bound(PrismMatrices&, const Mat3&, const Mat3&, BoundPrecision);
+template double determinant_bound(ControlMatrices&, const Mat3&, const Mat3&, const BoundOptions&);
+template double determinant_bound(HexMatrices&, const Mat3&, const Mat3&, const BoundOptions&);
+template double determinant_bound(PrismMatrices&, const Mat3&, const Mat3&, const BoundOptions&);
 
 }  // namespace subvol

@@ -81,7 +81,12 @@ class ControlMatrices {
   std::vector<Wide> entries_;  // for its alignment
 };
 
-enum class BoundPrecision { single_first, full };
+struct BoundOptions {
+  /// A bound may be found in single precision, which takes half as long, and be lower by 1e-5 of it or more.
+  bool single_first = false;
+  /// Matrices at corners are looked at before all others at once: for boxes of which no bound is likely.
+  bool corners_first = false;
+};
 
 /// A lower bound of det J over the box, > 0; or 0 if none is found.
 ///
@@ -104,10 +109,10 @@ enum class BoundPrecision { single_first, full };
 ///            coefficients' size, times 2 q for their differences, as L is taken to the coefficients). Entries at most
 ///            1e60 in size. Rounding here is accounted for.
 /// frame      regular: takes J to coordinates in which a cell without distortion has orthogonal columns.
-/// precision  single_first: a bound may be found in single precision, which takes half as long, and be lower by 1e-5
-///            of it or more. ControlMatrices have none.
+/// options    Ways to it: ControlMatrices have no single precision, and no corners.
 /// Matrices   ControlMatrices, HexMatrices or PrismMatrices (not const: they keep what is worked with).
 template <class Matrices>
-double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, BoundPrecision precision);
+double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame,
+                         const BoundOptions& options = {});
 
 }  // namespace subvol

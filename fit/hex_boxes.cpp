@@ -18,6 +18,9 @@ constexpr double kHopelessError = 0.55;
 /// Boxes that keep their coefficients (15 KB) until they are halved.
 constexpr int kMostKept = 64;
 
+/// Which of the first kWide entries of a matrix, by columns, are of that column.
+constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
+
 /// Columns of a contraction that are worked on at a time.
 constexpr int kSome = 5;
 
@@ -27,15 +30,16 @@ std::vector<int> model_degrees(Basis basis, int order) {
   return {5, kWide - 1};
 }
 
-/// out[o out_stride + m] = sum_k table[k kStride + o] in[k in_stride + m], o < num_out, for `length` numbers m, rounded
-/// up to whole vectors; k < n[m / kWide].
+/// out[o out_stride + m] = in[m] + sum_{k > 0} table[k kStride + o] in[k in_stride + m], o < num_out, for `length`
+/// numbers m, rounded up to whole vectors; k < n[m / kWide].
 template <int num_out>
 void contract_to(const double* table, const double* in, int in_stride, const int* n, int length, double* out,
                  int out_stride) {
   for (int m = 0; m < length; m += kWide) {
-    Wide sums[num_out] = {};
+    Wide sums[num_out];
+    std::fill_n(sums, num_out, load_wide(in + m));
     const int end = n[m / kWide];
-    for (int k = 0; k < end; ++k) {
+    for (int k = 1; k < end; ++k) {
       const Wide x = load_wide(in + k * in_stride + m);
       for (int o = 0; o < num_out; ++o) sums[o] += table[k * LineModels::kStride + o] * x;
     }
@@ -60,7 +64,7 @@ HexBoxes::HexBoxes(Basis basis, int order)
   tiers_[2] = tiers_[0];
   const int most = tiers_[0].back()->degree() + 1, face = n_ * n_;
   for (int d = 0; d < 3; ++d) {
-    modes_[d].assign(face * n_ + kWide, 0);
+    modes_[d].assign(row_ * n_ + kWide, 0);
     after_w_[d].assign(most * row_ + kWide, 0);
     after_v_[d].assign((n_ + kSome) * most, Wide{});
     is_used_[d].assign(lanes_, 0);
@@ -68,13 +72,12 @@ HexBoxes::HexBoxes(Basis basis, int order)
   bounds_ = tiers_[1][0]->bounds();
   slope_bounds_ = tiers_[1][0]->slope_bounds();
   lane_bounds_.assign(lanes_, 0);
-  inverse_bounds_ = inverse_slope_bounds_ = is_mode_ = mode_slope_bounds_ = mode_bounds_ = lane_bounds_;
-  weights_.assign(27 * lanes_, 0);
+  inverse_bounds_ = inverse_slope_bounds_ = mode_slope_bounds_ = mode_bounds_ = lane_bounds_;
+  weights_.assign(3 * n_ * kWeights, 0);
   std::copy_n(bounds_.begin(), n_, lane_bounds_.begin());
   std::copy_n(bounds_.begin() + 2, n_ - 2, mode_bounds_.begin() + 2);
   std::copy_n(slope_bounds_.begin() + 2, n_ - 2, mode_slope_bounds_.begin() + 2);
   for (int i = 2; i < n_; ++i) {
-    is_mode_[i] = 1;
     inverse_bounds_[i] = 1 / bounds_[i];
     inverse_slope_bounds_[i] = 1 / slope_bounds_[i];
   }
@@ -90,9 +93,9 @@ void HexBoxes::set_modes(std::span<const LocalMode> modes) {
   std::fill(used_.begin(), used_.end(), 0);
   places_.clear();
   for (const LocalMode& mode : modes) {
-    const int at = (mode.k * n_ + mode.j) * n_ + mode.i;
-    places_.push_back(at);
-    int& used = used_[at % (n_ * n_) / kWide];
+    const int at = mode.j * n_ + mode.i;
+    places_.push_back(mode.k * row_ + at);
+    int& used = used_[at / kWide];
     used = std::max(used, mode.k + 1);
   }
 }
@@ -108,11 +111,25 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   for (int corner = 0; corner < 8; ++corner)
     for (int row = 0; row < 3; ++row)
       for (int d = 0; d < 3; ++d) {
-        const double x = modes_[row][((corner >> 2) * n_ + (corner >> 1 & 1)) * n_ + (corner & 1)];
+        const double x = modes_[row][(corner >> 2) * row_ + (corner >> 1 & 1) * n_ + (corner & 1)];
         edges(row, d) += corner >> d & 1 ? x : -x;
       }
   mean_edges_ = 0.25 * edges.colwise().norm().transpose();
+  inverse_mean_edges_ = mean_edges_.cwiseInverse();
   make_weights();
+  take_steps();
+}
+
+/// By 1, x, N_2, ... in all directions, instead of N_0, N_1, N_2, ...: for 1 nothing must be multiplied.
+void HexBoxes::take_steps() {
+  for (int d = 0; d < 3; ++d) {
+    double* x = modes_[d].data();
+    for (int m = 0; m < n_ * n_; ++m) x[row_ + m] -= x[m];
+    for (int k = 0; k < n_; ++k, x += row_) {
+      for (int i = 0; i < n_; ++i) x[n_ + i] -= x[i];
+      for (int j = 0; j < n_; ++j) x[j * n_ + 1] -= x[j * n_];
+    }
+  }
 }
 
 /// |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i|, |sum_i x_i N_i'| <= |x_1 - x_0| + ...: that for
@@ -124,7 +141,7 @@ void HexBoxes::make_weights() {
     return x;
   };
   // Of the numbers in lanes.
-  const auto modes_along = [&](const double* x, const std::vector<double>& bounds) {
+  const auto modes_along = [&](const double* x, const AlignedDoubles& bounds) {
     Wide sum{};
     for (int i = 0; i < lanes_; i += kWide) sum += load_wide(x + i) * load_wide(bounds.data() + i);
     return sum_of_lanes(sum);
@@ -138,7 +155,7 @@ void HexBoxes::make_weights() {
     const double* modes = modes_[row].data();
     Wide all{};
     for (int first = 0; first < lanes_; first += kWide) {
-      const auto at = [&](int j, int k) { return load_wide(modes + (k * n_ + j) * n_ + first); };
+      const auto at = [&](int j, int k) { return load_wide(modes + k * row_ + j * n_ + first); };
       const Wide bounds = load_wide(lane_bounds_.data() + first);
       for (int j = 0; j < n_; ++j) {
         const Wide x0 = at(j, 0), x1 = at(j, 1);
@@ -166,7 +183,7 @@ void HexBoxes::make_weights() {
         const auto of = [&](int m) { return load_wide(sums[column] + m * lanes_ + first); };
         Wide sum = larger(of(0), of(1));
         for (int m = 2; m < n_; ++m) sum += value[m] * of(m);
-        store_wide(sum * load_wide(is_mode_.data() + first), weights(0, row, column) + first);
+        for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i) weight(0, i, row, column) = sum[i - first];
       }
     }
     total_[row] = sum_of_lanes(all);
@@ -174,7 +191,7 @@ void HexBoxes::make_weights() {
     // |a_1jk - a_0jk|, by k and j, and these numbers' sum over k.
     for (int k = 0; k < n_; ++k)
       for (int j = 0; j < n_; ++j) {
-        const double* x = modes + (k * n_ + j) * n_;
+        const double* x = modes + k * row_ + j * n_;
         steps[k * lanes_ + j] = std::abs(x[1] - x[0]);
       }
     for (int first = 0; first < lanes_; first += kWide) {
@@ -184,20 +201,17 @@ void HexBoxes::make_weights() {
       store_wide(sum, steps_by_j + first);
     }
     for (int m = 2; m < n_; ++m) {
-      weights(1, row, 0)[m] = modes_along(by_j + m * lanes_, mode_slope_bounds_) + steps_by_j[m];
-      weights(1, row, 1)[m] = along(by_j + m * lanes_);
-      weights(1, row, 2)[m] = along(by_j_slope + m * lanes_);
-      weights(2, row, 0)[m] = modes_along(by_k + m * lanes_, mode_slope_bounds_) + along(steps + m * lanes_);
-      weights(2, row, 1)[m] = along(by_k_slope + m * lanes_);
-      weights(2, row, 2)[m] = along(by_k + m * lanes_);
+      weight(1, m, row, 0) = modes_along(by_j + m * lanes_, mode_slope_bounds_) + steps_by_j[m];
+      weight(1, m, row, 1) = along(by_j + m * lanes_);
+      weight(1, m, row, 2) = along(by_j_slope + m * lanes_);
+      weight(2, m, row, 0) = modes_along(by_k + m * lanes_, mode_slope_bounds_) + along(steps + m * lanes_);
+      weight(2, m, row, 1) = along(by_k_slope + m * lanes_);
+      weight(2, m, row, 2) = along(by_k + m * lanes_);
     }
   }
   for (int d = 0; d < 3; ++d)
-    for (int i = 0; i < lanes_; i += kWide) {
-      Wide all{};
-      for (int row = 0; row < 3; ++row) all += load_wide(weights(d, row, d) + i);
-      store_wide(all > 0 ? Wide{} + 1 : Wide{}, is_used_[d].data() + i);
-    }
+    for (int i = 2; i < n_; ++i)
+      is_used_[d][i] = weight(d, i, 0, d) > 0 || weight(d, i, 1, d) > 0 || weight(d, i, 2, d) > 0;
 }
 
 const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
@@ -208,24 +222,29 @@ const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
   result.cell = cell_;
   const LineModels::Level& line = tiers_[direction][tier]->level(level);
   const LineModels::Errors& errors = line.errors[zone];
-  const double* used = is_used_[direction].data();
-  Wide sums[3][3] = {}, growth{}, inflation{};
+  // Entries, by columns: of the column along the direction, and of the others.
+  const Wide is_along = kIsColumn[direction], is_across = 1 - is_along;
+  Wide entries{};
+  double last = 0;
+  for (int i = 2; i < n_; ++i) {
+    const double* weights = &weight(direction, i, 0, 0);
+    entries += (errors.slope[i] * is_along + errors.value[i] * is_across) * load_wide(weights);
+    last += (direction == 2 ? errors.slope[i] : errors.value[i]) * weights[kWide];
+  }
+  store_wide(entries, result.entries.data());
+  result.entries(2, 2) = last;
+  Wide growth{}, inflation{};
   for (int i = 0; i < lanes_; i += kWide) {
     const Wide value = load_wide(errors.value.data() + i), slope = load_wide(errors.slope.data() + i);
-    const Wide is_used = load_wide(used + i), inverse_bound = load_wide(inverse_bounds_.data() + i);
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 3; ++column)
-        sums[row][column] +=
-            (column == direction ? slope : value) * load_wide(weights(direction, row, column) + i);
-    take_higher(growth, is_used * value * inverse_bound);
+    const Wide is_used = load_wide(is_used_[direction].data() + i);
+    const Wide inverse_bound = is_used * load_wide(inverse_bounds_.data() + i);
+    take_higher(growth, value * inverse_bound);
     take_higher(growth, is_used * slope * load_wide(inverse_slope_bounds_.data() + i));
-    take_higher(inflation, is_used * load_wide(line.largest_coefficient.data() + i) * inverse_bound);
+    take_higher(inflation, load_wide(line.largest_coefficient.data() + i) * inverse_bound);
   }
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column) result.entries(row, column) = sum_of_lanes(sums[row][column]);
   result.growth = 1 + highest_lane(growth);
   result.inflation = std::max(1.0, highest_lane(inflation));
-  result.size = line.exact ? 0 : result.entries.colwise().sum().cwiseQuotient(mean_edges_.transpose()).sum();
+  result.size = line.exact ? 0 : result.entries.colwise().sum().dot(inverse_mean_edges_);
   return result;
 }
 
@@ -263,7 +282,7 @@ void HexBoxes::choose_split(Box& box) {
     const Mat3 varies = matrices_.variation();
     for (int d = 0; d < 3; ++d)
       for (int column = 0; column < 3; ++column)
-        variation[d] += varies(d, column) * parts(box.levels[column]) / mean_edges_[column];
+        variation[d] += varies(d, column) * parts(box.levels[column]) * inverse_mean_edges_[column];
   }
   for (int d = 0; d < 3; ++d)
     if (box.levels[d] < LineModels::kMaxLevel &&
@@ -347,7 +366,7 @@ void HexBoxes::contract_w(const Box& box) {
   const int face = n_ * n_;
   const Contraction contract = contraction(q1(box, 2));
   for (int d = 0; d < 3; ++d)  // runs over the end of face
-    contract(table, modes_[d].data(), face, used_.data(), face, after_w_[d].data(), row_);
+    contract(table, modes_[d].data(), row_, used_.data(), face, after_w_[d].data(), row_);
 }
 
 void HexBoxes::contract_v(const Box& box) {
@@ -358,8 +377,9 @@ void HexBoxes::contract_v(const Box& box) {
     for (int w = 0; w < num_w; ++w) {
       const double* in = after_w_[d].data() + w * row_;
       for (int i = 0; i < n_; i += kSome) {  // runs over the end: what comes from there is written over, or not used
-        Wide sums[kSome] = {};
-        for (int j = 0; j < n_; ++j) {
+        Wide sums[kSome];
+        for (int s = 0; s < kSome; ++s) sums[s] = Wide{} + in[i + s];
+        for (int j = 1; j < n_; ++j) {
           const Wide x = load_wide(table + j * LineModels::kStride);
           for (int s = 0; s < kSome; ++s) sums[s] += in[j * n_ + i + s] * x;
         }

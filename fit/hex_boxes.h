@@ -100,6 +100,7 @@ class HexBoxes {
   bool shares(const Box& box, int direction) const;
   void set_modes(std::span<const LocalMode> modes);
   void make_weights();
+  void take_steps();
   const LineError& line_error(const Box& box, int direction);
   double error_size(const Box& box, int direction) {
     return line_error(box, direction).size;
@@ -117,31 +118,32 @@ class HexBoxes {
   int contracted_ = 0;                           // and how many of its directions, from w on: 2 at the most
   SpareCoefficients spare_;
   int num_coefficients_ = 0;                     // that were made
-  std::array<std::vector<double>, 3> modes_;     // x, y, z of a_ijk at (k n + j) n + i
+  std::array<AlignedDoubles, 3> modes_;          // x, y, z of a_ijk at k row_ + j n + i
   const LocalMode* of_modes_ = nullptr;          // and for which modes,
   std::size_t num_modes_ = 0;
   std::vector<int> places_;                      // where each of them is
   std::vector<int> used_;                        // of every kWide numbers j n + i: first k from where on all are 0
   std::vector<int> all_used_;                    // n_ for every kWide numbers of a row
-  std::array<std::vector<double>, 3> after_w_;   // at o_w row_ + j n + i
+  std::array<AlignedDoubles, 3> after_w_;        // at o_w row_ + j n + i
   std::array<std::vector<Wide>, 3> after_v_;     // at i q1_w + o_w, lane o_v
   HexMatrices matrices_;
   Vec3 mean_edges_;                              // lengths of the linear part's mean columns
-  // At i >= 2, 0 elsewhere: bounds of the sums over the other two numbers of a_ijk times their functions in that column
-  // of J.
-  double* weights(int direction, int row, int column) {
-    return weights_.data() + ((direction * 3 + row) * 3 + column) * lanes_;
+  Vec3 inverse_mean_edges_;
+  // i >= 2: bound of the sum over the other two numbers of a_ijk times their functions in that entry of J.
+  double& weight(int direction, int i, int row, int column) {
+    return weights_[static_cast<std::size_t>((direction * n_ + i) * kWeights + 3 * column + row)];
   }
-  std::vector<double> weights_;
-  std::array<std::vector<double>, 3> is_used_;   // by direction: 1 where they are not 0
+  static constexpr int kWeights = 2 * kWide;  // a matrix, by columns, in whole vectors
+  AlignedDoubles weights_;
+  std::array<AlignedDoubles, 3> is_used_;        // by direction: 1 where they are not 0
   Vec3 total_;                                   // sum of |a_ijk| times all three bounds
   std::size_t cell_ = 0;                         // number of the current one, from 1
   using Zones = std::array<LineError, LineModels::kZones>;
   std::array<std::array<std::array<Zones, kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
   LineModels::PerFunction bounds_, slope_bounds_;  // of N_i and N_i'
   // In lanes: bounds of all N_i; from 2 on, of these, of their slopes, ...
-  std::vector<double> lane_bounds_, mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_, is_mode_;
-  std::vector<double> sums_;                       // scratch of make_weights
+  AlignedDoubles lane_bounds_, mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_;
+  AlignedDoubles sums_;                            // scratch of make_weights
 };
 
 }  // namespace subvol

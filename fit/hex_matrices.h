@@ -116,7 +116,7 @@ class HexMatrices {
   struct Weights {
     /// Each vector: o and q - o along u, and along w.
     std::array<std::array<double, 4>, kMostVectors> of;
-    std::array<std::array<float, kMostVectors * kWide>, 4> narrow;  ///< each coefficient
+    alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide>, 4> narrow;  ///< each coefficient
   };
   const HexCoefficients* of_ = nullptr;
   int num_u_ = 0, num_w_ = 0;         // of of_
@@ -125,9 +125,9 @@ class HexMatrices {
       all_weights_;
   HexCoefficients product_;
   bool is_narrowed_ = false;
-  std::array<std::array<float, kMostVectors * kWide>, 3> narrow_{};  // coefficients less that in the middle
+  alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide>, 3> narrow_{};  // coefficients less that in the middle
   Vec3 narrow_sizes_;                                                // the largest ones of these
-  std::array<std::array<float, kMostVectors * kWide + 2 * kNarrowMargin>, 3> narrow_product_{};
+  alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide + 2 * kNarrowMargin>, 3> narrow_product_{};
   Vec3 narrow_errors_;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/basis.h"
+#include "fit/wide.h"
 
 #include <algorithm>
 #include <array>
@@ -36,7 +37,7 @@ class LineModels {
     std::array<Errors, kZones> errors;  ///< by zone
     PerFunction largest_coefficient{};  ///< max_o |b_io|
     bool exact = true;                  ///< there are no errors
-    std::vector<double> coefficients;   ///< b_io at (index (order + 1) + i) kStride + o
+    AlignedDoubles coefficients;        ///< b_io at (index (order + 1) + i) kStride + o
   };
 
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it

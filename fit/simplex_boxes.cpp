@@ -109,8 +109,7 @@ bool SimplexBoxes::is_stuck_at(const Box& box, const Mat3& mean) {
   mean_.resize(kWide);
   for (int row = 0; row < 3; ++row)
     for (int d = 0; d < 3; ++d) std::fill_n(mean_.entries(row, d), kWide, mean(row, d));
-  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs(), frame(box),
-                                                         BoundPrecision::full) == 0;
+  return mean.determinant() > 0 && determinant_bound(mean_, lasting * sides(box).cwiseAbs(), frame(box)) == 0;
 }
 
 SimplexBoxes::Box SimplexBoxes::root() {

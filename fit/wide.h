@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
+#include <new>
 #include <type_traits>
+#include <vector>
 
 #ifdef __AVX512F__
 #include <immintrin.h>
@@ -40,14 +43,44 @@ inline WideFloats load_wide(const float* from) {
 }
 inline void store_wide(const WideFloats& value, float* to) { std::memcpy(to, &value, sizeof value); }
 
-/// Lane by lane the lower (higher) of a and b, in a.
+/// Begins where a cache line does, so that vectors of whole lines do not cross any.
+template <class Number>
+struct AlignedAllocator {
+  using value_type = Number;
+  static constexpr std::align_val_t kAlignment{sizeof(Wide)};
+  AlignedAllocator() = default;
+  template <class Other>
+  explicit AlignedAllocator(const AlignedAllocator<Other>&) {}
+  Number* allocate(std::size_t count) {
+    return static_cast<Number*>(::operator new(count * sizeof(Number), kAlignment));
+  }
+  void deallocate(Number* numbers, std::size_t) { ::operator delete(numbers, kAlignment); }
+  bool operator==(const AlignedAllocator&) const = default;
+};
+using AlignedDoubles = std::vector<double, AlignedAllocator<double>>;
+
+/// Lane by lane the lower (higher) of a and b, in a; a itself where b is not a number.
 template <class Vector>
 void take_lower(Vector& a, const Vector& b) {
+#if defined __AVX512F__ && defined __AVX512VL__
+  if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_min_pd((__m512d)b, (__m512d)a);
+  else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_min_ps((__m256)b, (__m256)a);
+  else if constexpr (std::is_same_v<Vector, WideFloats>) a = (Vector)_mm512_min_ps((__m512)b, (__m512)a);
+  else a = b < a ? b : a;
+#else
   a = b < a ? b : a;
+#endif
 }
 template <class Vector>
 void take_higher(Vector& a, const Vector& b) {
+#if defined __AVX512F__ && defined __AVX512VL__
+  if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_max_pd((__m512d)b, (__m512d)a);
+  else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_max_ps((__m256)b, (__m256)a);
+  else if constexpr (std::is_same_v<Vector, WideFloats>) a = (Vector)_mm512_max_ps((__m512)b, (__m512)a);
+  else a = b > a ? b : a;
+#else
   a = b > a ? b : a;
+#endif
 }
 
 /// Lane by lane |x| where that is higher than a >= 0, in a.

@@ -228,8 +228,8 @@ TEST_CASE("Bounds of det J hold in either precision, at any size", "[hex_matrice
         random_hex(random, repeat % 2 ? 6 : 8, repeat % 3 ? 6 : 8, edges, uniform(random, 0, 0.02));
     matrices.set(hex);
     const Mat3 remainder = 1e-14 * edges.cwiseAbs().rowwise().sum().replicate(1, 3);
-    const double full = determinant_bound(matrices, remainder, Mat3::Identity(), BoundPrecision::full);
-    const double single = determinant_bound(matrices, remainder, Mat3::Identity(), BoundPrecision::single_first);
+    const double full = determinant_bound(matrices, remainder, Mat3::Identity());
+    const double single = determinant_bound(matrices, remainder, Mat3::Identity(), {.single_first = true});
     CAPTURE(repeat, size, flat, full, single);
     CHECK((full > 0) == (single > 0));
     if (!(full > 0)) continue;
@@ -249,7 +249,7 @@ TEST_CASE("What is too large or too small for single precision is left to double
   HexMatrices matrices;
   const HexCoefficients fine = random_hex(random, 6, 6, kEdges, 0.005);
   const auto bound = [&] {
-    return determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), BoundPrecision::single_first);
+    return determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), {.single_first = true});
   };
   matrices.set(fine);
   const double before = bound();
