@@ -18,6 +18,8 @@ constexpr double kHopelessError = 0.55;
 /// Boxes that keep their coefficients (15 KB) until they are halved.
 constexpr int kMostKept = 64;
 
+Wide size(const Wide& x) { return x < 0 ? -x : x; }
+
 /// Which of the first kWide entries of a matrix, by columns, are of that column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
 
@@ -130,12 +132,22 @@ void HexBoxes::take_steps() {
       for (int j = 0; j < n_; ++j) x[j * n_ + 1] -= x[j * n_];
     }
   }
+  for (int d = 0; d < 3; ++d) {
+    Wide total{};
+    for (int k = 0; k < n_; ++k)
+      for (int j = 0; j < n_; ++j) {
+        const double* x = modes_[d].data() + k * row_ + j * n_;
+        Wide sum{};
+        for (int i = 0; i < lanes_; i += kWide) sum += load_wide(lane_bounds_.data() + i) * size(load_wide(x + i));
+        total += bounds_[k] * bounds_[j] * sum;
+      }
+    total_[d] = sum_of_lanes(total);
+  }
 }
 
 /// |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i|, |sum_i x_i N_i'| <= |x_1 - x_0| + ...: that for
 /// two directions, one after the other. Numbers i are in lanes.
 void HexBoxes::make_weights() {
-  const auto size = [](const Wide& x) { return x < 0 ? -x : x; };
   const auto larger = [](Wide x, const Wide& y) {
     take_higher(x, y);
     return x;
@@ -153,20 +165,17 @@ void HexBoxes::make_weights() {
   const double *value = bounds_.data(), *slope = slope_bounds_.data();
   for (int row = 0; row < 3; ++row) {
     const double* modes = modes_[row].data();
-    Wide all{};
     for (int first = 0; first < lanes_; first += kWide) {
       const auto at = [&](int j, int k) { return load_wide(modes + k * row_ + j * n_ + first); };
-      const Wide bounds = load_wide(lane_bounds_.data() + first);
       for (int j = 0; j < n_; ++j) {
         const Wide x0 = at(j, 0), x1 = at(j, 1);
-        Wide sum = larger(size(x0), size(x1)), slopes = size(x1 - x0), total = size(x0) + size(x1);
+        Wide sum = larger(size(x0), size(x1)), slopes = size(x1 - x0);
         for (int k = 2; k < n_; ++k) {
           const Wide x = size(at(j, k));
-          sum += value[k] * x, slopes += slope[k] * x, total += value[k] * x;
+          sum += value[k] * x, slopes += slope[k] * x;
         }
         store_wide(sum, by_j + j * lanes_ + first);
         store_wide(slopes, by_j_slope + j * lanes_ + first);
-        all += value[j] * bounds * total;
       }
       for (int k = 0; k < n_; ++k) {
         const Wide x0 = at(0, k), x1 = at(1, k);
@@ -186,7 +195,6 @@ void HexBoxes::make_weights() {
         for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i) weight(0, i, row, column) = sum[i - first];
       }
     }
-    total_[row] = sum_of_lanes(all);
 
     // |a_1jk - a_0jk|, by k and j, and these numbers' sum over k.
     for (int k = 0; k < n_; ++k)
@@ -412,9 +420,9 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, halvings, L, differences, and the 16
-  // asked for.
-  const double roundings = 3 * (n_ + 4) + 1 + kWide * box.halved + 3 + 8 + 16;
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, three steps, halvings, L, differences,
+  // and the 16 asked for.
+  const double roundings = 3 * (n_ + 4) + 1 + 3 + kWide * box.halved + 3 + 8 + 16;
   const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
   for (int d = 0; d < 3; ++d) {
     result.col(d) *= 1 / parts(box.levels[d]);

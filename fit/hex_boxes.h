@@ -118,7 +118,7 @@ class HexBoxes {
   int contracted_ = 0;                           // and how many of its directions, from w on: 2 at the most
   SpareCoefficients spare_;
   int num_coefficients_ = 0;                     // that were made
-  std::array<AlignedDoubles, 3> modes_;          // x, y, z of a_ijk at k row_ + j n + i
+  std::array<AlignedDoubles, 3> modes_;          // x, y, z of a_ijk, then by 1, x, N_2, ..., at k row_ + j n + i
   const LocalMode* of_modes_ = nullptr;          // and for which modes,
   std::size_t num_modes_ = 0;
   std::vector<int> places_;                      // where each of them is
