@@ -136,7 +136,7 @@ class HexBoxes {
   static constexpr int kWeights = 2 * kWide;  // a matrix, by columns, in whole vectors
   AlignedDoubles weights_;
   std::array<AlignedDoubles, 3> is_used_;        // by direction: 1 where they are not 0
-  Vec3 total_;                                   // sum of |a_ijk| times all three bounds
+  Vec3 total_;                                   // sum of |a_ijk| times the bounds of 1, x, N_2, ...
   std::size_t cell_ = 0;                         // number of the current one, from 1
   using Zones = std::array<LineError, LineModels::kZones>;
   std::array<std::array<std::array<Zones, kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
