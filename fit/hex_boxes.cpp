@@ -91,19 +91,22 @@ HexBoxes::HexBoxes(Basis basis, int order)
 void HexBoxes::set_modes(std::span<const LocalMode> modes) {
   of_modes_ = modes.data();
   num_modes_ = modes.size();
-  for (int d = 0; d < 3; ++d) std::fill(modes_[d].begin(), modes_[d].end(), 0.0);
   std::fill(used_.begin(), used_.end(), 0);
   places_.clear();
   for (const LocalMode& mode : modes) {
-    const int at = mode.j * n_ + mode.i;
-    places_.push_back(mode.k * row_ + at);
-    int& used = used_[at / kWide];
-    used = std::max(used, mode.k + 1);
+    places_.push_back(mode.k * row_ + mode.j * n_ + mode.i);
+    const int last_i = std::max<int>(mode.i, 1), last_j = std::max<int>(mode.j, 1), last_k = std::max<int>(mode.k, 1);
+    for (int j = mode.j; j <= last_j; ++j)  // and where its steps go
+      for (int i = mode.i; i <= last_i; ++i) {
+        int& used = used_[(j * n_ + i) / kWide];
+        used = std::max(used, last_k + 1);
+      }
   }
 }
 
 void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
   if (modes.data() != of_modes_ || modes.size() != num_modes_) set_modes(modes);
+  for (int d = 0; d < 3; ++d) std::fill(modes_[d].begin(), modes_[d].end(), 0.0);
   for (std::size_t a = 0; a < modes.size(); ++a)
     for (int d = 0; d < 3; ++d) modes_[d][places_[a]] = coefficients[a][d];
   contracted_ = 0;
