@@ -90,6 +90,7 @@ void fit(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start, bool
 void fit_curved(Bytes& bytes, const TriangleMesh& target, const VolumeMesh& start, bool sound) {
   HighOrderFitOptions options{.order = 2, .adaptive = bytes.flag(), .max_iterations = 2};
   options.basis = bytes.flag() ? Basis::legendre : Basis::fourier;
+  options.improve_worst_places = bytes.flag();
   const HighOrderFitResult result = fit_high_order(target, start, options);
   require_finite(result.mesh.coefficients);
   if (sound) require(certify(result.mesh.space, result.mesh.coefficients).all_certified());
