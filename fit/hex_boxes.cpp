@@ -195,7 +195,8 @@ void HexBoxes::make_weights() {
         const auto of = [&](int m) { return load_wide(sums[column] + m * lanes_ + first); };
         Wide sum = larger(of(0), of(1));
         for (int m = 2; m < n_; ++m) sum += value[m] * of(m);
-        for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i) weight(0, i, row, column) = sum[i - first];
+        for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i)
+          weight(0, i, row, column) = sum[i - first];
       }
     }
 
@@ -423,9 +424,10 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, three steps, halvings, L, differences,
-  // and the 16 asked for.
-  const double roundings = 3 * (n_ + 4) + 1 + 3 + kWide * box.halved + 3 + 8 + 16;
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, halvings, L, differences,
+  // and the 16 asked for. Steps of steps have the roundings of those that they are made of: all in all kSteps of total_.
+  constexpr int kSteps = 13;
+  const double roundings = 3 * (n_ + 4) + 1 + kSteps + kWide * box.halved + 3 + 8 + 16;
   const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
   for (int d = 0; d < 3; ++d) {
     result.col(d) *= 1 / parts(box.levels[d]);

@@ -125,8 +125,9 @@ class HexMatrices {
       all_weights_;
   HexCoefficients product_;
   bool is_narrowed_ = false;
-  alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide>, 3> narrow_{};  // coefficients less that in the middle
-  Vec3 narrow_sizes_;                                                // the largest ones of these
+  // Coefficients less that in the middle, and the largest ones of these.
+  alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide>, 3> narrow_{};
+  Vec3 narrow_sizes_;
   alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide + 2 * kNarrowMargin>, 3> narrow_product_{};
   Vec3 narrow_errors_;
 };
