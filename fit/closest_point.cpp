@@ -281,7 +281,11 @@ ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
       stack[at] = {squared[c], node.child[c], node.is_leaf[c]};
     }
   }
-  if (best == kNoIndex) return {p, kNoIndex, std::numeric_limits<double>::quiet_NaN()};
+  if (!(best_squared < kInfinity)) {
+    if (!p.allFinite()) return {p, kNoIndex, std::numeric_limits<double>::quiet_NaN()};
+    const Vec3& corner = corners_[order_.front()][0];
+    return {corner, order_.front(), (p - corner).stableNorm()};
+  }
   const Vec3 point = closest_on_triangle(p, corners_[best]);
   return {point, best, (p - point).norm()};
 }

@@ -31,7 +31,8 @@ class ClosestPoint {
   /// good as long as neighbours stay neighbours. InputError: another number of vertices, a position that is not finite.
   void move(std::span<const Vec3> positions);
 
-  /// The closest point of the surface to p. Where p is not finite: triangle kNoIndex, distance NaN.
+  /// The closest point of the surface to p. Where p is not finite: triangle kNoIndex, distance NaN. Where it is so far
+  /// away that the square of every distance overflows: a corner of one of the triangles.
   ///
   /// hint  a triangle likely to be close (the answer for a point near by), or kNoIndex. It saves time and nothing else,
   ///       but that of several triangles at the same distance, up to rounding, the one returned may depend on it.

@@ -18,8 +18,8 @@ struct Stage {
 inline constexpr double kDefaultAccuracyPercent = 0.015;
 /// How far below `FitOptions::lambda_close` lambda may go for that, and for a tolerance that was asked for.
 inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;
-/// Where a fit's boundary intersects itself, lambda is raised by this factor, up to the most.
-inline constexpr double kUnfoldingFactor = 4, kMostUnfoldingLambda = 0.1;
+/// Where a fit's boundary intersects itself, lambda is raised up to this.
+inline constexpr double kMostUnfoldingLambda = 0.1;
 /// Lowering lambda ends when a stage takes less than this share off the mean distance.
 inline constexpr double kLeastGain = 0.01;
 /// Without a tolerance, halvings of lambda may cost so much of the mean scaled Jacobian in all.

@@ -2,6 +2,7 @@
 #include "fit/fit_target.h"
 
 #include "fit/enclosed_volume.h"
+#include "fit/option_checks.h"
 #include "fit/target_report.h"
 #include "subvol/error.h"
 
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace subvol {
 
@@ -45,16 +45,19 @@ std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
 }
 
 void Normalisation::take_in(VolumeMesh& mesh) const {
-  constexpr double kLeastSize = 1e-6;  // below, cells are lost in the rounding of the target's coordinates
+  // Below, cells are lost in the rounding of the target's coordinates, above the target in that of the cells'.
+  constexpr double kLeastSize = 1e-6, kMostSize = 1e6;
   mesh.positions = to_unit(std::move(mesh.positions));
   Eigen::AlignedBox3d box;
   for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
-  if (!box.isEmpty() && !(box.diagonal().norm() >= kLeastSize)) {
-    char size[32];
-    std::snprintf(size, sizeof size, "%.2g", box.diagonal().norm());
-    throw InputError(std::string("the mesh is ") + size +
-                     " times as large as the target; expected one roughly in place");
-  }
+  if (box.isEmpty()) return;
+  const double size = box.diagonal().stableNorm();
+  if (!(size >= kLeastSize && size <= kMostSize))
+    throw InputError(formatted("the mesh is %.2g times as large as the target; expected one roughly in place", size));
+  const double distance = box.center().stableNorm();
+  if (!(distance <= kMostSize))
+    throw InputError(formatted("the mesh is %.2g times the target's diagonal away from it; expected one roughly in place",
+                               distance));
 }
 
 std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {

@@ -21,7 +21,8 @@ struct Normalisation {
   explicit Normalisation(const TriangleMesh& target);
   explicit Normalisation(const PointCloud& target);
   std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
-  /// Moves a mesh to these coordinates. InputError: its cells are next to nothing beside the target.
+  /// Moves a mesh to these coordinates. InputError: its cells are next to nothing beside the target, or the target is
+  /// beside them, or is as far away.
   void take_in(VolumeMesh& mesh) const;
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };

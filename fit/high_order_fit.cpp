@@ -14,6 +14,7 @@
 #include "fit/quadrature.h"
 #include "fit/self_intersection.h"
 #include "fit/stage_runner.h"
+#include "fit/staged_fit.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 
@@ -61,7 +62,7 @@ VolumeMesh checked(VolumeMesh mesh) {
 }
 
 /// The high-order fit, in normalised coordinates.
-class HighOrderFit {
+class HighOrderFit : StagedFit {
  public:
   HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
   HighOrderFitResult run();
@@ -84,8 +85,8 @@ class HighOrderFit {
   FitProblem problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
                      const Stage& stage) const;
   bool run_stage(const Stage& stage);
-  FitSnapshot snapshot() const;
-  void go_back(FitSnapshot snapshot);
+  bool run_next_stage(const Stage& stage);
+  bool run_final_stage(double lambda) override { return run_stage(schedule_.final_stage(lambda)); }
   void take_own_boxes();
   void begin_try(const HighOrderTry& attempt);
   bool run_order(Approach approach, int order);
@@ -93,7 +94,8 @@ class HighOrderFit {
   bool run_higher_orders();
   bool raise_where_it_pays();
   bool run_adaptive_orders();
-  bool lower_lambda();
+  bool finish();
+  bool lower_lambda(std::size_t pairs);
   Outcome measured_outcome();
   bool improve_worst_places();
   bool is_better(const Outcome& next) const;
@@ -101,13 +103,15 @@ class HighOrderFit {
   Again draw_in_far_places();
   Again lift_worst_places();
   bool meets_tolerance();
-  void keep_state();
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
   TriangleMesh boundary(int intervals) const;
   TriangleMesh measured_boundary() const;
   double keep_mean(double distance);
   double measured_mean();
-  std::size_t intersecting_pairs() const;
+  std::size_t intersecting_pairs() const override;
+  bool is_folded() const;
+  std::vector<Vec3>& unknowns() override { return mesh_.coefficients; }
+  FitReport& report() override { return report_; }
 
   HighOrderFitOptions options_;
   FitTarget target_;
@@ -116,25 +120,24 @@ class HighOrderFit {
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
   BoundarySamples samples_;
-  std::vector<FitState> states_;  ///< of the current try, in the current orders
   int try_ = 0;              ///< number of the current try, from 1
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< the highest of any entity
-  double lambda_ = 0;        ///< of the last stage
+  FitSnapshot start_{};      ///< of the last stage that the schedule asked for
   std::vector<int> points_;  ///< of each cell per direction, in the last stage
   bool stays_dense_ = false; ///< after the first orders: cells have at least so many
   double emphasis_ = 0;      ///< of places of poor shape in E_W
   double far_length_ = 0;    ///< distance of places that count twice in E_S; 0: all count alike
   Outcome outcome_{};        ///< while the worst places are improved: of the state that is kept
   double most_mean_ = 0, most_max_ = 0;  ///< what that may cost
-  std::optional<double> mean_;  ///< percent, of the current state
   FitReport report_;
   MemoryBudget memory_;
   StageRunner runner_;
 };
 
 HighOrderFit::HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options)
-    : options_(checked(options)),
+    : StagedFit(options.keep_states),
+      options_(checked(options)),
       target_(std::move(target)),
       template_(checked(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
@@ -209,12 +212,6 @@ FitProblem HighOrderFit::problem(const ElementSpace& space, std::unique_ptr<High
   return problem;
 }
 
-/// Keeps where the mesh is, under the name of what it came from.
-void HighOrderFit::keep_state() {
-  if (!options_.keep_states) return;
-  states_.push_back({states_.empty() ? "template" : report_.last_kept_stage()->name, mesh_.coefficients});
-}
-
 bool HighOrderFit::run_stage(const Stage& stage) {
   if (!report_.stages.empty() && !runner_.in_time(formatted("order %d", order_), report_)) return false;
   StageRecord record;
@@ -239,16 +236,10 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   return going;
 }
 
-FitSnapshot HighOrderFit::snapshot() const {
-  return {mesh_.coefficients, lambda_, mean_, report_.stages.size(), states_.size()};
-}
-
-void HighOrderFit::go_back(FitSnapshot snapshot) {
-  mesh_.coefficients = std::move(snapshot.x);
-  lambda_ = snapshot.lambda;
-  mean_ = snapshot.mean_percent;
-  states_.resize(snapshot.num_states);
-  report_.undo_stages(snapshot.num_stages, report_.stages.size());
+/// One that the schedule asks for.
+bool HighOrderFit::run_next_stage(const Stage& stage) {
+  start_ = snapshot();
+  return run_stage(stage);
 }
 
 TriangleMesh HighOrderFit::boundary(int intervals) const {
@@ -259,6 +250,11 @@ TriangleMesh HighOrderFit::boundary(int intervals) const {
 /// Sampled more densely than what is fitted.
 TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sample_intervals(order_) + 1); }
 
+std::size_t HighOrderFit::intersecting_pairs() const { return self_intersections(measured_boundary()).pairs.size(); }
+
+/// Whether the boundary intersects itself, but for folds that are about as small as what is between samples.
+bool HighOrderFit::is_folded() const { return !self_intersections(boundary(sample_intervals(order_) + 1)).pairs.empty(); }
+
 double HighOrderFit::keep_mean(double distance) {
   mean_ = 100 * distance;
   if (StageRecord* stage = report_.last_kept_stage()) stage->mean_distance_percent = *mean_;
@@ -267,10 +263,6 @@ double HighOrderFit::keep_mean(double distance) {
 
 double HighOrderFit::measured_mean() {
   return mean_ ? *mean_ : keep_mean(target_.mean_distance(measured_boundary()));
-}
-
-std::size_t HighOrderFit::intersecting_pairs() const {
-  return self_intersections(boundary(sample_intervals(order_) + 1)).pairs.size();
 }
 
 bool HighOrderFit::meets_tolerance() {
@@ -297,7 +289,7 @@ bool HighOrderFit::run_order(Approach approach, int order) {
   if (order > schedule_.last_common_order()) take_own_boxes();
   set_orders(orders);
   for (const Stage& stage : schedule_.stages(approach, order, options_.order))
-    if (!run_stage(stage)) return false;
+    if (!run_next_stage(stage)) return false;
   return true;
 }
 
@@ -305,13 +297,14 @@ bool HighOrderFit::run_order(Approach approach, int order) {
 /// the tries that ended with the least energy.
 bool HighOrderFit::run_first_orders(int last) {
   struct Arrival {
-    std::size_t pairs;
+    bool folded;
     double mean, distortion, energy;
     HighOrderMesh mesh;
     std::vector<Vec3> ideal_boxes;
     std::vector<int> points;
     Approach approach;
     std::vector<FitState> states;
+    FitSnapshot start;
     int number;  ///< of the try
     std::size_t stages_begin, stages_end;  ///< in the report
   };
@@ -326,19 +319,20 @@ bool HighOrderFit::run_first_orders(int last) {
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
     const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
-    Arrival arrival{intersecting_pairs(), measured_mean(), distortion, energy, mesh_, ideal_boxes_, points_, approach_,
-                    states_, try_, stages_begin, report_.stages.size()};
+    Arrival arrival{is_folded(), measured_mean(), distortion, energy, mesh_, ideal_boxes_, points_, approach_,
+                    states_, start_, try_, stages_begin, report_.stages.size()};
     const bool better =
-        !best || std::tuple(arrival.pairs > 0, arrival.energy) < std::tuple(best->pairs > 0, best->energy);
+        !best || std::tuple(arrival.folded, arrival.energy) < std::tuple(best->folded, best->energy);
     if (better) best = std::move(arrival);
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
-    if (best->pairs == 0 && fair) break;
+    if (!best->folded && fair) break;
   }
   mesh_ = std::move(best->mesh);
   ideal_boxes_ = std::move(best->ideal_boxes);
   points_ = std::move(best->points);
   approach_ = best->approach;
   states_ = std::move(best->states);
+  start_ = std::move(best->start);
   try_ = best->number;
   report_.undo_stages(stages_before, best->stages_begin);
   report_.undo_stages(best->stages_end, report_.stages.size());
@@ -350,7 +344,7 @@ bool HighOrderFit::run_higher_orders() {
   stays_dense_ = true;
   while (order_ < options_.order)
     if (!run_order(approach_, std::min(2 * order_, options_.order))) return false;
-  return lower_lambda() && improve_worst_places();
+  return true;
 }
 
 /// Raises the orders of what gains most. False where that is not worth its nodes, or they have no room.
@@ -374,20 +368,19 @@ bool HighOrderFit::run_adaptive_orders() {
   stays_dense_ = true;
   while (!meets_tolerance() && raise_where_it_pays()) {
     take_own_boxes();
-    if (!run_stage(schedule_.final_stage(options_.lambda_close))) return false;
+    if (!run_next_stage(schedule_.final_stage(options_.lambda_close))) return false;
   }
-  return report_.stop_reason != StopReason::memory_limit && lower_lambda() && improve_worst_places();
+  return report_.stop_reason != StopReason::memory_limit;
 }
 
-/// The last stage with less and less weight on the cells' shape, while the tolerance is not met. One that has the
-/// surface intersect itself more, or is not done, is undone.
-bool HighOrderFit::lower_lambda() {
-  if (!options_.tolerance_percent || meets_tolerance()) return true;
-  std::size_t pairs = intersecting_pairs();
-  for (double lambda = lambda_ / 2; !meets_tolerance() && lambda > 1e-3 * options_.lambda_close; lambda /= 2) {
+/// The last stage with less and less weight on the cells' shape, while the tolerance is not met; without one, as far as
+/// unfolding has raised it. One that has the surface intersect itself in more than `pairs`, or is not done, is undone.
+bool HighOrderFit::lower_lambda(std::size_t pairs) {
+  const double least = (options_.tolerance_percent ? 1e-3 : 1) * options_.lambda_close;
+  for (double lambda = lambda_ / 2; !meets_tolerance() && lambda >= 0.99 * least; lambda /= 2) {
     const double before = measured_mean();
     FitSnapshot stiffer = snapshot();
-    const bool going = run_stage(schedule_.final_stage(lambda));
+    const bool going = run_final_stage(lambda);
     const std::size_t pairs_now = going ? intersecting_pairs() : 0;
     if (!going || pairs_now > pairs) {
       go_back(std::move(stiffer));
@@ -397,6 +390,12 @@ bool HighOrderFit::lower_lambda() {
     if (1 - measured_mean() / before < kLeastGain) break;
   }
   return true;
+}
+
+/// What is done once the orders are those of the finished mesh.
+bool HighOrderFit::finish() {
+  std::size_t pairs = intersecting_pairs();
+  return unfold(start_, kMostUnfoldingLambdaOfOrders, pairs) && lower_lambda(pairs) && improve_worst_places();
 }
 
 HighOrderFit::Outcome HighOrderFit::measured_outcome() {
@@ -483,7 +482,7 @@ HighOrderFitResult HighOrderFit::run() {
   look_over_template();
   const int first = std::min(schedule_.first_orders(options_.adaptive), options_.order);
   try {
-    if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders()))
+    if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders()) && finish())
       runner_.conclude(measured_mean(), options_.tolerance_percent, report_);
   } catch (const std::bad_alloc&) {
     end_for_memory(formatted("no memory was left at order %d", order_));

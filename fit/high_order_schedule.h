@@ -42,6 +42,9 @@ inline constexpr double kFairDistancePercent = 0.12, kFairDistortion = 0.3;
 /// Below this order the distance does not tell whether an approach went wrong.
 inline constexpr int kTellingOrder = 4;
 
+/// Where a fit's boundary intersects itself, lambda is raised up to this.
+inline constexpr double kMostUnfoldingLambdaOfOrders = 1;
+
 /// distance  mean distance of template and target by the target's length V/A.
 HighOrderSchedule make_high_order_schedule(double lambda_close, double distance);
 

@@ -33,14 +33,6 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
 /// InputError unless closest points are what pulls: Voronoi cells of points have no area.
 void require_closest(Correspondence correspondence);
 
-/// What a fit goes back to where a stage that it tries is no help.
-struct FitSnapshot {
-  std::vector<Vec3> x;
-  double lambda;
-  std::optional<double> mean_percent;  ///< distance, if it is known
-  std::size_t num_stages, num_states;  ///< then in the report, and kept
-};
-
 /// Runs the minimisations of a fit one after the other, with one clock and one report.
 class StageRunner {
  public:

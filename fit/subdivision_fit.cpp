@@ -12,6 +12,7 @@
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
 #include "fit/stage_runner.h"
+#include "fit/staged_fit.h"
 #include "fit/volume_energy.h"
 #include "subvol/audit.h"
 #include "subvol/boundary.h"
@@ -47,7 +48,7 @@ void check_options(const FitOptions& options) {
 }
 
 /// The recursive fit, in normalised coordinates.
-class SubdivisionFit {
+class SubdivisionFit : StagedFit {
  public:
   SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options);
   FitResult run();
@@ -63,22 +64,22 @@ class SubdivisionFit {
   bool start_level();
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   bool run_stage(const Stage& stage, const std::string& name);
+  bool run_stage(const Stage& stage) { return run_stage(stage, stage_name(stage)); }
+  bool run_final_stage(double lambda) override { return run_stage(schedule_.final_stage(lambda)); }
   bool run_stages();
-  FitSnapshot snapshot() const;
-  void go_back(FitSnapshot snapshot);
-  bool unfold(const FitSnapshot& start, std::size_t& pairs);
   bool lower_lambda(std::size_t pairs);
   TriangleMesh limit_triangles();
   double measured_mean();
   VolumeMesh current_mesh() const;
   double mean_scaled_jacobian() const;
-  std::size_t intersecting_pairs() const;
+  std::size_t intersecting_pairs() const override;
   bool meets_tolerance();
-  void keep_state();
   void store_result();
   void next_control();
   std::string stage_name(const Stage& stage) const;
   bool finest() const { return number_ == options_.levels; }
+  std::vector<Vec3>& unknowns() override { return unknowns_; }
+  FitReport& report() override { return result_.report; }
 
   FitOptions options_;
   FitTarget target_;               ///< sampled for the current level
@@ -89,7 +90,6 @@ class SubdivisionFit {
   SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
   SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
-  std::vector<FitState> states_;   ///< of the current try, by the numbers of the unknowns
   int try_ = 0;                    ///< tries begun, each with other ideal cells
   double own_box_share_ = 0;       ///< of the current try
   std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
@@ -97,8 +97,6 @@ class SubdivisionFit {
   int number_ = 0;                 ///< of the level of the finite element mesh
   FitLevel level_;
   std::optional<BoundaryRefinement> limit_check_;  ///< of level_.mesh, made when first measured
-  double lambda_ = 0;              ///< of the last stage
-  std::optional<double> mean_;     ///< percent, of the current state
   FitResult result_;
   std::map<std::string, double> seconds_;
   MemoryBudget memory_;
@@ -106,7 +104,8 @@ class SubdivisionFit {
 };
 
 SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options)
-    : options_((check_options(options), options)),
+    : StagedFit(options.keep_states),
+      options_((check_options(options), options)),
       target_(std::move(target)),
       template_(template_mesh),
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
@@ -151,12 +150,6 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
   if (!creases_.curves().empty())
     term->add_creases(creases_.energy(level_, kCreaseWidth * target_.surface.length(), stage.tangential_weight));
   return term;
-}
-
-/// Keeps where the cage is, under the name of what it came from.
-void SubdivisionFit::keep_state() {
-  if (!options_.keep_states) return;
-  states_.push_back({states_.empty() ? "template" : result_.report.last_kept_stage()->name, unknowns_});
 }
 
 /// Runs one minimisation over the current level's maps. False when the fit must end.
@@ -260,40 +253,6 @@ bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
-FitSnapshot SubdivisionFit::snapshot() const {
-  return {unknowns_, lambda_, mean_, result_.report.stages.size(), states_.size()};
-}
-
-void SubdivisionFit::go_back(FitSnapshot snapshot) {
-  unknowns_ = std::move(snapshot.x);
-  lambda_ = snapshot.lambda;
-  mean_ = snapshot.mean_percent;
-  states_.resize(snapshot.num_states);
-  result_.report.undo_stages(snapshot.num_stages, result_.report.stages.size());
-}
-
-/// The finest level again from its start, with more weight on the cells' shape, while the boundary intersects itself:
-/// thin walls that meet in a soft fit stay apart in a stiffer one. Kept where that leaves at most half of the pairs.
-bool SubdivisionFit::unfold(const FitSnapshot& start, std::size_t& pairs) {
-  for (double lambda = kUnfoldingFactor * lambda_; pairs > 0 && lambda <= kMostUnfoldingLambda;
-       lambda *= kUnfoldingFactor) {
-    const Stage stage = schedule_.final_stage(lambda);
-    FitSnapshot softer = snapshot();
-    unknowns_ = start.x;
-    const bool going = run_stage(stage, stage_name(stage));
-    const std::size_t pairs_now = going ? intersecting_pairs() : pairs;
-    if (pairs_now <= pairs / 2) {
-      pairs = pairs_now;
-      result_.report.undo_stages(start.num_stages, softer.num_stages);
-      states_.resize(std::min(states_.size(), start.num_states + 1));  // up to the start, from which it went
-    } else {
-      go_back(std::move(softer));
-    }
-    if (!going) return false;
-  }
-  return true;
-}
-
 /// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without
 /// a tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
 /// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too
@@ -309,9 +268,8 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   double mean = measured_mean(), volume = distortion();
   const double shape = mean_scaled_jacobian(), most_loss = options_.cage_only ? kMostCageShapeLoss : kMostShapeLoss;
   for (double lambda = lambda_ / 2; mean > wanted && lambda >= 0.99 * least; lambda /= 2) {
-    const Stage stage = schedule_.final_stage(lambda);
     FitSnapshot stiffer = snapshot();
-    if (!run_stage(stage, stage_name(stage))) {
+    if (!run_final_stage(lambda)) {
       go_back(std::move(stiffer));
       return false;
     }
@@ -333,12 +291,12 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
 bool SubdivisionFit::run_stages() {
   const FitSnapshot start = snapshot();
   for (const Stage& stage : schedule_.stages(number_)) {
-    if (!run_stage(stage, stage_name(stage))) return false;
+    if (!run_stage(stage)) return false;
     if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) break;
   }
   if (!finest()) return true;
   std::size_t pairs = intersecting_pairs();
-  return unfold(start, pairs) && lower_lambda(pairs);
+  return unfold(start, kMostUnfoldingLambda, pairs) && lower_lambda(pairs);
 }
 
 /// All or nothing: memory may run out here.

@@ -279,21 +279,27 @@ TEST_CASE("A fit refuses options out of range, empty targets and unusable templa
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, inverted, {}), InputError);
 }
 
-// A finding of the fuzzer: such a fit could not begin, lost its cells in rounding, and said that it had converged.
-TEST_CASE("A template that is next to nothing beside its target is refused by every fit") {
+// Findings of the fuzzer: a fit of a tiny template could not begin, lost its cells in rounding, and said that it had
+// converged; to points of a template too far away nothing was closest.
+TEST_CASE("A template that is next to nothing beside its target, or far beyond it, is refused by every fit") {
   const samples::Sample sample = samples::ball_sample();
-  VolumeMesh tiny = sample.template_mesh;
-  for (const double size : {1e-8, 1e-20}) {
-    for (std::size_t v = 0; v < tiny.num_vertices(); ++v) tiny.positions[v] = size * sample.template_mesh.positions[v];
-    CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, tiny, quick()),
+  VolumeMesh scaled = sample.template_mesh;
+  for (const double size : {1e-8, 1e-20, 1e8, 1e100}) {
+    for (std::size_t v = 0; v < scaled.num_vertices(); ++v) scaled.positions[v] = size * sample.template_mesh.positions[v];
+    CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, scaled, quick()),
                       Catch::Contains("times as large as the target"));
-    CHECK_THROWS_AS(fit_high_order(sample.target, tiny, {.order = 2}), InputError);
-    CHECK_THROWS_AS(optimize_mesh(tiny, &sample.target, {}), InputError);
+    CHECK_THROWS_AS(fit_high_order(sample.target, scaled, {.order = 2}), InputError);
+    CHECK_THROWS_AS(optimize_mesh(scaled, &sample.target, {}), InputError);
   }
-  tiny.positions.push_back(Vec3(1, 0, 0));  // of no cell: it makes none larger
-  CHECK_THROWS_AS(fit_subdivision_volume(sample.target, tiny, quick()), InputError);
-  CHECK_THROWS_AS(fit_high_order(sample.target, tiny, {.order = 2}), InputError);
-  CHECK_THROWS_AS(optimize_mesh(tiny, &sample.target, {}), InputError);
+  VolumeMesh far = sample.template_mesh;
+  for (Vec3& p : far.positions) p[0] += 1e9;
+  CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, far, quick()),
+                    Catch::Contains("times the target's diagonal away"));
+  for (std::size_t v = 0; v < scaled.num_vertices(); ++v) scaled.positions[v] = 1e-20 * sample.template_mesh.positions[v];
+  scaled.positions.push_back(Vec3(1, 0, 0));  // of no cell: it makes none larger
+  CHECK_THROWS_AS(fit_subdivision_volume(sample.target, scaled, quick()), InputError);
+  CHECK_THROWS_AS(fit_high_order(sample.target, scaled, {.order = 2}), InputError);
+  CHECK_THROWS_AS(optimize_mesh(scaled, &sample.target, {}), InputError);
 }
 
 TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proportions") {

@@ -143,3 +143,13 @@ TEST_CASE("distances refuse empty and broken surfaces", "[distance]") {
   CHECK(ClosestPoint(unit_square(0)).closest(Vec3(nan, 0, 0)).triangle == kNoIndex);
   CHECK(bounding_box_diagonal(unit_square(2)) == Approx(std::sqrt(2.0)));
 }
+
+TEST_CASE("points so far away that squares overflow have a closest point all the same", "[distance]") {
+  const ClosestPoint square(unit_square(0));
+  for (const Index hint : {kNoIndex, Index{0}}) {
+    const ClosestPoint::Hit hit = square.closest(Vec3(0, 0, 1e200), hint);
+    CHECK(hit.triangle != kNoIndex);
+    CHECK(hit.point.norm() <= std::sqrt(2.0));
+    CHECK(hit.distance == Approx(1e200));
+  }
+}

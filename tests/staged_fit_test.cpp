@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/staged_fit.h"
+
+#include <catch2/catch.hpp>
+
+#include <vector>
+
+using namespace subvol;
+
+namespace {
+
+/// Its one unknown tells what came of it: lambda, of the last stage. The boundary intersects itself in `pairs_at(lambda)`.
+class FoldedFit : public StagedFit {
+ public:
+  explicit FoldedFit(std::size_t (*pairs_at)(double)) : StagedFit(true), pairs_at_(pairs_at), x_(1, Vec3(7, 0, 0)) {}
+
+  bool unfold(double most_lambda) {
+    const FitSnapshot start = snapshot();
+    run_final_stage(0.01);
+    pairs = intersecting_pairs();
+    return StagedFit::unfold(start, most_lambda, pairs);
+  }
+  double x() const { return x_[0][0]; }
+  double lambda() const { return lambda_; }
+  std::size_t num_states() const { return states_.size(); }
+  std::vector<double> kept() const {
+    std::vector<double> result;
+    for (const StageRecord& stage : report_.stages)
+      if (stage.kept) result.push_back(stage.lambda);
+    return result;
+  }
+
+  std::size_t pairs = 0;
+  int most_stages = 100;
+  std::vector<double> starts;
+
+ private:
+  std::vector<Vec3>& unknowns() override { return x_; }
+  FitReport& report() override { return report_; }
+  bool run_final_stage(double lambda) override {
+    StageRecord record;
+    record.name = "stage";
+    record.lambda = lambda;
+    keep_state();
+    starts.push_back(x());
+    lambda_ = lambda;
+    mean_.reset();
+    x_[0][0] = lambda;
+    report_.stages.push_back(record);
+    return static_cast<int>(report_.stages.size()) < most_stages;
+  }
+  std::size_t intersecting_pairs() const override { return pairs_at_(x()); }
+
+  std::size_t (*pairs_at_)(double);
+  std::vector<Vec3> x_;
+  FitReport report_;
+};
+
+}  // namespace
+
+TEST_CASE("a boundary that does not intersect itself is left alone", "[staged_fit]") {
+  FoldedFit fit([](double) -> std::size_t { return 0; });
+  CHECK(fit.unfold(1));
+  CHECK(fit.x() == 0.01);
+  CHECK(fit.kept() == std::vector<double>{0.01});
+}
+
+TEST_CASE("a folded boundary is unfolded by the least lambda that does it, each from the same start", "[staged_fit]") {
+  FoldedFit fit([](double lambda) -> std::size_t { return lambda < 0.1 ? 6 : 0; });
+  CHECK(fit.unfold(1));
+  CHECK(fit.x() == Approx(0.16));
+  CHECK(fit.lambda() == Approx(0.16));
+  CHECK(fit.pairs == 0);
+  CHECK(fit.starts == std::vector<double>{7, 7, 7});
+  REQUIRE(fit.kept().size() == 1);
+  CHECK(fit.kept()[0] == Approx(0.16));
+  CHECK(fit.num_states() == 1);  // the start, from which the stage that was kept went
+}
+
+TEST_CASE("what leaves more than half of the pairs is undone; what leaves fewer is kept and stiffened", "[staged_fit]") {
+  FoldedFit slow([](double lambda) -> std::size_t { return lambda < 0.02 ? 6 : 4; });
+  CHECK(slow.unfold(1));
+  CHECK(slow.x() == 0.01);
+  CHECK(slow.pairs == 6);
+  CHECK(slow.kept() == std::vector<double>{0.01});
+  CHECK(slow.num_states() == 1);
+  FoldedFit step_by_step([](double lambda) -> std::size_t { return lambda < 0.02 ? 6 : lambda < 0.1 ? 3 : 1; });
+  CHECK(step_by_step.unfold(1));
+  CHECK(step_by_step.x() == Approx(0.16));
+  CHECK(step_by_step.pairs == 1);
+  CHECK(step_by_step.kept().size() == 1);
+}
+
+TEST_CASE("unfolding ends at the most lambda, and where the fit must end", "[staged_fit]") {
+  const auto pairs_at = [](double lambda) -> std::size_t { return lambda < 0.1 ? 6 : 0; };
+  FoldedFit bounded(pairs_at);
+  CHECK(bounded.unfold(0.1));
+  CHECK(bounded.x() == 0.01);
+  CHECK(bounded.pairs == 6);
+  FoldedFit interrupted(pairs_at);
+  interrupted.most_stages = 3;
+  CHECK_FALSE(interrupted.unfold(1));
+  CHECK(interrupted.x() == 0.01);  // as it was before the stage that was not done
+  CHECK(interrupted.kept() == std::vector<double>{0.01});
+}
