@@ -392,10 +392,17 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
   return true;
 }
 
-/// What is done once the orders are those of the finished mesh.
+/// What is done once the orders are those of the finished mesh. Improving the worst places undoes small folds as well;
+/// only what is still folded then begins the last stage again.
 bool HighOrderFit::finish() {
-  std::size_t pairs = intersecting_pairs();
-  return unfold(start_, kMostUnfoldingLambdaOfOrders, pairs) && lower_lambda(pairs) && improve_worst_places();
+  const std::size_t folded = intersecting_pairs();
+  if (!lower_lambda(folded) || !improve_worst_places()) return false;
+  std::size_t pairs = folded > 0 ? intersecting_pairs() : 0;
+  if (pairs == 0) return true;
+  const std::size_t pairs_before = pairs;
+  emphasis_ = far_length_ = 0;
+  if (!unfold(start_, kMostUnfoldingLambdaOfOrders, pairs)) return false;
+  return pairs == pairs_before || (lower_lambda(pairs) && improve_worst_places());
 }
 
 HighOrderFit::Outcome HighOrderFit::measured_outcome() {
