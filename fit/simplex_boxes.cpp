@@ -272,7 +272,7 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
       numbered && box.halvings % simplex_.halvings_between() == 0 && (box.tier < 0 || models_matter(box, lowest));
   const double wanted = std::max(wanted_error(lowest / mean_edges_.prod()),
                                  modelled && box.tier >= 0 ? kFall * by_mean_edges(lasting_error(box)) : 0);
-  std::vector<double> control = std::move(box.control);
+  AlignedDoubles control = std::move(box.control);
   box.control.clear();
   std::array<Box, 2> result{box, std::move(box)};
   result[0].vertices[b] = result[1].vertices[a] = 0.5 * (result[0].vertices[a] + result[0].vertices[b]);
@@ -290,8 +290,8 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
   return result;
 }
 
-void SimplexBoxes::halve_control(const SimplexHalving& halving, std::vector<double>& low,
-                                 std::vector<double>& high) const {
+void SimplexBoxes::halve_control(const SimplexHalving& halving, AlignedDoubles& low,
+                                 AlignedDoubles& high) const {
   for (const SimplexHalving::Round& round : halving.rounds) {
     for (const auto& [n, other] : round.means)
       for (std::size_t lane = 0; lane < lanes_; lane += kLanes) {

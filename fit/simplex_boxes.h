@@ -37,7 +37,7 @@ class SimplexBoxes {
     int tier = -1;                    ///< of the models that `control` comes from; -1: none is close enough
     int modelled = 0;                 ///< halvings of the part that they are of
     std::shared_ptr<const std::vector<Layer>> layers;  ///< what they leave out
-    std::vector<double> control;      ///< at alpha lanes_ + row num_layers_ + k
+    AlignedDoubles control;           ///< at alpha lanes_ + row num_layers_ + k
   };
   static constexpr int kLevelsPerDepth = 3, kMaxDepth = 20;
 
@@ -100,7 +100,7 @@ class SimplexBoxes {
   /// Of `matrices`.
   Mat3 rounding_error(const Box& box) const;
   /// Both hold the control points of the whole, and those of one half each when done.
-  void halve_control(const SimplexHalving& halving, std::vector<double>& low, std::vector<double>& high) const;
+  void halve_control(const SimplexHalving& halving, AlignedDoubles& low, AlignedDoubles& high) const;
 
   CellKind kind_;
   const SimplexModels& simplex_;

@@ -61,7 +61,7 @@ class SimplexModels {
     std::size_t first = 0;    ///< slot of the first function
     std::vector<Size> sizes;  ///< by slot - first
     /// b_alpha in the order of the tier's index, kWide at a time: of all functions the first ones, then the next ones.
-    std::vector<double> coefficients;
+    AlignedDoubles coefficients;
     /// Of b_alpha. Next to it are the others up to a multiple of kWide; `step` further on is b_alpha+kWide.
     std::size_t address(std::size_t slot, std::size_t alpha) const {
       return alpha / kWide * step() + kWide * (slot - first) + alpha % kWide;
