@@ -47,15 +47,17 @@ template <class Matrices>
 Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3& frame) {
   constexpr std::size_t kMost = 4;  // vectors of them; more make little difference (measured)
   const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
-  Wide products[3][6] = {};  // of the columns of rotation (J - mean), by its rows
+  using Vector = typename Matrices::Vector;
+  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
+  const Eigen::Matrix<Number, 3, 3> middle = mean.cast<Number>(), turn = rotation.cast<Number>();
+  Vector products[3][6] = {};  // of the columns of rotation (J - mean), by its rows
   for (std::size_t i = 0; i < sampled; ++i) {
     const std::size_t at = std::min(i == 0 ? 0 : i * (vectors - 1) / (sampled - 1) * kWide, matrices.size() - kWide);
-    WideMatrix j, turned;
+    MatrixOf<Vector> j, turned;
     matrices.load(at, j);
     for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) j[r][c] -= mean(r, c);
-      for (int r = 0; r < 3; ++r)
-        turned[r][c] = rotation(r, 0) * j[0][c] + rotation(r, 1) * j[1][c] + rotation(r, 2) * j[2][c];
+      for (int r = 0; r < 3; ++r) j[r][c] -= middle(r, c);
+      for (int r = 0; r < 3; ++r) turned[r][c] = turn(r, 0) * j[0][c] + turn(r, 1) * j[1][c] + turn(r, 2) * j[2][c];
     }
     for (int r = 0; r < 3; ++r)
       for (int c = 0, pair = 0; c < 3; ++c)
@@ -65,7 +67,7 @@ Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation,
   for (int r = 0; r < 3; ++r) {
     Mat3 moments;
     for (int c = 0, pair = 0; c < 3; ++c)
-      for (int d = c; d < 3; ++d) moments(c, d) = moments(d, c) = sum_of_lanes(products[r][pair++]);
+      for (int d = c; d < 3; ++d) moments(c, d) = moments(d, c) = sum_of_lanes(widen(products[r][pair++]));
     for (int c = 0; c < 3; ++c) result(r, c) = frame.col(c).dot(moments * frame.col(c));
   }
   return result / static_cast<double>(kWide * sampled);
@@ -179,8 +181,9 @@ struct Extremes {
 };
 
 /// What is known of a box when some of these T_b are not positive definite. begin: number of the first one.
-Bound failed_at(std::size_t begin, const WideMatrix& m, const Extremes<Wide>& own) {
-  const Wide det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+template <class Vector>
+Bound failed_at(std::size_t begin, const MatrixOf<Vector>& m, const Extremes<Vector>& own) {
+  const Vector det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
                    m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                    m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
   return {0, lanes_within(det, 0) != 0, begin + lowest_place(own.lowest_minor())};  // S_b > 0 has det J_b > 0
@@ -259,10 +262,11 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
   const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
     if (b == kNone) return {};
     const std::size_t begin = std::min(b / kWide * kWide, count - kWide);
-    WideMatrix m;
+    using Vector = typename Matrices::Vector;
+    MatrixOf<Vector> m;
     matrices.load(begin, m);
     multiply(unscaled, m);
-    Extremes<Wide> own(unscaled_shift);
+    Extremes<Vector> own(unscaled_shift);
     own.take(m);
     if (own.are_positive()) return {};
     return failed_at(begin, m, own);
@@ -275,17 +279,20 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
     for (const std::size_t corner : matrices.corners())
       if (const auto fails = failed_near(corner)) return *fails;
   in_the_way = kNone;
-  if (options.single_first) {
+  constexpr bool kHasDouble = requires { matrices.times(unscaled); };
+  if (options.single_first || !kHasDouble) {
     if (const double determinant = narrow_bound(matrices, unscaled, shift, scale, in_the_way); determinant > 0)
       return bound(determinant);
     if (const auto fails = failed_near(in_the_way)) return *fails;
   }
 
-  Extremes<Wide> extremes(unscaled_shift);
-  in_the_way = take_until_failure(matrices.times(unscaled), count, unscaled_shift, extremes);
-  if (in_the_way != kNone) return failed_near(in_the_way).value_or(Bound{0, false});
-  const double determinant = extremes.determinant(scale);
-  return determinant > 0 ? bound(determinant) : Bound{0, false};
+  if constexpr (kHasDouble) {
+    Extremes<Wide> extremes(unscaled_shift);
+    in_the_way = take_until_failure(matrices.times(unscaled), count, unscaled_shift, extremes);
+    if (in_the_way != kNone) return failed_near(in_the_way).value_or(Bound{0, false});
+    if (const double determinant = extremes.determinant(scale); determinant > 0) return bound(determinant);
+  }
+  return {0, false};
 }
 
 }  // namespace
@@ -305,21 +312,28 @@ Mat3 ControlMatrices::mean() const {
 }
 
 template <class Matrices>
-double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, const BoundOptions& options) {
+double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, const BoundOptions& options,
+                         Mat3* near_l) {
   constexpr int kMostTurns = 3;  // more cost what they save, and so does an end as soon as e is low (measured)
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
   if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
   const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
+    if (near_l) *near_l = l;
     return bound_by(l, lengths, mean, matrices, remainder, options, in_the_way);
   };
+  Bound result{0, false};
+  if (near_l && *near_l != Mat3::Zero()) {
+    result = bound(*near_l);
+    if (result.is_final) return result.value;
+  }
   const bool is_framed = frame != Mat3::Identity();
 
   const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
   const Vec3 framed_lengths = is_framed ? Vec3(framed.colwise().norm().transpose()) : lengths;
   const Mat3 to_frame = is_framed ? Mat3(scale.asDiagonal() * frame.inverse().transpose()) : Mat3(scale.asDiagonal());
   const Mat3 rotation = unrotate(framed * framed_lengths.cwiseInverse().asDiagonal());
-  Bound result = bound(to_frame * framed_lengths.asDiagonal() * rotation);
+  result = bound(to_frame * framed_lengths.asDiagonal() * rotation, result.in_the_way);
   if (result.is_final) return result.value;
 
   const Vec3 c = scales_by_variation(variation(matrices, mean, rotation, frame), framed_lengths);
@@ -335,8 +349,9 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   return result.value;
 }
 
-template double determinant_bound(ControlMatrices&, const Mat3&, const Mat3&, const BoundOptions&);
-template double determinant_bound(HexMatrices&, const Mat3&, const Mat3&, const BoundOptions&);
-template double determinant_bound(PrismMatrices&, const Mat3&, const Mat3&, const BoundOptions&);
+template double determinant_bound(ControlMatrices&, const Mat3&, const Mat3&, const BoundOptions&, Mat3*);
+template double determinant_bound(HexMatrices&, const Mat3&, const Mat3&, const BoundOptions&, Mat3*);
+template double determinant_bound(NarrowHexMatrices&, const Mat3&, const Mat3&, const BoundOptions&, Mat3*);
+template double determinant_bound(PrismMatrices&, const Mat3&, const Mat3&, const BoundOptions&, Mat3*);
 
 }  // namespace subvol

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 namespace subvol {
@@ -22,10 +23,13 @@ inline constexpr double kMostError = 1e4;
 inline constexpr double kMostNarrow = 1e20;
 
 /// l times each of them.
-inline void multiply(const Mat3& l, WideMatrix& matrices) {
+template <class Vector>
+void multiply(const Mat3& l, MatrixOf<Vector>& matrices) {
+  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
+  const Eigen::Matrix<Number, 3, 3> factors = l.cast<Number>();
   for (int c = 0; c < 3; ++c) {
-    const Wide x = matrices[0][c], y = matrices[1][c], z = matrices[2][c];
-    for (int r = 0; r < 3; ++r) matrices[r][c] = l(r, 0) * x + l(r, 1) * y + l(r, 2) * z;
+    const Vector x = matrices[0][c], y = matrices[1][c], z = matrices[2][c];
+    for (int r = 0; r < 3; ++r) matrices[r][c] = factors(r, 0) * x + factors(r, 1) * y + factors(r, 2) * z;
   }
 }
 
@@ -34,6 +38,8 @@ inline void multiply(const Mat3& l, WideMatrix& matrices) {
 /// Entry (row, column) of all of them is one array of doubles; at least kWide matrices.
 class ControlMatrices {
  public:
+  using Vector = Wide;  ///< of entries as they are loaded
+
   /// Room for `count` matrices; what they are is undefined. An entry may be written kWide - 1 numbers beyond its end.
   void resize(std::size_t count) {
     count_ = count;
@@ -102,17 +108,21 @@ struct BoundOptions {
 /// that is, S_b > 0 means sym(Q^T J_b C) > 0. Tried one after the other are the c that make M C's columns 1; those with
 /// c_j / c_i = v_ji / v_ij in the mean over pairs, where v_ij is how much component i (by Q) of column j of J frame
 /// varies, for the terms of each entry off the diagonal are of one size then. Then that L is turned, up to three times,
-/// towards a b whose S_b is not positive definite; and tried last are the first ones without the frame.
+/// towards a b whose S_b is not positive definite; and tried last are the first ones without the frame. Before all of
+/// them comes what served the box around, or failed there last: half of the parts are decided by that.
 ///
 /// remainder  R >= 0: bounds of the error of J's entries, and of the rounding errors in J_b's (each at least
 ///            16 units of roundoff of the entry; with HexMatrices and PrismMatrices also three units of the
 ///            coefficients' size, times 2 q for their differences, as L is taken to the coefficients). Entries at most
 ///            1e60 in size. Rounding here is accounted for.
 /// frame      regular: takes J to coordinates in which a cell without distortion has orthogonal columns.
-/// options    Ways to it: ControlMatrices have no single precision, and no corners.
-/// Matrices   ControlMatrices, HexMatrices or PrismMatrices (not const: they keep what is worked with).
+/// options    Ways to it: ControlMatrices have no corners, and only PrismMatrices have both precisions.
+/// near_l     unless null: an L to begin with, by coordinates of the same directions, or 0 for none; then the last one
+///            that was tried.
+/// Matrices   ControlMatrices, HexMatrices, NarrowHexMatrices or PrismMatrices (not const: they keep what is worked
+///            with). Of NarrowHexMatrices, R says nothing of single precision, whose errors they know.
 template <class Matrices>
 double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame,
-                         const BoundOptions& options = {});
+                         const BoundOptions& options = {}, Mat3* near_l = nullptr);
 
 }  // namespace subvol

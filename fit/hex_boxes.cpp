@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace subvol {
@@ -15,8 +16,13 @@ constexpr double kSmallError = 0.15;
 /// edges tell the mean matrix, and what they leave must be more than the variation of J (measured).
 constexpr double kHopelessError = 0.55;
 
-/// Boxes that keep their coefficients (15 KB) until they are halved.
+/// Boxes of each precision that keep their coefficients (15 KB, 8 KB) until they are halved.
 constexpr int kMostKept = 64;
+
+// Of the lowest det J, by the mean edges, up to `kGood` of it: what errors may come to.
+constexpr double kShare = 0.1, kGood = 0.3;
+
+constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
 
 Wide size(const Wide& x) { return x < 0 ? -x : x; }
 
@@ -49,6 +55,29 @@ void contract_to(const double* table, const double* in, int in_stride, const int
   }
 }
 
+/// out[o row + m] = start[m] + sum_{0 < i < n} table[i kStride + o] in[i row + m], o < num_out, for m < row: vectors,
+/// two at a time.
+template <int num_out>
+void contract_narrow_to(const float* table, const Narrow* start, const Narrow* in, int n, int row, Narrow* out) {
+  const auto contract = [&]<class Vector>(int m, const Vector&) {
+    const auto load = [](const Narrow* from) {
+      Vector result;
+      std::memcpy(&result, from, sizeof result);
+      return result;
+    };
+    Vector sums[num_out];
+    std::fill_n(sums, num_out, load(start + m));
+    for (int i = 1; i < n; ++i) {
+      const Vector x = load(in + i * row + m);
+      for (int o = 0; o < num_out; ++o) sums[o] += table[i * LineModels::kStride + o] * x;
+    }
+    for (int o = 0; o < num_out; ++o) std::memcpy(out + o * row + m, &sums[o], sizeof(Vector));
+  };
+  int m = 0;
+  for (; m + 2 <= row; m += 2) contract(m, WideFloats{});
+  if (m < row) contract(m, Narrow{});
+}
+
 using Contraction = void (*)(const double*, const double*, int, const int*, int, double*, int);
 /// The one for so many outputs.
 Contraction contraction(int num_out) {
@@ -57,7 +86,32 @@ Contraction contraction(int num_out) {
   return all[num_out];
 }
 
+using NarrowContraction = void (*)(const float*, const Narrow*, const Narrow*, int, int, Narrow*);
+NarrowContraction narrow_contraction(int num_out) {
+  static constexpr NarrowContraction all[] = {nullptr,
+                                              contract_narrow_to<1>,
+                                              contract_narrow_to<2>,
+                                              contract_narrow_to<3>,
+                                              contract_narrow_to<4>,
+                                              contract_narrow_to<5>,
+                                              contract_narrow_to<6>,
+                                              contract_narrow_to<7>,
+                                              contract_narrow_to<8>};
+  return all[num_out];
+}
+
 }  // namespace
+
+template <class Vector>
+CoefficientsPool<Vector>::Pooled CoefficientsPool<Vector>::take() {
+  if (spare_.empty()) {
+    spare_.reserve(++num_made_);  // so that returning them never allocates
+    spare_.push_back(std::make_unique<Coefficients>());
+  }
+  Pooled result(spare_.back().release(), Return{this});
+  spare_.pop_back();
+  return result;
+}
 
 HexBoxes::HexBoxes(Basis basis, int order)
     : n_(order + 1), lanes_((n_ + kWide - 1) / kWide * kWide), row_((n_ * n_ + kWide - 1) / kWide * kWide) {
@@ -69,6 +123,7 @@ HexBoxes::HexBoxes(Basis basis, int order)
     modes_[d].assign(row_ * n_ + kWide, 0);
     after_w_[d].assign(most * row_ + kWide, 0);
     after_v_[d].assign((n_ + kSome) * most, Wide{});
+    narrow_after_v_[d].assign(n_ * most, Narrow{});
     is_used_[d].assign(lanes_, 0);
   }
   bounds_ = tiers_[1][0]->bounds();
@@ -123,6 +178,8 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   inverse_mean_edges_ = mean_edges_.cwiseInverse();
   make_weights();
   take_steps();
+  constexpr double kMost = 1e10;
+  fits_single_ = total_.maxCoeff() < kMost && total_.maxCoeff() > 1 / kMost;
 }
 
 /// By 1, x, N_2, ... in all directions, instead of N_0, N_1, N_2, ...: for 1 nothing must be multiplied.
@@ -212,6 +269,7 @@ void HexBoxes::make_weights() {
       for (int k = 2; k < n_; ++k) sum += value[k] * of(k);
       store_wide(sum, steps_by_j + first);
     }
+    weight(0, 1, row, 0) = along(steps_by_j);
     for (int m = 2; m < n_; ++m) {
       weight(1, m, row, 0) = modes_along(by_j + m * lanes_, mode_slope_bounds_) + steps_by_j[m];
       weight(1, m, row, 1) = along(by_j + m * lanes_);
@@ -261,7 +319,7 @@ const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
 }
 
 bool HexBoxes::is_hopeless(Box& box) {
-  if (box.coefficients) return false;
+  if (has_coefficients(box)) return false;
   const double wanted = box.wanted < 0 ? kSmallError : box.wanted;
   box.modelled_levels = box.levels, box.modelled_index = box.index;
   box.halved = 0;
@@ -280,7 +338,7 @@ void HexBoxes::choose_split(Box& box) {
   // anyway along w comes first.
   constexpr double kNeeded = 0.6;
   constexpr double kCost[3] = {0.9, 1, 1.1};
-  const bool is_looked_at = box.coefficients != nullptr;
+  const bool is_looked_at = has_coefficients(box);
   box.split = -1;
   Vec3 variation = Vec3::Zero();
   for (int d = 2; d >= 0; --d) {
@@ -290,8 +348,8 @@ void HexBoxes::choose_split(Box& box) {
   }
   if (box.split >= 0) return;
   if (is_looked_at) {
-    matrices_.set(*box.coefficients);
-    const Mat3 varies = matrices_.variation();
+    Mat3 varies;
+    with_matrices(box, [&](const auto& matrices) { varies = matrices.variation(); });
     for (int d = 0; d < 3; ++d)
       for (int column = 0; column < 3; ++column)
         variation[d] += varies(d, column) * parts(box.levels[column]) * inverse_mean_edges_[column];
@@ -301,32 +359,52 @@ void HexBoxes::choose_split(Box& box) {
         (box.split < 0 || variation[d] * kCost[box.split] > variation[box.split] * kCost[d]))
       box.split = d;
   if (box.split < 0) box.split = 0;  // the deepest box there is
-  if (num_coefficients_ - static_cast<int>(spare_.size()) > kMostKept) box.coefficients.reset();
+  if (pool_.num_taken() > kMostKept) box.coefficients.reset();
+  if (narrow_pool_.num_taken() > kMostKept) box.narrow.reset();
+}
+
+bool HexBoxes::improve(Box& box, double lowest) {
+  if (box.is_precise) return false;
+  if (narrow_error_size(box) <= kShare * std::min(lowest / mean_edges_.prod(), kGood)) return false;
+  box.is_precise = true;
+  box.narrow.reset();
+  return true;
+}
+
+double HexBoxes::narrow_error_size(const Box& box) const {
+  double by_edge = 0;
+  for (int d = 0; d < 3; ++d) by_edge = std::max(by_edge, parts(box.levels[d]) * inverse_mean_edges_[d]);
+  return NarrowHexMatrices::entry_errors(box.narrow->precision).sum() * by_edge;
 }
 
 std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
-  constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
+  constexpr double kLeast = 1e-9, kNarrowShare = 0.25;
   if (lowest != -std::numeric_limits<double>::infinity())
     box.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);
-  auto low = std::move(box.coefficients);
-  for (int d = 0; d < 3; ++d)
-    if (low && !(error_size(box, d) <= box.wanted)) low.reset();
+  const bool was_whole = box.level == 0;
+  bool keeps = has_coefficients(box) && !was_whole;
+  for (int d = 0; d < 3; ++d) keeps = keeps && error_size(box, d) <= box.wanted;
+  if (box.narrow) keeps = keeps && narrow_error_size(box) <= kNarrowShare * box.wanted;
   std::array<Box, 2> result;
   for (int half = 0; half < 2; ++half) {
     Box& child = result[half];
     child.levels = box.levels, child.index = box.index, child.tiers = box.tiers;
     child.modelled_levels = box.modelled_levels, child.modelled_index = box.modelled_index;
     child.wanted = box.wanted;
+    child.near_l = box.near_l;
     child.halved = box.halved + 1;
     child.level = box.level + 1;
+    child.is_precise = !fits_single_ || (box.is_precise && !was_whole);
     ++child.levels[box.split];
     child.index[box.split] = 2 * box.index[box.split] + half;
   }
-  if (low) {
-    result[1].coefficients = new_coefficients();
-    low->halve(box.split, *result[1].coefficients);
-    result[0].coefficients = std::move(low);
-  }
+  const auto halve = [&](auto& pool, auto coefficients) {
+    result[1].*coefficients = pool.take();
+    (box.*coefficients)->halve(box.split, *(result[1].*coefficients));
+    result[0].*coefficients = std::move(box.*coefficients);
+  };
+  if (keeps && box.coefficients) halve(pool_, &Box::coefficients);
+  if (keeps && box.narrow) halve(narrow_pool_, &Box::narrow);
   return result;
 }
 
@@ -342,34 +420,25 @@ std::size_t HexBoxes::corner_matrix(const Box& box, int corner) const {
   return static_cast<std::size_t>((u * num_w + w) * kWide + v);
 }
 
-PooledCoefficients HexBoxes::new_coefficients() {
-  if (spare_.empty()) {
-    spare_.reserve(++num_coefficients_);  // so that returning them never allocates
-    spare_.push_back(std::make_unique<HexCoefficients>());
-  }
-  PooledCoefficients result(spare_.back().release(), ReturnToSpare{&spare_});
-  spare_.pop_back();
-  return result;
-}
-
 bool HexBoxes::shares(const Box& box, int d) const {
   return contracted_levels_[d] == box.levels[d] && contracted_index_[d] == box.index[d] &&
          contracted_tiers_[d] == box.tiers[d];
 }
 
-HexMatrices& HexBoxes::matrices(Box& box) {
-  if (!box.coefficients) {
-    if (contracted_ > 0 && !shares(box, 2)) contracted_ = 0;
-    if (contracted_ > 1 && !shares(box, 1)) contracted_ = 1;
-    if (contracted_ < 1) contract_w(box);
-    if (contracted_ < 2) contract_v(box);
-    contracted_ = 2;
-    contracted_levels_ = box.levels, contracted_index_ = box.index, contracted_tiers_ = box.tiers;
-    box.coefficients = new_coefficients();
+void HexBoxes::find_coefficients(Box& box) {
+  if (contracted_ > 0 && !shares(box, 2)) contracted_ = 0;
+  if (contracted_ > 1 && !shares(box, 1)) contracted_ = 1;
+  if (contracted_ < 1) contract_w(box);
+  if (contracted_ < 2) contract_v(box);
+  contracted_ = 2;
+  contracted_levels_ = box.levels, contracted_index_ = box.index, contracted_tiers_ = box.tiers;
+  if (box.is_precise) {
+    box.coefficients = pool_.take();
     contract_u(box, *box.coefficients);
+  } else {
+    box.narrow = narrow_pool_.take();
+    contract_u(box, *box.narrow);
   }
-  matrices_.set(*box.coefficients);
-  return matrices_;
 }
 
 void HexBoxes::contract_w(const Box& box) {
@@ -382,6 +451,7 @@ void HexBoxes::contract_w(const Box& box) {
 }
 
 void HexBoxes::contract_v(const Box& box) {
+  is_after_v_narrowed_ = false;
   const LineModels& line = models(box, 1);
   const double* table = line.coefficients(line.level(box.levels[1]), box.index[1]);
   const int num_w = q1(box, 2);
@@ -413,6 +483,54 @@ void HexBoxes::contract_u(const Box& box, HexCoefficients& result) {
   }
 }
 
+void HexBoxes::narrow_after_v(int num_w) {
+  for (int d = 0; d < 3; ++d)
+    for (int m = num_w; m < n_ * num_w; ++m) narrow_after_v_[d][m] = narrow(after_v_[d][m]);  // from i = 1 on
+  is_after_v_narrowed_ = true;
+}
+
+/// With c_i in the middle between the coefficients b_io of N_i's model, and A_i what is multiplied with them:
+///
+///   X_o = (A_0 + sum_i c_i A_i) + sum_i (b_io - c_i) A_i,
+///
+/// the first sum in double precision, and relative to a point of it: so all that is rounded is small beside the box.
+void HexBoxes::contract_u(const Box& box, NarrowHexCoefficients& result) {
+  const LineModels& line = models(box, 0);
+  const LineModels::Level& level = line.level(box.levels[0]);
+  const double* middles = line.middles(level, box.index[0]);
+  const float* deviations = line.deviations(level, box.index[0]);
+  const int num_w = q1(box, 2), num_u = q1(box, 0);
+  const NarrowContraction contract = narrow_contraction(num_u);
+  if (!is_after_v_narrowed_) narrow_after_v(num_w);
+  result.resize(num_u, num_w);
+  const double inflation = line_error(box, 1).inflation * line_error(box, 2).inflation;
+  for (int d = 0; d < 3; ++d) {
+    const Wide* in = after_v_[d].data();
+    Wide start[kWide], sizes{};
+    constexpr int kTogether = 4;  // runs over the end
+    for (int w = 0; w < num_w; w += kTogether) {
+      Wide sums[kTogether];
+      for (int s = 0; s < kTogether; ++s) sums[s] = in[w + s];
+      for (int i = 1; i < n_; ++i)
+        for (int s = 0; s < kTogether; ++s) sums[s] += middles[i] * in[i * num_w + w + s];
+      for (int s = 0; s < kTogether; ++s) start[w + s] = sums[s];
+    }
+    const double origin = start[num_w / 2][kWide / 2];
+    Narrow narrow_start[kWide];
+    for (int w = 0; w < num_w; ++w) {
+      start[w] -= origin;
+      take_higher_size(sizes, start[w]);
+      narrow_start[w] = narrow(start[w]);
+    }
+    contract(deviations, narrow_start, narrow_after_v_[d].data(), n_, num_w, result.coordinate(d));
+    double deviating = 0;
+    for (int i = 1; i < n_; ++i) deviating += level.largest_deviation[i] * weight(0, i, d, 0);
+    result.precision.sizes[d] = (1 + 1e-5) * (highest_lane(sizes) + inflation * deviating);
+  }
+  // The start and both factors are rounded, and each of the other sums; below 1e-36, errors are not by size.
+  result.precision.errors = (n_ + 1) * kNarrowRoundoff * result.precision.sizes + Vec3::Constant(1e-36);
+}
+
 /// With P the models: N_i N_j N_k - P_i P_j P_k = (N_i - P_i) N_j N_k + P_i (N_j - P_j) N_k + P_i P_j (N_k - P_k), and
 /// so with one of each three differentiated; |P| is at most `growth` times what bounds |N|.
 Mat3 HexBoxes::remainder(const Box& box) {
@@ -424,10 +542,11 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, halvings, L, differences,
-  // and the 16 asked for. Steps of steps have the roundings of those that they are made of: all in all kSteps of total_.
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, two for coefficients in two
+  // parts and the box's point, halvings, L, differences, and the 16 asked for. Steps of steps have the roundings of
+  // those that they are made of: all in all kSteps of total_.
   constexpr int kSteps = 13;
-  const double roundings = 3 * (n_ + 4) + 1 + kSteps + kWide * box.halved + 3 + 8 + 16;
+  const double roundings = 3 * (n_ + 4) + 1 + kSteps + 2 + kWide * box.halved + 3 + 8 + 16;
   const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
   for (int d = 0; d < 3; ++d) {
     result.col(d) *= 1 / parts(box.levels[d]);

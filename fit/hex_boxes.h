@@ -13,13 +13,29 @@
 
 namespace subvol {
 
-/// Coefficients that are no longer needed, for others.
-using SpareCoefficients = std::vector<std::unique_ptr<HexCoefficients>>;
-struct ReturnToSpare {
-  SpareCoefficients* spare = nullptr;
-  void operator()(HexCoefficients* coefficients) const { spare->emplace_back(coefficients); }
+/// Coefficients of one precision; those that are no longer needed are kept for others.
+template <class Vector>
+class CoefficientsPool {
+ public:
+  using Coefficients = HexCoefficientsOf<Vector>;
+  struct Return {
+    CoefficientsPool* pool = nullptr;
+    void operator()(Coefficients* coefficients) const { pool->spare_.emplace_back(coefficients); }
+  };
+  using Pooled = std::unique_ptr<Coefficients, Return>;
+
+  CoefficientsPool() = default;
+  CoefficientsPool(const CoefficientsPool&) = delete;  // what is pooled knows where to go
+  CoefficientsPool& operator=(const CoefficientsPool&) = delete;
+
+  Pooled take();
+  /// How many are in use.
+  int num_taken() const { return num_made_ - static_cast<int>(spare_.size()); }
+
+ private:
+  std::vector<std::unique_ptr<Coefficients>> spare_;
+  int num_made_ = 0;
 };
-using PooledCoefficients = std::unique_ptr<HexCoefficients, ReturnToSpare>;
 
 /// Bernstein coefficients of the Jacobian dx/du of one high-order hex over its dyadic boxes, got by halving them in the
 /// direction that pays most.
@@ -28,7 +44,8 @@ using PooledCoefficients = std::unique_ptr<HexCoefficients, ReturnToSpare>;
 /// degree with small errors by this cell's coefficients, along v always of degree kWide - 1, so that a row of
 /// coefficients is one `Wide`. The map's coefficients follow by three contractions, of which boxes of one place along
 /// w, or v and w, share the first ones; or by halving those of the box around it, where its models are good enough.
-/// `HexMatrices` makes J's of them.
+/// `HexMatrices` makes J's of them. Parts of the cell have them in single precision, relative to a point of their own:
+/// so errors are small beside the part, not the cell; and in double only where det J is too low for these errors.
 class HexBoxes {
  public:
   struct Box {
@@ -40,13 +57,15 @@ class HexBoxes {
     int halved = 0;     ///< how often the coefficients have been since
     double wanted = -1; ///< errors of a direction's models, share of the mean edges; < 0: small ones
     int split = 0;      ///< direction to be halved
-    PooledCoefficients coefficients;  ///< once looked at; few boxes keep them
+    bool is_precise = true;  ///< coefficients are in double precision
+    Mat3 near_l = Mat3::Zero();  ///< of `determinant_bound`: the last one for this box, or the one around it
+    // Once looked at, one of them; few boxes keep them.
+    CoefficientsPool<Wide>::Pooled coefficients;
+    CoefficientsPool<Narrow>::Pooled narrow;
   };
   static constexpr int kLevelsPerDepth = 3, kMaxDepth = LineModels::kMaxLevel;
 
   HexBoxes(Basis basis, int order);
-  HexBoxes(const HexBoxes&) = delete;  // boxes know where their coefficients go
-  HexBoxes& operator=(const HexBoxes&) = delete;
 
   /// Takes a cell by its modes and their coefficients, relative to a point nearby.
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
@@ -55,19 +74,29 @@ class HexBoxes {
   static int num_corners() { return 8; }
   /// lowest: det of dx/du where it is least, as far as known: errors of models must be small beside it.
   std::array<Box, 2> children(Box box, double lowest);
-  /// Models are chosen before a box is looked at.
-  static bool improve(Box&, double) { return false; }
+  /// Goes over to double precision, if the errors of single precision matter beside `lowest`. False: they do not.
+  bool improve(Box& box, double lowest);
   static Vec3 corner_point(const Box& box, int corner);
 
   /// Chooses the box's models, unless it has coefficients. Whether their errors are so large that no bound can be hoped
   /// for.
   bool is_hopeless(Box& box);
-  /// The coefficients of J's, dx by the box's own coordinates, on a box whose models have been chosen; valid until the
-  /// next call, and as long as the box has its coefficients.
-  HexMatrices& matrices(Box& box);
+  /// Calls work(matrices) with the coefficients of J's, dx by the box's own coordinates, on a box whose models have
+  /// been chosen: `HexMatrices` or `NarrowHexMatrices`.
+  template <class Work>
+  void with_matrices(Box& box, const Work& work) {
+    if (!has_coefficients(box)) find_coefficients(box);
+    if (box.is_precise) {
+      matrices_.set(*box.coefficients);
+      work(matrices_);
+    } else {
+      narrow_matrices_.set(*box.narrow);
+      work(narrow_matrices_);
+    }
+  }
   /// Number of the matrix at a corner of the box: J there, by the model.
   std::size_t corner_matrix(const Box& box, int corner) const;
-  /// Bounds of the errors of J's entries: modelling and rounding.
+  /// Bounds of the errors of J's entries: modelling, and rounding in double precision.
   Mat3 remainder(const Box& box);
   /// The direction along which J varies most, as far as looked at, and errors of models are largest. Takes the
   /// coefficients, where many boxes have some.
@@ -78,6 +107,7 @@ class HexBoxes {
   double mean_determinant() const { return mean_edges_.prod(); }
   /// Of `determinant_bound`.
   static Mat3 frame(const Box&) { return Mat3::Identity(); }
+  static Mat3* near_l(Box& box) { return &box.near_l; }
   /// det of dx/du over that of `matrices`.
   static double determinant_scale(const Box& box) { return parts(box.level); }
 
@@ -95,7 +125,8 @@ class HexBoxes {
   };
   const LineModels& models(const Box& box, int direction) const { return *tiers_[direction][box.tiers[direction]]; }
   int q1(const Box& box, int direction) const { return models(box, direction).degree() + 1; }
-  PooledCoefficients new_coefficients();
+  static bool has_coefficients(const Box& box) { return box.coefficients || box.narrow; }
+  void find_coefficients(Box& box);
   /// Whether the buffers hold the same functions of a direction.
   bool shares(const Box& box, int direction) const;
   void set_modes(std::span<const LocalMode> modes);
@@ -105,9 +136,13 @@ class HexBoxes {
   double error_size(const Box& box, int direction) {
     return line_error(box, direction).size;
   }
+  /// What errors of single precision do to J, share of the mean edges.
+  double narrow_error_size(const Box& box) const;
   void contract_w(const Box& box);
   void contract_v(const Box& box);
   void contract_u(const Box& box, HexCoefficients& result);
+  void contract_u(const Box& box, NarrowHexCoefficients& result);
+  void narrow_after_v(int num_w);
 
   static constexpr int kMostTiers = 2;
 
@@ -116,8 +151,8 @@ class HexBoxes {
   std::array<std::vector<const LineModels*>, 3> tiers_;  // per direction, by ascending degree; along v there is one
   std::array<int, 3> contracted_levels_{}, contracted_index_{}, contracted_tiers_{};  // what the buffers hold
   int contracted_ = 0;                           // and how many of its directions, from w on: 2 at the most
-  SpareCoefficients spare_;
-  int num_coefficients_ = 0;                     // that were made
+  CoefficientsPool<Wide> pool_;
+  CoefficientsPool<Narrow> narrow_pool_;
   std::array<AlignedDoubles, 3> modes_;          // x, y, z of a_ijk, then by 1, x, N_2, ..., at k row_ + j n + i
   const LocalMode* of_modes_ = nullptr;          // and for which modes,
   std::size_t num_modes_ = 0;
@@ -126,16 +161,21 @@ class HexBoxes {
   std::vector<int> all_used_;                    // n_ for every kWide numbers of a row
   std::array<AlignedDoubles, 3> after_w_;        // at o_w row_ + j n + i
   std::array<std::vector<Wide>, 3> after_v_;     // at i q1_w + o_w, lane o_v
+  bool is_after_v_narrowed_ = false;             // and whether these are of them:
+  std::array<std::vector<Narrow, AlignedAllocator<Narrow>>, 3> narrow_after_v_;
   HexMatrices matrices_;
+  NarrowHexMatrices narrow_matrices_;
   Vec3 mean_edges_;                              // lengths of the linear part's mean columns
   Vec3 inverse_mean_edges_;
-  // i >= 2: bound of the sum over the other two numbers of a_ijk times their functions in that entry of J.
+  // Bound of the sum over the other two numbers of a_ijk times their functions in that entry of J, for i >= 2; and of
+  // that of a_1jk - a_0jk along u, in column u, for i = 1.
   double& weight(int direction, int i, int row, int column) {
     return weights_[static_cast<std::size_t>((direction * n_ + i) * kWeights + 3 * column + row)];
   }
   static constexpr int kWeights = 2 * kWide;  // a matrix, by columns, in whole vectors
   AlignedDoubles weights_;
   std::array<AlignedDoubles, 3> is_used_;        // by direction: 1 where they are not 0
+  bool fits_single_ = true;                      // whether the cell's size is far from overflow there
   Vec3 total_;                                   // sum of |a_ijk| times the bounds of 1, x, N_2, ...
   std::size_t cell_ = 0;                         // number of the current one, from 1
   using Zones = std::array<LineError, LineModels::kZones>;

@@ -118,20 +118,24 @@ class Search {
     if (boxes_.is_hopeless(box)) return keep(std::move(box), parent_lowest);
     double lowest;
     do {
-      auto& matrices = boxes_.matrices(box);
       const double scale = boxes_.determinant_scale(box);
       // A bound by the whole cell may be very close to det J, those by parts are not by far.
       const BoundOptions bounding{.single_first = box.level > 0, .corners_first = parent_lowest != -kInfinity};
-      const double bound = scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box), bounding);
+      double bound = 0;
+      int lowest_corner = 0;
+      lowest = kInfinity;
+      boxes_.with_matrices(box, [&](auto& matrices) {
+        bound = scale * determinant_bound(matrices, boxes_.remainder(box), boxes_.frame(box), bounding,
+                                          boxes_.near_l(box));
+        if (bound > 0) return;
+        for (int corner = 0; corner < boxes_.num_corners(); ++corner) {
+          const double value = scale * matrices[boxes_.corner_matrix(box, corner)].determinant();
+          if (value < lowest) lowest = value, lowest_corner = corner;
+        }
+      });
       if (bound > 0) {
         result_.lower_bound = std::min(result_.lower_bound, bound);
         return;
-      }
-      int lowest_corner = 0;
-      lowest = kInfinity;
-      for (int corner = 0; corner < boxes_.num_corners(); ++corner) {
-        const double value = scale * matrices[boxes_.corner_matrix(box, corner)].determinant();
-        if (value < lowest) lowest = value, lowest_corner = corner;
       }
       if (lowest <= 0) lowest = try_witness(boxes_.corner_point(box, lowest_corner));
     } while (lowest > 0 && boxes_.improve(box, lowest));

@@ -145,10 +145,18 @@ LineModels::Level LineModels::make_level(int l) const {
       for (int o = 0; o <= q; ++o) row(part, i + 1)[o] = static_cast<double>(value[o] + shift);
     }
   }
+  level.middles.resize(static_cast<std::size_t>(parts) * (order_ + 1));
+  level.deviations.assign(level.coefficients.size(), 0);
   for (int part = 0; part < parts; ++part)
-    for (int i = 0; i <= order_; ++i)
-      for (int o = 0; o <= q; ++o)
-        level.largest_coefficient[i] = std::max(level.largest_coefficient[i], std::abs(row(part, i)[o]));
+    for (int i = 0; i <= order_; ++i) {
+      const std::size_t place = static_cast<std::size_t>(part) * (order_ + 1) + i;
+      const double* b = row(part, i);
+      const auto [least, largest] = std::minmax_element(b, b + q + 1);
+      const double middle = level.middles[place] = 0.5 * (*least + *largest);
+      level.largest_coefficient[i] = std::max({level.largest_coefficient[i], -*least, *largest});
+      level.largest_deviation[i] = std::max(level.largest_deviation[i], *largest - middle);
+      for (int o = 0; o <= q; ++o) level.deviations[place * kStride + o] = static_cast<float>(b[o] - middle);
+    }
   return level;
 }
 

@@ -38,6 +38,11 @@ class LineModels {
     PerFunction largest_coefficient{};  ///< max_o |b_io|
     bool exact = true;                  ///< there are no errors
     AlignedDoubles coefficients;        ///< b_io at (index (order + 1) + i) kStride + o
+    // The same in two parts, for single precision: c_i in the middle between the least and the largest b_io over o, and
+    // b_io - c_i, these good to a unit of roundoff (of either precision) beyond what the coefficients are.
+    std::vector<double> middles;        ///< c_i at index (order + 1) + i
+    std::vector<float, AlignedAllocator<float>> deviations;  ///< b_io - c_i, like coefficients
+    PerFunction largest_deviation{};    ///< max_o |b_io - c_i|
   };
 
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it
@@ -52,6 +57,12 @@ class LineModels {
   const Level& level(int l) const;
   const double* coefficients(const Level& level, int index) const {
     return level.coefficients.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
+  }
+  const double* middles(const Level& level, int index) const {
+    return level.middles.data() + static_cast<std::size_t>(index) * (order_ + 1);
+  }
+  const float* deviations(const Level& level, int index) const {
+    return level.deviations.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
   }
 
  private:

@@ -67,21 +67,21 @@ void PrismMatrices::resize(int degree) {
   }
 }
 
-template <class Vector>
-void PrismMatrices::load(const std::array<std::vector<Vector>, 3>& x, std::size_t first,
-                         MatrixOf<Vector>& result) const {
-  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
-  constexpr Vector kLowW{0, 1, 2, 3, 4, 5, 6, 7}, kHighW = kWide - 1 - kLowW;
+template <class Lanes>
+void PrismMatrices::load(const std::array<std::vector<Lanes>, 3>& x, std::size_t first,
+                         MatrixOf<Lanes>& result) const {
+  using Number = std::remove_cvref_t<decltype(Lanes{}[0])>;
+  constexpr Lanes kLowW{0, 1, 2, 3, 4, 5, 6, 7}, kHighW = kWide - 1 - kLowW;
   const std::size_t n = first / kWide;
   const Triangle::Neighbours& at = triangle_->neighbours[n];
   const Number e0 = at.exponents[0], e1 = at.exponents[1], e2 = at.exponents[2];
   for (int row = 0; row < 3; ++row) {
-    const Vector* of = x[row].data();
-    const Vector here = of[n], o1 = of[at.o1], o2 = of[at.o2];
+    const Lanes* of = x[row].data();
+    const Lanes here = of[n], o1 = of[at.o1], o2 = of[at.o2];
     result[row][0] = e0 * (of[at.u0] - here) + e1 * (here - o1) + e2 * (of[at.u2] - o2);
     result[row][1] = e0 * (of[at.v0] - here) + e1 * (of[at.v1] - o1) + e2 * (here - o2);
-    const Vector step = __builtin_shufflevector(here, here, 1, 2, 3, 4, 5, 6, 7, 7) - here;
-    result[row][2] = kLowW * __builtin_shufflevector(step, step, 0, 0, 1, 2, 3, 4, 5, 6) + kHighW * step;
+    const Lanes step = shifted_down(here) - here;
+    result[row][2] = kLowW * shifted_up(step) + kHighW * step;
   }
 }
 template void PrismMatrices::load(const std::array<std::vector<Wide>, 3>&, std::size_t, WideMatrix&) const;

@@ -19,6 +19,7 @@ namespace subvol {
 ///   J_b = sum_c alpha_c (X_{alpha - e_c + e_i} - X_{alpha - e_c + e_0}),  i = 1, 2;   w as in `HexMatrices`
 class PrismMatrices {
  public:
+  using Vector = Wide;
   PrismMatrices();
   ~PrismMatrices();
   PrismMatrices(PrismMatrices&&) noexcept;
@@ -69,8 +70,8 @@ class PrismMatrices {
   /// Of the coefficients over a triangle of one degree.
   struct Triangle;
 
-  template <class Vector>
-  void load(const std::array<std::vector<Vector>, 3>& x, std::size_t first, MatrixOf<Vector>& result) const;
+  template <class Lanes>
+  void load(const std::array<std::vector<Lanes>, 3>& x, std::size_t first, MatrixOf<Lanes>& result) const;
   void make_narrow();
 
   int degree_ = 0, count_ = 0;

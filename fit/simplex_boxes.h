@@ -58,6 +58,7 @@ class SimplexBoxes {
   double mean_determinant() const { return mean_edges_.prod(); }
   /// Of `determinant_bound`.
   Mat3 frame(const Box& box) const;
+  static Mat3* near_l(Box&) { return nullptr; }  // parts have sides of other directions
   double determinant_scale(const Box& box) const;
 
  protected:
@@ -142,14 +143,19 @@ class TetBoxes : public SimplexBoxes {
  public:
   TetBoxes(Basis basis, int order) : SimplexBoxes(CellKind::tet, basis, order) {}
   static int num_corners() { return 4; }
-  /// J's coefficients on a box with models; valid until the next call.
-  ControlMatrices& matrices(const Box& box);
+  /// Calls work(matrices) with J's coefficients on a box with models.
+  template <class Work>
+  void with_matrices(const Box& box, const Work& work) {
+    work(matrices(box));
+  }
   /// Number of the matrix at a corner of the box: J there, by the model.
   std::size_t corner_matrix(const Box& box, int corner) const;
   /// Whether no model is good enough for a box whose matrices are there.
   bool is_stuck(const Box& box) { return SimplexBoxes::is_stuck(box, matrices_); }
 
  private:
+  ControlMatrices& matrices(const Box& box);
+
   ControlMatrices matrices_;
 };
 
@@ -157,14 +163,19 @@ class PrismBoxes : public SimplexBoxes {
  public:
   PrismBoxes(Basis basis, int order) : SimplexBoxes(CellKind::prism, basis, order) {}
   static int num_corners() { return 6; }
-  /// J's coefficients on a box with models; valid until the next call.
-  PrismMatrices& matrices(const Box& box);
+  /// Calls work(matrices) with J's coefficients on a box with models.
+  template <class Work>
+  void with_matrices(const Box& box, const Work& work) {
+    work(matrices(box));
+  }
   /// Number of the matrix at a corner of the box whose matrices are there: J there, by the model.
   std::size_t corner_matrix(const Box& box, int corner) const;
   /// Whether no model is good enough for a box whose matrices are there.
   bool is_stuck(const Box& box) { return SimplexBoxes::is_stuck(box, matrices_); }
 
  private:
+  PrismMatrices& matrices(const Box& box);
+
   PrismMatrices matrices_;
 };
 

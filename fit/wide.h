@@ -32,6 +32,17 @@ using Narrow = float __attribute__((vector_size(kWide * sizeof(float))));
 inline void store_wide(const Narrow& value, float* to) { std::memcpy(to, &value, sizeof value); }
 inline Narrow narrow(const Wide& x) { return __builtin_convertvector(x, Narrow); }
 inline Wide widen(const Narrow& x) { return __builtin_convertvector(x, Wide); }
+inline Wide widen(const Wide& x) { return x; }
+
+/// Lanes of eight one place up (down); the first (last) one stays.
+template <class Vector>
+Vector shifted_up(const Vector& x) {
+  return __builtin_shufflevector(x, x, 0, 0, 1, 2, 3, 4, 5, 6);
+}
+template <class Vector>
+Vector shifted_down(const Vector& x) {
+  return __builtin_shufflevector(x, x, 1, 2, 3, 4, 5, 6, 7, 7);
+}
 
 /// Sixteen numbers of single precision.
 inline constexpr int kWideFloats = 16;
@@ -42,6 +53,10 @@ inline WideFloats load_wide(const float* from) {
   return result;
 }
 inline void store_wide(const WideFloats& value, float* to) { std::memcpy(to, &value, sizeof value); }
+
+/// The numbers in vectors, one after the other.
+inline float* numbers(Narrow* vectors) { return reinterpret_cast<float*>(vectors); }
+inline const float* numbers(const Narrow* vectors) { return reinterpret_cast<const float*>(vectors); }
 
 /// Begins where a cache line does, so that vectors of whole lines do not cross any.
 template <class Number>

@@ -13,6 +13,7 @@
 #include <functional>
 #include <limits>
 #include <random>
+#include <type_traits>
 #include <vector>
 
 using namespace subvol;
@@ -45,7 +46,27 @@ HexCoefficients random_hex(Random& random, int num_u, int num_w, const Mat3& edg
   return result;
 }
 
-Vec3 value(const HexCoefficients& hex, const Vec3& at) {
+/// In single precision, relative to a coefficient in the middle.
+NarrowHexCoefficients narrowed(const HexCoefficients& hex) {
+  NarrowHexCoefficients result;
+  result.resize(hex.num_u(), hex.num_w());
+  for (int row = 0; row < 3; ++row) {
+    const double origin = hex.coordinate(row)[hex.num_vectors() / 2][kWide / 2];
+    double size = 0;
+    for (int n = 0; n < hex.num_vectors(); ++n)
+      for (int v = 0; v < kWide; ++v) {
+        const double x = hex.coordinate(row)[n][v] - origin;
+        size = std::max(size, std::abs(x));
+        result.coordinate(row)[n][v] = static_cast<float>(x);
+      }
+    result.precision.sizes[row] = size;
+    result.precision.errors[row] = size * std::numeric_limits<float>::epsilon() / 2;
+  }
+  return result;
+}
+
+template <class Vector>
+Vec3 value(const HexCoefficientsOf<Vector>& hex, const Vec3& at) {
   Vec3 result = Vec3::Zero();
   for (int u = 0; u < hex.num_u(); ++u)
     for (int w = 0; w < hex.num_w(); ++w)
@@ -57,7 +78,8 @@ Vec3 value(const HexCoefficients& hex, const Vec3& at) {
 }
 
 /// What the matrices say that J is at a point.
-Mat3 jacobian(const HexMatrices& matrices, const HexCoefficients& hex, const Vec3& at) {
+template <class Vector>
+Mat3 jacobian(const HexMatricesOf<Vector>& matrices, const HexCoefficientsOf<Vector>& hex, const Vec3& at) {
   Mat3 result = Mat3::Zero();
   for (std::size_t b = 0; b < matrices.size(); ++b) {
     const int vector = static_cast<int>(b) / kWide, v = static_cast<int>(b) % kWide;
@@ -76,36 +98,68 @@ Mat3 differences(const Map& map, const Vec3& at) {
   return result;
 }
 
-/// All ways to the entries of the matrices agree, those in single precision up to their bounds.
+/// That product's entries are those of l times `exact`, up to `error` of a row and the bounds of single precision.
+template <class Product, class Matrices>
+void check_product(const Product& product, const Matrices& exact, const Mat3& l, const Vec3& errors) {
+  const auto check = [&]<class Entries>(Entries& entries) {
+    using Vector = std::remove_reference_t<decltype(entries[0][0])>;
+    constexpr std::size_t kLanes = sizeof(Vector) / sizeof(entries[0][0][0]);
+    for (std::size_t first = 0; first < exact.size(); first += kWide) {
+      const std::size_t from = std::min(first, exact.size() - kLanes);
+      product.load(from, entries);
+      for (std::size_t k = 0; k < kWide; ++k) {
+        const Mat3 wanted = l * exact[first + k];
+        for (int row = 0; row < 3; ++row)
+          for (int column = 0; column < 3; ++column)
+            CHECK(std::abs(entries[row][column][first - from + k] - wanted(row, column)) <= errors[row]);
+      }
+    }
+  };
+  if constexpr (requires { typename Product::Vector; }) {
+    MatrixOf<typename Product::Vector> entries;
+    check(entries);
+  } else {
+    WideMatrix entries;
+    check(entries);
+  }
+}
+
+/// All ways to the entries of the matrices agree.
 template <class Matrices>
-void check_loads(Matrices& matrices, const Mat3& l) {
-  using Vector = typename Matrices::NarrowProduct::Vector;
-  constexpr std::size_t kLanes = sizeof(Vector) / sizeof(float);
-  const auto product = matrices.times(l);
-  const auto narrow = matrices.narrow_product(l);
-  REQUIRE(narrow.errors().maxCoeff() <= kMostError);
-  WideMatrix entries, product_entries;
-  MatrixOf<Vector> narrow_entries;
-  double largest = 0;
+void check_loads(const Matrices& matrices) {
+  MatrixOf<typename Matrices::Vector> entries;
+  const double margin = std::is_same_v<typename Matrices::Vector, Wide> ? 1e-13 : 1e-4;
   for (std::size_t first = 0; first < matrices.size(); first += kWide) {
     matrices.load(first, entries);
-    product.load(first, product_entries);
-    const std::size_t narrow_first = std::min(first, matrices.size() - kLanes);
-    narrow.load(narrow_first, narrow_entries);
     for (int k = 0; k < kWide; ++k) {
-      const Mat3 j = matrices[first + static_cast<std::size_t>(k)], lj = l * j;
+      const Mat3 j = matrices[first + static_cast<std::size_t>(k)];
       for (int row = 0; row < 3; ++row)
-        for (int column = 0; column < 3; ++column) {
-          CHECK(entries[row][column][k] == Approx(j(row, column)).margin(1e-13));
-          CHECK(product_entries[row][column][k] == Approx(lj(row, column)).margin(1e-12));
-          const std::size_t lane = first - narrow_first + static_cast<std::size_t>(k);
-          const double error = std::abs(narrow_entries[row][column][lane] - lj(row, column));
-          CHECK(error <= narrow.errors()[row]);
-          largest = std::max(largest, error);
-        }
+        for (int column = 0; column < 3; ++column)
+          CHECK(entries[row][column][k] == Approx(j(row, column)).margin(margin));
     }
   }
-  CHECK(largest > 0);
+}
+
+/// Coefficients in single precision differ from those in double by a constant, up to their bounds.
+void check_narrow(HexBoxes& boxes, const HexBoxes::Box& box) {
+  if (box.halved > 0) return;  // of other models than its own
+  HexBoxes::Box precise;
+  precise.level = box.level, precise.levels = box.levels, precise.index = box.index, precise.tiers = box.tiers;
+  precise.modelled_levels = box.modelled_levels, precise.modelled_index = box.modelled_index;
+  boxes.with_matrices(precise, [](const auto&) {});
+  const NarrowHexCoefficients& narrow = *box.narrow;
+  const HexCoefficients& exact = *precise.coefficients;
+  for (int row = 0; row < 3; ++row) {
+    double least = std::numeric_limits<double>::infinity(), largest = -least, size = 0;
+    for (int n = 0; n < exact.num_vectors(); ++n)
+      for (int v = 0; v < kWide; ++v) {
+        const double x = narrow.coordinate(row)[n][v], difference = x - exact.coordinate(row)[n][v];
+        least = std::min(least, difference), largest = std::max(largest, difference);
+        size = std::max(size, std::abs(x));
+      }
+    CHECK(largest - least <= 2 * narrow.precision.errors[row] + 1e-13);
+    CHECK(size <= narrow.precision.sizes[row]);
+  }
 }
 
 const Mat3 kEdges = (Mat3() << 1, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 3).finished();
@@ -132,9 +186,34 @@ TEST_CASE("Halves of a map of a hex are the map", "[hex_matrices]") {
       }
 }
 
+TEST_CASE("Halves in single precision are halves up to their bounds", "[hex_matrices]") {
+  Random random(7);
+  HexCoefficients whole = random_hex(random, 6, 8, kEdges, 0.2), high;
+  NarrowHexCoefficients narrow = narrowed(whole), narrow_high;
+  Vec3 offset = Vec3::Zero();
+  for (int row = 0; row < 3; ++row) offset[row] = whole.coordinate(row)[whole.num_vectors() / 2][kWide / 2];
+  for (int level = 0; level < 30; ++level) {
+    whole.halve(level % 3, high);
+    narrow.halve(level % 3, narrow_high);
+    const auto check = [&](const NarrowHexCoefficients& of, const HexCoefficients& exact) {
+      for (int row = 0; row < 3; ++row)
+        for (int n = 0; n < exact.num_vectors(); ++n)
+          for (int v = 0; v < kWide; ++v) {
+            const double x = exact.coordinate(row)[n][v] - offset[row];
+            CHECK(std::abs(of.coordinate(row)[n][v] - x) <= of.precision.errors[row]);
+            CHECK(std::abs(of.coordinate(row)[n][v]) <= (1 + 1e-6) * of.precision.sizes[row]);
+          }
+    };
+    check(narrow, whole);
+    check(narrow_high, high);
+    if (level % 2) std::swap(whole, high), std::swap(narrow, narrow_high);
+  }
+}
+
 TEST_CASE("Matrices of a hex are the Jacobian of its map, in either precision", "[hex_matrices]") {
   Random random(2);
   HexMatrices matrices;
+  NarrowHexMatrices narrow_matrices;
   for (const int num_u : {2, 3, 6, 8})
     for (const int num_w : {2, 5, 8}) {
       const HexCoefficients hex = random_hex(random, num_u, num_w, kEdges, 0.2);
@@ -142,7 +221,17 @@ TEST_CASE("Matrices of a hex are the Jacobian of its map, in either precision", 
       const Vec3 at(uniform(random, 0.1, 0.9), uniform(random, 0.1, 0.9), uniform(random, 0.1, 0.9));
       const auto map = [&](const Vec3& x) { return value(hex, x); };
       CHECK((jacobian(matrices, hex, at) - differences(map, at)).norm() < 1e-8);
-      check_loads(matrices, kAny);
+      check_loads(matrices);
+      check_product(matrices.times(kAny), matrices, kAny, Vec3::Constant(1e-12));
+
+      const NarrowHexCoefficients narrow = narrowed(hex);
+      narrow_matrices.set(narrow);
+      check_loads(narrow_matrices);
+      const auto product = narrow_matrices.narrow_product(kAny);
+      REQUIRE(product.errors().maxCoeff() <= kMostError);
+      check_product(product, matrices, kAny, product.errors());
+      CHECK((narrow_matrices.mean() - matrices.mean()).norm() < 1e-4);
+      CHECK((narrow_matrices.variation() - matrices.variation()).norm() < 1e-3);
 
       Mat3 mean = Mat3::Zero();
       for (std::size_t b = 0; b < matrices.size(); ++b) mean += matrices[b] / static_cast<double>(matrices.size());
@@ -213,28 +302,38 @@ TEST_CASE("Matrices of a prism are the Jacobian of its map, in either precision"
     CHECK((j - differences(map, at)).norm() < 1e-8);
     CHECK((matrices.mean() - mean).leftCols(2).norm() < 1e-12);
     for (const std::size_t corner : matrices.corners()) CHECK(corner % kWide == 0);
-    check_loads(matrices, kAny);
+    check_loads(matrices);
+    check_product(matrices.times(kAny), matrices, kAny, Vec3::Constant(1e-12));
+    const auto product = matrices.narrow_product(kAny);
+    REQUIRE(product.errors().maxCoeff() <= kMostError);
+    check_product(product, matrices, kAny, product.errors());
   }
 }
 
-TEST_CASE("Bounds of det J hold in either precision, at any size", "[hex_matrices]") {
+TEST_CASE("Bounds of det J hold in either precision", "[hex_matrices]") {
   Random random(4);
   HexMatrices matrices;
+  NarrowHexMatrices narrow_matrices;
   int found = 0, far_apart = 0;
   for (int repeat = 0; repeat < 400; ++repeat) {
-    const double size = std::pow(10.0, uniform(random, -45, 45)), flat = std::pow(10.0, uniform(random, -5, 0));
+    const double size = std::pow(10.0, uniform(random, -10, 10)), flat = std::pow(10.0, uniform(random, -5, 0));
     const Mat3 edges = size * kEdges * Vec3(1, 1, flat).asDiagonal();
     const HexCoefficients hex =
         random_hex(random, repeat % 2 ? 6 : 8, repeat % 3 ? 6 : 8, edges, uniform(random, 0, 0.02));
+    const NarrowHexCoefficients narrow = narrowed(hex);
     matrices.set(hex);
+    narrow_matrices.set(narrow);
     const Mat3 remainder = 1e-14 * edges.cwiseAbs().rowwise().sum().replicate(1, 3);
     const double full = determinant_bound(matrices, remainder, Mat3::Identity());
-    const double single = determinant_bound(matrices, remainder, Mat3::Identity(), {.single_first = true});
+    const double single = determinant_bound(narrow_matrices, remainder, Mat3::Identity());
     CAPTURE(repeat, size, flat, full, single);
-    CHECK((full > 0) == (single > 0));
-    if (!(full > 0)) continue;
+    if (flat > 0.01) CHECK((full > 0) == (single > 0));  // flatter ones are too close to the errors
+    if (!(full > 0)) {
+      CHECK(single == 0);
+      continue;
+    }
     ++found;
-    far_apart += std::abs(single - full) > 0.01 * full;  // another L was the first to prove it
+    far_apart += flat > 0.01 && std::abs(single - full) > 0.01 * full;  // another L was the first to prove it
     for (int sample = 0; sample < 20; ++sample) {
       const Vec3 at(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
       CHECK(jacobian(matrices, hex, at).determinant() >= std::max(full, single));
@@ -244,39 +343,72 @@ TEST_CASE("Bounds of det J hold in either precision, at any size", "[hex_matrice
   CHECK(far_apart < found / 10);
 }
 
-TEST_CASE("What is too large or too small for single precision is left to double", "[hex_matrices]") {
-  Random random(5);
+TEST_CASE("A bound begins with the L that is known", "[hex_matrices]") {
+  Random random(8);
   HexMatrices matrices;
-  const HexCoefficients fine = random_hex(random, 6, 6, kEdges, 0.005);
-  const auto bound = [&] {
-    return determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), {.single_first = true});
+  const HexCoefficients hex = random_hex(random, 6, 6, kEdges, 0.005);
+  matrices.set(hex);
+  Mat3 l = Mat3::Zero();
+  const double bound = determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), {}, &l);
+  CHECK(bound > 0);
+  CHECK(l != Mat3::Zero());
+  const Mat3 before = l;
+  CHECK(determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), {}, &l) == Approx(bound));
+  CHECK(l == before);
+  l = -before;  // of no use
+  CHECK(determinant_bound(matrices, Mat3::Zero(), Mat3::Identity(), {}, &l) == Approx(bound));
+  CHECK((l - before).norm() < 1e-12 * before.norm());
+}
+
+TEST_CASE("Nothing of a larger box counts in a smaller one", "[hex_matrices]") {
+  Random random(5);
+  NarrowHexMatrices matrices;
+  const auto bound = [&](const HexCoefficients& hex) {
+    const NarrowHexCoefficients narrow = narrowed(hex);
+    matrices.set(narrow);
+    return determinant_bound(matrices, Mat3::Zero(), Mat3::Identity());
   };
-  matrices.set(fine);
-  const double before = bound();
-  CHECK(before > 0);
-  for (const double size : {1e-48, 1e-39, 1e39, 1e48}) {
-    const HexCoefficients other = random_hex(random, 8, 8, size * kEdges, 0.005);
-    matrices.set(other);
-    CHECK(bound() > 0);
-    HexCoefficients folded = other;  // what was of another box, or is infinite in single precision, must not count
-    for (int n = 0; n < folded.num_vectors(); ++n) folded.coordinate(0)[n] *= -1;
-    matrices.set(folded);
-    CHECK(bound() == 0);
-    matrices.set(fine);
-    CHECK(bound() == before);
-  }
-  // An odd number of vectors: what is behind the last one must not be that of a larger box.
-  for (int repeat = 0; repeat < 20; ++repeat) {
-    const HexCoefficients large = random_hex(random, 8, 8, 1e18 * kEdges, 0.005);
-    matrices.set(large);
-    CHECK(bound() > 0);
-    HexCoefficients small = random_hex(random, 3, 3, 1e-18 * kEdges, 0.001);
-    matrices.set(small);
-    CHECK(bound() > 0);
+  for (int repeat = 0; repeat < 20; ++repeat) {  // an odd number of vectors is followed by others in the last load
+    CHECK(bound(random_hex(random, 8, 8, 1e9 * kEdges, 0.005)) > 0);
+    HexCoefficients small = random_hex(random, 3, 3, 1e-9 * kEdges, 0.001);
+    CHECK(bound(small) > 0);
     const int vector = repeat % 9, lane = repeat % kWide;
-    small.coordinate(0)[vector][lane] += 1e-18 * (vector < 3 ? 8 : -8);  // J is folded there
-    matrices.set(small);
-    CHECK(bound() == 0);
+    small.coordinate(0)[vector][lane] += 1e-9 * (vector < 3 ? 8 : -8);  // J is folded there
+    CHECK(bound(small) == 0);
+  }
+}
+
+TEST_CASE("What is too large or too small for single precision is left to double", "[hex_matrices]") {
+  std::vector<LocalMode> modes;
+  std::vector<Vec3> coefficients;
+  for (int corner = 0; corner < 8; ++corner) {
+    LocalMode mode;
+    mode.i = corner & 1, mode.j = corner >> 1 & 1, mode.k = static_cast<std::uint8_t>(corner >> 2);
+    modes.push_back(mode);
+    coefficients.push_back(kEdges * Vec3(mode.i, mode.j, mode.k));
+  }
+  HexBoxes boxes(Basis::fourier, 4);
+  for (const double size : {1e-45, 1e-12, 1.0, 1e12, 1e45}) {
+    std::vector<Vec3> sized;
+    for (const Vec3& x : coefficients) sized.push_back(size * x);
+    boxes.set_cell(modes, sized);
+    HexBoxes::Box root = boxes.root();
+    CHECK(root.is_precise);
+    REQUIRE(!boxes.is_hopeless(root));
+    boxes.choose_split(root);
+    auto children = boxes.children(std::move(root), boxes.mean_determinant());
+    for (HexBoxes::Box& child : children) {
+      CHECK(child.is_precise == (size != 1));
+      // Single precision gives way to double where det J is not far above its errors.
+      CHECK(!boxes.is_hopeless(child));
+      boxes.with_matrices(child, [](const auto&) {});
+      CHECK(!boxes.improve(child, 0.1 * boxes.mean_determinant()));
+      CHECK(boxes.improve(child, 1e-7 * boxes.mean_determinant()) == (size == 1));
+      CHECK(child.is_precise);
+      boxes.with_matrices(child, [](const auto& matrices) {
+        CHECK(std::is_same_v<std::remove_cvref_t<decltype(matrices)>, HexMatrices>);
+      });
+    }
   }
 }
 
@@ -316,22 +448,33 @@ TEST_CASE("Boxes of a hex have the Jacobian of the cell, by models and by halves
       HexBoxes boxes(basis, order);
       boxes.set_cell(modes, others);  // of which nothing must stay
       boxes.set_cell(modes, coefficients);
-      int halved = 0, looked_at = 0;
-      for (int walk = 0; walk < 20; ++walk) {
+      int halved = 0, narrow_halved = 0, looked_at = 0;
+      for (int walk = 0; walk < 40; ++walk) {
         HexBoxes::Box box = boxes.root();
         for (int level = 0; level < 9; ++level) {
           double lowest = -std::numeric_limits<double>::infinity();
           if (!boxes.is_hopeless(box)) {
             ++looked_at;
-            halved += box.halved > 0 && box.coefficients;
-            const HexMatrices& matrices = boxes.matrices(box);
+            (box.is_precise ? halved : narrow_halved) += box.halved > 0 && (box.coefficients || box.narrow);
             const Mat3 remainder = boxes.remainder(box);
             const Vec3 local(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
             const Vec3 low = HexBoxes::corner_point(box, 0), high = HexBoxes::corner_point(box, 7);
             const Mat3 wanted = exact(low + local.cwiseProduct(high - low)) * (high - low).asDiagonal();
-            const Mat3 error = (jacobian(matrices, *box.coefficients, local) - wanted).cwiseAbs();
-            CAPTURE(basis, order, share_left_out, level, box.halved);
-            CHECK((error.array() <= remainder.array() + 1e-14).all());
+            CAPTURE(basis, order, share_left_out, level, box.halved, box.is_precise);
+            const auto check = [&](const Mat3& j, const Vec3& more) {
+              const Mat3 error = (j - wanted).cwiseAbs();
+              CHECK((error.array() <= remainder.array() + more.replicate(1, 3).array() + 1e-14).all());
+            };
+            boxes.with_matrices(box, [&]<class Matrices>(const Matrices& matrices) {
+              if constexpr (std::is_same_v<Matrices, HexMatrices>) {
+                check(jacobian(matrices, *box.coefficients, local), Vec3::Zero());
+              } else {
+                const Vec3 errors = NarrowHexMatrices::entry_errors(box.narrow->precision);
+                check(jacobian(matrices, *box.narrow, local), errors);
+              }
+            });
+            if (box.narrow) check_narrow(boxes, box);
+            if (walk % 3 == 0 && level > 2) boxes.improve(box, 1e-9 * boxes.mean_determinant());
             CHECK(boxes.determinant_scale(box) * (high - low).prod() == Approx(1));
             lowest = walk % 2 ? 0.3 * boxes.mean_determinant() : 1e-3 * boxes.mean_determinant();
           }
@@ -342,5 +485,6 @@ TEST_CASE("Boxes of a hex have the Jacobian of the cell, by models and by halves
       }
       CHECK(looked_at > 20);
       CHECK(halved > 10);
+      CHECK(narrow_halved > 10);
     }
 }
