@@ -3,6 +3,7 @@
 #include "cli/exit_status.h"
 #include "cli/report.h"
 #include "cli/standard_output.h"
+#include "subvol/atomic_file.h"
 #include "subvol/error.h"
 
 #include <csignal>
@@ -48,6 +49,7 @@ void require_known_verb(const CLI::App& app, int argc, char** argv) {
   } catch (...) {
   }
   // Nothing is allocated any more, nothing unwound: other threads still run.
+  delete_temporaries();
   (void)!write(STDERR_FILENO, "subvol: ", 8);
   (void)!write(STDERR_FILENO, what, std::strlen(what));
   (void)!write(STDERR_FILENO, "\n", 1);

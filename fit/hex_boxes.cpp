@@ -103,7 +103,7 @@ NarrowContraction narrow_contraction(int num_out) {
 }  // namespace
 
 template <class Vector>
-CoefficientsPool<Vector>::Pooled CoefficientsPool<Vector>::take() {
+typename CoefficientsPool<Vector>::Pooled CoefficientsPool<Vector>::take() {
   if (spare_.empty()) {
     spare_.reserve(++num_made_);  // so that returning them never allocates
     spare_.push_back(std::make_unique<Coefficients>());
