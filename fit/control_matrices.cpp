@@ -225,7 +225,7 @@ double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift,
   if constexpr (!requires { typename Matrices::NarrowProduct; }) {
     return 0;
   } else {
-    constexpr double kMostScale = 1e3, kMostShift = 1e10;  // far from underflow and overflow
+    constexpr double kMostShift = 1e10;  // far from underflow and overflow
     if (!(scale.maxCoeff() < kMostScale)) return 0;
     const auto product = matrices.narrow_product(unscaled);
     const Mat3 g = scale.cwiseProduct(product.errors()) * scale.transpose();

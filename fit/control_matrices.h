@@ -21,6 +21,8 @@ using WideMatrix = MatrixOf<Wide>;
 inline constexpr double kMostError = 1e4;
 /// Coefficients and entries of L from this size on are not kept in single precision.
 inline constexpr double kMostNarrow = 1e20;
+/// From this ratio of the mean's longest and shortest column on, no bound is looked for in single precision.
+inline constexpr double kMostScale = 1e3;
 
 /// l times each of them.
 template <class Vector>
@@ -88,7 +90,8 @@ class ControlMatrices {
 };
 
 struct BoundOptions {
-  /// A bound may be found in single precision, which takes half as long, and be lower by 1e-5 of it or more.
+  /// Of matrices that have both precisions: a bound may be found in single precision, which takes half as long, and be
+  /// lower by 1e-5 of it or more.
   bool single_first = false;
   /// Matrices at corners are looked at before all others at once: for boxes of which no bound is likely.
   bool corners_first = false;

@@ -318,8 +318,9 @@ const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
   return result;
 }
 
-bool HexBoxes::is_hopeless(Box& box) {
-  if (has_coefficients(box)) return false;
+bool HexBoxes::is_hopeless(Box& box) { return !has_coefficients(box) && choose_models(box) > kHopelessError; }
+
+double HexBoxes::choose_models(Box& box) {
   const double wanted = box.wanted < 0 ? kSmallError : box.wanted;
   box.modelled_levels = box.levels, box.modelled_index = box.index;
   box.halved = 0;
@@ -330,7 +331,7 @@ bool HexBoxes::is_hopeless(Box& box) {
     for (tier = 0; tier < last && !(error_size(box, d) <= wanted);) ++tier;
     sum += error_size(box, d);
   }
-  return sum > kHopelessError;
+  return sum;
 }
 
 void HexBoxes::choose_split(Box& box) {
@@ -363,11 +364,15 @@ void HexBoxes::choose_split(Box& box) {
   if (narrow_pool_.num_taken() > kMostKept) box.narrow.reset();
 }
 
-bool HexBoxes::improve(Box& box, double lowest) {
+bool HexBoxes::improve(Box& box, double lowest, bool is_last) {
   if (box.is_precise) return false;
-  if (narrow_error_size(box) <= kShare * std::min(lowest / mean_edges_.prod(), kGood)) return false;
+  const auto lengths = narrow_matrices_.mean().colwise().norm();
+  const bool is_looked_at = lengths.maxCoeff() < kMostScale * lengths.minCoeff();
+  const double allowed = kShare * std::min(lowest / mean_edges_.prod(), kGood);
+  if (is_looked_at && !is_last && narrow_error_size(box) <= allowed) return false;
   box.is_precise = true;
   box.narrow.reset();
+  choose_models(box);  // what comes next is contracted, with models of the box itself
   return true;
 }
 
@@ -527,8 +532,8 @@ void HexBoxes::contract_u(const Box& box, NarrowHexCoefficients& result) {
     for (int i = 1; i < n_; ++i) deviating += level.largest_deviation[i] * weight(0, i, d, 0);
     result.precision.sizes[d] = (1 + 1e-5) * (highest_lane(sizes) + inflation * deviating);
   }
-  // The start and both factors are rounded, and each of the other sums; below 1e-36, errors are not by size.
-  result.precision.errors = (n_ + 1) * kNarrowRoundoff * result.precision.sizes + Vec3::Constant(1e-36);
+  // The start, both factors, their product, and each of n_ - 1 sums are rounded; below 1e-36, errors are not by size.
+  result.precision.errors = (n_ + 2) * kNarrowRoundoff * result.precision.sizes + Vec3::Constant(1e-36);
 }
 
 /// With P the models: N_i N_j N_k - P_i P_j P_k = (N_i - P_i) N_j N_k + P_i (N_j - P_j) N_k + P_i P_j (N_k - P_k), and

@@ -45,7 +45,8 @@ class CoefficientsPool {
 /// coefficients is one `Wide`. The map's coefficients follow by three contractions, of which boxes of one place along
 /// w, or v and w, share the first ones; or by halving those of the box around it, where its models are good enough.
 /// `HexMatrices` makes J's of them. Parts of the cell have them in single precision, relative to a point of their own:
-/// so errors are small beside the part, not the cell; and in double only where det J is too low for these errors.
+/// so errors are small beside the part, not the cell. The whole cell has them in double precision, and so have parts
+/// where single precision is not good enough (`improve`), and their parts.
 class HexBoxes {
  public:
   struct Box {
@@ -74,8 +75,9 @@ class HexBoxes {
   static int num_corners() { return 8; }
   /// lowest: det of dx/du where it is least, as far as known: errors of models must be small beside it.
   std::array<Box, 2> children(Box box, double lowest);
-  /// Goes over to double precision, if the errors of single precision matter beside `lowest`. False: they do not.
-  bool improve(Box& box, double lowest);
+  /// Goes over to double precision, where single precision does not serve the box that was looked at last, its errors
+  /// matter beside `lowest`, or no parts will be looked at. False: none of these.
+  bool improve(Box& box, double lowest, bool is_last);
   static Vec3 corner_point(const Box& box, int corner);
 
   /// Chooses the box's models, unless it has coefficients. Whether their errors are so large that no bound can be hoped
@@ -108,7 +110,7 @@ class HexBoxes {
   /// Of `determinant_bound`.
   static Mat3 frame(const Box&) { return Mat3::Identity(); }
   static Mat3* near_l(Box& box) { return &box.near_l; }
-  /// det of dx/du over that of `matrices`.
+  /// det of dx/du over that of the matrices.
   static double determinant_scale(const Box& box) { return parts(box.level); }
 
  private:
@@ -125,6 +127,8 @@ class HexBoxes {
   };
   const LineModels& models(const Box& box, int direction) const { return *tiers_[direction][box.tiers[direction]]; }
   int q1(const Box& box, int direction) const { return models(box, direction).degree() + 1; }
+  /// The least tiers whose errors are small, of models of the box itself. The sum of their errors.
+  double choose_models(Box& box);
   static bool has_coefficients(const Box& box) { return box.coefficients || box.narrow; }
   void find_coefficients(Box& box);
   /// Whether the buffers hold the same functions of a direction.

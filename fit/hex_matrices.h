@@ -27,7 +27,8 @@ class HexCoefficientsOf {
   Vector* coordinate(int row) { return x_[row].data() + kMargin; }
   const Vector* coordinate(int row) const { return x_[row].data() + kMargin; }
 
-  /// Of what is in single precision, by rows: bounds of its errors, which come from that, and of its size.
+  /// Of what is in single precision, by rows: bounds of its errors, which come from that, and of its size when it was
+  /// made. Halves are as large but for their roundings.
   struct Precision {
     Vec3 errors = Vec3::Zero(), sizes = Vec3::Zero();
   };

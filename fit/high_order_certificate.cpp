@@ -119,7 +119,7 @@ class Search {
     double lowest;
     do {
       const double scale = boxes_.determinant_scale(box);
-      // A bound by the whole cell may be very close to det J, those by parts are not by far.
+      // A bound by a whole prism may be very close to det J, those by parts are not by far.
       const BoundOptions bounding{.single_first = box.level > 0, .corners_first = parent_lowest != -kInfinity};
       double bound = 0;
       int lowest_corner = 0;
@@ -138,7 +138,7 @@ class Search {
         return;
       }
       if (lowest <= 0) lowest = try_witness(boxes_.corner_point(box, lowest_corner));
-    } while (lowest > 0 && boxes_.improve(box, lowest));
+    } while (lowest > 0 && boxes_.improve(box, lowest, box.level >= max_level_));
     if (lowest > 0 && boxes_.is_stuck(box)) {
       decided_ = false;
       return;

@@ -135,7 +135,7 @@ void PrismMatrices::make_narrow() {
       narrow_[row][n] = narrow(relative);
     }
     narrow_sizes_[row] = highest_lane(size);
-    if (!(narrow_sizes_[row] < kMostNarrow)) {  // as in `HexMatrices`
+    if (!(narrow_sizes_[row] < kMostNarrow)) {  // no number must be infinite, even if it counts 0 times
       std::fill(narrow_[row].begin(), narrow_[row].end(), Narrow{});
       narrow_sizes_[row] = std::numeric_limits<double>::max();
     }

@@ -227,7 +227,7 @@ void SimplexBoxes::store_sums(std::span<const Weighted> models, std::size_t firs
   }
 }
 
-bool SimplexBoxes::improve(Box& box, double lowest) {
+bool SimplexBoxes::improve(Box& box, double lowest, bool) {
   if (simplex_.is_exact() || box.tier < 0 || box.modelled != box.halvings ||
       box.tier + 1 >= simplex_.num_tiers() || !models_matter(box, lowest))
     return false;

@@ -46,7 +46,7 @@ class SimplexBoxes {
   /// lowest: det of dx/du where it is least, as far as known. New models are taken where the old ones' errors matter.
   std::array<Box, 2> children(Box box, double lowest);
   /// Takes models of a higher tier where the errors of those there are matter. False: there are none.
-  bool improve(Box& box, double lowest);
+  bool improve(Box& box, double lowest, bool is_last);
   /// Boxes are halved along their longest sides.
   static void choose_split(Box&) {}
   Vec3 corner_point(const Box& box, int corner) const;
