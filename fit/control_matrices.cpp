@@ -48,7 +48,7 @@ Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation,
   constexpr std::size_t kMost = 4;  // vectors of them; more make little difference (measured)
   const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
   using Vector = typename Matrices::Vector;
-  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
+  using Number = NumberOf<Vector>;
   const Eigen::Matrix<Number, 3, 3> middle = mean.cast<Number>(), turn = rotation.cast<Number>();
   Vector products[3][6] = {};  // of the columns of rotation (J - mean), by its rows
   for (std::size_t i = 0; i < sampled; ++i) {
@@ -172,7 +172,7 @@ struct Extremes {
   }
 
  private:
-  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
+  using Number = NumberOf<Vector>;
   static Number number(double x) { return static_cast<Number>(x); }
 
   Number start0, start1, start2;
@@ -259,13 +259,14 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
   const Mat3 unscaled = (longest * scale).cwiseInverse().asDiagonal() * l;
   const Vec3 unscaled_shift = shift.cwiseQuotient(scale.cwiseAbs2());
   const std::size_t count = matrices.size();
+  using Vector = typename Matrices::Vector;
+  const Eigen::Matrix<NumberOf<Vector>, 3, 3> factors = unscaled.template cast<NumberOf<Vector>>();
   const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
     if (b == kNone) return {};
     const std::size_t begin = std::min(b / kWide * kWide, count - kWide);
-    using Vector = typename Matrices::Vector;
     MatrixOf<Vector> m;
     matrices.load(begin, m);
-    multiply(unscaled, m);
+    multiply(factors, m);
     Extremes<Vector> own(unscaled_shift);
     own.take(m);
     if (own.are_positive()) return {};

@@ -24,14 +24,15 @@ inline constexpr double kMostNarrow = 1e20;
 /// From this ratio of the mean's longest and shortest column on, no bound is looked for in single precision.
 inline constexpr double kMostScale = 1e3;
 
+template <class Vector>
+using NumberOf = std::remove_cvref_t<decltype(Vector{}[0])>;
+
 /// l times each of them.
 template <class Vector>
-void multiply(const Mat3& l, MatrixOf<Vector>& matrices) {
-  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
-  const Eigen::Matrix<Number, 3, 3> factors = l.cast<Number>();
+void multiply(const Eigen::Matrix<NumberOf<Vector>, 3, 3>& l, MatrixOf<Vector>& matrices) {
   for (int c = 0; c < 3; ++c) {
     const Vector x = matrices[0][c], y = matrices[1][c], z = matrices[2][c];
-    for (int r = 0; r < 3; ++r) matrices[r][c] = factors(r, 0) * x + factors(r, 1) * y + factors(r, 2) * z;
+    for (int r = 0; r < 3; ++r) matrices[r][c] = l(r, 0) * x + l(r, 1) * y + l(r, 2) * z;
   }
 }
 

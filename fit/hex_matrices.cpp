@@ -13,9 +13,6 @@ namespace {
 constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
 
 template <class Vector>
-using NumberOf = std::remove_cvref_t<decltype(Vector{}[0])>;
-
-template <class Vector>
 Vector load(const NumberOf<Vector>* from) {
   Vector result;
   std::memcpy(&result, from, sizeof result);

@@ -81,7 +81,7 @@ class HexMatricesOf {
  protected:
   void load(const Coefficients& of, std::size_t first, MatrixOf<Vector>& result) const;
 
-  using Number = std::remove_cvref_t<decltype(Vector{}[0])>;
+  using Number = NumberOf<Vector>;
   static constexpr int kMostVectors = Coefficients::kMost * Coefficients::kMost;
   /// What differences count.
   struct Weights {

@@ -70,7 +70,7 @@ void PrismMatrices::resize(int degree) {
 template <class Lanes>
 void PrismMatrices::load(const std::array<std::vector<Lanes>, 3>& x, std::size_t first,
                          MatrixOf<Lanes>& result) const {
-  using Number = std::remove_cvref_t<decltype(Lanes{}[0])>;
+  using Number = NumberOf<Lanes>;
   constexpr Lanes kLowW{0, 1, 2, 3, 4, 5, 6, 7}, kHighW = kWide - 1 - kLowW;
   const std::size_t n = first / kWide;
   const Triangle::Neighbours& at = triangle_->neighbours[n];
