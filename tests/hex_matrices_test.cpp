@@ -162,6 +162,21 @@ void check_narrow(HexBoxes& boxes, const HexBoxes::Box& box) {
   }
 }
 
+/// The functions of the vertices, and a cell made of them.
+std::vector<LocalMode> corner_modes() {
+  std::vector<LocalMode> result(8);
+  for (int corner = 0; corner < 8; ++corner) {
+    result[corner].i = corner & 1, result[corner].j = corner >> 1 & 1;
+    result[corner].k = static_cast<std::uint8_t>(corner >> 2);
+  }
+  return result;
+}
+std::vector<Vec3> straight_cell(const Mat3& edges) {
+  std::vector<Vec3> result;
+  for (const LocalMode& mode : corner_modes()) result.push_back(edges * Vec3(mode.i, mode.j, mode.k));
+  return result;
+}
+
 const Mat3 kEdges = (Mat3() << 1, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 3).finished();
 const Mat3 kAny = (Mat3() << 0.9, -0.3, 0.2, 0.4, 1.1, -0.1, 0.1, 0.5, 0.7).finished();
 
@@ -379,19 +394,10 @@ TEST_CASE("Nothing of a larger box counts in a smaller one", "[hex_matrices]") {
 }
 
 TEST_CASE("What is too large or too small for single precision is left to double", "[hex_matrices]") {
-  std::vector<LocalMode> modes;
-  std::vector<Vec3> coefficients;
-  for (int corner = 0; corner < 8; ++corner) {
-    LocalMode mode;
-    mode.i = corner & 1, mode.j = corner >> 1 & 1, mode.k = static_cast<std::uint8_t>(corner >> 2);
-    modes.push_back(mode);
-    coefficients.push_back(kEdges * Vec3(mode.i, mode.j, mode.k));
-  }
+  const std::vector<LocalMode> modes = corner_modes();
   HexBoxes boxes(Basis::fourier, 4);
   for (const double size : {1e-45, 1e-12, 1.0, 1e12, 1e45}) {
-    std::vector<Vec3> sized;
-    for (const Vec3& x : coefficients) sized.push_back(size * x);
-    boxes.set_cell(modes, sized);
+    boxes.set_cell(modes, straight_cell(size * kEdges));
     HexBoxes::Box root = boxes.root();
     CHECK(root.is_precise);
     REQUIRE(!boxes.is_hopeless(root));
@@ -413,16 +419,9 @@ TEST_CASE("What is too large or too small for single precision is left to double
 }
 
 TEST_CASE("Parts that single precision does not serve go over to double", "[hex_matrices]") {
-  std::vector<LocalMode> modes;
-  std::vector<Vec3> coefficients;
-  for (int corner = 0; corner < 8; ++corner) {
-    LocalMode mode;
-    mode.i = corner & 1, mode.j = corner >> 1 & 1, mode.k = static_cast<std::uint8_t>(corner >> 2);
-    modes.push_back(mode);
-    coefficients.push_back(Vec3(mode.i, mode.j / 5000.0, mode.k / 5000.0));
-  }
+  const std::vector<LocalMode> modes = corner_modes();
   HexBoxes boxes(Basis::fourier, 2);
-  boxes.set_cell(modes, coefficients);
+  boxes.set_cell(modes, straight_cell(Vec3(1, 1 / 5000.0, 1 / 5000.0).asDiagonal()));
   HexBoxes::Box root = boxes.root();
   CHECK(!boxes.is_hopeless(root));
   boxes.choose_split(root);
