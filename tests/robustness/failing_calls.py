@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes one allocation or one call on a file fail, in one run after the other; nothing may crash, hang, or be half done.
+"""Makes one allocation or one call on a file fail, in one run after the other: none may crash, hang, or be half done.
 
 Usage: tests/robustness/failing_calls.py PROGRAM SAMPLE_PROGRAM LIBRARY [--runs N] [--seed S] [NAME ...]
 
