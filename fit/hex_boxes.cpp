@@ -366,7 +366,8 @@ void HexBoxes::choose_split(Box& box) {
 
 bool HexBoxes::improve(Box& box, double lowest, bool is_last) {
   if (box.is_precise) return false;
-  const auto lengths = narrow_matrices_.mean().colwise().norm();
+  const Mat3 mean = narrow_matrices_.mean();
+  const Vec3 lengths = mean.colwise().norm().transpose();
   const bool is_looked_at = lengths.maxCoeff() < kMostScale * lengths.minCoeff();
   const double allowed = kShare * std::min(lowest / mean_edges_.prod(), kGood);
   if (is_looked_at && !is_last && narrow_error_size(box) <= allowed) return false;
