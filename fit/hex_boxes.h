@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/hex_matrices.h"
-#include "fit/line_models.h"
-#include "fit/shape_functions.h"
+#include "fit/hex_contraction.h"
 
 #include <array>
 #include <cstdint>
@@ -49,10 +47,8 @@ class CoefficientsPool {
 /// where single precision is not good enough (`improve`), and their parts.
 class HexBoxes {
  public:
-  struct Box {
-    int level = 0;                         ///< halvings, of all directions
-    std::array<int, 3> levels{}, index{};  ///< per direction: side 2^-level, and place
-    std::array<int, 3> tiers{};            ///< of the models, by ascending degree
+  struct Box : HexPart {
+    int level = 0;  ///< halvings, of all directions
     /// What the models are of: this box, or one around it.
     std::array<int, 3> modelled_levels{}, modelled_index{};
     int halved = 0;     ///< how often the coefficients have been since
@@ -125,48 +121,24 @@ class HexBoxes {
     double growth = 1;     ///< bounds of |model| and |model'|
     double inflation = 1;  ///< largest coefficients
   };
-  const LineModels& models(const Box& box, int direction) const { return *tiers_[direction][box.tiers[direction]]; }
-  int q1(const Box& box, int direction) const { return models(box, direction).degree() + 1; }
+  int q1(const Box& box, int direction) const { return contraction_.models(box, direction).degree() + 1; }
   /// The least tiers whose errors are small, of models of the box itself. The sum of their errors.
   double choose_models(Box& box);
   static bool has_coefficients(const Box& box) { return box.coefficients || box.narrow; }
   void find_coefficients(Box& box);
-  /// Whether the buffers hold the same functions of a direction.
-  bool shares(const Box& box, int direction) const;
-  void set_modes(std::span<const LocalMode> modes);
   void make_weights();
-  void take_steps();
   const LineError& line_error(const Box& box, int direction);
   double error_size(const Box& box, int direction) {
     return line_error(box, direction).size;
   }
   /// What errors of single precision do to J, share of the mean edges.
   double narrow_error_size(const Box& box) const;
-  void contract_w(const Box& box);
-  void contract_v(const Box& box);
-  void contract_u(const Box& box, HexCoefficients& result);
-  void contract_u(const Box& box, NarrowHexCoefficients& result);
-  void narrow_after_v(int num_w);
-
-  static constexpr int kMostTiers = 2;
 
   int n_;                                        // functions per direction
-  int lanes_, row_;                              // n_ and its square, to a multiple of kWide
-  std::array<std::vector<const LineModels*>, 3> tiers_;  // per direction, by ascending degree; along v there is one
-  std::array<int, 3> contracted_levels_{}, contracted_index_{}, contracted_tiers_{};  // what the buffers hold
-  int contracted_ = 0;                           // and how many of its directions, from w on: 2 at the most
+  int lanes_;                                    // to a multiple of kWide
+  HexContraction contraction_;
   CoefficientsPool<Wide> pool_;
   CoefficientsPool<Narrow> narrow_pool_;
-  std::array<AlignedDoubles, 3> modes_;          // x, y, z of a_ijk, then by 1, x, N_2, ..., at k row_ + j n + i
-  const LocalMode* of_modes_ = nullptr;          // and for which modes,
-  std::size_t num_modes_ = 0;
-  std::vector<int> places_;                      // where each of them is
-  std::vector<int> used_;                        // of every kWide numbers j n + i: first k from where on all are 0
-  std::vector<int> all_used_;                    // n_ for every kWide numbers of a row
-  std::array<AlignedDoubles, 3> after_w_;        // at o_w row_ + j n + i
-  std::array<std::vector<Wide>, 3> after_v_;     // at i q1_w + o_w, lane o_v
-  bool is_after_v_narrowed_ = false;             // and whether these are of them:
-  std::array<std::vector<Narrow, AlignedAllocator<Narrow>>, 3> narrow_after_v_;
   HexMatrices matrices_;
   NarrowHexMatrices narrow_matrices_;
   Vec3 mean_edges_;                              // lengths of the linear part's mean columns
@@ -180,13 +152,12 @@ class HexBoxes {
   AlignedDoubles weights_;
   std::array<AlignedDoubles, 3> is_used_;        // by direction: 1 where they are not 0
   bool fits_single_ = true;                      // whether the cell's size is far from overflow there
-  Vec3 total_;                                   // sum of |a_ijk| times the bounds of 1, x, N_2, ...
   std::size_t cell_ = 0;                         // number of the current one, from 1
   using Zones = std::array<LineError, LineModels::kZones>;
-  std::array<std::array<std::array<Zones, kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
+  std::array<std::array<std::array<Zones, HexContraction::kMostTiers>, LineModels::kMaxLevel + 1>, 3> errors_;
   LineModels::PerFunction bounds_, slope_bounds_;  // of N_i and N_i'
-  // In lanes: bounds of all N_i; from 2 on, of these, of their slopes, ...
-  AlignedDoubles lane_bounds_, mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_;
+  // In lanes: bounds of N_i from 2 on, of their slopes, ...
+  AlignedDoubles mode_bounds_, mode_slope_bounds_, inverse_bounds_, inverse_slope_bounds_;
   AlignedDoubles sums_;                            // scratch of make_weights
 };
 

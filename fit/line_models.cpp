@@ -145,6 +145,9 @@ LineModels::Level LineModels::make_level(int l) const {
       for (int o = 0; o <= q; ++o) row(part, i + 1)[o] = static_cast<double>(value[o] + shift);
     }
   }
+  level.narrow_coefficients.resize(level.coefficients.size());
+  std::transform(level.coefficients.begin(), level.coefficients.end(), level.narrow_coefficients.begin(),
+                 [](double b) { return static_cast<float>(b); });
   level.middles.resize(static_cast<std::size_t>(parts) * (order_ + 1));
   level.deviations.assign(level.coefficients.size(), 0);
   for (int part = 0; part < parts; ++part)
@@ -157,6 +160,10 @@ LineModels::Level LineModels::make_level(int l) const {
       level.largest_deviation[i] = std::max(level.largest_deviation[i], *largest - middle);
       for (int o = 0; o <= q; ++o) level.deviations[place * kStride + o] = static_cast<float>(b[o] - middle);
     }
+  for (int i = 0; i <= order_; ++i) {
+    level.narrow_largest_coefficient[i] = static_cast<float>(level.largest_coefficient[i]);
+    level.narrow_largest_deviation[i] = static_cast<float>(level.largest_deviation[i]);
+  }
   return level;
 }
 

@@ -38,11 +38,13 @@ class LineModels {
     PerFunction largest_coefficient{};  ///< max_o |b_io|
     bool exact = true;                  ///< there are no errors
     AlignedDoubles coefficients;        ///< b_io at (index (order + 1) + i) kStride + o
-    // The same in two parts, for single precision: c_i in the middle between the least and the largest b_io over o, and
-    // b_io - c_i, these good to a unit of roundoff (of either precision) beyond what the coefficients are.
+    // For single precision the same, and in two parts: c_i in the middle between the least and the largest b_io over o,
+    // and b_io - c_i. All good to a unit of roundoff (of either precision) beyond what the coefficients are.
+    AlignedFloats narrow_coefficients;  ///< b_io, like coefficients
     std::vector<double> middles;        ///< c_i at index (order + 1) + i
-    std::vector<float, AlignedAllocator<float>> deviations;  ///< b_io - c_i, like coefficients
+    AlignedFloats deviations;           ///< b_io - c_i, like coefficients
     PerFunction largest_deviation{};    ///< max_o |b_io - c_i|
+    std::array<float, std::tuple_size_v<PerFunction>> narrow_largest_coefficient{}, narrow_largest_deviation{};
   };
 
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it
@@ -57,6 +59,9 @@ class LineModels {
   const Level& level(int l) const;
   const double* coefficients(const Level& level, int index) const {
     return level.coefficients.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
+  }
+  const float* narrow_coefficients(const Level& level, int index) const {
+    return level.narrow_coefficients.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
   }
   const double* middles(const Level& level, int index) const {
     return level.middles.data() + static_cast<std::size_t>(index) * (order_ + 1);

@@ -73,6 +73,7 @@ struct AlignedAllocator {
   bool operator==(const AlignedAllocator&) const = default;
 };
 using AlignedDoubles = std::vector<double, AlignedAllocator<double>>;
+using AlignedFloats = std::vector<float, AlignedAllocator<float>>;
 
 /// Lane by lane the lower (higher) of a and b, in a; a itself where b is not a number.
 template <class Vector>

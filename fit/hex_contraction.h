@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/hex_matrices.h"
+#include "fit/line_models.h"
+#include "fit/shape_functions.h"
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// A dyadic part of [0, 1]^3, and which models of N_i(u), N_j(v), N_k(w) stand for them there.
+struct HexPart {
+  std::array<int, 3> levels{}, index{};  ///< per direction: side 2^-level, and place
+  std::array<int, 3> tiers{};            ///< of the models, by ascending degree
+};
+
+/// Bernstein coefficients of the map of one high-order hex on its parts: with N_k = sum_q b_kq B_q there,
+///
+///   X_opq = sum_i b_io sum_j b_jp sum_k b_kq a_ijk
+///
+/// Parts of one place along w, or along w and v, share the first contractions. Along u and w models are of the least
+/// degree asked for; along v always of degree kWide - 1, so that a row of coefficients is one vector.
+///
+/// In single precision, with b_kq = c_k + d_kq, c_k in the middle between the least b_kq and the largest:
+///
+///   W_q   = sum_k d_kq a_k                  M  = sum_k c_k a_k
+///   V_pq  = sum_j (d_jp M_j + b_jp W_jq)    M' = sum_j c_j M_j
+///   X_opq = sum_i (d_io M'_i + b_io V_ipq) + sum_i c_i M'_i
+///
+/// without the last sum, which is a point that the coefficients are relative to, and with M and M' in double precision:
+/// so all that is rounded is small beside the part.
+class HexContraction {
+ public:
+  static constexpr int kMostTiers = 2;
+
+  HexContraction(Basis basis, int order);
+
+  int num_tiers(int direction) const { return static_cast<int>(tiers_[direction].size()); }
+  const LineModels& models(int direction, int tier) const { return *tiers_[direction][tier]; }
+  const LineModels& models(const HexPart& part, int direction) const { return models(direction, part.tiers[direction]); }
+
+  /// Takes a cell by its modes and their coefficients, relative to a point nearby.
+  void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
+  /// By 1, x, N_2, ... in all directions, instead of N_0, N_1, N_2, ...: for 1 nothing must be multiplied. Comes before
+  /// all contractions.
+  void take_steps();
+  /// x, y or z of a_ijk, at k row() + j (order + 1) + i.
+  const double* modes(int coordinate) const { return modes_[coordinate].data(); }
+  int row() const { return row_; }
+  /// After `take_steps`: sum of |a_ijk| times the bounds of 1, x, N_2, ...
+  const Vec3& total() const { return total_; }
+
+  void contract(const HexPart& part, HexCoefficients& result);
+  void contract(const HexPart& part, NarrowHexCoefficients& result);
+
+ private:
+  static constexpr int kRow = 16;  ///< rows of n_^2 numbers are rounded up to so many
+  template <class Vector>
+  using PerCoordinate = std::array<std::vector<Vector, AlignedAllocator<Vector>>, 3>;
+
+  /// What the buffers hold: how many directions are contracted, from w on, and for which part.
+  struct Contracted {
+    int directions = 0;
+    HexPart part;
+    /// Forgets what is not of that part.
+    void keep(const HexPart& wanted);
+  };
+
+  void set_modes(std::span<const LocalMode> modes);
+  void contract_w(const HexPart& part);
+  void contract_v(const HexPart& part);
+  void narrow_modes();
+  void contract_narrow_w(const HexPart& part);
+  void contract_narrow_v(const HexPart& part);
+
+  int n_;                                                 // functions per direction
+  int lanes_, row_;                                       // n_ to a multiple of kWide, and its square to one of kRow
+  std::array<std::vector<const LineModels*>, 3> tiers_;   // per direction, by ascending degree; along v there is one
+  LineModels::PerFunction bounds_;                        // of N_i
+  AlignedDoubles lane_bounds_;
+
+  std::array<AlignedDoubles, 3> modes_;
+  const LocalMode* of_modes_ = nullptr;  // and for which modes,
+  std::size_t num_modes_ = 0;
+  std::vector<int> places_;              // where each of them is
+  std::vector<int> used_;                // of every kRow numbers j n + i: first k from where on all are 0
+  std::vector<int> all_used_;            // the same where all are used
+  Vec3 total_;
+
+  Contracted contracted_;
+  std::array<AlignedDoubles, 3> after_w_;  // at q row_ + j n + i
+  PerCoordinate<Wide> after_v_;            // at i q1_w + q, lane p
+  std::vector<Wide, AlignedAllocator<Wide>> no_more_;
+
+  bool has_narrow_modes_ = false;
+  PerCoordinate<float> narrow_modes_, mode_sizes_;        // a_ijk and |a_ijk|
+  Contracted narrow_contracted_;
+  std::array<AlignedDoubles, 3> middles_w_, middles_v_;  // M at j n + i, M' at i
+  PerCoordinate<float> narrow_middles_w_;                // M
+  PerCoordinate<float> narrow_w_;                        // W at q row_ + j n + i
+  PerCoordinate<Narrow> narrow_v_;                       // V at i q1_w + q, lane p
+  std::vector<Narrow, AlignedAllocator<Narrow>> no_narrow_more_, more_;  // sum_j d_jp M_j at i, lane p
+  // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: sum_k d_k |a_k|; sum_j d_j |M_j| at i; sum_j b_j of the first at i.
+  PerCoordinate<float> sizes_w_, sizes_v_, sizes_of_w_;
+  AlignedFloats middle_sizes_;  // |M|
+};
+
+}  // namespace subvol
