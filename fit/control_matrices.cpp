@@ -101,29 +101,31 @@ int lowest_place(const Vector& x) {
   return result;
 }
 
-/// A unit vector near the eigenvector of a symmetric matrix's least eigenvalue: of the adjugate of s + m, where m makes
-/// all eigenvalues positive. Closer ones serve no better (measured).
+/// A vector near the eigenvector of a symmetric matrix's least eigenvalue: a column of the adjugate of s + m, where m
+/// makes all eigenvalues positive. Closer ones serve no better (measured).
 Vec3 near_least_eigenvector(const Mat3& s) {
-  Mat3 shifted = s - s.trace() / 3 * Mat3::Identity();
+  const double third = s.trace() / 3;
+  Mat3 shifted = s;
+  shifted.diagonal().array() -= third;
   const double half_size = std::sqrt(shifted.squaredNorm() / 6);  // eigenvalues of that are within twice as much
   if (!(half_size > 0)) return Vec3::UnitX();
-  shifted = shifted / half_size + 2 * Mat3::Identity();
+  shifted.diagonal().array() += 2 * half_size;
   Mat3 adjugate;
   for (int d = 0; d < 3; ++d) adjugate.col(d) = shifted.col((d + 1) % 3).cross(shifted.col((d + 2) % 3));
   int largest;
   adjugate.diagonal().maxCoeff(&largest);
-  return adjugate.col(largest).normalized();
+  return adjugate.col(largest);
 }
 
 /// L + (margin - e) v (J_b D v)^T / |J_b D v|^2, where e <= 0 is the least eigenvalue of sym(L J_b D) and v its
-/// eigenvector: then v^T L J_b D v = margin. A step of the perceptron algorithm for an L that suits all b.
+/// eigenvector, of any length: then v^T L J_b D v = margin v^T v. A step of the perceptron algorithm for an L that suits
+/// all b.
 Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
   constexpr double kMargin = 0.06;  // against L's largest entry
-  l /= l.cwiseAbs().maxCoeff();
+  l *= 1 / l.cwiseAbs().maxCoeff();
   const Mat3 product = l * scaled_matrix;
-  const Mat3 s = 0.5 * (product + product.transpose());
-  const Vec3 v = near_least_eigenvector(s);
-  const double least = std::min(0.0, v.dot(s * v));
+  const Vec3 v = near_least_eigenvector(0.5 * (product + product.transpose()));
+  const double least = std::min(0.0, v.dot(product * v) / v.squaredNorm());
   const Vec3 w = scaled_matrix * v;
   return l + (kMargin - least) / w.squaredNorm() * v * w.transpose();
 }
@@ -216,20 +218,40 @@ std::size_t take_until_failure(const Product& product, std::size_t count, const 
 /// Twice what must be taken from the diagonal of S_b, where |error of L J D| <= g.
 Vec3 sums_of_both(const Mat3& g) { return g.rowwise().sum() + g.colwise().sum().transpose(); }
 
+/// What bounds by any L have in common.
+///
+/// D is taken times the longest column of the mean: no entry of T_b below is much above 1.
+struct Scaling {
+  Scaling(const Mat3& mean_matrix, const Vec3& mean_lengths, const Mat3& remainder)
+      : mean(mean_matrix), lengths(mean_lengths), longest(lengths.maxCoeff()),
+        scale(longest * lengths.cwiseInverse()), unscaling(lengths / (longest * longest)),
+        squared_unscaling((lengths / longest).cwiseAbs2()),
+        scaled_remainder(remainder * (scale / longest).asDiagonal()) {}
+
+  Mat3 mean;
+  Vec3 lengths;            ///< of its columns
+  double longest;
+  Vec3 scale;              ///< D
+  Vec3 unscaling;          ///< 1 over D, and over `longest`
+  Vec3 squared_unscaling;  ///< 1 over D^2
+  Mat3 scaled_remainder;   ///< by `longest`, times D
+};
+
 /// The bound of det S_b in single precision, or 0; in_the_way: where it failed, if so.
 ///
 /// S_b = D T_b D, T_b = sym(unscaled J_b) - ..., where T_b is about 1 at the most.
 template <class Matrices>
-double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift, const Vec3& scale,
+double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift, const Scaling& scaling,
                     std::size_t& in_the_way) {
   if constexpr (!requires { typename Matrices::NarrowProduct; }) {
     return 0;
   } else {
     constexpr double kMostShift = 1e10;  // far from underflow and overflow
+    const Vec3& scale = scaling.scale;
     if (!(scale.maxCoeff() < kMostScale)) return 0;
     const auto product = matrices.narrow_product(unscaled);
     const Mat3 g = scale.cwiseProduct(product.errors()) * scale.transpose();
-    const Vec3 more = (1 + 1e-5) * (shift + 0.5 * sums_of_both(g)).cwiseQuotient(scale.cwiseAbs2());
+    const Vec3 more = (1 + 1e-5) * (shift + 0.5 * sums_of_both(g)).cwiseProduct(scaling.squared_unscaling);
     if (!(product.errors().maxCoeff() <= kMostError && more.maxCoeff() <= kMostShift)) return 0;
     Extremes<typename Matrices::NarrowProduct::Vector> extremes(more);
     in_the_way = take_until_failure(product, matrices.size(), more, extremes);
@@ -239,25 +261,21 @@ double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift,
 
 /// The bound by one L.
 ///
-/// lengths     of the mean's columns: 1 over D
 /// in_the_way  number of the matrix to begin with: one that another L failed at is likely to be in the way again
 template <class Matrices>
-Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices, const Mat3& remainder,
-               const BoundOptions& options, std::size_t in_the_way) {
+Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOptions& options,
+               std::size_t in_the_way) {
   constexpr double kLeastDeterminant = 1e-3;  // of L, by its largest entry cubed: so it is good to 1e-11
-  l /= l.cwiseAbs().maxCoeff();
-  if (!(l.determinant() > kLeastDeterminant)) return {0, false};
-  // D is taken times the largest length: no entry of T_b below is much above 1.
-  const double longest = lengths.maxCoeff();
-  const Vec3 scale = longest * lengths.cwiseInverse();
-  const Mat3 own_remainder = remainder / longest;
-  const Vec3 shift = 0.5 * (1 + 1e-12) * sums_of_both(l.cwiseAbs() * own_remainder * scale.asDiagonal());
+  l *= 1 / l.cwiseAbs().maxCoeff();
+  const double l_determinant = l.determinant();
+  if (!(l_determinant > kLeastDeterminant)) return {0, false};
+  const Vec3 shift = 0.5 * (1 + 1e-12) * sums_of_both(l.cwiseAbs() * scaling.scaled_remainder);
   for (int i = 0; i < 3; ++i)
-    if (!(l.row(i).dot(mean.col(i)) > shift[i] * lengths[i])) return {0, false};
+    if (!(l.row(i).dot(scaling.mean.col(i)) > shift[i] * scaling.lengths[i])) return {0, false};
 
   // T_b = D^-1 S_b D^-1 = sym(D^-1 L J_b) - ...: what is scaled are the extremes over all b.
-  const Mat3 unscaled = (longest * scale).cwiseInverse().asDiagonal() * l;
-  const Vec3 unscaled_shift = shift.cwiseQuotient(scale.cwiseAbs2());
+  const Mat3 unscaled = scaling.unscaling.asDiagonal() * l;
+  const Vec3 unscaled_shift = shift.cwiseProduct(scaling.squared_unscaling);
   const std::size_t count = matrices.size();
   using Vector = typename Matrices::Vector;
   const Eigen::Matrix<NumberOf<Vector>, 3, 3> factors = unscaled.template cast<NumberOf<Vector>>();
@@ -273,7 +291,7 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
     return failed_at(begin, m, own);
   };
   const auto bound = [&](double determinant) {
-    return Bound{determinant * (1 - 1e-11) * lengths.prod() / l.determinant(), true};
+    return Bound{determinant * (1 - 1e-11) * scaling.lengths.prod() / l_determinant, true};
   };
   if (const auto fails = failed_near(in_the_way)) return *fails;
   if (in_the_way != kNone || options.corners_first)
@@ -282,7 +300,7 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
   in_the_way = kNone;
   constexpr bool kHasDouble = requires { matrices.times(unscaled); };
   if (options.single_first || !kHasDouble) {
-    if (const double determinant = narrow_bound(matrices, unscaled, shift, scale, in_the_way); determinant > 0)
+    if (const double determinant = narrow_bound(matrices, unscaled, shift, scaling, in_the_way); determinant > 0)
       return bound(determinant);
     if (const auto fails = failed_near(in_the_way)) return *fails;
   }
@@ -291,7 +309,7 @@ Bound bound_by(Mat3 l, const Vec3& lengths, const Mat3& mean, Matrices& matrices
     Extremes<Wide> extremes(unscaled_shift);
     in_the_way = take_until_failure(matrices.times(unscaled), count, unscaled_shift, extremes);
     if (in_the_way != kNone) return failed_near(in_the_way).value_or(Bound{0, false});
-    if (const double determinant = extremes.determinant(scale); determinant > 0) return bound(determinant);
+    if (const double determinant = extremes.determinant(scaling.scale); determinant > 0) return bound(determinant);
   }
   return {0, false};
 }
@@ -319,9 +337,10 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
   if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
+  const Scaling scaling(mean, lengths, remainder);
   const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
     if (near_l) *near_l = l;
-    return bound_by(l, lengths, mean, matrices, remainder, options, in_the_way);
+    return bound_by(l, scaling, matrices, options, in_the_way);
   };
   Bound result{0, false};
   if (near_l && *near_l != Mat3::Zero()) {

@@ -22,7 +22,10 @@ std::vector<int> model_degrees(Basis basis, int order) {
   return {5, kWide - 1};
 }
 
-Wide size(const Wide& x) { return x < 0 ? -x : x; }
+template <class Vector>
+Vector size(const Vector& x) {
+  return x < 0 ? -x : x;
+}
 
 template <class Vector>
 Vector load(const NumberOf<Vector>* from) {
@@ -109,10 +112,6 @@ void contract_to_lanes(const Table<NumberOf<Vector>>& table, const NumberOf<Vect
   }
 }
 
-void narrow_all(const AlignedDoubles& from, std::size_t count, float* to) {
-  for (std::size_t m = 0; m < count; m += kWide) store_wide(narrow(load_wide(from.data() + m)), to + m);
-}
-
 constexpr double kNoMore[LineModels::kMaxDegree + 1] = {};
 constexpr float kNoNarrowMore[LineModels::kMaxDegree + 1] = {};
 
@@ -127,32 +126,31 @@ void HexContraction::Contracted::keep(const HexPart& wanted) {
 }
 
 HexContraction::HexContraction(Basis basis, int order)
-    : n_(order + 1), lanes_((n_ + kWide - 1) / kWide * kWide), row_((n_ * n_ + kRow - 1) / kRow * kRow) {
+    : n_(order + 1), face_(n_ * n_), lanes_((n_ + kWide - 1) / kWide * kWide),
+      row_((3 * face_ + kRow - 1) / kRow * kRow) {
   for (const int degree : model_degrees(basis, order)) tiers_[0].push_back(&LineModels::get(basis, order, degree));
   tiers_[1] = {&LineModels::get(basis, order, kWide - 1)};
   tiers_[2] = tiers_[0];
   bounds_ = tiers_[1][0]->bounds();
   lane_bounds_.assign(lanes_, 0);
   std::copy_n(bounds_.begin(), n_, lane_bounds_.begin());
-  const int most = tiers_[0].back()->degree() + 1, lines = n_ + kSome;
+
+  // With room for what is read, or written, behind the end.
+  const std::size_t most = tiers_[0].back()->degree() + 1, rows = row_ + kRow, lines = n_ + kSome;
+  for (AlignedDoubles* numbers : {&modes_, &after_w_}) numbers->assign((std::max<std::size_t>(n_, most) + 1) * rows, 0);
+  for (AlignedFloats* numbers : {&narrow_modes_, &mode_sizes_, &narrow_w_})
+    numbers->assign((std::max<std::size_t>(n_, most) + 1) * rows, 0);
+  middles_w_.assign(rows, 0);
+  narrow_middles_w_.assign(rows, 0);
+  sizes_w_.assign(rows, 0);
+  for (AlignedFloats* numbers : {&narrow_middles_v_, &sizes_v_, &sizes_of_w_}) numbers->assign(3 * lanes_, 0);
   for (int d = 0; d < 3; ++d) {
-    modes_[d].assign(row_ * n_ + kRow, 0);
-    after_w_[d].assign(most * row_ + kRow, 0);
     after_v_[d].assign(lines * most, Wide{});
-    narrow_modes_[d].assign(row_ * n_, 0);
-    mode_sizes_[d].assign(row_ * n_, 0);
-    middles_w_[d].assign(row_ + kRow, 0);
-    middles_v_[d].assign(lanes_, 0);
-    narrow_middles_w_[d].assign(row_ + kRow, 0);
-    narrow_w_[d].assign(most * row_ + kRow, 0);
     narrow_v_[d].assign(lines * most + 1, Narrow{});
-    sizes_w_[d].assign(row_ + kRow, 0);
-    for (AlignedFloats* sizes : {&sizes_v_[d], &sizes_of_w_[d]}) sizes->assign(row_, 0);
   }
   no_more_.assign(lines, Wide{});
   no_narrow_more_.assign(lines, Narrow{});
   more_.assign(lines, Narrow{});
-  middle_sizes_.assign(row_ + kRow, 0);
   used_.resize(row_ / kRow);
   all_used_.assign(kWide, n_);
 }
@@ -165,39 +163,40 @@ void HexContraction::set_modes(std::span<const LocalMode> modes) {
   for (const LocalMode& mode : modes) {
     places_.push_back(mode.k * row_ + mode.j * n_ + mode.i);
     const int last_i = std::max<int>(mode.i, 1), last_j = std::max<int>(mode.j, 1), last_k = std::max<int>(mode.k, 1);
-    for (int j = mode.j; j <= last_j; ++j)  // and where its steps go
-      for (int i = mode.i; i <= last_i; ++i) {
-        int& used = used_[(j * n_ + i) / kRow];
-        used = std::max(used, last_k + 1);
-      }
+    for (int d = 0; d < 3; ++d)
+      for (int j = mode.j; j <= last_j; ++j)  // and where its steps go
+        for (int i = mode.i; i <= last_i; ++i) {
+          int& used = used_[(d * face_ + j * n_ + i) / kRow];
+          used = std::max(used, last_k + 1);
+        }
   }
 }
 
 void HexContraction::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
   if (modes.data() != of_modes_ || modes.size() != num_modes_) set_modes(modes);
-  for (int d = 0; d < 3; ++d) std::fill(modes_[d].begin(), modes_[d].end(), 0.0);
+  std::fill(modes_.begin(), modes_.end(), 0.0);
   for (std::size_t a = 0; a < modes.size(); ++a)
-    for (int d = 0; d < 3; ++d) modes_[d][places_[a]] = coefficients[a][d];
+    for (int d = 0; d < 3; ++d) modes_[d * face_ + places_[a]] = coefficients[a][d];
   contracted_.directions = narrow_contracted_.directions = 0;
   has_narrow_modes_ = false;
 }
 
 void HexContraction::take_steps() {
-  for (int d = 0; d < 3; ++d) {
-    double* x = modes_[d].data();
-    for (int m = 0; m < n_ * n_; ++m) x[row_ + m] -= x[m];
-    for (int k = 0; k < n_; ++k, x += row_) {
+  double* x = modes_.data();
+  for (int m = 0; m < 3 * face_; ++m) x[row_ + m] -= x[m];
+  for (int k = 0; k < n_; ++k)
+    for (int d = 0; d < 3; ++d) {
+      x = modes_.data() + k * row_ + d * face_;
       for (int i = 0; i < n_; ++i) x[n_ + i] -= x[i];
       for (int j = 0; j < n_; ++j) x[j * n_ + 1] -= x[j * n_];
     }
-  }
   for (int d = 0; d < 3; ++d) {
     Wide total{};
     for (int k = 0; k < n_; ++k)
       for (int j = 0; j < n_; ++j) {
-        const double* x = modes_[d].data() + k * row_ + j * n_;
+        const double* line = modes(d) + k * row_ + j * n_;
         Wide sum{};
-        for (int i = 0; i < lanes_; i += kWide) sum += load_wide(lane_bounds_.data() + i) * size(load_wide(x + i));
+        for (int i = 0; i < lanes_; i += kWide) sum += load_wide(lane_bounds_.data() + i) * size(load_wide(line + i));
         total += bounds_[k] * bounds_[j] * sum;
       }
     total_[d] = sum_of_lanes(total);
@@ -223,18 +222,18 @@ void HexContraction::contract(const HexPart& part, HexCoefficients& result) {
 
 void HexContraction::contract_w(const HexPart& part) {
   const LineModels& line = models(part, 2);
-  for (int d = 0; d < 3; ++d)
-    subvol::contract<double>(line.degree() + 1, {line.coefficients(line.level(part.levels[2]), part.index[2]), 1},
-                             {modes_[d].data(), row_, n_ * n_, used_.data()}, kNoMore, after_w_[d].data(), row_);
+  subvol::contract<double>(line.degree() + 1, {line.coefficients(line.level(part.levels[2]), part.index[2]), 1},
+                           {modes_.data(), row_, 3 * face_, used_.data()}, kNoMore, after_w_.data(), row_);
 }
 
 void HexContraction::contract_v(const HexPart& part) {
   const LineModels& line = models(part, 1);
+  const Table<double> table{line.coefficients(line.level(part.levels[1]), part.index[1]), 1};
   const int num_w = models(part, 2).degree() + 1;
   for (int d = 0; d < 3; ++d)
     for (int w = 0; w < num_w; ++w)
-      contract_to_lanes<Wide>({line.coefficients(line.level(part.levels[1]), part.index[1]), 1},
-                              after_w_[d].data() + w * row_, n_, no_more_.data(), after_v_[d].data() + w, num_w);
+      contract_to_lanes<Wide>(table, after_w_.data() + w * row_ + d * face_, n_, no_more_.data(),
+                              after_v_[d].data() + w, num_w);
 }
 
 void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result) {
@@ -252,68 +251,88 @@ void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result
   for (int d = 0; d < 3; ++d) {
     Narrow more{};  // lane o: sum_i d_io M'_i
     for (int i = 1; i < n_; ++i)
-      more += static_cast<float>(middles_v_[d][i]) * load<Narrow>(deviations + i * LineModels::kStride);
+      more += narrow_middles_v_[d * lanes_ + i] * load<Narrow>(deviations + i * LineModels::kStride);
     subvol::contract<float>(num_u, {line.narrow_coefficients(level, part.index[0]), 1},
                             {numbers(narrow_v_[d].data()), row, row, all_used_.data()},
                             reinterpret_cast<const float*>(&more), numbers(result.coordinate(d)), row);
   }
+  result.precision = precision(level);
+}
 
-  // By the direction whose deviations terms have: what they sum up to at the most. Rounded are their factors, products
-  // and sums: n + 2 times along each direction from that one on; below 1e-33, errors are not by size.
+/// By the direction whose deviations terms have: what they sum up to at the most. Rounded are their factors, products
+/// and sums: n + 2 times along each direction from that one on; below 1e-33, errors are not by size.
+NarrowHexCoefficients::Precision HexContraction::precision(const LineModels::Level& along_u) const {
+  constexpr double kUp = 1 + 1e-5;
+  NarrowHexCoefficients::Precision result;
   for (int d = 0; d < 3; ++d) {
-    double by_u = 0, by_v = 0, by_w = 0;
-    for (int i = 0; i < n_; ++i) {
-      const double largest = i == 0 ? 1 : level.largest_coefficient[i];
-      if (i > 0) by_u += level.largest_deviation[i] * std::abs(middles_v_[d][i]);
-      by_v += largest * sizes_v_[d][i];
-      by_w += largest * sizes_of_w_[d][i];
+    Narrow all{}, rounded{};
+    for (int i = 0; i < lanes_; i += kWide) {
+      const auto at = [&](const AlignedFloats& numbers) { return load<Narrow>(numbers.data() + d * lanes_ + i); };
+      const Narrow largest = load<Narrow>(along_u.largest_narrow.data() + i);
+      const Narrow by_u = load<Narrow>(along_u.largest_narrow_deviation.data() + i) * size(at(narrow_middles_v_)),
+                   by_v = largest * at(sizes_v_), by_w = largest * at(sizes_of_w_);
+      all += by_u + by_v + by_w;
+      rounded += by_u + 2 * by_v + 3 * by_w;
     }
-    constexpr double kUp = 1 + 1e-5;
-    result.precision.sizes[d] = kUp * (by_u + by_v + by_w);
-    result.precision.errors[d] =
-        kUp * (n_ + 2) * kNarrowRoundoff * (by_u + 2 * by_v + 3 * by_w) + 1e-33;
+    result.sizes[d] = kUp * sum_of_lanes(widen(all));
+    result.errors[d] = kUp * (n_ + 2) * kNarrowRoundoff * sum_of_lanes(widen(rounded)) + 1e-33;
   }
+  return result;
 }
 
 void HexContraction::narrow_modes() {
   has_narrow_modes_ = true;
-  for (int d = 0; d < 3; ++d) {
-    narrow_all(modes_[d], static_cast<std::size_t>(row_ * n_), narrow_modes_[d].data());
-    for (int m = 0; m < row_ * n_; ++m) mode_sizes_[d][m] = std::abs(narrow_modes_[d][m]);
+  for (int m = 0; m < n_ * row_; m += kWide) {
+    const Narrow here = narrow(load_wide(modes_.data() + m));
+    store_wide(here, narrow_modes_.data() + m);
+    store_wide(size(here), mode_sizes_.data() + m);
   }
 }
 
 void HexContraction::contract_narrow_w(const HexPart& part) {
   const LineModels& line = models(part, 2);
   const LineModels::Level& level = line.level(part.levels[2]);
-  const int face = n_ * n_;
-  for (int d = 0; d < 3; ++d) {
-    subvol::contract<double>(1, {line.middles(level, part.index[2]), 1, 1},
-                             {modes_[d].data(), row_, face, used_.data()}, kNoMore, middles_w_[d].data(), 0);
-    narrow_all(middles_w_[d], static_cast<std::size_t>(face), narrow_middles_w_[d].data());
-    subvol::contract<float>(line.degree() + 1, {line.deviations(level, part.index[2]), 0},
-                            {narrow_modes_[d].data(), row_, face, used_.data()}, kNoNarrowMore,
-                            narrow_w_[d].data(), row_);
-  }
+  const auto lines = [&](const auto& numbers) {
+    return Lines<std::remove_cvref_t<decltype(numbers[0])>>{numbers.data(), row_, 3 * face_, used_.data()};
+  };
+  subvol::contract<double>(1, {line.middles(level, part.index[2]), 1, 1}, lines(modes_), kNoMore, middles_w_.data(), 0);
+  for (int m = 0; m < 3 * face_; m += kWide)
+    store_wide(narrow(load_wide(middles_w_.data() + m)), narrow_middles_w_.data() + m);
+  subvol::contract<float>(line.degree() + 1, {line.deviations(level, part.index[2]), 0}, lines(narrow_modes_),
+                          kNoNarrowMore, narrow_w_.data(), row_);
+  subvol::contract<float>(1, {level.largest_narrow_deviation.data(), 0, 1}, lines(mode_sizes_), kNoNarrowMore,
+                          sizes_w_.data(), 0);
 }
 
 void HexContraction::contract_narrow_v(const HexPart& part) {
   const LineModels& line = models(part, 1);
   const LineModels::Level& level = line.level(part.levels[1]);
+  const Table<float> deviations{line.deviations(level, part.index[1]), 0},
+      table{line.narrow_coefficients(level, part.index[1]), 1};
+  const double* middles = line.middles(level, part.index[1]);
+  const float *largest = level.largest_narrow.data(), *largest_deviation = level.largest_narrow_deviation.data();
   const int num_w = models(part, 2).degree() + 1;
   for (int d = 0; d < 3; ++d) {
-    subvol::contract<double>(1, {line.middles(level, part.index[1]), 1, 1},
-                             {middles_w_[d].data(), n_, n_, all_used_.data()}, kNoMore, middles_v_[d].data(), 0);
-    contract_to_lanes<Narrow>({line.deviations(level, part.index[1]), 0}, narrow_middles_w_[d].data(), n_,
-                              no_narrow_more_.data(), more_.data(), 1);
+    contract_to_lanes<Narrow>(deviations, narrow_middles_w_.data() + d * face_, n_, no_narrow_more_.data(),
+                              more_.data(), 1);
     for (int w = 0; w < num_w; ++w)
-      contract_to_lanes<Narrow>({line.narrow_coefficients(level, part.index[1]), 1}, narrow_w_[d].data() + w * row_,
-                                n_, more_.data(), narrow_v_[d].data() + w, num_w);
-    for (int m = 0; m < n_ * n_; ++m) middle_sizes_[m] = std::abs(narrow_middles_w_[d][m]);
-    subvol::contract<float>(1, {level.narrow_largest_deviation.data(), 0, 1},
-                            {middle_sizes_.data(), n_, n_, all_used_.data()}, kNoNarrowMore, sizes_v_[d].data(), 0);
-    subvol::contract<float>(1, {level.narrow_largest_coefficient.data(), 1, 1},
-                            {sizes_w_[d].data(), n_, n_, all_used_.data()}, kNoNarrowMore, sizes_of_w_[d].data(), 0);
+      contract_to_lanes<Narrow>(table, narrow_w_.data() + w * row_ + d * face_, n_, more_.data(),
+                                narrow_v_[d].data() + w, num_w);
+    for (int i = 0; i < n_; i += kWide) {
+      const double* middle = middles_w_.data() + d * face_ + i;
+      const float* size_w = sizes_w_.data() + d * face_ + i;
+      Wide sum = load_wide(middle);
+      Narrow sizes{}, of_w = load<Narrow>(size_w);
+      for (int j = 1; j < n_; ++j) {
+        const Wide x = load_wide(middle + j * n_);
+        sum += middles[j] * x;
+        sizes += largest_deviation[j] * size(narrow(x));
+        of_w += largest[j] * load<Narrow>(size_w + j * n_);
+      }
+      store_wide(narrow(sum), narrow_middles_v_.data() + d * lanes_ + i);
+      store_wide(sizes, sizes_v_.data() + d * lanes_ + i);
+      store_wide(of_w, sizes_of_w_.data() + d * lanes_ + i);
+    }
   }
 }
 

@@ -48,7 +48,7 @@ class HexContraction {
   /// all contractions.
   void take_steps();
   /// x, y or z of a_ijk, at k row() + j (order + 1) + i.
-  const double* modes(int coordinate) const { return modes_[coordinate].data(); }
+  const double* modes(int coordinate) const { return modes_.data() + coordinate * face_; }
   int row() const { return row_; }
   /// After `take_steps`: sum of |a_ijk| times the bounds of 1, x, N_2, ...
   const Vec3& total() const { return total_; }
@@ -57,11 +57,11 @@ class HexContraction {
   void contract(const HexPart& part, NarrowHexCoefficients& result);
 
  private:
-  static constexpr int kRow = 16;  ///< rows of n_^2 numbers are rounded up to so many
+  static constexpr int kRow = 16;  ///< rows are rounded up to so many numbers
   template <class Vector>
-  using PerCoordinate = std::array<std::vector<Vector, AlignedAllocator<Vector>>, 3>;
+  using Vectors = std::vector<Vector, AlignedAllocator<Vector>>;
 
-  /// What the buffers hold: how many directions are contracted, from w on, and for which part.
+  /// What buffers hold: how many directions are contracted, from w on, and for which part.
   struct Contracted {
     int directions = 0;
     HexPart part;
@@ -75,14 +75,17 @@ class HexContraction {
   void narrow_modes();
   void contract_narrow_w(const HexPart& part);
   void contract_narrow_v(const HexPart& part);
+  /// After `contract_narrow_v`, of what it and a contraction along u leave.
+  NarrowHexCoefficients::Precision precision(const LineModels::Level& along_u) const;
 
-  int n_;                                                 // functions per direction
-  int lanes_, row_;                                       // n_ to a multiple of kWide, and its square to one of kRow
-  std::array<std::vector<const LineModels*>, 3> tiers_;   // per direction, by ascending degree; along v there is one
-  LineModels::PerFunction bounds_;                        // of N_i
+  int n_, face_;                                         // functions per direction, and their square
+  int lanes_, row_;                                      // n_ to a multiple of kWide, 3 face_ to one of kRow
+  std::array<std::vector<const LineModels*>, 3> tiers_;  // per direction, by ascending degree; along v there is one
+  LineModels::PerFunction bounds_;                       // of N_i
   AlignedDoubles lane_bounds_;
 
-  std::array<AlignedDoubles, 3> modes_;
+  // x, y and z are one after the other, so far as nothing else is said.
+  AlignedDoubles modes_;                 // a_ijk at k row_ + j n + i
   const LocalMode* of_modes_ = nullptr;  // and for which modes,
   std::size_t num_modes_ = 0;
   std::vector<int> places_;              // where each of them is
@@ -91,21 +94,20 @@ class HexContraction {
   Vec3 total_;
 
   Contracted contracted_;
-  std::array<AlignedDoubles, 3> after_w_;  // at q row_ + j n + i
-  PerCoordinate<Wide> after_v_;            // at i q1_w + q, lane p
-  std::vector<Wide, AlignedAllocator<Wide>> no_more_;
+  AlignedDoubles after_w_;                // at q row_ + j n + i
+  std::array<Vectors<Wide>, 3> after_v_;  // at i q1_w + q, lane p
+  Vectors<Wide> no_more_;
 
   bool has_narrow_modes_ = false;
-  PerCoordinate<float> narrow_modes_, mode_sizes_;        // a_ijk and |a_ijk|
+  AlignedFloats narrow_modes_, mode_sizes_;  // a_ijk and |a_ijk|
   Contracted narrow_contracted_;
-  std::array<AlignedDoubles, 3> middles_w_, middles_v_;  // M at j n + i, M' at i
-  PerCoordinate<float> narrow_middles_w_;                // M
-  PerCoordinate<float> narrow_w_;                        // W at q row_ + j n + i
-  PerCoordinate<Narrow> narrow_v_;                       // V at i q1_w + q, lane p
-  std::vector<Narrow, AlignedAllocator<Narrow>> no_narrow_more_, more_;  // sum_j d_jp M_j at i, lane p
+  AlignedDoubles middles_w_;                          // M at j n + i
+  AlignedFloats narrow_middles_w_, narrow_middles_v_; // M, and M' at i
+  AlignedFloats narrow_w_;                            // W at q row_ + j n + i
+  std::array<Vectors<Narrow>, 3> narrow_v_;           // V at i q1_w + q, lane p
+  Vectors<Narrow> no_narrow_more_, more_;             // sum_j d_jp M_j at i, lane p
   // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: sum_k d_k |a_k|; sum_j d_j |M_j| at i; sum_j b_j of the first at i.
-  PerCoordinate<float> sizes_w_, sizes_v_, sizes_of_w_;
-  AlignedFloats middle_sizes_;  // |M|
+  AlignedFloats sizes_w_, sizes_v_, sizes_of_w_;
 };
 
 }  // namespace subvol

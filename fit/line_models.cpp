@@ -160,9 +160,10 @@ LineModels::Level LineModels::make_level(int l) const {
       level.largest_deviation[i] = std::max(level.largest_deviation[i], *largest - middle);
       for (int o = 0; o <= q; ++o) level.deviations[place * kStride + o] = static_cast<float>(b[o] - middle);
     }
-  for (int i = 0; i <= order_; ++i) {
-    level.narrow_largest_coefficient[i] = static_cast<float>(level.largest_coefficient[i]);
-    level.narrow_largest_deviation[i] = static_cast<float>(level.largest_deviation[i]);
+  level.largest_narrow[0] = 1;
+  for (int i = 1; i <= order_; ++i) {
+    level.largest_narrow[i] = static_cast<float>(level.largest_coefficient[i]);
+    level.largest_narrow_deviation[i] = static_cast<float>(level.largest_deviation[i]);
   }
   return level;
 }

@@ -435,8 +435,10 @@ TEST_CASE("Parts that single precision does not serve go over to double", "[hex_
 TEST_CASE("Boxes of a hex have the Jacobian of the cell, by models and by halves of coefficients", "[hex_matrices]") {
   Random random(6);
   for (const Basis basis : {Basis::fourier, Basis::legendre})
-    for (const auto& [order, share_left_out] :
+    for (const std::pair<int, double>& of :
          {std::pair{1, 0.0}, {3, 0.0}, {4, 0.0}, {8, 0.0}, {12, 0.0}, {3, 0.6}, {4, 0.6}, {8, 0.6}, {12, 0.9}}) {
+      const int order = of.first;
+      const double share_left_out = of.second;
       std::vector<LocalMode> modes;
       std::vector<Vec3> coefficients, others;
       for (int k = 0; k <= order; ++k)
