@@ -34,8 +34,12 @@ Mat3 unrotate(const Mat3& m) {
   for (int step = 0; step < 12; ++step) {
     if (step > 0) inverse = inverse_transposed(rotation);
     const double distance = (inverse - rotation).squaredNorm();
-    const double factor = distance > 1 ? std::sqrt(inverse.norm() / rotation.norm()) : 1;
-    rotation = 0.5 * (factor * rotation + inverse / factor);
+    if (distance > 1) {
+      const double factor = std::sqrt(inverse.norm() / rotation.norm());
+      rotation *= factor;
+      inverse *= 1 / factor;
+    }
+    rotation = 0.5 * (rotation + inverse);
     if (distance < 4 * near) break;
   }
   const Mat3 product = rotation.transpose() * m;
@@ -43,46 +47,45 @@ Mat3 unrotate(const Mat3& m) {
 }
 
 /// Mean square of the entries of rotation (J_b - mean) frame, over some of the matrices that are spread over all.
+/// frame: null for none.
 template <class Matrices>
-Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3& frame) {
+Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3* frame) {
   constexpr std::size_t kMost = 4;  // vectors of them; more make little difference (measured)
   const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
   using Vector = typename Matrices::Vector;
   using Number = NumberOf<Vector>;
   const Eigen::Matrix<Number, 3, 3> middle = mean.cast<Number>(), turn = rotation.cast<Number>();
-  Vector products[3][6] = {};  // of the columns of rotation (J - mean), by its rows
+  MatrixOf<Vector> squares{};
   for (std::size_t i = 0; i < sampled; ++i) {
     const std::size_t at = std::min(i == 0 ? 0 : i * (vectors - 1) / (sampled - 1) * kWide, matrices.size() - kWide);
-    MatrixOf<Vector> j, turned;
+    MatrixOf<Vector> j;
     matrices.load(at, j);
-    for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) j[r][c] -= middle(r, c);
-      for (int r = 0; r < 3; ++r) turned[r][c] = turn(r, 0) * j[0][c] + turn(r, 1) * j[1][c] + turn(r, 2) * j[2][c];
-    }
     for (int r = 0; r < 3; ++r)
-      for (int c = 0, pair = 0; c < 3; ++c)
-        for (int d = c; d < 3; ++d) products[r][pair++] += turned[r][c] * turned[r][d];
+      for (int c = 0; c < 3; ++c) j[r][c] -= middle(r, c);
+    multiply(turn, j);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) {
+        Vector x = j[r][c];
+        if (frame) {
+          x = Vector{};
+          for (int k = 0; k < 3; ++k) x += static_cast<Number>((*frame)(k, c)) * j[r][k];
+        }
+        squares[r][c] += x * x;
+      }
   }
   Mat3 result;
-  for (int r = 0; r < 3; ++r) {
-    Mat3 moments;
-    for (int c = 0, pair = 0; c < 3; ++c)
-      for (int d = c; d < 3; ++d) moments(c, d) = moments(d, c) = sum_of_lanes(widen(products[r][pair++]));
-    for (int c = 0; c < 3; ++c) result(r, c) = frame.col(c).dot(moments * frame.col(c));
-  }
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) result(r, c) = sum_of_lanes(widen(squares[r][c]));
   return result / static_cast<double>(kWide * sampled);
 }
 
-/// c, up to a factor. lengths: of the columns of M frame.
+/// c, whose product is 1. lengths: of the columns of M frame.
 Vec3 scales_by_variation(const Mat3& variation, const Vec3& lengths) {
   constexpr double kLeast = 0.01;  // squared share of the lengths, beside which less variation does not count
   const Mat3 v = variation + kLeast * Vec3::Ones() * lengths.cwiseAbs2().transpose();
-  Vec3 result;
-  for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
-    result[i] = std::cbrt(std::sqrt(v(i, j) / v(j, i) * (v(i, k) / v(k, i))));
-  }
-  return result;
+  const double by_01 = v(0, 1) / v(1, 0), by_02 = v(0, 2) / v(2, 0), by_12 = v(1, 2) / v(2, 1);
+  const double first = std::cbrt(std::sqrt(by_01 * by_02)), second = std::cbrt(std::sqrt(by_12 / by_01));
+  return {first, second, 1 / (first * second)};
 }
 
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
@@ -351,14 +354,20 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
 
   const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
   const Vec3 framed_lengths = is_framed ? Vec3(framed.colwise().norm().transpose()) : lengths;
-  const Mat3 to_frame = is_framed ? Mat3(scale.asDiagonal() * frame.inverse().transpose()) : Mat3(scale.asDiagonal());
-  const Mat3 rotation = unrotate(framed * framed_lengths.cwiseInverse().asDiagonal());
-  result = bound(to_frame * framed_lengths.asDiagonal() * rotation, result.in_the_way);
+  const Vec3 framed_scale = is_framed ? Vec3(framed_lengths.cwiseInverse()) : scale;
+  // D frame^-T diag(c)^-1 rotation.
+  const auto from_frame = [&](const Vec3& c, const Mat3& rotation) -> Mat3 {
+    const Mat3 in_frame = c.cwiseInverse().asDiagonal() * rotation;
+    return scale.asDiagonal() * (is_framed ? Mat3(frame.inverse().transpose() * in_frame) : in_frame);
+  };
+  const Mat3 rotation = unrotate(framed * framed_scale.asDiagonal());
+  result = bound(from_frame(framed_scale, rotation), result.in_the_way);
   if (result.is_final) return result.value;
 
-  const Vec3 c = scales_by_variation(variation(matrices, mean, rotation, frame), framed_lengths);
-  const double size = std::cbrt(framed.determinant() * c.prod());
-  Mat3 l = to_frame * c.cwiseInverse().asDiagonal() * unrotate(framed * (c / size).asDiagonal());
+  const Vec3 c =
+      scales_by_variation(variation(matrices, mean, rotation, is_framed ? &frame : nullptr), framed_lengths);
+  const double size = std::cbrt(framed.determinant());
+  Mat3 l = from_frame(c, unrotate(framed * (c / size).asDiagonal()));
   result = bound(l, result.in_the_way);
   for (int turn = 0; turn < kMostTurns && !result.is_final && result.in_the_way != kNone; ++turn) {
     l = turned(l, matrices[result.in_the_way] * scale.asDiagonal());

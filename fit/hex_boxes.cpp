@@ -155,13 +155,8 @@ void HexBoxes::make_weights() {
       is_used_[d][i] = weight(d, i, 0, d) > 0 || weight(d, i, 1, d) > 0 || weight(d, i, 2, d) > 0;
 }
 
-const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
-  const int level = box.modelled_levels[direction], tier = box.tiers[direction];
-  const int zone = LineModels::zone(level, box.modelled_index[direction]);
-  LineError& result = errors_[direction][level][tier][zone];
-  if (result.cell == cell_) return result;
+void HexBoxes::find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result) {
   result.cell = cell_;
-  const LineModels::Level& line = contraction_.models(direction, tier).level(level);
   const LineModels::Errors& errors = line.errors[zone];
   // Entries, by columns: of the column along the direction, and of the others.
   const Wide is_along = kIsColumn[direction], is_across = 1 - is_along;
@@ -186,7 +181,6 @@ const HexBoxes::LineError& HexBoxes::line_error(const Box& box, int direction) {
   result.growth = 1 + highest_lane(growth);
   result.inflation = std::max(1.0, highest_lane(inflation));
   result.size = line.exact ? 0 : result.entries.colwise().sum().dot(inverse_mean_edges_);
-  return result;
 }
 
 bool HexBoxes::is_hopeless(Box& box) { return !has_coefficients(box) && choose_models(box) > kHopelessError; }

@@ -38,13 +38,11 @@ class CoefficientsPool {
 /// Bernstein coefficients of the Jacobian dx/du of one high-order hex over its dyadic boxes, got by halving them in the
 /// direction that pays most.
 ///
-/// On a box each of N_i(u), N_j(v), N_k(w) is replaced by `LineModels` of its direction: along u and w of the least
-/// degree with small errors by this cell's coefficients, along v always of degree kWide - 1, so that a row of
-/// coefficients is one `Wide`. The map's coefficients follow by three contractions, of which boxes of one place along
-/// w, or v and w, share the first ones; or by halving those of the box around it, where its models are good enough.
-/// `HexMatrices` makes J's of them. Parts of the cell have them in single precision, relative to a point of their own:
-/// so errors are small beside the part, not the cell. The whole cell has them in double precision, and so have parts
-/// where single precision is not good enough (`improve`), and their parts.
+/// On a box each of N_i(u), N_j(v), N_k(w) is replaced by `LineModels` of its direction, of the least degree with small
+/// errors by this cell's coefficients. The map's coefficients follow by `HexContraction`; or by halving those of the box
+/// around it, where its models are good enough. `HexMatrices` makes J's of them. Parts of the cell have them in single
+/// precision, relative to a point of their own: so errors are small beside the part, not the cell. The whole cell has
+/// them in double precision, and so have parts where single precision is not good enough (`improve`), and their parts.
 class HexBoxes {
  public:
   struct Box : HexPart {
@@ -127,7 +125,13 @@ class HexBoxes {
   static bool has_coefficients(const Box& box) { return box.coefficients || box.narrow; }
   void find_coefficients(Box& box);
   void make_weights();
-  const LineError& line_error(const Box& box, int direction);
+  const LineError& line_error(const Box& box, int direction) {
+    const int level = box.modelled_levels[direction], zone = LineModels::zone(level, box.modelled_index[direction]);
+    LineError& result = errors_[direction][level][box.tiers[direction]][zone];
+    if (result.cell != cell_) find_line_error(contraction_.models(box, direction).level(level), zone, direction, result);
+    return result;
+  }
+  void find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result);
   double error_size(const Box& box, int direction) {
     return line_error(box, direction).size;
   }

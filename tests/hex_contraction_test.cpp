@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/hex_contraction.h"
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+using namespace subvol;
+
+namespace {
+
+using Random = std::mt19937;
+
+double uniform(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+/// A bent unit cube; each inner mode is left out with that probability.
+void bend(Random& random, int order, double share_left_out, std::vector<LocalMode>& modes,
+          std::vector<Vec3>& coefficients) {
+  for (int k = 0; k <= order; ++k)
+    for (int j = 0; j <= order; ++j)
+      for (int i = 0; i <= order; ++i) {
+        const bool is_vertex = i < 2 && j < 2 && k < 2;
+        if (!is_vertex && uniform(random, 0, 1) < share_left_out) continue;
+        LocalMode mode;
+        mode.i = static_cast<std::uint8_t>(i), mode.j = static_cast<std::uint8_t>(j);
+        mode.k = static_cast<std::uint8_t>(k);
+        modes.push_back(mode);
+        const double size = 0.1 / (1 + i * i + j * j + k * k);
+        Vec3 x = size * Vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
+        if (is_vertex) x += Vec3(i, j, k);
+        coefficients.push_back(x);
+      }
+}
+
+HexPart random_part(Random& random, const HexContraction& contraction) {
+  HexPart part;
+  for (int d = 0; d < 3; ++d) {
+    part.levels[d] = static_cast<int>(random() % 6);
+    part.index[d] = static_cast<int>(random() % (1u << part.levels[d]));
+    part.tiers[d] = static_cast<int>(random() % static_cast<unsigned>(contraction.num_tiers(d)));
+  }
+  return part;
+}
+
+}  // namespace
+
+TEST_CASE("A hex contracted in single precision is what it is in double, less a point, up to its bounds",
+          "[hex_matrices]") {
+  Random random(11);
+  for (const Basis basis : {Basis::fourier, Basis::legendre})
+    for (const int order : {1, 2, 3, 4, 5, 8, 12, 16})
+      for (const double share_left_out : {0.0, 0.7}) {
+        std::vector<LocalMode> modes;
+        std::vector<Vec3> coefficients;
+        bend(random, order, share_left_out, modes, coefficients);
+        HexContraction contraction(basis, order);
+        contraction.set_cell(modes, coefficients);
+        contraction.take_steps();
+        double sum_of_logs = 0;
+        int count = 0;
+        HexPart part;
+        for (int round = 0; round < 60; ++round) {
+          const HexPart next = random_part(random, contraction);
+          if (round % 3 == 0) part = next;
+          for (int d = 0; d < round % 3; ++d)  // so that contractions before it are shared
+            part.levels[d] = next.levels[d], part.index[d] = next.index[d], part.tiers[d] = next.tiers[d];
+          HexCoefficients wide;
+          NarrowHexCoefficients narrow;
+          contraction.contract(part, wide);
+          contraction.contract(part, narrow);
+          REQUIRE(narrow.num_u() == wide.num_u());
+          REQUIRE(narrow.num_w() == wide.num_w());
+          CAPTURE(basis, order, share_left_out, round, part.levels, part.index, part.tiers);
+          for (int d = 0; d < 3; ++d) {
+            double lowest = 1e300, highest = -1e300, largest = 0;
+            for (int n = 0; n < wide.num_vectors(); ++n)
+              for (int p = 0; p < kWide; ++p) {
+                const double difference = wide.coordinate(d)[n][p] - narrow.coordinate(d)[n][p];
+                lowest = std::min(lowest, difference), highest = std::max(highest, difference);
+                largest = std::max(largest, std::abs(static_cast<double>(narrow.coordinate(d)[n][p])));
+              }
+            CHECK(highest - lowest <= 2 * narrow.precision.errors[d] + 1e-13);
+            CHECK(largest <= narrow.precision.sizes[d]);
+            sum_of_logs += std::log(narrow.precision.sizes[d] / largest);
+            ++count;
+          }
+        }
+        CHECK(std::exp(sum_of_logs / count) < 4);  // or parts would go over to double precision for nothing
+      }
+}
