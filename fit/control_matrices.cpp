@@ -121,8 +121,8 @@ Vec3 near_least_eigenvector(const Mat3& s) {
 }
 
 /// L + (margin - e) v (J_b D v)^T / |J_b D v|^2, where e <= 0 is the least eigenvalue of sym(L J_b D) and v its
-/// eigenvector, of any length: then v^T L J_b D v = margin v^T v. A step of the perceptron algorithm for an L that suits
-/// all b.
+/// eigenvector, of any length: then v^T L J_b D v = margin v^T v. A step of the perceptron algorithm for an L that
+/// suits all b.
 Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
   constexpr double kMargin = 0.06;  // against L's largest entry
   l *= 1 / l.cwiseAbs().maxCoeff();
@@ -338,8 +338,9 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
                          Mat3* near_l) {
   constexpr int kMostTurns = 3;  // more cost what they save, and so does an end as soon as e is low (measured)
   const Mat3 mean = matrices.mean();
-  const Vec3 lengths = mean.colwise().norm().transpose(), scale = lengths.cwiseInverse();
-  if (!((mean * scale.asDiagonal()).determinant() > 1e-12)) return 0;  // also where a column is 0 or not finite
+  const Vec3 lengths = mean.colwise().norm().transpose(), inverse_lengths = lengths.cwiseInverse();
+  // Also where a column is 0 or not finite.
+  if (!((mean * inverse_lengths.asDiagonal()).determinant() > 1e-12)) return 0;
   const Scaling scaling(mean, lengths, remainder);
   const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
     if (near_l) *near_l = l;
@@ -354,11 +355,11 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
 
   const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
   const Vec3 framed_lengths = is_framed ? Vec3(framed.colwise().norm().transpose()) : lengths;
-  const Vec3 framed_scale = is_framed ? Vec3(framed_lengths.cwiseInverse()) : scale;
+  const Vec3 framed_scale = is_framed ? Vec3(framed_lengths.cwiseInverse()) : inverse_lengths;
   // D frame^-T diag(c)^-1 rotation.
   const auto from_frame = [&](const Vec3& c, const Mat3& rotation) -> Mat3 {
     const Mat3 in_frame = c.cwiseInverse().asDiagonal() * rotation;
-    return scale.asDiagonal() * (is_framed ? Mat3(frame.inverse().transpose() * in_frame) : in_frame);
+    return inverse_lengths.asDiagonal() * (is_framed ? Mat3(frame.inverse().transpose() * in_frame) : in_frame);
   };
   const Mat3 rotation = unrotate(framed * framed_scale.asDiagonal());
   result = bound(from_frame(framed_scale, rotation), result.in_the_way);
@@ -370,11 +371,11 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   Mat3 l = from_frame(c, unrotate(framed * (c / size).asDiagonal()));
   result = bound(l, result.in_the_way);
   for (int turn = 0; turn < kMostTurns && !result.is_final && result.in_the_way != kNone; ++turn) {
-    l = turned(l, matrices[result.in_the_way] * scale.asDiagonal());
+    l = turned(l, matrices[result.in_the_way] * inverse_lengths.asDiagonal());
     result = bound(l, result.in_the_way);
   }
   // The remainder is smallest by the box's own coordinates.
-  if (!result.is_final && is_framed) result = bound(unrotate(mean * scale.asDiagonal()), result.in_the_way);
+  if (!result.is_final && is_framed) result = bound(unrotate(mean * inverse_lengths.asDiagonal()), result.in_the_way);
   return result.value;
 }
 

@@ -21,8 +21,6 @@ constexpr int kMostKept = 64;
 // Of the lowest det J, by the mean edges, up to `kGood` of it: what errors may come to.
 constexpr double kShare = 0.1, kGood = 0.3;
 
-Wide size(const Wide& x) { return x < 0 ? -x : x; }
-
 /// Which of the first kWide entries of a matrix, by columns, are of that column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
 
@@ -64,7 +62,8 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   for (int corner = 0; corner < 8; ++corner)
     for (int row = 0; row < 3; ++row)
       for (int d = 0; d < 3; ++d) {
-        const double x = contraction_.modes(row)[(corner >> 2) * contraction_.row() + (corner >> 1 & 1) * n_ + (corner & 1)];
+        const int k = corner >> 2, j = corner >> 1 & 1, i = corner & 1;
+        const double x = contraction_.modes(row)[k * contraction_.row() + j * n_ + i];
         edges(row, d) += corner >> d & 1 ? x : -x;
       }
   mean_edges_ = 0.25 * edges.colwise().norm().transpose();
@@ -100,9 +99,9 @@ void HexBoxes::make_weights() {
       const auto at = [&](int j, int k) { return load_wide(modes + k * face + j * n_ + first); };
       for (int j = 0; j < n_; ++j) {
         const Wide x0 = at(j, 0), x1 = at(j, 1);
-        Wide sum = larger(size(x0), size(x1)), slopes = size(x1 - x0);
+        Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
         for (int k = 2; k < n_; ++k) {
-          const Wide x = size(at(j, k));
+          const Wide x = size_of(at(j, k));
           sum += value[k] * x, slopes += slope[k] * x;
         }
         store_wide(sum, by_j + j * lanes_ + first);
@@ -110,9 +109,9 @@ void HexBoxes::make_weights() {
       }
       for (int k = 0; k < n_; ++k) {
         const Wide x0 = at(0, k), x1 = at(1, k);
-        Wide sum = larger(size(x0), size(x1)), slopes = size(x1 - x0);
+        Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
         for (int j = 2; j < n_; ++j) {
-          const Wide x = size(at(j, k));
+          const Wide x = size_of(at(j, k));
           sum += value[j] * x, slopes += slope[j] * x;
         }
         store_wide(sum, by_k + k * lanes_ + first);

@@ -39,10 +39,11 @@ class CoefficientsPool {
 /// direction that pays most.
 ///
 /// On a box each of N_i(u), N_j(v), N_k(w) is replaced by `LineModels` of its direction, of the least degree with small
-/// errors by this cell's coefficients. The map's coefficients follow by `HexContraction`; or by halving those of the box
-/// around it, where its models are good enough. `HexMatrices` makes J's of them. Parts of the cell have them in single
-/// precision, relative to a point of their own: so errors are small beside the part, not the cell. The whole cell has
-/// them in double precision, and so have parts where single precision is not good enough (`improve`), and their parts.
+/// errors by this cell's coefficients. The map's coefficients follow by `HexContraction`; or by halving those of the
+/// box around it, where its models are good enough. `HexMatrices` makes J's of them. Parts of the cell have them in
+/// single precision, relative to a point of their own: so errors are small beside the part, not the cell. The whole
+/// cell has them in double precision, and so have parts where single precision is not good enough (`improve`), and
+/// their parts.
 class HexBoxes {
  public:
   struct Box : HexPart {
@@ -128,7 +129,8 @@ class HexBoxes {
   const LineError& line_error(const Box& box, int direction) {
     const int level = box.modelled_levels[direction], zone = LineModels::zone(level, box.modelled_index[direction]);
     LineError& result = errors_[direction][level][box.tiers[direction]][zone];
-    if (result.cell != cell_) find_line_error(contraction_.models(box, direction).level(level), zone, direction, result);
+    if (result.cell != cell_)
+      find_line_error(contraction_.models(box, direction).level(level), zone, direction, result);
     return result;
   }
   void find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result);

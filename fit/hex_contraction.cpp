@@ -2,7 +2,7 @@
 #include "fit/hex_contraction.h"
 
 #include <algorithm>
-#include <cmath>
+#include <cassert>
 #include <cstring>
 #include <limits>
 #include <type_traits>
@@ -22,18 +22,6 @@ std::vector<int> model_degrees(Basis basis, int order) {
   return {5, basis == Basis::legendre ? 6 : kWide - 1};
 }
 
-template <class Vector>
-Vector size(const Vector& x) {
-  return x < 0 ? -x : x;
-}
-
-template <class Vector>
-Vector load(const NumberOf<Vector>* from) {
-  Vector result;
-  std::memcpy(&result, from, sizeof result);
-  return result;
-}
-
 /// Of one direction: coefficients of its functions, `stride` apart, and what 1 counts, which has none: 1, or 0 where
 /// they are deviations.
 template <class Number>
@@ -43,10 +31,9 @@ struct Table {
   int stride = LineModels::kStride;
 };
 
-/// Lines of numbers, each `stride` after the one before; of every kEach numbers, those lines are 0 from `used` on.
+/// Lines of numbers, each `stride` after the one before; of every kRow numbers, those lines are 0 from `used` on.
 template <class Number>
 struct Lines {
-  static constexpr int kEach = 16;
   const Number* begin;
   int stride, length;
   const int* used;
@@ -61,7 +48,7 @@ void contract_to(const Table<Number>& table, const Lines<Number>& in, const Numb
     const Vector first = table.one * load<Vector>(in.begin + m);
     Vector sums[num_out];
     std::fill_n(sums, num_out, first);
-    const int end = in.used[m / Lines<Number>::kEach];
+    const int end = in.used[m / HexContraction::kRow];
     for (int k = 1; k < end; ++k) {
       const Vector x = load<Vector>(in.begin + k * in.stride + m);
       for (int o = 0; o < num_out; ++o) sums[o] += table.coefficients[k * table.stride + o] * x;
@@ -146,7 +133,7 @@ HexContraction::HexContraction(Basis basis, int order)
   for (AlignedFloats* numbers : {&narrow_middles_v_, &sizes_v_, &sizes_of_w_}) numbers->assign(3 * lanes_, 0);
   for (int d = 0; d < 3; ++d) {
     after_v_[d].assign(lines * most, Wide{});
-    narrow_v_[d].assign(lines * most + 1, Narrow{});
+    narrow_v_[d].assign(lines * most, Narrow{});
   }
   no_more_.assign(lines, Wide{});
   no_narrow_more_.assign(lines, Narrow{});
@@ -178,10 +165,12 @@ void HexContraction::set_cell(std::span<const LocalMode> modes, std::span<const 
   for (std::size_t a = 0; a < modes.size(); ++a)
     for (int d = 0; d < 3; ++d) modes_[d * face_ + places_[a]] = coefficients[a][d];
   contracted_.directions = narrow_contracted_.directions = 0;
-  has_narrow_modes_ = false;
+  has_narrow_modes_ = has_steps_ = false;
 }
 
 void HexContraction::take_steps() {
+  assert(!has_steps_);
+  has_steps_ = true;
   double* x = modes_.data();
   for (int m = 0; m < 3 * face_; ++m) x[row_ + m] -= x[m];
   for (int k = 0; k < n_; ++k)
@@ -196,7 +185,8 @@ void HexContraction::take_steps() {
       for (int j = 0; j < n_; ++j) {
         const double* line = modes(d) + k * row_ + j * n_;
         Wide sum{};
-        for (int i = 0; i < lanes_; i += kWide) sum += load_wide(lane_bounds_.data() + i) * size(load_wide(line + i));
+        for (int i = 0; i < lanes_; i += kWide)
+          sum += load_wide(lane_bounds_.data() + i) * size_of(load_wide(line + i));
         total += bounds_[k] * bounds_[j] * sum;
       }
     total_[d] = sum_of_lanes(total);
@@ -204,6 +194,7 @@ void HexContraction::take_steps() {
 }
 
 void HexContraction::contract(const HexPart& part, HexCoefficients& result) {
+  assert(has_steps_);
   contracted_.keep(part);
   if (contracted_.directions < 1) contract_w(part);
   if (contracted_.directions < 2) contract_v(part);
@@ -237,6 +228,7 @@ void HexContraction::contract_v(const HexPart& part) {
 }
 
 void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result) {
+  assert(has_steps_);
   if (!has_narrow_modes_) narrow_modes();
   narrow_contracted_.keep(part);
   if (narrow_contracted_.directions < 1) contract_narrow_w(part);
@@ -254,13 +246,14 @@ void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result
       more += narrow_middles_v_[d * lanes_ + i] * load<Narrow>(deviations + i * LineModels::kStride);
     subvol::contract<float>(num_u, {line.narrow_coefficients(level, part.index[0]), 1},
                             {numbers(narrow_v_[d].data()), row, row, all_used_.data()},
-                            reinterpret_cast<const float*>(&more), numbers(result.coordinate(d)), row);
+                            numbers(&more), numbers(result.coordinate(d)), row);
   }
   result.precision = precision(level);
 }
 
 /// By the direction whose deviations terms have: what they sum up to at the most. Rounded are their factors, products
-/// and sums: n + 2 times along each direction from that one on; below 1e-33, errors are not by size.
+/// and sums: n + 2 times along each direction from that one on. In 1e-5 are the roundings of these bounds themselves,
+/// and products of roundings: about 100; in 1e-33 is underflow, of up to 17^3 terms with coefficients up to 60.
 NarrowHexCoefficients::Precision HexContraction::precision(const LineModels::Level& along_u) const {
   constexpr double kUp = 1 + 1e-5;
   NarrowHexCoefficients::Precision result;
@@ -269,7 +262,7 @@ NarrowHexCoefficients::Precision HexContraction::precision(const LineModels::Lev
     for (int i = 0; i < lanes_; i += kWide) {
       const auto at = [&](const AlignedFloats& numbers) { return load<Narrow>(numbers.data() + d * lanes_ + i); };
       const Narrow largest = load<Narrow>(along_u.largest_narrow.data() + i);
-      const Narrow by_u = load<Narrow>(along_u.largest_narrow_deviation.data() + i) * size(at(narrow_middles_v_)),
+      const Narrow by_u = load<Narrow>(along_u.largest_deviation.data() + i) * size_of(at(narrow_middles_v_)),
                    by_v = largest * at(sizes_v_), by_w = largest * at(sizes_of_w_);
       all += by_u + by_v + by_w;
       rounded += by_u + 2 * by_v + 3 * by_w;
@@ -285,7 +278,7 @@ void HexContraction::narrow_modes() {
   for (int m = 0; m < n_ * row_; m += kWide) {
     const Narrow here = narrow(load_wide(modes_.data() + m));
     store_wide(here, narrow_modes_.data() + m);
-    store_wide(size(here), mode_sizes_.data() + m);
+    store_wide(size_of(here), mode_sizes_.data() + m);
   }
 }
 
@@ -300,7 +293,7 @@ void HexContraction::contract_narrow_w(const HexPart& part) {
     store_wide(narrow(load_wide(middles_w_.data() + m)), narrow_middles_w_.data() + m);
   subvol::contract<float>(line.degree() + 1, {line.deviations(level, part.index[2]), 0}, lines(narrow_modes_),
                           kNoNarrowMore, narrow_w_.data(), row_);
-  subvol::contract<float>(1, {level.largest_narrow_deviation.data(), 0, 1}, lines(mode_sizes_), kNoNarrowMore,
+  subvol::contract<float>(1, {level.largest_deviation.data(), 0, 1}, lines(mode_sizes_), kNoNarrowMore,
                           sizes_w_.data(), 0);
 }
 
@@ -310,7 +303,7 @@ void HexContraction::contract_narrow_v(const HexPart& part) {
   const Table<float> deviations{line.deviations(level, part.index[1]), 0},
       table{line.narrow_coefficients(level, part.index[1]), 1};
   const double* middles = line.middles(level, part.index[1]);
-  const float *largest = level.largest_narrow.data(), *largest_deviation = level.largest_narrow_deviation.data();
+  const float *largest = level.largest_narrow.data(), *largest_deviation = level.largest_deviation.data();
   const int num_w = models(part, 2).degree() + 1;
   for (int d = 0; d < 3; ++d) {
     contract_to_lanes<Narrow>(deviations, narrow_middles_w_.data() + d * face_, n_, no_narrow_more_.data(),
@@ -326,7 +319,7 @@ void HexContraction::contract_narrow_v(const HexPart& part) {
       for (int j = 1; j < n_; ++j) {
         const Wide x = load_wide(middle + j * n_);
         sum += middles[j] * x;
-        sizes += largest_deviation[j] * size(narrow(x));
+        sizes += largest_deviation[j] * size_of(load<Narrow>(narrow_middles_w_.data() + d * face_ + i + j * n_));
         of_w += largest[j] * load<Narrow>(size_w + j * n_);
       }
       store_wide(narrow(sum), narrow_middles_v_.data() + d * lanes_ + i);

@@ -35,14 +35,18 @@ struct HexPart {
 class HexContraction {
  public:
   static constexpr int kMostTiers = 2;
+  static constexpr int kRow = kWideFloats;  ///< rows are rounded up to so many numbers
 
   HexContraction(Basis basis, int order);
 
   int num_tiers(int direction) const { return static_cast<int>(tiers_[direction].size()); }
   const LineModels& models(int direction, int tier) const { return *tiers_[direction][tier]; }
-  const LineModels& models(const HexPart& part, int direction) const { return models(direction, part.tiers[direction]); }
+  const LineModels& models(const HexPart& part, int direction) const {
+    return models(direction, part.tiers[direction]);
+  }
 
-  /// Takes a cell by its modes and their coefficients, relative to a point nearby.
+  /// Takes a cell by its modes and their coefficients, relative to a point nearby. Modes must stay where, and what,
+  /// they are until others come.
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
   /// By 1, x, N_2, ... in all directions, instead of N_0, N_1, N_2, ...: for 1 nothing must be multiplied. Comes before
   /// all contractions.
@@ -57,7 +61,6 @@ class HexContraction {
   void contract(const HexPart& part, NarrowHexCoefficients& result);
 
  private:
-  static constexpr int kRow = 16;  ///< rows are rounded up to so many numbers
   template <class Vector>
   using Vectors = std::vector<Vector, AlignedAllocator<Vector>>;
 
@@ -89,7 +92,7 @@ class HexContraction {
   const LocalMode* of_modes_ = nullptr;  // and for which modes,
   std::size_t num_modes_ = 0;
   std::vector<int> places_;              // where each of them is
-  std::vector<int> used_;                // of every kRow numbers j n + i: first k from where on all are 0
+  std::vector<int> used_;                // of every kRow numbers of a row: first k from where on all are 0
   std::vector<int> all_used_;            // the same where all are used
   Vec3 total_;
 
@@ -98,15 +101,17 @@ class HexContraction {
   std::array<Vectors<Wide>, 3> after_v_;  // at i q1_w + q, lane p
   Vectors<Wide> no_more_;
 
-  bool has_narrow_modes_ = false;
+  bool has_steps_ = false, has_narrow_modes_ = false;
   AlignedFloats narrow_modes_, mode_sizes_;  // a_ijk and |a_ijk|
   Contracted narrow_contracted_;
   AlignedDoubles middles_w_;                          // M at j n + i
   AlignedFloats narrow_middles_w_, narrow_middles_v_; // M, and M' at i
   AlignedFloats narrow_w_;                            // W at q row_ + j n + i
   std::array<Vectors<Narrow>, 3> narrow_v_;           // V at i q1_w + q, lane p
-  Vectors<Narrow> no_narrow_more_, more_;             // sum_j d_jp M_j at i, lane p
-  // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: sum_k d_k |a_k|; sum_j d_j |M_j| at i; sum_j b_j of the first at i.
+  Vectors<Narrow> more_;                              // sum_j d_jp M_j at i, lane p
+  Vectors<Narrow> no_narrow_more_;
+  // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: sum_k d_k |a_k|; sum_j d_j |M_j| at i; sum_j b_j of the first,
+  // at i.
   AlignedFloats sizes_w_, sizes_v_, sizes_of_w_;
 };
 

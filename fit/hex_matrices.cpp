@@ -2,7 +2,6 @@
 #include "fit/hex_matrices.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 #include <type_traits>
 
@@ -11,13 +10,6 @@ namespace subvol {
 namespace {
 
 constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
-
-template <class Vector>
-Vector load(const NumberOf<Vector>* from) {
-  Vector result;
-  std::memcpy(&result, from, sizeof result);
-  return result;
-}
 
 /// Of n coefficients, `stride` vectors apart.
 template <int n, class Vector>
@@ -148,7 +140,6 @@ Mat3 HexMatricesOf<Vector>::mean() const {
 template <class Vector>
 Mat3 HexMatricesOf<Vector>::variation() const {
   constexpr Vector kInside{1, 1, 1, 1, 1, 1, 0, 0};  // where there are two more
-  const auto size = [](const Vector& x) { return x < 0 ? -x : x; };
   const int degree_u = num_u_ - 1, degree_v = kWide - 1, degree_w = num_w_ - 1;
   Vector uu{}, vv{}, ww{}, uv{}, uw{}, vw{};
   for (int row = 0; row < 3; ++row)
@@ -156,12 +147,12 @@ Mat3 HexMatricesOf<Vector>::variation() const {
       for (int w = 0; w < degree_w; w += 2) {
         const Vector* x = of_->coordinate(row) + u * num_w_ + w;
         const Vector step_u = x[num_w_] - x[0], step_v = shifted_down(x[0]) - x[0], step_w = x[1] - x[0];
-        uv += size(shifted_down(step_u) - step_u);
-        vw += size(shifted_down(step_w) - step_w);
-        uw += size(x[num_w_ + 1] - x[1] - step_u);
-        vv += size(kInside * (shifted_down(step_v) - step_v));
-        if (u + 2 <= degree_u) uu += size(x[2 * num_w_] - x[num_w_] - step_u);
-        if (w + 2 <= degree_w) ww += size(x[2] - x[1] - step_w);
+        uv += size_of(shifted_down(step_u) - step_u);
+        vw += size_of(shifted_down(step_w) - step_w);
+        uw += size_of(x[num_w_ + 1] - x[1] - step_u);
+        vv += size_of(kInside * (shifted_down(step_v) - step_v));
+        if (u + 2 <= degree_u) uu += size_of(x[2 * num_w_] - x[num_w_] - step_u);
+        if (w + 2 <= degree_w) ww += size_of(x[2] - x[1] - step_w);
       }
   const int samples_u = num_u_ / 2, samples_w = num_w_ / 2;
   const auto mean = [](const Vector& sum, int samples) {

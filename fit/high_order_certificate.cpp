@@ -9,7 +9,6 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>

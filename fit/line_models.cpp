@@ -157,14 +157,13 @@ LineModels::Level LineModels::make_level(int l) const {
       const auto [least, largest] = std::minmax_element(b, b + q + 1);
       const double middle = level.middles[place] = 0.5 * (*least + *largest);
       level.largest_coefficient[i] = std::max({level.largest_coefficient[i], -*least, *largest});
-      level.largest_deviation[i] = std::max(level.largest_deviation[i], *largest - middle);
+      level.largest_deviation[i] = std::max(level.largest_deviation[i], static_cast<float>(*largest - middle));
       for (int o = 0; o <= q; ++o) level.deviations[place * kStride + o] = static_cast<float>(b[o] - middle);
     }
+  std::transform(level.largest_coefficient.begin(), level.largest_coefficient.end(), level.largest_narrow.begin(),
+                 [](double b) { return static_cast<float>(b); });
   level.largest_narrow[0] = 1;
-  for (int i = 1; i <= order_; ++i) {
-    level.largest_narrow[i] = static_cast<float>(level.largest_coefficient[i]);
-    level.largest_narrow_deviation[i] = static_cast<float>(level.largest_deviation[i]);
-  }
+  level.largest_deviation[0] = 0;
   return level;
 }
 

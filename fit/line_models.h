@@ -43,9 +43,8 @@ class LineModels {
     AlignedFloats narrow_coefficients;  ///< b_io, like coefficients
     std::vector<double> middles;        ///< c_i at index (order + 1) + i
     AlignedFloats deviations;           ///< b_io - c_i, like coefficients
-    PerFunction largest_deviation{};    ///< max_o |b_io - c_i|
-    /// In single precision: both; with 1 instead of N_0, whose coefficients are 1 and deviations 0.
-    std::array<float, std::tuple_size_v<PerFunction>> largest_narrow{}, largest_narrow_deviation{};
+    /// In single precision max_o |b_io|, and max_o |b_io - c_i|; with 1 instead of N_0: 1 and 0.
+    std::array<float, std::tuple_size_v<PerFunction>> largest_narrow{}, largest_deviation{};
   };
 
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it

@@ -54,6 +54,19 @@ inline WideFloats load_wide(const float* from) {
 }
 inline void store_wide(const WideFloats& value, float* to) { std::memcpy(to, &value, sizeof value); }
 
+/// A vector of consecutive numbers, aligned or not.
+template <class Vector>
+Vector load(const std::remove_cvref_t<decltype(Vector{}[0])>* from) {
+  Vector result;
+  std::memcpy(&result, from, sizeof result);
+  return result;
+}
+/// |x|, lane by lane.
+template <class Vector>
+Vector size_of(const Vector& x) {
+  return x < 0 ? -x : x;
+}
+
 /// The numbers in vectors, one after the other.
 inline float* numbers(Narrow* vectors) { return reinterpret_cast<float*>(vectors); }
 inline const float* numbers(const Narrow* vectors) { return reinterpret_cast<const float*>(vectors); }
