@@ -19,7 +19,7 @@ constexpr double kHopelessError = 0.55;
 constexpr int kMostKept = 64;
 
 // Of the lowest det J, by the mean edges, up to `kGood` of it: what errors may come to.
-constexpr double kShare = 0.1, kGood = 0.3;
+constexpr double kShare = 0.1, kGood = 0.5;
 
 /// Which of the first kWide entries of a matrix, by columns, are of that column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
@@ -201,7 +201,7 @@ double HexBoxes::choose_models(Box& box) {
 void HexBoxes::choose_split(Box& box) {
   // Contractions along u cost least, and boxes next to one another share those along w, and v: what must be halved
   // anyway along w comes first.
-  constexpr double kNeeded = 0.6;
+  constexpr double kNeeded = 0.3;
   constexpr double kCost[3] = {0.9, 1, 1.1};
   const bool is_looked_at = has_coefficients(box);
   box.split = -1;
@@ -311,8 +311,8 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, two for the middles of
-  // coefficients, halvings, L, differences, and the 16 asked for. Steps of steps have the roundings of
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, two for tables in two parts,
+  // halvings, L, differences, and the 16 asked for. Steps of steps have the roundings of
   // those that they are made of: all in all kSteps of the total.
   constexpr int kSteps = 13;
   const double roundings = 3 * (n_ + 4) + 1 + kSteps + 2 + kWide * box.halved + 3 + 8 + 16;

@@ -22,14 +22,9 @@ std::vector<int> model_degrees(Basis basis, int order) {
   return {5, basis == Basis::legendre ? 6 : kWide - 1};
 }
 
-/// Of one direction: coefficients of its functions, `stride` apart, and what 1 counts, which has none: 1, or 0 where
-/// they are deviations.
-template <class Number>
-struct Table {
-  const Number* coefficients;
-  Number one;
-  int stride = LineModels::kStride;
-};
+/// What tables hold, for each function of a direction, kStride apart: coefficients of all outputs, where 1, which has
+/// none of its own, counts 1; or deviations, where it counts 0, and for the last output middles, where it counts 1.
+enum class Of { values, deviations };
 
 /// Lines of numbers, each `stride` after the one before; of every kRow numbers, those lines are 0 from `used` on.
 template <class Number>
@@ -39,19 +34,22 @@ struct Lines {
   const int* used;
 };
 
-/// out[o out_stride + m] = more[o] + one in[0][m] + sum_{k > 0} table[k][o] in[k][m], o < num_out, for all m < length,
-/// and some behind them, to whole vectors.
-template <int num_out, class Number>
-void contract_to(const Table<Number>& table, const Lines<Number>& in, const Number* more, Number* out,
-                 int out_stride) {
+/// out[o out_stride + m] = more[o] + [1 counts 1] in[0][m] + sum_{k > 0} table[k][o] in[k][m], o < num_out, for all
+/// m < length, and some behind them, to whole vectors. by_size: of |in| instead.
+template <int num_out, Of of, bool by_size, class Number>
+void contract_to(const Number* table, const Lines<Number>& in, const Number* more, Number* out, int out_stride) {
   const auto contract = [&]<class Vector>(int m, const Vector&) {
-    const Vector first = table.one * load<Vector>(in.begin + m);
-    Vector sums[num_out];
-    std::fill_n(sums, num_out, first);
+    const auto line = [&](int k) {
+      const Vector x = load<Vector>(in.begin + k * in.stride + m);
+      return by_size ? size_of(x) : x;
+    };
+    Vector sums[num_out] = {};
+    const Vector first = line(0);
+    std::fill(of == Of::values ? sums : sums + num_out - 1, sums + num_out, first);
     const int end = in.used[m / HexContraction::kRow];
     for (int k = 1; k < end; ++k) {
-      const Vector x = load<Vector>(in.begin + k * in.stride + m);
-      for (int o = 0; o < num_out; ++o) sums[o] += table.coefficients[k * table.stride + o] * x;
+      const Vector x = line(k);
+      for (int o = 0; o < num_out; ++o) sums[o] += table[k * LineModels::kStride + o] * x;
     }
     for (int o = 0; o < num_out; ++o) {
       sums[o] += more[o];
@@ -67,40 +65,43 @@ void contract_to(const Table<Number>& table, const Lines<Number>& in, const Numb
   }
 }
 
-template <class Number>
-void contract(int num_out, const Table<Number>& table, const Lines<Number>& in, const Number* more, Number* out,
+/// For a number of outputs known at run time, deviations' middle among them.
+template <Of of, class Number>
+void contract(int num_out, const Number* table, const Lines<Number>& in, const Number* more, Number* out,
               int out_stride) {
-  using Contract = void (*)(const Table<Number>&, const Lines<Number>&, const Number*, Number*, int);
+  using Contract = void (*)(const Number*, const Lines<Number>&, const Number*, Number*, int);
   static constexpr Contract kAll[] = {nullptr,
-                                      contract_to<1, Number>,
-                                      contract_to<2, Number>,
-                                      contract_to<3, Number>,
-                                      contract_to<4, Number>,
-                                      contract_to<5, Number>,
-                                      contract_to<6, Number>,
-                                      contract_to<7, Number>,
-                                      contract_to<8, Number>};
+                                      contract_to<1, of, false, Number>,
+                                      contract_to<2, of, false, Number>,
+                                      contract_to<3, of, false, Number>,
+                                      contract_to<4, of, false, Number>,
+                                      contract_to<5, of, false, Number>,
+                                      contract_to<6, of, false, Number>,
+                                      contract_to<7, of, false, Number>,
+                                      contract_to<8, of, false, Number>,
+                                      contract_to<9, of, false, Number>};
   kAll[num_out](table, in, more, out, out_stride);
 }
 
-/// out[i out_stride], lane p, = more[i] + one in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n. Runs over
-/// the end: reads kSome numbers, and writes as many vectors, behind it.
-template <class Vector>
-void contract_to_lanes(const Table<NumberOf<Vector>>& table, const NumberOf<Vector>* in, int n, const Vector* more,
+/// out[i out_stride], lane p, = more[i] + [1 counts 1] in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n. Runs
+/// over the end: reads up to kSome numbers, and writes as many vectors, behind it.
+template <Of of, class Vector>
+void contract_to_lanes(const NumberOf<Vector>* table, const NumberOf<Vector>* in, int n, const Vector* more,
                        Vector* out, int out_stride) {
   for (int i = 0; i < n; i += kSome) {
-    Vector sums[kSome];
-    for (int s = 0; s < kSome; ++s) sums[s] = Vector{} + table.one * in[i + s];
+    Vector sums[kSome] = {};
+    if (of == Of::values)
+      for (int s = 0; s < kSome; ++s) sums[s] += in[i + s];
     for (int j = 1; j < n; ++j) {
-      const Vector x = load<Vector>(table.coefficients + j * table.stride);
+      const Vector x = load<Vector>(table + j * LineModels::kStride);
       for (int s = 0; s < kSome; ++s) sums[s] += in[j * n + i + s] * x;
     }
     for (int s = 0; s < kSome; ++s) out[(i + s) * out_stride] = sums[s] + more[i + s];
   }
 }
 
-constexpr double kNoMore[LineModels::kMaxDegree + 1] = {};
-constexpr float kNoNarrowMore[LineModels::kMaxDegree + 1] = {};
+constexpr double kNoMore[LineModels::kMaxDegree + 2] = {};
+constexpr float kNoNarrowMore[LineModels::kMaxDegree + 2] = {};
 
 }  // namespace
 
@@ -123,14 +124,13 @@ HexContraction::HexContraction(Basis basis, int order)
   std::copy_n(bounds_.begin(), n_, lane_bounds_.begin());
 
   // With room for what is read, or written, behind the end.
-  const std::size_t most = tiers_[0].back()->degree() + 1, rows = row_ + kRow, lines = n_ + kSome;
-  for (AlignedDoubles* numbers : {&modes_, &after_w_}) numbers->assign((std::max<std::size_t>(n_, most) + 1) * rows, 0);
-  for (AlignedFloats* numbers : {&narrow_modes_, &mode_sizes_, &narrow_w_})
-    numbers->assign((std::max<std::size_t>(n_, most) + 1) * rows, 0);
-  middles_w_.assign(rows, 0);
-  narrow_middles_w_.assign(rows, 0);
-  sizes_w_.assign(rows, 0);
-  for (AlignedFloats* numbers : {&narrow_middles_v_, &sizes_v_, &sizes_of_w_}) numbers->assign(3 * lanes_, 0);
+  const std::size_t most = tiers_[0].back()->degree() + 1, row = row_ + kRow, lines = n_ + kSome;
+  modes_.assign(n_ * row, 0);
+  after_w_.assign(most * row, 0);
+  narrow_modes_.assign(n_ * row, 0);
+  narrow_w_.assign((most + 1) * row, 0);
+  sizes_w_.assign(2 * row, 0);
+  for (AlignedFloats* numbers : {&middles_v_, &middle_sizes_v_, &sizes_v_}) numbers->assign(3 * lanes_, 0);
   for (int d = 0; d < 3; ++d) {
     after_v_[d].assign(lines * most, Wide{});
     narrow_v_[d].assign(lines * most, Narrow{});
@@ -201,30 +201,30 @@ void HexContraction::contract(const HexPart& part, HexCoefficients& result) {
   contracted_.directions = 2;
 
   const LineModels& line = models(part, 0);
+  const double* table = line.coefficients(line.level(part.levels[0]), part.index[0]);
   const int num_u = line.degree() + 1, num_w = models(part, 2).degree() + 1, row = num_w * kWide;
   result.resize(num_u, num_w);
   for (int d = 0; d < 3; ++d) {
-    const double* in = reinterpret_cast<const double*>(after_v_[d].data());
-    double* out = reinterpret_cast<double*>(result.coordinate(d));
-    subvol::contract<double>(num_u, {line.coefficients(line.level(part.levels[0]), part.index[0]), 1},
-                             {in, row, row, all_used_.data()}, kNoMore, out, row);
+    const Lines<double> in{reinterpret_cast<const double*>(after_v_[d].data()), row, row, all_used_.data()};
+    subvol::contract<Of::values>(num_u, table, in, kNoMore, reinterpret_cast<double*>(result.coordinate(d)), row);
   }
 }
 
 void HexContraction::contract_w(const HexPart& part) {
   const LineModels& line = models(part, 2);
-  subvol::contract<double>(line.degree() + 1, {line.coefficients(line.level(part.levels[2]), part.index[2]), 1},
-                           {modes_.data(), row_, 3 * face_, used_.data()}, kNoMore, after_w_.data(), row_);
+  const Lines<double> in{modes_.data(), row_, 3 * face_, used_.data()};
+  subvol::contract<Of::values>(line.degree() + 1, line.coefficients(line.level(part.levels[2]), part.index[2]), in,
+                               kNoMore, after_w_.data(), row_);
 }
 
 void HexContraction::contract_v(const HexPart& part) {
   const LineModels& line = models(part, 1);
-  const Table<double> table{line.coefficients(line.level(part.levels[1]), part.index[1]), 1};
+  const double* table = line.coefficients(line.level(part.levels[1]), part.index[1]);
   const int num_w = models(part, 2).degree() + 1;
   for (int d = 0; d < 3; ++d)
     for (int w = 0; w < num_w; ++w)
-      contract_to_lanes<Wide>(table, after_w_.data() + w * row_ + d * face_, n_, no_more_.data(),
-                              after_v_[d].data() + w, num_w);
+      contract_to_lanes<Of::values>(table, after_w_.data() + w * row_ + d * face_, n_, no_more_.data(),
+                                    after_v_[d].data() + w, num_w);
 }
 
 void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result) {
@@ -237,94 +237,74 @@ void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result
 
   const LineModels& line = models(part, 0);
   const LineModels::Level& level = line.level(part.levels[0]);
-  const float* deviations = line.deviations(level, part.index[0]);
+  const float *deviations = line.deviations(level, part.index[0]),
+              *coefficients = line.narrow_coefficients(level, part.index[0]), *others = deviations + line.degree() + 1;
   const int num_u = line.degree() + 1, num_w = models(part, 2).degree() + 1, row = num_w * kWide;
   result.resize(num_u, num_w);
   for (int d = 0; d < 3; ++d) {
     Narrow more{};  // lane o: sum_i d_io M'_i
-    for (int i = 1; i < n_; ++i)
-      more += narrow_middles_v_[d * lanes_ + i] * load<Narrow>(deviations + i * LineModels::kStride);
-    subvol::contract<float>(num_u, {line.narrow_coefficients(level, part.index[0]), 1},
-                            {numbers(narrow_v_[d].data()), row, row, all_used_.data()},
-                            numbers(&more), numbers(result.coordinate(d)), row);
-  }
-  result.precision = precision(level);
-}
-
-/// By the direction whose deviations terms have: what they sum up to at the most. Rounded are their factors, products
-/// and sums: n + 2 times along each direction from that one on. In 1e-5 are the roundings of these bounds themselves,
-/// and products of roundings: about 100; in 1e-33 is underflow, of up to 17^3 terms with coefficients up to 60.
-NarrowHexCoefficients::Precision HexContraction::precision(const LineModels::Level& along_u) const {
-  constexpr double kUp = 1 + 1e-5;
-  NarrowHexCoefficients::Precision result;
-  for (int d = 0; d < 3; ++d) {
-    Narrow all{}, rounded{};
-    for (int i = 0; i < lanes_; i += kWide) {
-      const auto at = [&](const AlignedFloats& numbers) { return load<Narrow>(numbers.data() + d * lanes_ + i); };
-      const Narrow largest = load<Narrow>(along_u.largest_narrow.data() + i);
-      const Narrow by_u = load<Narrow>(along_u.largest_deviation.data() + i) * size_of(at(narrow_middles_v_)),
-                   by_v = largest * at(sizes_v_), by_w = largest * at(sizes_of_w_);
-      all += by_u + by_v + by_w;
-      rounded += by_u + 2 * by_v + 3 * by_w;
+    const float *middles = middles_v_.data() + d * lanes_, *middle_sizes = middle_sizes_v_.data() + d * lanes_,
+                *sizes = sizes_v_.data() + d * lanes_;
+    double size = sizes[0];
+    for (int i = 1; i < n_; ++i) {
+      const int at = i * LineModels::kStride;
+      more += middles[i] * load<Narrow>(deviations + at);
+      size += others[at + LineModels::kLargestDeviation] * middle_sizes[i] +
+              others[at + LineModels::kLargest] * sizes[i];
     }
-    result.sizes[d] = kUp * sum_of_lanes(widen(all));
-    result.errors[d] = kUp * (n_ + 2) * kNarrowRoundoff * sum_of_lanes(widen(rounded)) + 1e-33;
+    const Lines<float> in{numbers(narrow_v_[d].data()), row, row, all_used_.data()};
+    subvol::contract<Of::values>(num_u, coefficients, in, numbers(&more), numbers(result.coordinate(d)), row);
+
+    // Rounded are both factors of each product, the product and the sums: n + 2 times a direction. In 1e-5 are the
+    // roundings of these bounds themselves, and products of roundings: about 100; in 1e-33 is underflow, of up to 17^3
+    // terms with coefficients up to 60.
+    result.precision.sizes[d] = (1 + 1e-5) * size;
+    result.precision.errors[d] = 3 * (n_ + 2) * kNarrowRoundoff * result.precision.sizes[d] + 1e-33;
   }
-  return result;
 }
 
 void HexContraction::narrow_modes() {
   has_narrow_modes_ = true;
-  for (int m = 0; m < n_ * row_; m += kWide) {
-    const Narrow here = narrow(load_wide(modes_.data() + m));
-    store_wide(here, narrow_modes_.data() + m);
-    store_wide(size_of(here), mode_sizes_.data() + m);
-  }
+  for (int m = 0; m < n_ * row_; m += kWide) store_wide(narrow(load_wide(modes_.data() + m)), narrow_modes_.data() + m);
 }
 
 void HexContraction::contract_narrow_w(const HexPart& part) {
   const LineModels& line = models(part, 2);
-  const LineModels::Level& level = line.level(part.levels[2]);
-  const auto lines = [&](const auto& numbers) {
-    return Lines<std::remove_cvref_t<decltype(numbers[0])>>{numbers.data(), row_, 3 * face_, used_.data()};
-  };
-  subvol::contract<double>(1, {line.middles(level, part.index[2]), 1, 1}, lines(modes_), kNoMore, middles_w_.data(), 0);
-  for (int m = 0; m < 3 * face_; m += kWide)
-    store_wide(narrow(load_wide(middles_w_.data() + m)), narrow_middles_w_.data() + m);
-  subvol::contract<float>(line.degree() + 1, {line.deviations(level, part.index[2]), 0}, lines(narrow_modes_),
-                          kNoNarrowMore, narrow_w_.data(), row_);
-  subvol::contract<float>(1, {level.largest_deviation.data(), 0, 1}, lines(mode_sizes_), kNoNarrowMore,
-                          sizes_w_.data(), 0);
+  const float* deviations = line.deviations(line.level(part.levels[2]), part.index[2]);
+  const int num_w = line.degree() + 1;
+  const Lines<float> in{narrow_modes_.data(), row_, 3 * face_, used_.data()};
+  subvol::contract<Of::deviations>(num_w + 1, deviations, in, kNoNarrowMore, narrow_w_.data(), row_);
+  contract_to<2, Of::deviations, true>(deviations + num_w + LineModels::kLargestDeviation, in, kNoNarrowMore,
+                                       sizes_w_.data(), row_);
 }
 
 void HexContraction::contract_narrow_v(const HexPart& part) {
   const LineModels& line = models(part, 1);
   const LineModels::Level& level = line.level(part.levels[1]);
-  const Table<float> deviations{line.deviations(level, part.index[1]), 0},
-      table{line.narrow_coefficients(level, part.index[1]), 1};
-  const double* middles = line.middles(level, part.index[1]);
-  const float *largest = level.largest_narrow.data(), *largest_deviation = level.largest_deviation.data();
+  const float *deviations = line.deviations(level, part.index[1]), *others = deviations + kWide,
+              *coefficients = line.narrow_coefficients(level, part.index[1]);
   const int num_w = models(part, 2).degree() + 1;
   for (int d = 0; d < 3; ++d) {
-    contract_to_lanes<Narrow>(deviations, narrow_middles_w_.data() + d * face_, n_, no_narrow_more_.data(),
-                              more_.data(), 1);
+    const float* middles = narrow_w_.data() + num_w * row_ + d * face_;
+    contract_to_lanes<Of::deviations>(deviations, middles, n_, no_narrow_more_.data(), more_.data(), 1);
     for (int w = 0; w < num_w; ++w)
-      contract_to_lanes<Narrow>(table, narrow_w_.data() + w * row_ + d * face_, n_, more_.data(),
-                                narrow_v_[d].data() + w, num_w);
+      contract_to_lanes<Of::values>(coefficients, narrow_w_.data() + w * row_ + d * face_, n_, more_.data(),
+                                    narrow_v_[d].data() + w, num_w);
     for (int i = 0; i < n_; i += kWide) {
-      const double* middle = middles_w_.data() + d * face_ + i;
-      const float* size_w = sizes_w_.data() + d * face_ + i;
-      Wide sum = load_wide(middle);
-      Narrow sizes{}, of_w = load<Narrow>(size_w);
+      const float *sizes_w = sizes_w_.data() + d * face_ + i, *middle_sizes_w = sizes_w + row_;
+      Narrow middle = load<Narrow>(middles + i), middle_size = load<Narrow>(middle_sizes_w),
+             sizes = load<Narrow>(sizes_w);
       for (int j = 1; j < n_; ++j) {
-        const Wide x = load_wide(middle + j * n_);
-        sum += middles[j] * x;
-        sizes += largest_deviation[j] * size_of(load<Narrow>(narrow_middles_w_.data() + d * face_ + i + j * n_));
-        of_w += largest[j] * load<Narrow>(size_w + j * n_);
+        const float* other = others + j * LineModels::kStride;
+        const Narrow s = load<Narrow>(middle_sizes_w + j * n_);
+        middle += other[LineModels::kMiddle] * load<Narrow>(middles + j * n_ + i);
+        middle_size += other[LineModels::kMiddleSize] * s;
+        sizes += other[LineModels::kLargestDeviation] * s +
+                 other[LineModels::kLargest] * load<Narrow>(sizes_w + j * n_);
       }
-      store_wide(narrow(sum), narrow_middles_v_.data() + d * lanes_ + i);
+      store_wide(middle, middles_v_.data() + d * lanes_ + i);
+      store_wide(middle_size, middle_sizes_v_.data() + d * lanes_ + i);
       store_wide(sizes, sizes_v_.data() + d * lanes_ + i);
-      store_wide(of_w, sizes_of_w_.data() + d * lanes_ + i);
     }
   }
 }

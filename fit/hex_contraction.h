@@ -30,8 +30,9 @@ struct HexPart {
 ///   V_pq  = sum_j (d_jp M_j + b_jp W_jq)    M' = sum_j c_j M_j
 ///   X_opq = sum_i (d_io M'_i + b_io V_ipq) + sum_i c_i M'_i
 ///
-/// without the last sum, which is a point that the coefficients are relative to, and with M and M' in double precision:
-/// so all that is rounded is small beside the part.
+/// without the last sum, which is a point that the coefficients are relative to. Every term of the others has a
+/// deviation d: so all that is rounded is small beside the part. What bounds it are the same sums over sizes, with
+/// max_q |d_kq|, max_q |b_kq| and |c_k|.
 class HexContraction {
  public:
   static constexpr int kMostTiers = 2;
@@ -78,8 +79,6 @@ class HexContraction {
   void narrow_modes();
   void contract_narrow_w(const HexPart& part);
   void contract_narrow_v(const HexPart& part);
-  /// After `contract_narrow_v`, of what it and a contraction along u leave.
-  NarrowHexCoefficients::Precision precision(const LineModels::Level& along_u) const;
 
   int n_, face_;                                         // functions per direction, and their square
   int lanes_, row_;                                      // n_ to a multiple of kWide, 3 face_ to one of kRow
@@ -102,17 +101,16 @@ class HexContraction {
   Vectors<Wide> no_more_;
 
   bool has_steps_ = false, has_narrow_modes_ = false;
-  AlignedFloats narrow_modes_, mode_sizes_;  // a_ijk and |a_ijk|
+  AlignedFloats narrow_modes_;  // a_ijk
   Contracted narrow_contracted_;
-  AlignedDoubles middles_w_;                          // M at j n + i
-  AlignedFloats narrow_middles_w_, narrow_middles_v_; // M, and M' at i
-  AlignedFloats narrow_w_;                            // W at q row_ + j n + i
-  std::array<Vectors<Narrow>, 3> narrow_v_;           // V at i q1_w + q, lane p
-  Vectors<Narrow> more_;                              // sum_j d_jp M_j at i, lane p
+  AlignedFloats narrow_w_;                   // W at q row_ + j n + i, then M
+  std::array<Vectors<Narrow>, 3> narrow_v_;  // V at i q1_w + q, lane p
+  Vectors<Narrow> more_;                     // sum_j d_jp M_j at i, lane p
   Vectors<Narrow> no_narrow_more_;
-  // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: sum_k d_k |a_k|; sum_j d_j |M_j| at i; sum_j b_j of the first,
-  // at i.
-  AlignedFloats sizes_w_, sizes_v_, sizes_of_w_;
+  AlignedFloats middles_v_;                  // M' at i
+  // With d_k for max_q |d_kq|, b_j for max_p |b_jp|: s = sum_k d_k |a_k| at j n + i, then S = sum_k |c_k| |a_k|;
+  // sum_j (d_j S_j + b_j s_j) at i; sum_j |c_j| S_j.
+  AlignedFloats sizes_w_, sizes_v_, middle_sizes_v_;
 };
 
 }  // namespace subvol

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <span>
@@ -148,22 +149,21 @@ LineModels::Level LineModels::make_level(int l) const {
   level.narrow_coefficients.resize(level.coefficients.size());
   std::transform(level.coefficients.begin(), level.coefficients.end(), level.narrow_coefficients.begin(),
                  [](double b) { return static_cast<float>(b); });
-  level.middles.resize(static_cast<std::size_t>(parts) * (order_ + 1));
   level.deviations.assign(level.coefficients.size(), 0);
   for (int part = 0; part < parts; ++part)
     for (int i = 0; i <= order_; ++i) {
-      const std::size_t place = static_cast<std::size_t>(part) * (order_ + 1) + i;
       const double* b = row(part, i);
+      float* deviations = level.deviations.data() + (b - level.coefficients.data());
       const auto [least, largest] = std::minmax_element(b, b + q + 1);
-      const double middle = level.middles[place] = 0.5 * (*least + *largest);
-      level.largest_coefficient[i] = std::max({level.largest_coefficient[i], -*least, *largest});
-      level.largest_deviation[i] = std::max(level.largest_deviation[i], static_cast<float>(*largest - middle));
-      for (int o = 0; o <= q; ++o) level.deviations[place * kStride + o] = static_cast<float>(b[o] - middle);
+      const double middle = 0.5 * (*least + *largest), size = std::max(-*least, *largest);
+      level.largest_coefficient[i] = std::max(level.largest_coefficient[i], size);
+      for (int o = 0; o <= q; ++o) deviations[o] = static_cast<float>(b[o] - middle);
+      float* then = deviations + q + 1;
+      then[kMiddle] = static_cast<float>(middle);
+      then[kLargestDeviation] = static_cast<float>(*largest - middle);
+      then[kMiddleSize] = std::abs(then[kMiddle]);
+      then[kLargest] = static_cast<float>(size);
     }
-  std::transform(level.largest_coefficient.begin(), level.largest_coefficient.end(), level.largest_narrow.begin(),
-                 [](double b) { return static_cast<float>(b); });
-  level.largest_narrow[0] = 1;
-  level.largest_deviation[0] = 0;
   return level;
 }
 

@@ -32,6 +32,9 @@ class LineModels {
   static constexpr int kZones = 4;
   static int zone(int level, int index) { return std::min({index, (1 << level) - 1 - index, kZones - 1}); }
 
+  /// What follows the deviations of one function: c, the largest |deviation|, |c|, the largest |b|.
+  enum Deviations { kMiddle, kLargestDeviation, kMiddleSize, kLargest };
+
   /// The models of all parts of one level.
   struct Level {
     std::array<Errors, kZones> errors;  ///< by zone
@@ -41,10 +44,8 @@ class LineModels {
     // For single precision the same, and in two parts: c_i in the middle between the least and the largest b_io over o,
     // and b_io - c_i. All good to a unit of roundoff (of either precision) beyond what the coefficients are.
     AlignedFloats narrow_coefficients;  ///< b_io, like coefficients
-    std::vector<double> middles;        ///< c_i at index (order + 1) + i
-    AlignedFloats deviations;           ///< b_io - c_i, like coefficients
-    /// In single precision max_o |b_io|, and max_o |b_io - c_i|; with 1 instead of N_0: 1 and 0.
-    std::array<float, std::tuple_size_v<PerFunction>> largest_narrow{}, largest_deviation{};
+    /// b_io - c_i, like coefficients; then, from entry degree + 1 on, as in `Deviations`.
+    AlignedFloats deviations;
   };
 
   /// The models of a basis, an order of 1 .. kMaxOrder and a degree of 1 .. kMaxDegree: made once, each level when it
@@ -62,9 +63,6 @@ class LineModels {
   }
   const float* narrow_coefficients(const Level& level, int index) const {
     return level.narrow_coefficients.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
-  }
-  const double* middles(const Level& level, int index) const {
-    return level.middles.data() + static_cast<std::size_t>(index) * (order_ + 1);
   }
   const float* deviations(const Level& level, int index) const {
     return level.deviations.data() + static_cast<std::size_t>(index) * (order_ + 1) * kStride;
