@@ -311,11 +311,10 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, two for tables in two parts,
-  // halvings, L, differences, and the 16 asked for. Steps of steps have the roundings of
-  // those that they are made of: all in all kSteps of the total.
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, halvings, L, differences, and
+  // the 16 asked for. Steps of steps have the roundings of those that they are made of: all in all kSteps of the total.
   constexpr int kSteps = 13;
-  const double roundings = 3 * (n_ + 4) + 1 + kSteps + 2 + kWide * box.halved + 3 + 8 + 16;
+  const double roundings = 3 * (n_ + 4) + 1 + kSteps + kWide * box.halved + 3 + 8 + 16;
   const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
   for (int d = 0; d < 3; ++d) {
     result.col(d) *= 1 / parts(box.levels[d]);

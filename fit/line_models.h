@@ -34,6 +34,7 @@ class LineModels {
 
   /// What follows the deviations of one function: c, the largest |deviation|, |c|, the largest |b|.
   enum Deviations { kMiddle, kLargestDeviation, kMiddleSize, kLargest };
+  static_assert(kMaxDegree + 1 + kLargest < kStride);
 
   /// The models of all parts of one level.
   struct Level {
