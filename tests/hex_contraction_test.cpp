@@ -1,43 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/hex_contraction.h"
 
+#include "tests/bent_hex.h"
+
 #include <catch2/catch.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <random>
-#include <vector>
 
 using namespace subvol;
 
 namespace {
 
 using Random = std::mt19937;
-
-double uniform(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
-
-/// A bent unit cube; each inner mode is left out with that probability.
-void bend(Random& random, int order, double share_left_out, std::vector<LocalMode>& modes,
-          std::vector<Vec3>& coefficients) {
-  for (int k = 0; k <= order; ++k)
-    for (int j = 0; j <= order; ++j)
-      for (int i = 0; i <= order; ++i) {
-        const bool is_vertex = i < 2 && j < 2 && k < 2;
-        if (!is_vertex && uniform(random, 0, 1) < share_left_out) continue;
-        LocalMode mode;
-        mode.i = static_cast<std::uint8_t>(i), mode.j = static_cast<std::uint8_t>(j);
-        mode.k = static_cast<std::uint8_t>(k);
-        modes.push_back(mode);
-        const double size = 0.1 / (1 + i * i + j * j + k * k);
-        Vec3 x = size * Vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
-        if (is_vertex) x += Vec3(i, j, k);
-        coefficients.push_back(x);
-      }
-}
 
 HexPart random_part(Random& random, const HexContraction& contraction) {
   HexPart part;
@@ -57,11 +34,11 @@ TEST_CASE("A hex contracted in single precision is what it is in double, less a 
   for (const Basis basis : {Basis::fourier, Basis::legendre})
     for (const int order : {1, 2, 3, 4, 5, 8, 12, 16}) {
       HexContraction contraction(basis, order);
-      std::array<std::vector<LocalMode>, 4> modes;  // each stays until all are done
-      for (int pattern = 0; pattern < 4; ++pattern) {
-        std::vector<Vec3> coefficients;
-        bend(random, order, pattern % 2 * 0.7, modes[pattern], coefficients);
-        contraction.set_cell(modes[pattern], coefficients);
+      std::array<BentHex, 4> hexes;  // each stays until all are done
+      for (BentHex& hex : hexes) {
+        const int pattern = static_cast<int>(&hex - hexes.data());
+        hex = bent_hex(random, order, Mat3::Identity(), 0.1, pattern % 2 * 0.7);
+        contraction.set_cell(hex.modes, hex.coefficients);
         contraction.take_steps();
         double sum_of_logs = 0;
         int count = 0;
@@ -76,7 +53,7 @@ TEST_CASE("A hex contracted in single precision is what it is in double, less a 
           contraction.contract(part, wide);
           contraction.contract(part, narrow);
           HexContraction fresh(basis, order);
-          fresh.set_cell(modes[pattern], coefficients);
+          fresh.set_cell(hex.modes, hex.coefficients);
           fresh.take_steps();
           HexCoefficients fresh_wide;
           NarrowHexCoefficients fresh_narrow;

@@ -4,6 +4,7 @@
 #include "fit/hex_boxes.h"
 #include "fit/prism_matrices.h"
 #include "fit/simplex_tables.h"
+#include "tests/bent_hex.h"
 
 #include <Eigen/LU>
 #include <catch2/catch.hpp>
@@ -439,23 +440,11 @@ TEST_CASE("Boxes of a hex have the Jacobian of the cell, by models and by halves
          {std::pair{1, 0.0}, {3, 0.0}, {4, 0.0}, {8, 0.0}, {12, 0.0}, {3, 0.6}, {4, 0.6}, {8, 0.6}, {12, 0.9}}) {
       const int order = of.first;
       const double share_left_out = of.second;
-      std::vector<LocalMode> modes;
-      std::vector<Vec3> coefficients, others;
-      for (int k = 0; k <= order; ++k)
-        for (int j = 0; j <= order; ++j)
-          for (int i = 0; i <= order; ++i) {
-            const bool is_vertex = i < 2 && j < 2 && k < 2;
-            if (!is_vertex && uniform(random, 0, 1) < share_left_out) continue;
-            LocalMode mode;
-            mode.i = static_cast<std::uint8_t>(i), mode.j = static_cast<std::uint8_t>(j);
-            mode.k = static_cast<std::uint8_t>(k);
-            modes.push_back(mode);
-            const double size = 0.03 / (1 + i * i + j * j + k * k);
-            Vec3 x = size * Vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
-            if (is_vertex) x += kEdges * Vec3(i, j, k);
-            coefficients.push_back(x);
-            others.push_back(3 * x + Vec3::Ones());
-          }
+      const BentHex hex = bent_hex(random, order, kEdges, 0.03, share_left_out);
+      const std::vector<LocalMode>& modes = hex.modes;
+      const std::vector<Vec3>& coefficients = hex.coefficients;
+      std::vector<Vec3> others;
+      for (const Vec3& x : coefficients) others.push_back(3 * x + Vec3::Ones());
       ShapeFunctions shapes(CellKind::hex, basis, order);
       const auto exact = [&](const Vec3& at) {
         shapes.set_point(at);
