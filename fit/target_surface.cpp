@@ -13,6 +13,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <sstream>
 #include <string>
 
 namespace subvol {
@@ -96,6 +97,7 @@ TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOption
     const Vec3 &a = positions_[corners[0]], &b = positions_[corners[1]], &c = positions_[corners[2]];
     const Vec3 normal = (b - a).cross(c - a);
     const double length = normal.norm();
+    if (!std::isfinite(length)) throw InputError("target: triangle " + std::to_string(t) + " is too large");
     if (!(length > 0)) continue;
     triangles_.push_back(corners);
     normals_.push_back(normal / length);
@@ -135,6 +137,14 @@ TargetSurface::TargetSurface(const PointCloud& cloud, PointWeights weights) {
 }
 
 void TargetSurface::set_box(const Vec3& low, const Vec3& high) {
+  // Cubes of lengths are far from overflow and underflow then.
+  constexpr double kLeast = 1e-90, kMost = 1e90;
+  const double extent = (high - low).maxCoeff();
+  if (!(extent >= kLeast && extent <= kMost)) {
+    std::ostringstream said;
+    said << "target: its extent is " << extent << ", expected " << kLeast << " to " << kMost;
+    throw InputError(said.str());
+  }
   diagonal_ = (high - low).norm();
   centre_ = low + 0.5 * (high - low);
 }

@@ -39,11 +39,10 @@ const char* to_string(VolumeSource source);
 /// point cloud there are only samples, its points; their normals and the area are estimated (`cloud_geometry.h`).
 class TargetSurface {
  public:
-  /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area,
-  /// else
-  ///        InputError. Triangles without area are dropped; the others keep their order.
+  /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area, an
+  ///        extent of 1e-90 to 1e90, else InputError. Triangles without area are dropped; the others keep their order.
   explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
-  /// InputError: as `cloud_geometry`.
+  /// InputError: as `cloud_geometry`, and an extent out of that range.
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);
 
   /// Whether there are points only: no triangles, nothing to integrate over.

@@ -183,6 +183,11 @@ TEST_CASE("what TargetSurface refuses") {
   TriangleMesh bad = mesh;
   bad.positions[3][1] = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(TargetSurface(bad), InputError);
+  for (const double far : {1e91, 1e160, 1e303, 1.7e308}) {  // whose products overflow, one after the other
+    bad.positions[3][1] = far;
+    CHECK_THROWS_AS(TargetSurface(bad), InputError);
+    CHECK_THROWS_AS(TargetSurface(PointCloud{bad.positions}), InputError);
+  }
 }
 
 TEST_CASE("a needle of next to no area is sampled along its length, not without end") {
