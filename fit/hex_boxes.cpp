@@ -89,14 +89,14 @@ void HexBoxes::make_weights() {
     return sum_of_lanes(sum);
   };
   const auto along = [&](const double* x) { return std::max(x[0], x[1]) + modes_along(x, mode_bounds_); };
-  const int line = n_ * lanes_, face = contraction_.row();
+  const int line = n_ * lanes_, layer = contraction_.row();
   double *by_j = sums_.data(), *by_j_slope = by_j + line, *by_k = by_j_slope + line, *by_k_slope = by_k + line,
          *steps = by_k_slope + line, *steps_by_j = steps + line;
   const double *value = bounds_.data(), *slope = slope_bounds_.data();
   for (int row = 0; row < 3; ++row) {
     const double* modes = contraction_.modes(row);
     for (int first = 0; first < lanes_; first += kWide) {
-      const auto at = [&](int j, int k) { return load_wide(modes + k * face + j * n_ + first); };
+      const auto at = [&](int j, int k) { return load_wide(modes + k * layer + j * n_ + first); };
       for (int j = 0; j < n_; ++j) {
         const Wide x0 = at(j, 0), x1 = at(j, 1);
         Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
@@ -130,7 +130,7 @@ void HexBoxes::make_weights() {
     // |a_1jk - a_0jk|, by k and j, and these numbers' sum over k.
     for (int k = 0; k < n_; ++k)
       for (int j = 0; j < n_; ++j) {
-        const double* x = modes + k * face + j * n_;
+        const double* x = modes + k * layer + j * n_;
         steps[k * lanes_ + j] = std::abs(x[1] - x[0]);
       }
     for (int first = 0; first < lanes_; first += kWide) {

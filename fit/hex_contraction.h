@@ -58,7 +58,9 @@ class HexContraction {
   /// After `take_steps`: sum of |a_ijk| times the bounds of 1, x, N_2, ...
   const Vec3& total() const { return total_; }
 
+  /// In double precision; levels of the part up to LineModels::kMaxLevel.
   void contract(const HexPart& part, HexCoefficients& result);
+  /// In single precision, with `result.precision`; for a cell whose `total` is within 1e-10 to 1e10.
   void contract(const HexPart& part, NarrowHexCoefficients& result);
 
  private:
