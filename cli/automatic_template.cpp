@@ -19,6 +19,7 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
     teller.tell(progress);
     return !interrupted();
   };
+  options.cancelled = interrupted;
   catch_interrupt();
   TemplateChoice choice = choose_template(std::get<TriangleMesh>(target), options);
   teller.finish();

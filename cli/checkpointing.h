@@ -55,7 +55,7 @@ class Checkpointing {
   RunIdentity identity_;
   StageLog log_;
   Clock::time_point written_ = Clock::now();
-  bool is_written_ = true;
+  bool is_written_ = false;
   std::string failure_;  ///< of the last write; empty: none
 };
 

@@ -20,27 +20,27 @@ struct ConvertArguments {
   bool limit = false;
 };
 
-void convert_volume(const ConvertArguments& arguments, const std::vector<Output>& outputs,
+void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outputs,
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.input, warnings);
-  for (const Output& output : outputs) {
+  require_all_written(write_each(outputs, [&](const Output& output) {
     if (arguments.limit && shows_surface(output)) {
       const TessellatedSurface limit = tessellated_limit(mesh, writing);
       write_output(output, mesh, mesh, &limit, writing);
     } else {
       write_output(output, mesh, writing);
     }
-  }
+  }));
 }
 
-void convert_high_order(const ConvertArguments& arguments, const std::vector<Output>& outputs,
+void convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs,
                         const WritingOptions& writing) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   const HighOrderFile file = read_high_order(arguments.input);
-  for (const Output& output : outputs) write_output(output, file, writing);
+  require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
 }
 
-void convert_surface(const ConvertArguments& arguments, const std::vector<Output>& outputs,
+void convert_surface(const ConvertArguments& arguments, std::vector<Output>& outputs,
                      const WritingOptions& writing, std::vector<std::string>& warnings) {
   for (const Output& output : outputs) {
     if (output.part == Part::cutaway)
@@ -50,11 +50,11 @@ void convert_surface(const ConvertArguments& arguments, const std::vector<Output
     }
   }
   const PolygonMesh surface = load_polygons(arguments.input, warnings);
-  for (const Output& output : outputs) write_output(output, surface, writing);
+  require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, surface, writing); }));
 }
 
 int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
-  const std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway});
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway});
   apply_resources(arguments.run);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.input;

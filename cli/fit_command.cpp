@@ -123,6 +123,7 @@ void FitRun::fit() {
   options.distortion = distortion(arguments_);
   result_ = followed([&](auto progress) {
     options.progress = progress;
+    options.cancelled = interrupted;
     return std::visit(
         [&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); }, target_);
   });
@@ -135,13 +136,13 @@ void FitRun::write() {
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
   const auto write = [&](bool with_limit) {
-    for (const Output& output : outputs_) {
-      if (shows_surface(output) != with_limit) continue;
+    write_each([&](const Output& output) {
+      if (shows_surface(output) != with_limit) return;
       if (output.part == Part::animation)
         write_animation(output, result_.cage, result_.states, writing);
       else
         write_output(output, result_.cage, result_.mesh, &limit_, writing);
-    }
+    });
   };
   write(false);  // where little memory is left the limit surface may be what does not fit
   limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, writing, progress); });
@@ -210,6 +211,7 @@ int FitRun::run() {
   timed("check", &FitRun::check);
   write_report(report(), seconds_json(result_.report));
   if (!arguments_.run.quiet) summarise();
+  require_outputs();
   return status(result_.report, mesh_check_.valid());
 }
 

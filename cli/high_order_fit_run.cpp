@@ -50,6 +50,7 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
     teller.tell(progress);
     return !interrupted();
   };
+  options.cancelled = interrupted;
   catch_interrupt();
   HighOrderFitResult result =
       std::visit([&](const auto& geometry) { return fit_high_order(geometry, template_mesh, options); }, target);
@@ -94,7 +95,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (arguments.run.outputs.empty() && arguments.run.report.empty())
     throw UsageError(std::string(arguments.command) + ": nothing to write; give -o FILE or --report FILE");
   const Clock::time_point start = Clock::now();
-  const std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::animation});
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::animation});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::size_t told = 0;
@@ -130,10 +131,17 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   Checkpointing checkpointing(
       arguments.run, run_identity(verb, {{"target", fingerprint(target)}, {"template", fingerprint(template_mesh)}}));
   const Clock::time_point untangle_start = Clock::now();
-  if (arguments.untangles || has_few_inverted_cells(template_mesh))
-    untangle_template(arguments.template_mesh.path, arguments.run,
-                      {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()},
-                      template_mesh, warnings);
+  if (arguments.untangles || has_few_inverted_cells(template_mesh)) {
+    try {
+      untangle_template(arguments.template_mesh.path, arguments.run,
+                        {.time_limit_seconds = arguments.fit.time_limit_seconds, .log = checkpointing.log()},
+                        template_mesh, warnings);
+    } catch (const EndedEarly&) {
+      checkpointing.finish(warnings);
+      tell_warnings();
+      throw;
+    }
+  }
   const double untangle_seconds = seconds_since(untangle_start);
   const Clock::time_point fit_start = Clock::now();
   HighOrderFitResult result = fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start),
@@ -149,12 +157,12 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   writing.source = arguments.target;
   writing.options = options_of_result(verb);
   const HighOrderFile file{std::move(result.mesh), template_mesh.references};
-  for (const Output& output : outputs) {
+  const std::vector<std::string> failures = write_each(outputs, [&](const Output& output) {
     if (output.part == Part::animation)
       write_animation(output, file.mesh, result.states, writing);
     else
       write_output(output, file, writing);
-  }
+  });
   const double write_seconds = seconds_since(write_start);
 
   const Clock::time_point check_start = Clock::now();
@@ -167,6 +175,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     if (loaded.choice) json["template"] = choice_json(*loaded.choice);
     checkpointing.describe(json);
     json["warnings"] = warnings;
+    for (const std::string& failure : failures) json["warnings"].push_back(as_utf8(failure));
     Json seconds{{"read", read_seconds},
                  {arguments.untangles ? "untangle" : "template", template_seconds + untangle_seconds},
                  {"fit", fit_seconds},
@@ -176,13 +185,14 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     seconds["total"] = seconds_since(start);
     json["seconds"] = std::move(seconds);
     json["peak_memory_bytes"] = peak_memory_bytes();
-    json["outputs"] = output_names(arguments.run);
+    json["outputs"] = output_names(outputs);
     write_report(arguments.run.report, json);
   }
   if (!arguments.run.quiet) {
     std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n' << to_text(mesh_check);
-    for (const auto& name : output_names(arguments.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+    for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
   }
+  require_all_written(failures);
   return status(report, mesh_check);
 }
 

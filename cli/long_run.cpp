@@ -31,14 +31,20 @@ void LongRun::write_report(Json json, const Json& parts) const {
   seconds.update(parts);
   seconds["total"] = this->seconds();
   json["warnings"] = warnings_;
+  for (const std::string& failure : failures_) json["warnings"].push_back(as_utf8(failure));
   json["seconds"] = std::move(seconds);
   json["peak_memory_bytes"] = peak_memory_bytes();
-  json["outputs"] = output_names(run_);
+  json["outputs"] = output_names(outputs_);
   cli::write_report(run_.report, json);
 }
 
+void LongRun::write_each(const std::function<void(const Output&)>& write) {
+  const std::vector<std::string> failures = cli::write_each(outputs_, write);
+  failures_.insert(failures_.end(), failures.begin(), failures.end());
+}
+
 void LongRun::tell_outputs() const {
-  for (const auto& name : output_names(run_)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+  for (const Output& output : outputs_) std::cerr << "wrote " << output.path.string() << '\n';
 }
 
 int LongRun::status(const FitReport& report, bool valid) {

@@ -8,6 +8,7 @@
 #include "fit/fit_report.h"
 
 #include <chrono>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -55,7 +56,11 @@ class LongRun {
   double seconds() const { return seconds_since(start_); }
   /// Adds what every report ends with, and writes it if one was asked for. parts: seconds of parts of the work.
   void write_report(Json json, const Json& parts = Json::object()) const;
+  /// As the function of that name, with what could not be written in the report's warnings.
+  void write_each(const std::function<void(const Output&)>& write);
   void tell_outputs() const;
+  /// At the end of a run, when all else is told: IoError if an output could not be written.
+  void require_outputs() const { require_all_written(failures_); }
   /// An ExitStatus.
   static int status(const FitReport& report, bool valid);
 
@@ -72,6 +77,7 @@ class LongRun {
 
   Clock::time_point start_ = Clock::now();
   std::size_t told_ = 0;
+  std::vector<std::string> failures_;  ///< of outputs
   Json seconds_ = Json::object();
 };
 

@@ -6,6 +6,7 @@
 #include "subvol/atomic_file.h"
 #include "subvol/error.h"
 
+#include <atomic>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -39,15 +40,18 @@ void require_known_verb(const CLI::App& app, int argc, char** argv) {
   throw UsageError(std::string("there is no verb '") + argv[1] + "'; there are:" + verbs);
 }
 
-/// An exception that leaves a parallel loop ends the program here: in order, and with nothing half-written.
+/// Whether an allocation has failed.
+std::atomic<bool> has_run_out{false};
+
+[[noreturn]] void run_out() {
+  has_run_out = true;
+  throw std::bad_alloc();
+}
+
+/// An exception that leaves a parallel loop ends the program here: in order, and with nothing half-written. In the
+/// program's first thread the language does not say which one it was.
 [[noreturn]] void end_in_order() {
-  const char* what = "an error in a parallel loop";
-  try {
-    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
-  } catch (const std::bad_alloc&) {
-    what = kOutOfMemory;
-  } catch (...) {
-  }
+  const char* what = has_run_out ? kOutOfMemory : "an error in a parallel loop";
   // Nothing is allocated any more, nothing unwound: other threads still run.
   delete_temporaries();
   (void)!write(STDERR_FILENO, "subvol: ", 8);
@@ -66,6 +70,14 @@ void keep_freed_memory() {
 #endif
 }
 
+/// An unset variable of a script is no file name: without this, its option would count as not given.
+void require_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& value : option->results())
+      if (value.empty()) throw UsageError(option->get_name() + ": expected a value, got nothing");
+  for (const CLI::App* verb : app.get_subcommands()) require_values(*verb);
+}
+
 int run(int argc, char** argv) {
   remember_command_line(argc, argv);
   CLI::App app{"Fits volume meshes to surfaces: subdivision volumes and shells.", "subvol"};
@@ -77,6 +89,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
+  require_values(app);
   return action();
 }
 
@@ -86,6 +99,8 @@ int run_to_status(int argc, char** argv) {
     return run(argc, argv);
   } catch (const UsageError& error) {
     return complain(error.what(), kUsage);
+  } catch (const EndedEarly& error) {
+    return complain(error.what(), error.status);
   } catch (const InputError& error) {
     return complain(error.what(), kRejected);
   } catch (const std::bad_alloc&) {
@@ -101,6 +116,7 @@ int run_to_status(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace subvol::cli;
   keep_freed_memory();
+  std::set_new_handler(run_out);
   std::set_terminate(end_in_order);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
   prepare_standard_output();

@@ -74,6 +74,7 @@ void OptimizeRun::optimize() {
   options.log = checkpointing_->log();
   result_ = followed([&](auto progress) {
     options.progress = progress;
+    options.cancelled = interrupted;
     return optimize_mesh(mesh_, target_ ? &*target_ : nullptr, options);
   });
   checkpointing_->finish(result_.report.warnings);
@@ -84,7 +85,7 @@ void OptimizeRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.mesh;
   writing.options = options_of_result(verb_);
-  for (const Output& output : outputs_) write_output(output, result_.mesh, writing);
+  write_each([&](const Output& output) { write_output(output, result_.mesh, writing); });
 }
 
 // What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
@@ -131,6 +132,7 @@ int OptimizeRun::run() {
   timed("check", &OptimizeRun::check);
   write_report(report());
   if (!arguments_.run.quiet) summarise();
+  require_outputs();
   return status(result_.report, mesh_check_.valid());
 }
 

@@ -2,6 +2,7 @@
 #include "cli/outputs.h"
 
 #include "cli/exit_status.h"
+#include "subvol/atomic_file.h"
 #include "subvol/error.h"
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <cstring>
 #include <set>
 #include <string_view>
+#include <system_error>
 #include <tuple>
 #include <utility>
 
@@ -72,11 +74,15 @@ void require_writable_folder(const fs::path& file) {
 
 void require_free(const fs::path& file, bool force) {
   std::error_code ignored;
+  const bool exists = fs::exists(file, ignored);
+  if (ignored == std::errc::filename_too_long)
+    throw IoError(file.string() + ": cannot be written: " + ignored.message());
   if (fs::is_directory(file, ignored)) throw UsageError(file.string() + ": is a folder");
   if (!force && fs::is_regular_file(file, ignored)) {
     throw UsageError(file.string() + ": exists; give --force to replace it");
   }
-  if (!fs::exists(file, ignored) || fs::is_regular_file(file, ignored)) require_writable_folder(file);
+  if (!exists || fs::is_regular_file(file, ignored))
+    require_writable_folder(behind_links(file));
 }
 
 bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }
@@ -93,7 +99,10 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
   std::vector<Output> outputs;
   std::set<fs::path> seen;
   const auto claim = [&](const fs::path& path, bool force) {
-    if (!seen.insert(fs::absolute(path).lexically_normal()).second) {
+    std::error_code ignored;
+    fs::path file = fs::weakly_canonical(fs::absolute(behind_links(path)), ignored);
+    if (file.empty()) file = fs::absolute(path).lexically_normal();
+    if (!seen.insert(std::move(file)).second) {
       throw UsageError(path.string() + ": named twice as an output");
     }
     require_free(path, force);
@@ -105,19 +114,50 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
       throw UsageError("-o " + text + ": there is no " +
                        std::string(kPartNames[static_cast<std::size_t>(part)]) + " here");
     claim(outputs.back().path, options.force);
+    std::error_code ignored;
+    outputs.back().is_new = !fs::exists(outputs.back().path, ignored);
   }
   if (!options.report.empty()) claim(options.report, options.force);
   // Who goes on from a checkpoint may go on writing it.
-  if (!options.checkpoint.empty())
+  if (!options.checkpoint.empty()) {
     claim(options.checkpoint, options.force || options.checkpoint == options.resume);
+    std::error_code ignored;
+    if (fs::is_fifo(options.checkpoint, ignored))
+      throw UsageError("--checkpoint " + options.checkpoint + ": nothing can be read again from a pipe");
+  }
   return outputs;
 }
 
-Json output_names(const RunOptions& options) {
+std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write) {
+  std::vector<std::string> failures;
+  std::erase_if(outputs, [&](Output& output) {
+    try {
+      std::error_code ignored;
+      if (output.is_new && fs::exists(output.path, ignored))
+        throw IoError(output.path.string() + ": not written: somebody else has made this file since the work began");
+      write(output);
+      output.is_new = false;
+      return false;
+    } catch (const IoError& error) {
+      failures.push_back(error.what());
+    } catch (const InputError& error) {
+      failures.push_back(error.what());
+    }
+    return true;
+  });
+  return failures;
+}
+
+void require_all_written(const std::vector<std::string>& failures) {
+  if (failures.empty()) return;
+  std::string text = failures.front();
+  for (std::size_t i = 1; i < failures.size(); ++i) text += "\nsubvol: " + failures[i];
+  throw IoError(text);
+}
+
+Json output_names(const std::vector<Output>& outputs) {
   Json names = Json::array();
-  for (const std::string& text : options.outputs) {
-    names.push_back(part_and_file(text).second);
-  }
+  for (const Output& output : outputs) names.push_back(as_utf8(output.path.string()));
   return names;
 }
 

@@ -4,6 +4,7 @@
 #include "cli/run_options.h"
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct Output {
   Part part = Part::result;
   std::filesystem::path path;
   std::string extension;        ///< lower case, with its dot
+  bool is_new = false;          ///< there was no such file before the work
   bool is_volume() const;       ///< a format that holds cells
   bool is_scene() const;        ///< a format that holds scenes
 };
@@ -32,15 +34,22 @@ std::string output_formats();
 /// Reads the -o options and checks, before any work, that each, the report and the checkpoint could be written.
 ///
 /// parts  that there are besides the result.
-/// UsageError: an unknown extension, a file named twice, a part that there is not or that needs another format, an
-/// existing file without --force. IoError: a folder that is not there or cannot be written to.
+/// UsageError: an unknown extension, a file named twice (by links, too), a part that there is not or that needs another
+/// format, an existing file without --force, a checkpoint that is a pipe. IoError: a folder that is not there
+/// or cannot be written to, a name that is too long.
 std::vector<Output> checked_outputs(const RunOptions& options, const std::vector<Part>& parts);
 
 /// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: no place to
 /// write.
 void require_free(const std::filesystem::path& file, bool force);
 
+/// write(output) for each of them. One that cannot be written does not cost the others: it is taken off the list, and
+/// what was said of it returned. Nor is one written over a file that was made since it was found that there is none.
+std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write);
+/// IoError, of all that could not be written; nothing where there is none.
+void require_all_written(const std::vector<std::string>& failures);
+
 /// The file names, as the report lists them.
-Json output_names(const RunOptions& options);
+Json output_names(const std::vector<Output>& outputs);
 
 }  // namespace subvol::cli

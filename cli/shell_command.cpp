@@ -110,6 +110,7 @@ void ShellRun::grow() {
   try {
     result_ = followed([&](auto progress) {
       options.progress = progress;
+      options.cancelled = interrupted;
       return make_shell(surface_.polygons, options);
     });
   } catch (const InputError& error) {
@@ -134,6 +135,7 @@ void ShellRun::curve() {
   };
   curved_ = followed([&](auto progress) {
     options.progress = progress;
+    options.cancelled = interrupted;
     return curve_shell(result_, options);
   });
   take_figures(*curved_, result_);
@@ -144,8 +146,9 @@ void ShellRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.surface;
   writing.options = options_of_result(verb_);
-  for (const Output& output : outputs_)
+  write_each([&](const Output& output) {
     curved_ ? write_shell(output, result_, *curved_, writing) : write_shell(output, result_, writing);
+  });
 }
 
 // What counts is what is on the disk: the first .mesh, of curved cells the first .vtu, is read back and checked in
@@ -154,7 +157,7 @@ void ShellRun::check() {
   failures_ = result_.failures;
   for (const Output& output : outputs_) {
     if (!std::filesystem::is_regular_file(output.path)) continue;
-    if (curved_ && output.extension == ".vtu") {
+    if (curved_ && output.part == Part::result && output.extension == ".vtu") {
       const HighOrderMesh reread = read_high_order(output.path).mesh;
       const MeshCheck found = check_mesh(reread, curved_boundary(reread, arguments_.writing.chord_percent));
       failures_ = {found.quality->certificate, found.intersecting_faces};
@@ -236,6 +239,7 @@ int ShellRun::run() {
   timed("subdivide", &ShellRun::check_subdivided);
   write_report(report(), seconds_json(result_.report));
   if (!arguments_.run.quiet) summarise();
+  require_outputs();
   return status(result_.report, failures_.none());
 }
 

@@ -29,7 +29,7 @@ struct SubdivideArguments {
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
-  const std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway});
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings);
@@ -45,7 +45,8 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
   if (std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
-  for (const Output& output : outputs) write_output(output, cage, fine, &limit, writing);
+  const std::vector<std::string> failures =
+      write_each(outputs, [&](const Output& output) { write_output(output, cage, fine, &limit, writing); });
 
   const QualityReport quality = measure_quality(fine);
   if (!arguments.run.report.empty()) {
@@ -62,7 +63,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
                                           {"certified_cells", quality.certificate.certified}}},
                                         {"warnings", warnings},
                                         {"peak_memory_bytes", peak_memory_bytes()},
-                                        {"outputs", output_names(arguments.run)}});
+                                        {"outputs", output_names(outputs)}});
   }
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
@@ -70,6 +71,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
               << quality.min_scaled_jacobian << "; " << quality.certificate.not_certified.size()
               << " cells not proved valid\n";
   }
+  require_all_written(failures);
   return kDone;
 }
 

@@ -28,11 +28,12 @@ std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& ver
   return outputs;
 }
 
-int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs,
+int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs,
                    const VolumeMesh& mesh, const Json& details) {
   WritingOptions writing = run.writing;
   writing.options = options_of_result(verb);
-  for (const Output& output : outputs) write_output(output, mesh, writing);
+  const std::vector<std::string> failures =
+      write_each(outputs, [&](const Output& output) { write_output(output, mesh, writing); });
   const MeshCheck check = check_mesh(mesh);
   if (!run.run.report.empty()) {
     Json json{{"subvol", version()}, {"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};
@@ -40,14 +41,15 @@ int write_template(const TemplateRun& run, const CLI::App& verb, const std::vect
     json.update(check_json(check));
     json["warnings"] = run.warnings;
     json["peak_memory_bytes"] = peak_memory_bytes();
-    json["outputs"] = output_names(run.run);
+    json["outputs"] = output_names(outputs);
     write_report(run.run.report, json);
   }
   if (!run.run.quiet) {
     for (const std::string& warning : run.warnings) std::cerr << "subvol: warning: " << warning << '\n';
     std::cerr << to_text(check);
-    for (const auto& name : output_names(run.run)) std::cerr << "wrote " << name.get<std::string>() << '\n';
+    for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
   }
+  require_all_written(failures);
   return check.valid() ? kDone : kFailed;
 }
 

@@ -26,7 +26,7 @@ std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& ver
 
 /// Writes a template, its report (`details` and what `check_mesh` finds) and a summary. Returns kDone, or kFailed where
 /// the mesh is not valid.
-int write_template(const TemplateRun& run, const CLI::App& verb, const std::vector<Output>& outputs,
+int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs,
                    const VolumeMesh& mesh, const Json& details);
 
 /// One group of verbs each.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/untangling.h"
 
+#include "cli/exit_status.h"
 #include "cli/interrupt.h"
 #include "cli/progress.h"
 #include "fit/curve_mesh.h"
@@ -25,10 +26,16 @@ void untangle_template(const std::string& path, const RunOptions& run, OptimizeO
     teller.tell(progress);
     return !interrupted();
   };
+  options.cancelled = interrupted;
   catch_interrupt();
   try {
-    if (const std::size_t untangled = untangle_before_fit(mesh, options); untangled > 0)
-      warnings.push_back(path + ": " + std::to_string(untangled) +
+    const UntangledStart start = untangle_before_fit(mesh, options);
+    if (start.left > 0)
+      throw EndedEarly(path + ": the work was ended before its cells were valid; " + std::to_string(start.left) +
+                           " were not, and there is nothing to write",
+                       start.stop_reason == StopReason::cancelled ? kInterrupted : kNotConverged);
+    if (start.tangled > 0)
+      warnings.push_back(path + ": " + std::to_string(start.tangled) +
                          " cells were not valid; they were untangled before the fit");
   } catch (const InputError& error) {
     throw InputError(path + ": " + error.what());

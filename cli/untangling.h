@@ -18,7 +18,7 @@ bool has_few_inverted_cells(const VolumeMesh& mesh);
 ///
 /// path     of its file, for messages.
 /// options  but for their progress.
-/// InputError: some cells cannot be made valid. Ctrl-C ends it, as an interrupted run.
+/// InputError: some cells cannot be made valid. EndedEarly: Ctrl-C, or the time was over, before they were.
 void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
                        std::vector<std::string>& warnings);
 

@@ -36,7 +36,7 @@ void add_writing_options(CLI::App& verb, WritingOptions& options);
 /// Reads where a cutaway is cut: x, y or z, also with a place as "z:0.3". Returns what is wrong, or nothing.
 std::string parse_cut(const std::string& text, CutPlane& cut);
 
-// Whatever is written is read back and compared with what it should be (`require_written`): IoError.
+// Whatever is written is read back and compared with what it should be, as far as `require_written` does: IoError.
 
 /// Writes a scene; curved cells as .vtu, .msh, .mesh or .vtk.
 void write_scene(const std::filesystem::path& path, const Scene& scene);

@@ -120,11 +120,16 @@ class BufferWriter {
 
 std::vector<float> relative_positions(const std::vector<Vec3>& positions, const Placement& place,
                                       const Complaint& refuse) {
+  constexpr double kLeast = 1e-30;  // below it, single precision runs out of digits
   std::vector<float> values;
   values.reserve(3 * positions.size());
+  double largest = 0;
   for (const Vec3& position : positions)
-    for (const double x : Vec3((position - place.origin) / place.unit))
+    for (const double x : Vec3((position - place.origin) / place.unit)) {
       values.push_back(to_float(x, "positions", refuse));
+      largest = std::max(largest, std::abs(x));
+    }
+  if (largest > 0 && largest < kLeast) refuse("positions", "expected a size in the range of float32");
   return values;
 }
 

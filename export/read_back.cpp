@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <tuple>
 
@@ -198,11 +199,12 @@ void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, std::span
 
 // --- .obj, .usda ----------------------------------------------------------------------------------------------------
 
-void compare_polygons(const WrittenFile& file, const PolygonMesh& found, const PolygonMesh& wanted) {
+/// tolerance  of coordinates.
+void compare_polygons(const WrittenFile& file, const PolygonMesh& found, const PolygonMesh& wanted, double tolerance) {
   file.same_count("vertices", found.positions.size(), wanted.positions.size());
   file.same_count("faces", found.num_faces(), wanted.num_faces());
   for (std::size_t v = 0; v < wanted.positions.size(); ++v)
-    file.same(found.positions[v] == wanted.positions[v], "vertex", v);
+    file.same((found.positions[v] - wanted.positions[v]).cwiseAbs().maxCoeff() <= tolerance, "vertex", v);
   for (std::size_t f = 0; f < wanted.num_faces(); ++f)
     file.same(found.face_offsets[f + 1] == wanted.face_offsets[f + 1], "the number of corners of face", f);
   file.same_count("corners of faces", found.face_vertices.size(), wanted.face_vertices.size());
@@ -229,10 +231,11 @@ PolygonMesh obj_polygons(const WrittenFile& file) {
   return mesh;
 }
 
-/// The numbers of an array of a .usda.
-std::vector<double> usda_array(const WrittenFile& file, const std::string& bytes, const std::string& declaration) {
-  const std::string opening = ' ' + declaration + " = [";
-  const std::size_t begin = bytes.find(opening), end = bytes.find(']', begin + opening.size());
+/// The numbers of a value of a .usda: an array, or a tuple, whose closing bracket is the first one.
+std::vector<double> usda_numbers(const WrittenFile& file, const std::string& bytes, const std::string& declaration,
+                                 const std::string& brackets = "[]") {
+  const std::string opening = ' ' + declaration + " = " + brackets[0];
+  const std::size_t begin = bytes.find(opening), end = bytes.find(brackets[1], begin + opening.size());
   if (begin == std::string::npos || end == std::string::npos) file.differs("there is no " + declaration);
   std::string numbers = bytes.substr(begin + opening.size(), end - begin - opening.size());
   std::replace_if(numbers.begin(), numbers.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
@@ -245,11 +248,18 @@ std::vector<double> usda_array(const WrittenFile& file, const std::string& bytes
 PolygonMesh usda_polygons(const WrittenFile& file) {
   const std::string bytes = read_file(file.path());
   PolygonMesh mesh;
-  const std::vector<double> points = usda_array(file, bytes, "point3f[] points");
-  for (std::size_t i = 0; i + 2 < points.size(); i += 3) mesh.positions.emplace_back(&points[i]);
-  for (const double count : usda_array(file, bytes, "int[] faceVertexCounts"))
+  const std::vector<double> points = usda_numbers(file, bytes, "point3f[] points");
+  Vec3 origin = Vec3::Zero();
+  const std::string translate = "double3 xformOp:translate";
+  if (bytes.find(translate) != std::string::npos) {
+    const std::vector<double> value = usda_numbers(file, bytes, translate, "()");
+    file.same_count("coordinates of the translation", value.size(), 3);
+    origin = Vec3(value.data());
+  }
+  for (std::size_t i = 0; i + 2 < points.size(); i += 3) mesh.positions.emplace_back(origin + Vec3(&points[i]));
+  for (const double count : usda_numbers(file, bytes, "int[] faceVertexCounts"))
     mesh.face_offsets.push_back(mesh.face_offsets.back() + static_cast<std::size_t>(count));
-  for (const double vertex : usda_array(file, bytes, "int[] faceVertexIndices"))
+  for (const double vertex : usda_numbers(file, bytes, "int[] faceVertexIndices"))
     mesh.face_vertices.push_back(static_cast<Index>(vertex));
   return mesh;
 }
@@ -371,9 +381,15 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
 }
 
 void require_written(const fs::path& path, const PolygonMesh& surface) {
-  const bool is_obj = lower_case_extension(path) == ".obj";
+  // A translation that is taken off and added again rounds twice.
+  constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+  double reach = 0;
+  for (const Vec3& p : surface.positions) reach = std::max(reach, p.cwiseAbs().maxCoeff());
   read_back(path, [&](const WrittenFile& file) {
-    compare_polygons(file, is_obj ? obj_polygons(file) : usda_polygons(file), surface);
+    if (lower_case_extension(path) == ".obj")
+      compare_polygons(file, obj_polygons(file), surface, 0);
+    else
+      compare_polygons(file, usda_polygons(file), surface, kRounding * reach);
   });
 }
 

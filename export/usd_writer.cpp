@@ -109,6 +109,14 @@ void append_array(std::string& text, const char* declaration, const Range& value
   text += "]\n";
 }
 
+/// What is taken off the points, which USD keeps in single precision: a transform adds it again, in double. Zero where
+/// the cage is about as large as it is far from the origin.
+Vec3 origin_of(const Vec3& low, const Vec3& high) {
+  constexpr double kFar = 8;
+  const double reach = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
+  return reach > kFar * (high - low).maxCoeff() ? Vec3(low + 0.5 * (high - low)) : Vec3::Zero();
+}
+
 void append_geometry(std::string& text, const PolygonMesh& cage) {
   const auto number = [&](auto value) { append_number(text, value); };
   const auto point = [&](const Vec3& p) {
@@ -118,12 +126,19 @@ void append_geometry(std::string& text, const PolygonMesh& cage) {
   };
   Vec3 low = cage.positions[0], high = low;
   for (const Vec3& p : cage.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  const Vec3 origin = origin_of(low, high);
+  const auto placed = [&](const Vec3& p) { point(p - origin); };
+  if (!origin.isZero(0)) {
+    text += "    double3 xformOp:translate = ";
+    point(origin);
+    text += "\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n";
+  }
   std::vector<std::size_t> counts;
   for (std::size_t f = 0; f < cage.num_faces(); ++f) counts.push_back(cage.face_offsets[f + 1] - cage.face_offsets[f]);
-  append_array(text, "float3[] extent", std::array{low, high}, point);
+  append_array(text, "float3[] extent", std::array{low, high}, placed);
   append_array(text, "int[] faceVertexCounts", counts, number);
   append_array(text, "int[] faceVertexIndices", cage.face_vertices, number);
-  append_array(text, "point3f[] points", cage.positions, point);
+  append_array(text, "point3f[] points", cage.positions, placed);
 }
 
 void append_tags(std::string& text, const FeatureTags& tags) {

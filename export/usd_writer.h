@@ -25,7 +25,8 @@ struct UsdOptions {
 /// returns  points, faceVertexCounts, faceVertexIndices, crease* and corner* arrays, interpolateBoundary
 ///          "edgeAndCorner", triangleSubdivisionRule "catmullClark", orientation "rightHanded", extent; metersPerUnit,
 ///          upAxis and defaultPrim for the stage. Points are single precision in USD's schema; the digits of the double
-///          are written all the same.
+///          are written all the same. Of a cage that is far from the origin they are relative to its middle, where an
+///          xformOp:translate puts them.
 ///
 /// InputError: a mesh without faces or with indices out of range or coordinates that are not finite; a tag that names
 /// no vertex or no edge of the cage, or has a sharpness that is not positive; a name that is no USD identifier;

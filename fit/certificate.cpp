@@ -2,7 +2,7 @@
 #include "fit/certificate.h"
 
 #include "fit/bernstein.h"
-#include "fit/parallel_errors.h"
+#include "subvol/parallel_errors.h"
 #include "subvol/error.h"
 
 #include <algorithm>

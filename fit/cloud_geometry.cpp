@@ -3,6 +3,7 @@
 
 #include "fit/site_tree.h"
 #include "subvol/error.h"
+#include "subvol/length_range.h"
 
 #include <Eigen/Eigenvalues>
 
@@ -16,6 +17,7 @@ namespace subvol {
 namespace {
 
 constexpr std::size_t kNeighbors = 16;
+constexpr double kLeastShare = 1e-20;  // of the first guess at a squared radius
 
 /// A point of the tree by its distance from the one that is looked at.
 struct Neighbor {
@@ -27,9 +29,10 @@ struct Neighbor {
 /// The k nearest of the others, nearest first; k is at most their number.
 class NeighborSearch {
  public:
-  NeighborSearch(const SiteTree& tree, std::size_t k) : tree_(tree), k_(k) {}
+  NeighborSearch(const SiteTree& tree, std::size_t k, double least) : tree_(tree), k_(k), least_(least) {}
 
-  /// squared_radius  a guess at how far they are, > 0; receives a good one for points near by.
+  /// squared_radius  a guess at how far they are, >= least; receives a good one for points near by, >= least > 0 even
+  ///                 where points lie on each other.
   const std::vector<Neighbor>& operator()(Index place, double& squared_radius) {
     const Vec3& centre = tree_.position(place);
     for (;; squared_radius *= 4) {
@@ -43,13 +46,14 @@ class NeighborSearch {
       if (other != place) found_.push_back({(tree_.position(other) - centre).squaredNorm(), other});
     std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
     found_.resize(k_);
-    squared_radius = std::max(2 * found_.back().squared_distance, 1e-12 * squared_radius);
+    squared_radius = std::max({2 * found_.back().squared_distance, 1e-12 * squared_radius, least_});
     return found_;
   }
 
  private:
   const SiteTree& tree_;
   std::size_t k_;
+  double least_;
   std::vector<Index> places_;
   std::vector<Neighbor> found_;
 };
@@ -81,6 +85,7 @@ CloudGeometry cloud_geometry(std::span<const Vec3> points) {
     high = high.cwiseMax(p);
   }
   if (low == high) throw InputError("point cloud: all points are in one place");
+  require_length((high - low).maxCoeff(), "point cloud");
   const SiteTree tree(points);
   const std::size_t n = points.size(), k = std::min(kNeighbors, n - 1);
   CloudGeometry result;
@@ -90,7 +95,7 @@ CloudGeometry cloud_geometry(std::span<const Vec3> points) {
   const double first_radius = (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < (n + kRun - 1) / kRun; ++run) {
-    NeighborSearch neighbors(tree, k);
+    NeighborSearch neighbors(tree, k, kLeastShare * first_radius);
     double squared_radius = first_radius;
     for (std::size_t i = run * kRun; i < std::min(n, (run + 1) * kRun); ++i) {
       const auto place = static_cast<Index>(i);

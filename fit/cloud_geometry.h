@@ -23,7 +23,8 @@ struct CloudGeometry {
 /// which is the area per point on the mean where points are scattered at random with a density that changes slowly.
 /// Where the cloud is thicker (by noise) than its points are apart, areas come out too small and normals uncertain.
 ///
-/// InputError: fewer than two points, positions that are not finite, all points in one place. Parallel, same bits for
+/// InputError: fewer than two points, positions that are not finite, all points in one place, an extent that
+/// `require_length` refuses. Parallel, same bits for
 /// any number of threads. Cost: about 5 microseconds a point on one core.
 CloudGeometry cloud_geometry(std::span<const Vec3> points);
 

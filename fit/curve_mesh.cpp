@@ -9,16 +9,19 @@
 
 namespace subvol {
 
-std::size_t untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options) {
-  const std::size_t before = certify(mesh).not_certified.size();
-  if (before == 0) return 0;
+UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options) {
+  const std::size_t tangled = certify(mesh).not_certified.size();
+  if (tangled == 0) return {};
   OptimizeResult result = optimize_mesh(mesh, nullptr, options);
-  if (!result.uncertified.empty())
-    throw InputError(std::to_string(result.uncertified.size()) +
-                     " cells could not be made valid before the fit, the first is cell " +
-                     std::to_string(result.uncertified[0]));
+  const std::vector<Index>& left = result.uncertified;
+  const StopReason reason = result.report.stop_reason;
+  if (!left.empty() && (reason == StopReason::cancelled || reason == StopReason::time_limit))
+    return {tangled, left.size(), reason};
+  if (!left.empty())
+    throw InputError(std::to_string(left.size()) + " cells could not be made valid before the fit, the first is cell " +
+                     std::to_string(left[0]));
   mesh = std::move(result.mesh);
-  return before;
+  return {tangled};
 }
 
 }  // namespace subvol

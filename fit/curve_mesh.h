@@ -14,10 +14,16 @@ namespace subvol {
 /// nearly flat; starting low gets past them.
 inline constexpr double kCurvingLambda = 0.0025;
 
+struct UntangledStart {
+  std::size_t tangled = 0;  ///< cells that were not certified
+  std::size_t left = 0;     ///< of them, those that are not yet; above 0: the work was ended, and the mesh is as it was
+  StopReason stop_reason = StopReason::converged;  ///< where some are left: cancelled or time_limit
+};
+
 /// Makes the cells of a mesh valid over its own boundary, where they are not, before it is fitted to a target.
 ///
-/// returns  the number of cells that were not certified; 0: the mesh is as it was.
-/// InputError: some could not be made valid, with the first; and as `optimize_mesh`.
-std::size_t untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options);
+/// Nothing is done where none is tangled. InputError: some could not be made valid, with the first; and as
+/// `optimize_mesh`.
+UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options);
 
 }  // namespace subvol

@@ -2,7 +2,7 @@
 #include "fit/high_order_certificate.h"
 
 #include "fit/hex_boxes.h"
-#include "fit/parallel_errors.h"
+#include "subvol/parallel_errors.h"
 #include "fit/simplex_boxes.h"
 #include "subvol/error.h"
 

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace subvol {
@@ -95,8 +96,9 @@ void HighOrderEnergy::fill_references(CellGroup& group) const {
   group.by_point = static_cast<bool>(reference_);
   const std::size_t per_batch = group.by_point ? group.num_points() : 1;
   group.to_reference.resize(9 * per_batch * group.batches.size());
-  std::atomic<Index> bad_cell{kNoIndex};
-#pragma omp parallel for schedule(static)
+  constexpr Index kNone = std::numeric_limits<Index>::max();
+  Index bad_cell = kNone;
+#pragma omp parallel for schedule(static) reduction(min : bad_cell)
   for (std::size_t b = 0; b < group.batches.size(); ++b)
     for (std::size_t q = 0; q < per_batch; ++q)
       for (int l = 0; l < kLanes; ++l) {
@@ -105,13 +107,13 @@ void HighOrderEnergy::fill_references(CellGroup& group) const {
         if (reference_) {
           const Mat3 reference = reference_(cell, group.points[q]);
           inverse = reference.inverse();
-          if (!(reference.determinant() > 0) || !inverse.allFinite()) bad_cell = cell;
+          if (!(reference.determinant() > 0) || !inverse.allFinite()) bad_cell = std::min(bad_cell, cell);
         } else {
           inverse = inverse_ideal_[cell];
         }
         for (int e = 0; e < 9; ++e) lanes(group.to_reference[9 * (b * per_batch + q) + e])[l] = inverse(e / 3, e % 3);
       }
-  if (bad_cell != kNoIndex)
+  if (bad_cell != kNone)
     throw InputError("HighOrderEnergy: the reference of cell " + std::to_string(bad_cell) + " has no positive volume");
 }
 

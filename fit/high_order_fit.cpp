@@ -142,7 +142,8 @@ HighOrderFit::HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, co
       template_(checked(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
+      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
+               options.log}) {
   target_.normalisation.take_in(template_);
   mesh_.coefficients = template_.positions;
 }

@@ -27,6 +27,7 @@ struct HighOrderFitOptions {
   double time_limit_seconds = 0;                 ///< 0: none
   double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
   /// Takes the results of minimisations from here and keeps them here; null: no.
   StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills HighOrderFitResult::states

@@ -7,12 +7,14 @@
 #include "fit/self_intersection.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/length_range.h"
 #include "subvol/mesh_topology.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <numeric>
 
@@ -85,6 +87,17 @@ double enclosed_volume(const TriangleMesh& surface) {
   return sum / 6;
 }
 
+/// Volumes and distances are numbers then. Positions that are not finite are a defect, and told as one.
+void require_extent(std::span<const Vec3> points, const char* what) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Vec3& p : points) {
+    if (!p.allFinite()) continue;
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  if (const double extent = (high - low).maxCoeff(); extent > 0) require_length(extent, what);
+}
+
 /// How the boundary's triangles are compared with a target; empty: there is none.
 using Compare = std::function<void(const TriangleMesh& boundary, MeshCheck& check)>;
 
@@ -93,6 +106,7 @@ Compare comparison(const TriangleMesh* target, const MeshCheckOptions& options) 
     throw InputError("mesh check: distance_samples is " + std::to_string(options.distance_samples) +
                      ", expected 1 or more");
   if (!target) return {};
+  require_extent(target->positions, "mesh check: target");
   const auto tree = std::make_shared<const ClosestPoint>(*target);
   return [target, tree, samples = options.distance_samples](const TriangleMesh& boundary, MeshCheck& check) {
     check.target_diagonal = bounding_box_diagonal(*target);
@@ -106,6 +120,7 @@ Compare comparison(const PointCloud* target) {
   for (std::size_t j = 0; j < target->points.size(); ++j)
     if (!target->points[j].allFinite())
       throw InputError("mesh check: point " + std::to_string(j) + " of the cloud is not finite");
+  require_extent(target->points, "mesh check: cloud");
   return [target](const TriangleMesh& boundary, MeshCheck& check) {
     check.target_diagonal = bounding_box_diagonal(*target);
     check.distance = surface_distance(boundary, *target);
@@ -243,6 +258,7 @@ void require_samples(int per_direction) {
 
 MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const MeshCheckOptions& options) {
   require_samples(options.samples_per_direction);
+  require_extent(mesh.positions, "mesh check: mesh");
   MeshCheck check = count_cells(mesh);
   if (has_any(check.defects, {Kind::no_cells, Kind::size_mismatch, Kind::index_out_of_range})) return check;
   if (!begins("quality", 0, options.progress, check)) return check;
@@ -258,7 +274,8 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   if (!begins("topology", 0.2, options.progress, check)) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
-  if (!has_any(check.defects, {Kind::bad_tag})) check.subdivision_audit = audit(mesh);
+  if (!has_any(check.defects, {Kind::bad_tag, Kind::inconsistent_orientation, Kind::nonconforming_face}))
+    check.subdivision_audit = audit(mesh);
   if (has_any(check.defects, {Kind::not_finite})) return check;
   std::vector<Index> face_of_triangle;
   const PolygonMesh boundary = boundary_surface(mesh, topology);
@@ -273,6 +290,7 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
                        const WorkProgress& progress, int samples_per_direction) {
   if (samples_per_direction != 0) require_samples(samples_per_direction);
   const VolumeMesh straight = mesh.straight_sided();
+  require_extent(mesh.coefficients, "mesh check: mesh");
   MeshCheck check = count_cells(straight);
   std::erase_if(check.defects, [](const MeshDefect& defect) { return defect.kind == Kind::inverted_cell; });
   check.orders = order_summary(mesh.space);

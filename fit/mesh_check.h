@@ -97,8 +97,9 @@ struct MeshCheck {
 ///
 /// target   what the boundary should be, or null.
 /// Where the progress ends it, what has not been looked at is as if defects ruled it out.
-/// InputError, before anything is looked at: options out of range; a target that `ClosestPoint` refuses, or a cloud
-/// without points or with one that is not finite. Never for what is wrong with the mesh.
+/// InputError, before anything is looked at: options out of range; a mesh or target of more than one point whose extent
+/// `require_length` refuses; a target that `ClosestPoint` refuses, or a cloud without points or with one that is not
+/// finite. Never for what else is wrong with the mesh.
 /// Deterministic for any number of threads. Cost on one core: per hex about 2 us, per boundary quad 50 us without
 /// and 80 us with a target.
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target = nullptr,

@@ -220,8 +220,9 @@ bool NewtonRun::linearize() {
 bool NewtonRun::find_direction(IterationRecord& record) {
   ReducedHessian reduced(problem_, inverse_diagonal_);
   record.linear_iterations += conjugate_gradients(reduced, gradient_, options_, d_);
+  constexpr double kLevel = 1e-26;  // of an energy without dimension: less is rounding, and nobody's gain
   slope_ = dot(gradient_, d_);
-  return slope_ < 0;
+  return slope_ < -kLevel;
 }
 
 NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {

@@ -91,8 +91,8 @@ class MeshOptimizer {
         own_boundary_(!target),
         target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),
         relief_(mesh.num_cells(), 1),
-        runner_(
-            {SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
+        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
+                 options.cancelled, options.log}) {
     target_.normalisation.take_in(mesh_);
   }
   OptimizeResult run(const VolumeMesh& original);
@@ -118,6 +118,7 @@ class MeshOptimizer {
   void relieve_far_cells(std::span<const double> triangle_distances);
   void weigh_cells(std::span<const double> least_jacobians);
   void measure_distance();
+  bool steps_ran_out() const;
   void finish(bool going);
 
   OptimizeOptions options_;
@@ -132,6 +133,7 @@ class MeshOptimizer {
   std::vector<std::uint8_t> refined_;  ///< sample triangles beside places that are too far off: seen at more points
   std::vector<double> relief_;      ///< of the cells: share of its weight that each keeps for being beside a far place
   std::vector<Index> uncertified_;
+  bool gains_ended_ = false;        ///< whether rounds of improvement ended since they no longer gained
   double mean_percent_ = 0, max_percent_ = 0;  ///< distances after the last stage, at its samples
   FitReport report_;
   StageRunner runner_;
@@ -330,6 +332,7 @@ bool MeshOptimizer::improve() {
     if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
       lambda /= 2;
     } else if (!now.gains_on(before, kMaxMargin * options_.max_tolerance_percent)) {
+      gains_ended_ = true;
       break;
     }
     before = now;
@@ -357,6 +360,14 @@ void MeshOptimizer::measure_distance() {
   max_percent_ = 100 * distance.max();
 }
 
+/// Whether the caller's limit of steps, not the schedule's, ended a minimisation.
+bool MeshOptimizer::steps_ran_out() const {
+  return options_.max_iterations > 0 &&
+         std::any_of(report_.stages.begin(), report_.stages.end(), [](const StageRecord& stage) {
+           return stage.kept && stage.ended == MinimizerStop::iteration_limit;
+         });
+}
+
 void MeshOptimizer::finish(bool going) {
   if (going) measure_distance();
   report_.seconds = {{"total", runner_.seconds()}};
@@ -370,8 +381,10 @@ void MeshOptimizer::finish(bool going) {
         formatted("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%",
                   mean_percent_, max_percent_);
   } else {
-    report_.explanation = formatted("all cells are valid and no longer gain; boundary within %.4g %% of its surface",
-                                 max_percent_);
+    report_.explanation = formatted("all cells are valid%s; boundary within %.4g %% of its surface",
+                                    gains_ended_ && !steps_ran_out() ? " and no longer gain" : "", max_percent_);
+    if (steps_ran_out())
+      report_.explanation += formatted("; stages took all of the %d steps allowed", options_.max_iterations);
   }
 }
 

@@ -32,6 +32,7 @@ struct OptimizeOptions {
   int max_iterations = 0;                ///< per stage; 0: the schedule's own
   double time_limit_seconds = 0;         ///< 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
   StageLog* log = nullptr;               ///< takes the results of minimisations from here and keeps them here; null: no
 };
 

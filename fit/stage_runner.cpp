@@ -51,7 +51,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
   int iteration = 0;
-  minimizer.ended = [this] { return is_over(); };
+  minimizer.ended = [this] { return is_over() || (options_.cancelled && options_.cancelled()); };
   minimizer.progress = [&](const IterationRecord& step) {
     const double energy = step.surface_energy + stage.lambda * step.volume_energy;
     const bool wanted = !options_.progress ||
@@ -95,6 +95,10 @@ bool StageRunner::in_time(const std::string& work, FitReport& report) const {
 }
 
 void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const {
+  constexpr double kFarPercent = 10;
+  if (mean_percent > kFarPercent)
+    report.warnings.push_back(
+        formatted("the result is far from its target, %.3g %% on the mean: is the template roughly in place?", mean_percent));
   const StageRecord* last = report.last_kept_stage();
   if (last && last->ended == MinimizerStop::infeasible_start) {
     report.stop_reason = StopReason::stalled;

@@ -42,6 +42,7 @@ class StageRunner {
     int max_iterations = 0;         ///< 0: the stage's own
     double time_limit_seconds = 0;  ///< 0: none
     std::function<bool(const FitProgress&)> progress;
+    std::function<bool()> cancelled;
     StageLog* log = nullptr;        ///< null: none is kept
   };
 

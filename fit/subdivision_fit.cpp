@@ -109,7 +109,8 @@ SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh
       target_(std::move(target)),
       template_(template_mesh),
       memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
-      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.log}) {
+      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
+               options.log}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   target_.normalisation.take_in(template_);

@@ -5,6 +5,7 @@
 #include "fit/enclosed_volume.h"
 #include "fit/soup_topology.h"
 #include "subvol/error.h"
+#include "subvol/length_range.h"
 #include "subvol/solid_topology.h"
 
 #include <Eigen/Geometry>
@@ -13,7 +14,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <sstream>
 #include <string>
 
 namespace subvol {
@@ -62,8 +62,8 @@ Volume find_volume(std::span<const Vec3> positions, std::span<const std::array<I
 
 Volume find_volume(std::span<const Vec3> points, const CloudGeometry& geometry, const Vec3& extent) {
   for (double cells : kCloudCells) {
-    const double resolution = extent.maxCoeff() / (cells * geometry.spacing);
-    const double flooded = flooded_volume(points, std::clamp(static_cast<int>(resolution), 1, 2 * kFloodResolution));
+    const double resolution = std::clamp(extent.maxCoeff() / (cells * geometry.spacing), 1.0, 2.0 * kFloodResolution);
+    const double flooded = flooded_volume(points, static_cast<int>(resolution));
     if (flooded > kFlatness * isoperimetric_bound(geometry.area)) return {flooded, VolumeSource::flood};
   }
   return {isoperimetric_bound(geometry.area) / 2, VolumeSource::isoperimetric};
@@ -137,14 +137,7 @@ TargetSurface::TargetSurface(const PointCloud& cloud, PointWeights weights) {
 }
 
 void TargetSurface::set_box(const Vec3& low, const Vec3& high) {
-  // Cubes of lengths are far from overflow and underflow then.
-  constexpr double kLeast = 1e-90, kMost = 1e90;
-  const double extent = (high - low).maxCoeff();
-  if (!(extent >= kLeast && extent <= kMost)) {
-    std::ostringstream said;
-    said << "target: its extent is " << extent << ", expected " << kLeast << " to " << kMost;
-    throw InputError(said.str());
-  }
+  require_length((high - low).maxCoeff(), "target");
   diagonal_ = (high - low).norm();
   centre_ = low + 0.5 * (high - low);
 }

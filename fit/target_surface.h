@@ -40,7 +40,7 @@ const char* to_string(VolumeSource source);
 class TargetSurface {
  public:
   /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area, an
-  ///        extent of 1e-90 to 1e90, else InputError. Triangles without area are dropped; the others keep their order.
+  ///        extent that `require_length` takes, else InputError. Triangles without area are dropped; the others keep their order.
   explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
   /// InputError: as `cloud_geometry`, and an extent out of that range.
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);

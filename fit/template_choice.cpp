@@ -96,6 +96,7 @@ Chooser::ShortFit Chooser::fit_subdivided(const VolumeMesh& mesh) {
   FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
   options.time_limit_seconds = time_left();
   options.progress = trial_progress([&] { return ++steps <= kMostSteps; });
+  options.cancelled = options_.cancelled;
   const FitResult fit = fit_subdivision_volume(target_, mesh, options);
   return {refined_triangles(boundary_surface(fit.mesh, MeshTopology(fit.mesh))),
           measure_quality(fit.mesh).mean_scaled_jacobian};
@@ -108,6 +109,7 @@ Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
   options.max_iterations = kMostSteps;
   options.time_limit_seconds = time_left();
   options.progress = trial_progress();
+  options.cancelled = options_.cancelled;
   const HighOrderMesh fitted = fit_high_order(target_, mesh, options).mesh;
   BoundarySamples samples = make_boundary_samples(fitted.space, kIntervals);
   return {{samples.positions.apply(fitted.coefficients), std::move(samples.triangles)},
@@ -117,6 +119,7 @@ Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
 /// Fits a template a little and notes how that went. False where cancelled.
 bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
   const auto [surface, mean_scaled_jacobian] = options_.order > 0 ? fit_curved(mesh) : fit_subdivided(mesh);
+  choice_.cancelled = choice_.cancelled || (options_.cancelled && options_.cancelled());
   if (choice_.cancelled) return false;
   const SurfaceDistance distance = surface_distance(surface, ClosestPoint(surface), target_, tree_);
   TemplateTrial trial{.cells = mesh.num_cells(), .pillowed = pillowed};

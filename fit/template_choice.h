@@ -22,6 +22,7 @@ struct TemplateChoiceOptions {
   Basis basis = Basis::fourier;  ///< of these
   double time_limit_seconds = 0; ///< of the trials; 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
 };
 
 /// Counts that are tried where none is asked for, until one fits well.

@@ -10,7 +10,6 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -78,6 +77,8 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int 
 void VolumeEnergy::find_pattern() {
   const VolumeMesh& mesh = *mesh_;
   pattern_ = clique_pattern(num_nodes_, mesh.cell_offsets, mesh.cell_vertices);
+  if (pattern_.num_entries() > std::numeric_limits<Index>::max())
+    throw InputError("VolumeEnergy: a mesh of " + std::to_string(num_nodes_) + " vertices has more pairs of them than can be numbered");
   pattern_.blocks = {};
   block_offsets_.assign(1, 0);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
@@ -127,18 +128,20 @@ void VolumeEnergy::fill_references(Group& group) const {
   const std::size_t num_points = group.rule.num_points();
   const Mat3 ideal = ideal_matrix(group.rule.kind);
   group.to_reference.resize(group.batches.size() * num_points * 9 * kLanes);
-  std::atomic<Index> bad_cell{kNoIndex};
-#pragma omp parallel for schedule(static)
+  constexpr Index kNone = std::numeric_limits<Index>::max();
+  Index bad_cell = kNone;
+#pragma omp parallel for schedule(static) reduction(min : bad_cell)
   for (std::size_t b = 0; b < group.batches.size(); ++b)
     for (std::size_t q = 0; q < num_points; ++q)
       for (int l = 0; l < kLanes; ++l) {
         const Mat3 reference = reference_(group.batches[b][l], group.rule.points[q]);
         const Mat3 to_reference = ideal * reference.inverse();
-        if (!(reference.determinant() > 0) || !to_reference.allFinite()) bad_cell = group.batches[b][l];
+        if (!(reference.determinant() > 0) || !to_reference.allFinite())
+          bad_cell = std::min(bad_cell, group.batches[b][l]);
         for (int e = 0; e < 9; ++e)
           group.to_reference[(9 * (b * num_points + q) + e) * kLanes + l] = to_reference(e / 3, e % 3);
       }
-  if (bad_cell != kNoIndex)
+  if (bad_cell != kNone)
     throw InputError("VolumeEnergy: the reference of cell " + std::to_string(bad_cell) + " has no positive volume");
 }
 

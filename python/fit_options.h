@@ -3,6 +3,7 @@
 
 #include "cli/writing.h"
 #include "fit/basis.h"
+#include "fit/curve_mesh.h"
 #include "fit/high_order_fit.h"
 #include "python/keywords.h"
 #include "subvol/subdivision.h"
@@ -27,6 +28,9 @@ void take_solver_options(Keywords& keywords, Options& options) {
 
 /// order, basis, adaptive, tolerance, and the above.
 HighOrderFitOptions high_order_options(Keywords& keywords);
+
+/// InputError, naming the function, where the work was ended before all cells were valid.
+void require_untangled(const UntangledStart& start, const char* function);
 
 void take_chord(Keywords& keywords, cli::WritingOptions& writing);
 

@@ -98,12 +98,13 @@ class Fit {
   void untangle_template(double time_limit_seconds) {
     if (!cli::has_few_inverted_cells(*template_)) return;
     auto mesh = std::make_shared<VolumeMesh>(*template_);
-    const std::size_t untangled = work_.run("untangle", [&] {
+    const UntangledStart untangled = work_.run("untangle", [&] {
       return untangle_before_fit(
           *mesh, {.time_limit_seconds = time_limit_seconds, .progress = work_.progress()});
     });
-    if (untangled > 0)
-      warnings_.push_back(std::to_string(untangled) + " cells were not valid; they were untangled before the fit");
+    require_untangled(untangled, "fit");
+    if (untangled.tangled > 0)
+      warnings_.push_back(std::to_string(untangled.tangled) + " cells were not valid; they were untangled before the fit");
     template_ = std::move(mesh);
   }
 
@@ -255,6 +256,12 @@ HighOrderFitOptions high_order_options(Keywords& keywords) {
   keywords.take("tolerance", options.tolerance_percent);
   take_solver_options(keywords, options);
   return options;
+}
+
+void require_untangled(const UntangledStart& start, const char* function) {
+  if (start.left > 0)
+    throw InputError(std::string(function) + ": the work was ended before the mesh was valid; " +
+                     std::to_string(start.left) + " cells were not");
 }
 
 void take_chord(Keywords& keywords, cli::WritingOptions& writing) { keywords.take("chord", writing.chord_percent); }

@@ -99,12 +99,13 @@ class Optimization {
     OptimizeOptions options;
     options.time_limit_seconds = curving_.time_limit_seconds;
     options.progress = curving_.progress;
-    const std::size_t untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
+    const UntangledStart untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
       options.log = log;
       return untangle_before_fit(start, options);
     });
-    if (untangled > 0)
-      warnings_.push_back(std::to_string(untangled) + " cells were not valid; they were untangled before curving");
+    require_untangled(untangled, "optimize");
+    if (untangled.tangled > 0)
+      warnings_.push_back(std::to_string(untangled.tangled) + " cells were not valid; they were untangled before curving");
     HighOrderFitResult found = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       curving_.log = log;
       return fit_high_order(*target_, start, curving_);

@@ -137,8 +137,8 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
            FitReport& report) {
   std::vector<Vec3> unknowns;
   FitProblem problem = make_problem(shell, mesh, strands, unknowns);
-  const StageRunner runner(
-      {SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress});
+  const StageRunner runner({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
+                            options.cancelled});
   StageRecord record;
   record.name = "order " + std::to_string(options.order);
   record.order = options.order;

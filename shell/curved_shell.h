@@ -19,6 +19,7 @@ struct CurvedShellOptions {
   int max_iterations = 0;         ///< 0: the default
   double time_limit_seconds = 0;  ///< 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
   /// Triangles that stand for the boundary where it is looked at for intersections, as fine as the caller wants it
   /// known (`curved_boundary` of export). Empty: `max(4, 2 order)` samples an edge, which overlook sharp folds.
   std::function<CurvedBoundary(const HighOrderMesh&)> boundary;

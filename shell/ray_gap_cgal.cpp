@@ -28,12 +28,13 @@ std::vector<double> ray_gaps(const TriangleMesh& surface, std::span<const Vec3> 
   if (directions.size() != surface.positions.size())
     throw InputError("ray_gaps: expected one direction per vertex (" + std::to_string(surface.positions.size()) +
                      "), got " + std::to_string(directions.size()));
+  std::vector<double> gaps(directions.size(), std::numeric_limits<double>::infinity());
+  if (surface.triangles.size() < 2) return gaps;  // the tree leaves out no triangle where it has but one
   Triangles triangles;
   for (const auto& [a, b, c] : surface.triangles)
     triangles.emplace_back(point(surface.positions[a]), point(surface.positions[b]), point(surface.positions[c]));
   Tree tree(triangles.cbegin(), triangles.cend());
   tree.build();
-  std::vector<double> gaps(directions.size(), std::numeric_limits<double>::infinity());
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t v = 0; v < gaps.size(); ++v) {
     const Vec3 &from = surface.positions[v], to = from + directions[v];

@@ -97,6 +97,8 @@ class ShellMaker {
   void finish(const PolygonMesh& surface, ShellResult& result);
   /// Tells the caller; false: it is to end.
   bool tell(const char* stage, int iteration, double energy, double fraction);
+  /// The same without telling; wanted: what they said last.
+  bool goes_on(bool wanted);
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   void timed(const char* part, void (ShellMaker::*work)());
 
@@ -116,7 +118,12 @@ class ShellMaker {
 
 bool ShellMaker::tell(const char* stage, int iteration, double energy, double fraction) {
   if (ended_) return false;
-  if (options_.progress && !options_.progress({stage, 0, iteration, energy, fraction})) {
+  return goes_on(!options_.progress || options_.progress({stage, 0, iteration, energy, fraction}));
+}
+
+bool ShellMaker::goes_on(bool wanted) {
+  if (ended_) return false;
+  if (!wanted || (options_.cancelled && options_.cancelled())) {
     ended_ = true;
     report_.stop_reason = StopReason::cancelled;
     report_.explanation = "stopped by the caller";
@@ -233,6 +240,10 @@ MinimizerStop ShellMaker::solve(int round) {
   int iteration = 0;
   MinimizerOptions minimizer;
   minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultIterations;
+  minimizer.ended = [&] {
+    return (options_.cancelled && options_.cancelled()) ||
+           (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds);
+  };
   minimizer.progress = [&](const IterationRecord& record) {
     ++iteration;
     const double in_round = static_cast<double>(iteration) / minimizer.max_iterations;
@@ -240,6 +251,7 @@ MinimizerStop ShellMaker::solve(int round) {
                 0.95 - 0.85 * std::pow(0.5, round) * (1 - 0.5 * in_round));
   };
   MinimizerResult found = minimize_newton(problem, unknowns, minimizer);
+  if (found.stop == MinimizerStop::cancelled) goes_on(true);  // within a step, where nobody was told
   stage.ended = found.stop;
   stage.iterations = std::move(found.iterations);
   stage.stop = std::move(found.explanation);

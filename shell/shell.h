@@ -26,6 +26,7 @@ struct ShellOptions {
   int max_iterations = 0;                ///< per solve; 0: the default
   double time_limit_seconds = 0;         ///< 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
+  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
 };
 
 /// A shell and what is true of it. Thicknesses are per strand (`shell_layers.h`), in the surface's unit; those of a

@@ -74,6 +74,9 @@ std::vector<double> layer_shares(int num_layers, double growth) {
   if (!(growth > 0) || !std::isfinite(growth)) throw InputError("layer_shares: growth must be positive");
   std::vector<double> shares{0};
   for (int k = 0; k < num_layers; ++k) shares.push_back(shares.back() + std::pow(growth, k));
+  if (!std::isfinite(shares.back()))
+    throw InputError("layer_shares: " + std::to_string(num_layers) + " layers that grow by " + std::to_string(growth) +
+                     " are thicker than any number");
   for (double& share : shares) share /= num_layers > 0 ? shares.back() : 1;
   return shares;
 }

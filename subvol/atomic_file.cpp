@@ -98,8 +98,20 @@ void write_all(int fd, std::string_view bytes, const fs::path& path) {
   }
 }
 
+/// Writes under way to what may have no reader.
+std::atomic<int> num_waiting{0};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+struct Waiting {
+  Waiting() { ++num_waiting; }
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+  ~Waiting() { --num_waiting; }
+};
+
 void write_directly(const fs::path& path, std::string_view bytes) {
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  const Waiting waiting;
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (file.get() < 0) fail(path, "open for writing", errno);
   write_all(file.get(), bytes, path);
   if (!file.close()) fail(path, "close", errno);
@@ -129,15 +141,26 @@ void flush_folder(const fs::path& target) {
 
 }  // namespace
 
+fs::path behind_links(const fs::path& path) {
+  constexpr int kMostLinks = 40;
+  fs::path target = path;
+  std::error_code ignored;
+  for (int i = 0; i < kMostLinks; ++i) {
+    if (!fs::is_symlink(target, ignored) || target.native().starts_with("/proc/")) return target;
+    target = target.parent_path() / fs::read_symlink(target, ignored);  // an absolute one stands by itself
+  }
+  fail(path, "write", ELOOP);
+}
+
+bool waits_for_reader() noexcept { return num_waiting > 0; }
+
 void write_file_atomically(const fs::path& path, std::string_view bytes) {
   std::error_code ignored;
-  const fs::path resolved = fs::is_symlink(path, ignored) ? fs::weakly_canonical(path, ignored) : path;
-  const fs::path target = resolved.empty() ? path : resolved;
-
+  const fs::path target = behind_links(path);
   struct stat status = {};
   const bool exists = ::stat(target.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) fail(path, "write", EISDIR);
-  if (exists && !S_ISREG(status.st_mode)) return write_directly(target, bytes);
+  if (exists && (!S_ISREG(status.st_mode) || fs::is_symlink(target, ignored))) return write_directly(target, bytes);
   // A rename would replace a write-protected file without asking.
   if (exists && ::access(target.c_str(), W_OK) != 0) fail(path, "replace", errno);
 

@@ -2,6 +2,7 @@
 #include "subvol/auto_template.h"
 
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 #include "subvol/pillow.h"
 #include "subvol/solid_fraction.h"
 #include "subvol/template_frames.h"
@@ -14,6 +15,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 
 namespace subvol {
@@ -27,19 +29,46 @@ struct Placement {
   std::array<bool, 3> half_offset{}; ///< moved by half a cell along each axis
 };
 
-/// The grid around a surface, with two layers of cells to spare on all sides: one stays empty, one lets holes go
-/// around.
-VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
-  constexpr int kSpare = 2;
+/// Edges of cells that are tried, by the one that the count and the volume make.
+constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
+constexpr double kLeastSize = 0.9;
+/// Most cells of one grid, empty ones and those to spare counted in: a second and half a gigabyte per thread or less.
+double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
+
+/// The box around a surface, in the coordinates of a frame.
+Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
   Eigen::AlignedBox3d box;
-  const Mat3 to_frame = placement.frame.transpose();
   for (const auto& t : surface.triangles)
-    for (Index v : t) box.extend(Vec3(to_frame * surface.positions[v]));
+    for (Index v : t) box.extend(Vec3(frame.transpose() * surface.positions[v]));
+  return box;
+}
+
+/// Along each axis the whole number of cells of the grid around a box, whether an integer holds it or not. Two layers of
+/// cells are to spare on all sides: one stays empty, one lets holes go around.
+Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
+  constexpr int kSpare = 2;
+  return (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
+}
+
+/// Those frames whose grids for so many cells in the solid have few enough in all. The farther apart the solid's parts
+/// are, or the thinner its walls, the more of a grid is empty.
+std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t cells, std::span<const Mat3> frames) {
+  const double size = kLeastSize * std::cbrt(solid.volume / static_cast<double>(cells));
+  std::vector<Mat3> result;
+  for (const Mat3& frame : frames)
+    if (cells_around(box_in(frame, solid.surface), size).prod() <= most_grid_cells(cells)) result.push_back(frame);
+  return result;
+}
+
+/// The grid around a surface, of so many cells that they can be numbered.
+VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
+  const Eigen::AlignedBox3d box = box_in(placement.frame, surface);
+  const Eigen::Array3d cells = cells_around(box, placement.size);
   VoxelGrid grid;
   Vec3 low = box.center();
   for (int a = 0; a < 3; ++a) {
     const auto axis = static_cast<std::size_t>(a);
-    grid.cells[axis] = static_cast<int>(std::ceil(box.sizes()[a] / placement.size)) + 1 + 2 * kSpare;
+    grid.cells[axis] = static_cast<int>(cells[a]);
     low[a] -= placement.size * (grid.cells[axis] / 2.0 + (placement.half_offset[axis] ? 0.5 : 0.0));
   }
   grid.edges = placement.size * placement.frame;
@@ -106,7 +135,6 @@ double Search::pillowed_size(const Mat3& frame) const {
 
 /// All sizes, frames and offsets, the likeliest first.
 std::vector<Placement> Search::placements() const {
-  constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
   std::vector<double> sizes;
   for (const Mat3& frame : frames_)
     sizes.push_back(options_.pillow ? pillowed_size(frame) : std::cbrt(solid_.volume / cells_));
@@ -158,8 +186,10 @@ bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result,
     const std::size_t count = std::min(kBatch, all.size() - first);
     std::array<std::optional<Candidate>, kBatch> found;
     std::array<std::size_t, kBatch> num_right{};
+    ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic)
-    for (std::size_t i = 0; i < count; ++i) found[i] = best_of(all[first + i], num_right[i]);
+    for (std::size_t i = 0; i < count; ++i) errors.guard([&] { found[i] = best_of(all[first + i], num_right[i]); });
+    errors.rethrow();
     for (std::size_t i = 0; i < count; ++i) {
       right += num_right[i];
       if (found[i]) candidates.push_back(std::move(*found[i]));
@@ -192,10 +222,17 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   result.wanted = solid.topology;
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
+    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, frames);
+    if (usable.empty() && rung == 0)
+      throw InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
+                       std::to_string(std::lround(most_grid_cells(cells))) +
+                       " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one "
+                       "by one");
+    if (usable.empty()) break;
     std::vector<Candidate> candidates;
     const double done = static_cast<double>(rung) / kLadder.size();
     // Most often the first rung is all there is.
-    if (!Search(solid, options, cells, frames)
+    if (!Search(solid, options, cells, std::move(usable))
              .run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
       result.cancelled = true;
       return result;

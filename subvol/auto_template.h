@@ -50,7 +50,9 @@ struct AutoTemplateResult {
 /// Where no grid of the count asked for carries the topology, counts 1.3, 1.7, 2.2, 3, ... 20 times as large are tried:
 /// `cells_asked` tells which one worked.
 ///
-/// InputError: as `solid_boundary`; options out of range.
+/// InputError: as `solid_boundary`; options out of range; a solid whose parts are so far apart, or walls so thin, that
+/// grids would have more than a million and 64 times the cells asked for, most of them empty (larger counts for which
+/// they would are not tried).
 /// Deterministic, parallel, same bits for any number of threads. Cost: seconds; grows with cells and triangles.
 AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options = {},
                                   std::size_t most = 1);

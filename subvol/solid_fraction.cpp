@@ -98,6 +98,7 @@ void add_length(double low, double high, int count, Index first, Index stride, d
                 std::vector<double>& sums) {
   low = std::max(low, 0.0);
   high = std::min(high, double(count));
+  if (!(low < high)) return;  // no integer may hold it then
   for (int k = static_cast<int>(low); k < count && k < high; ++k)
     sums[first + stride * k] += weight * (std::min(high, k + 1.0) - std::max(low, double(k)));
 }

@@ -18,20 +18,28 @@ namespace {
 
 /// Equal positions become one vertex; vertices of no triangle go. Numbers ascend as in the input.
 TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped) {
-  std::vector<Index> order(mesh.positions.size());
-  std::iota(order.begin(), order.end(), 0);
+  std::vector<char> used(mesh.positions.size(), 0);
+  for (const auto& t : mesh.triangles)
+    for (Index v : t) {
+      if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size() || !mesh.positions[v].allFinite())
+        throw InputError("surface: a triangle names a vertex that is not there, or whose position is not finite");
+      used[v] = 1;
+    }
+  std::vector<Index> order;
+  for (std::size_t v = 0; v < used.size(); ++v)
+    if (used[v]) order.push_back(static_cast<Index>(v));
   const auto less = [&](Index a, Index b) {
     const Vec3 &p = mesh.positions[a], &q = mesh.positions[b];
     return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
   };
   std::stable_sort(order.begin(), order.end(), less);
-  std::vector<Index> first(order.size());
+  std::vector<Index> first(mesh.positions.size(), kNoIndex);
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool same = i > 0 && !less(order[i - 1], order[i]);
     first[order[i]] = same ? first[order[i - 1]] : order[i];
   }
   TriangleMesh result;
-  std::vector<Index> number(order.size(), kNoIndex);
+  std::vector<Index> number(mesh.positions.size(), kNoIndex);
   const auto vertex = [&](Index v) {
     Index& n = number[first[v]];
     if (n == kNoIndex) {
@@ -41,10 +49,6 @@ TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped) {
     return n;
   };
   for (const auto& t : mesh.triangles) {
-    for (Index v : t)
-      if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size() ||
-          !mesh.positions[v].allFinite())
-        throw InputError("surface: a triangle names a vertex that is not there, or whose position is not finite");
     const std::array<Index, 3> corners{vertex(t[0]), vertex(t[1]), vertex(t[2])};
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) ++dropped;
     else result.triangles.push_back(corners);

@@ -3,6 +3,7 @@
 
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/length_range.h"
 #include "subvol/sound_points.h"
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
@@ -19,8 +20,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Extents and coordinates within these keep the fourth powers that areas and their products need in range.
-constexpr double kSmallestExtent = 1e-70, kLargestCoordinate = 1e70;
 /// Twice a triangle's area, relative to its longest edge squared, at or below which it has no direction left.
 constexpr double kNoArea = 1e-15;
 
@@ -105,10 +104,10 @@ void check_extent(const std::vector<Vec3>& positions, const Remarks& remarks) {
   const double largest = std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
   const double extent = (upper - lower).maxCoeff();
   std::string figure;
-  append_number(figure, largest > kLargestCoordinate ? largest : extent);
-  if (largest > kLargestCoordinate)
+  append_number(figure, largest > kMostLength ? largest : extent);
+  if (largest > kMostLength)
     remarks.fail("coordinates up to " + figure + ": areas overflow; scale the surface down");
-  if (extent < kSmallestExtent)
+  if (extent < kLeastLength)
     remarks.fail("the bounding box is only " + figure + " wide: areas underflow; scale it up");
 }
 

@@ -73,6 +73,19 @@ TEST_CASE("replacing a file keeps its permissions, and a symbolic link stays one
   CHECK(fs::status(folder / "f").permissions() == (fs::perms::owner_read | fs::perms::owner_write));
 }
 
+TEST_CASE("a symbolic link that leads nowhere yet is followed, one that leads to itself is an IoError") {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "sub");
+  fs::create_symlink("sub/second", folder / "first");
+  fs::create_symlink("f", folder / "sub/second");
+  write_file_atomically(folder / "first", "new");
+  CHECK(fs::is_symlink(folder / "first"));
+  CHECK(fs::is_symlink(folder / "sub/second"));
+  CHECK(content_of(folder / "sub/f") == "new");
+  fs::create_symlink("circle", folder / "circle");
+  CHECK_THROWS_AS(write_file_atomically(folder / "circle", "x"), IoError);
+}
+
 TEST_CASE("a new file has the permissions the umask grants, not those of a private temporary") {
   const TemporaryFolder folder;
   write_file_atomically(folder / "f", "x");

@@ -17,6 +17,7 @@
 #include <catch2/catch.hpp>
 
 #include <functional>
+#include <limits>
 
 using namespace subvol;
 
@@ -160,6 +161,26 @@ TEST_CASE("Where a count cannot carry the topology, one that can is named", "[te
   REQUIRE(!result.templates.empty());
   CHECK(result.templates.front().cells_asked > 8);
   check_template(result.templates.front(), {1, 0, 1}, result.templates.front().cells_asked);
+}
+
+TEST_CASE("Parts that are too far apart for a grid are refused") {
+  const TriangleMesh cube = voxel_surface(1, 1, 1, [](int, int, int) { return true; });
+  for (const double apart : {3000.0, 1e10}) {
+    TriangleMesh two = cube;
+    for (const auto& [a, b, c] : cube.triangles) {
+      const auto n = static_cast<Index>(cube.positions.size());
+      two.triangles.push_back({a + n, b + n, c + n});
+    }
+    for (const Vec3& p : cube.positions) two.positions.push_back(p + apart * Vec3(1, 1, 0));
+    CHECK_THROWS_AS(auto_templates(two, {.cells = 50}), InputError);
+  }
+}
+
+TEST_CASE("Positions of no triangle may be anything", "[templates]") {
+  TriangleMesh cube = voxel_surface(1, 1, 1, [](int, int, int) { return true; });
+  const double volume = solid_boundary(cube).volume;
+  cube.positions.resize(cube.positions.size() + 40, Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  CHECK(solid_boundary(cube).volume == volume);
 }
 
 TEST_CASE("Automatic templates do not depend on chance, and can be cancelled", "[templates]") {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "element_fixtures.h"
 #include "fit/high_order_certificate.h"
-#include "fit/parallel_errors.h"
+#include "subvol/parallel_errors.h"
 #include "subvol/error.h"
 
 #include <Eigen/LU>

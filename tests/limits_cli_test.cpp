@@ -73,6 +73,18 @@ TEST_CASE("A run that was interrupted leaves a checkpoint and goes on", "[cli][c
   CHECK(content_of(place / "out.mesh") == wanted);
 }
 
+TEST_CASE("A run that was interrupted before anything was done leaves a checkpoint all the same", "[cli][checkpoint]") {
+  const Workplace place;
+  place.file("c", "something else");
+  const pid_t child = place.start(kFit + "--levels 3 --progress json -o out.mesh --checkpoint c --force");
+  for (int i = 0; i < 600 && content_of(place / "stdout.txt").empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  kill(child, SIGINT);
+  REQUIRE(place.finish(child).status == 130);
+  CHECK(content_of(place / "c") != "something else");
+  CHECK(place.run(kFit + "--levels 3 --time-limit 1 -o out.mesh --resume c --force").status == 4);
+}
+
 TEST_CASE("A checkpoint of another run is refused, and said why", "[cli][checkpoint]") {
   const Workplace place;
   REQUIRE(place.run(kShort + "--levels 1 --report r.json --checkpoint c").status == kStepsRanOut);

@@ -141,7 +141,23 @@ TEST_CASE("whatever is wrong with a mesh, its check returns", "[mesh_check]") {
   twice.add_cell(CellKind::hex, vertices);
   CHECK_FALSE(check_mesh(twice).valid());
   CHECK_FALSE(to_text(check_mesh(twice)).empty());
+  VolumeMesh mirrored = lattice(2, 1, 1);  // its second cell has bottom and top exchanged
+  std::swap_ranges(mirrored.cell_vertices.begin() + 8, mirrored.cell_vertices.begin() + 12,
+                   mirrored.cell_vertices.begin() + 12);
+  CHECK(has(check_mesh(mirrored), MeshDefect::Kind::inconsistent_orientation));
+  CHECK(check_mesh(mirrored).quality->inverted_cells == 1);
   CHECK_THROWS_AS(check_mesh(lattice(1, 1, 1), nullptr, {.samples_per_direction = 1}), InputError);
+}
+
+TEST_CASE("A mesh whose volume no number holds is refused by its check", "[mesh_check]") {
+  for (const double size : {1e41, 1e-41}) {
+    VolumeMesh mesh = lattice(1, 1, 1);
+    for (Vec3& p : mesh.positions) p *= size;
+    CHECK_THROWS_AS(check_mesh(mesh), InputError);
+    const VolumeMesh unit = lattice(1, 1, 1);
+    const TriangleMesh target = boundary_triangles(mesh);
+    CHECK_THROWS_AS(check_mesh(unit, &target), InputError);
+  }
 }
 
 TEST_CASE("A check that is ended states only what was looked at", "[mesh_check]") {

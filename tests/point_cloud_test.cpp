@@ -97,7 +97,22 @@ TEST_CASE("A cloud's geometry has the same bits for one and two threads, and ref
   CHECK_THROWS_AS(cloud_geometry(std::vector{Vec3(0, 0, 0)}), InputError);
   CHECK_THROWS_AS(cloud_geometry(std::vector(20, Vec3(1, 2, 3))), InputError);
   CHECK_THROWS_AS(cloud_geometry(std::vector{Vec3(0, 0, 0), Vec3(NAN, 0, 0)}), InputError);
+  CHECK_THROWS_AS(cloud_geometry(std::vector{Vec3(0, 0, 0), Vec3(1e-170, 0, 0)}), InputError);
   CHECK_NOTHROW(cloud_geometry(std::vector{Vec3(0, 0, 0), Vec3(1, 0, 0)}));
+}
+
+TEST_CASE("Points that rounding puts in one place have no area, and those around have theirs") {
+  PointCloud cloud = on_sphere(1000);
+  const double area = cloud_geometry(cloud.points).area;
+  for (int k = 0; k < 300; ++k) cloud.points.push_back(Vec3(0, 0, 1));
+  const CloudGeometry geometry = cloud_geometry(cloud.points);
+  CHECK(geometry.area == Approx(area).epsilon(0.05));
+  CHECK(*std::max_element(geometry.areas.begin() + 1000, geometry.areas.end()) == 0);
+
+  PointCloud two_groups;
+  RandomPoints random(3);
+  for (int k = 0; k < 80; ++k) two_groups.points.push_back(1e-11 * random.point() + Vec3(k < 40 ? 0 : 1, 0, 0));
+  CHECK(TargetSurface(two_groups).volume() > 0);
 }
 
 TEST_CASE("Points pull at the nearest places alone: value and derivatives") {

@@ -133,6 +133,21 @@ TEST_CASE("Layers grow by the factor given", "[shell]") {
   CHECK(layer_shares(0, 2) == std::vector<double>{0});
   CHECK_THROWS_AS(layer_shares(-1, 1), InputError);
   CHECK_THROWS_AS(layer_shares(1, 0), InputError);
+  CHECK_THROWS_AS(layer_shares(200, 100), InputError);
+}
+
+TEST_CASE("A flat shell is perfect from the start, and says so", "[shell]") {
+  for (const Faces faces : {Faces::quads, Faces::triangles}) {
+    const ShellResult shell = make_shell(plane(faces), {.thickness = 0.1, .layers = 2});
+    INFO(shell.report.explanation);
+    CHECK(shell.report.stop_reason == StopReason::converged);
+  }
+}
+
+TEST_CASE("One face has room for its shell", "[shell]") {
+  const PolygonMesh triangle{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 3}, {0, 1, 2}};
+  const ShellResult shell = make_shell(triangle, {.thickness = 0.05, .optimize = false});
+  CHECK(shell.mesh.positions[3].z() == Approx(0.05));
 }
 
 TEST_CASE("A sphere's shell is as thick as its energy says, and has that volume", "[shell]") {

@@ -113,6 +113,28 @@ TEST_CASE("Outputs that are pipes are written to and not read back", "[cli]") {
   }
 }
 
+TEST_CASE("A pipe that nobody reads is waited for until a signal comes", "[cli]") {
+  const Workplace place;
+  REQUIRE(mkfifo((place / "pipe").c_str(), 0600) == 0);
+  CHECK(place.run(kFit + "--levels 1 --checkpoint pipe -o out.mesh").status == 2);
+  const pid_t child = place.start(kFit + "--levels 1 --max-iterations 1 -o out.mesh --report pipe");
+  for (int i = 0; i < 600 && !place.has("out.mesh"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  for (siginfo_t ended{}; ended.si_pid == 0; waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+    kill(child, SIGTERM);
+  }
+  CHECK(place.finish(child).status == 130);
+  CHECK(place.run("check out.mesh --quiet").status == 0);
+}
+
+TEST_CASE("An option without a value is a usage error, not one that was not given", "[cli]") {
+  const Workplace place;
+  for (const char* words : {"check template.mesh --target ''", "subdivide template.mesh -o a.mesh --report ''",
+                            "fit target.off --template '' -o a.mesh", "check ''"})
+    CHECK(shell(place, std::string("\"$SUBVOL\" ") + words) == 2);
+  CHECK_FALSE(place.has("a.mesh"));
+}
+
 TEST_CASE("What cannot be done is said before a template is made", "[cli][templates]") {
   const Workplace place;
   place.file("other.checkpoint", "OFF\n");

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/obj_writer.h"
+#include "export/read_back.h"
 #include "export/usd_writer.h"
 #include "subvol/error.h"
+#include "tests/temporary_folder.h"
 #include "tests/usda_reader.h"
 
 #include <catch2/catch.hpp>
@@ -11,6 +13,7 @@
 #include <sstream>
 
 using namespace subvol;
+using subvol::test::TemporaryFolder;
 using subvol_tests::UsdaFile;
 
 namespace {
@@ -96,6 +99,20 @@ TEST_CASE("a .usda cage read back has the same points and faces and is a Catmull
   const auto& indices = file.numbers("faceVertexIndices");
   CHECK(std::vector<Index>(indices.begin(), indices.end()) == mesh.face_vertices);
   CHECK(file.numbers("extent") == std::vector<double>{0, 0, 0, 1, 1, 1});
+}
+
+TEST_CASE("a .usda cage far from the origin keeps its shape in single precision") {
+  PolygonMesh mesh = cube();
+  for (Vec3& p : mesh.positions) p = 0.5 * p + Vec3(5e6, 5e6, 100);
+  const std::string text = usd_text(mesh, {});
+  CHECK(text.find("double3 xformOp:translate = (5000000.25, 5000000.25, 100.25)") != std::string::npos);
+  CHECK(text.find("uniform token[] xformOpOrder = [\"xformOp:translate\"]") != std::string::npos);
+  CHECK(text.find("float3[] extent = [(-0.25, -0.25, -0.25), (0.25, 0.25, 0.25)]") != std::string::npos);
+  const TemporaryFolder folder;
+  write_usd(folder / "cage.usda", mesh, {});
+  CHECK_NOTHROW(require_written(folder / "cage.usda", mesh));
+  mesh.positions[3].x() += 1e-3;
+  CHECK_THROWS_AS(require_written(folder / "cage.usda", mesh), IoError);
 }
 
 TEST_CASE("creases and corners survive the way through .usda, chained where sharpness is equal") {

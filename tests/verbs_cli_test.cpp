@@ -42,7 +42,7 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
 TEST_CASE("A shell of curved cells goes to its files with its thickness, and is what the files say", "[cli]") {
   const Workplace place;
   const Run run = place.run(
-      "shell target.off --thickness 2% --side both --order 2 -o shell.vtu -o shell.msh -o shell.glb "
+      "shell target.off --thickness 2% --side both --order 2 -o cage:cage.vtu -o shell.vtu -o shell.msh -o shell.glb "
       "-o cage:cage.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
