@@ -81,8 +81,9 @@ void require_free(const fs::path& file, bool force) {
   if (!force && fs::is_regular_file(file, ignored)) {
     throw UsageError(file.string() + ": exists; give --force to replace it");
   }
-  if (!exists || fs::is_regular_file(file, ignored))
-    require_writable_folder(behind_links(file));
+  const fs::path target = behind_links(file);
+  const bool is_open = fs::is_symlink(target, ignored);  // by /proc/.../fd/N: written to as it is
+  if (!is_open && (!exists || fs::is_regular_file(file, ignored))) require_writable_folder(target);
 }
 
 bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }

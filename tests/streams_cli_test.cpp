@@ -113,6 +113,15 @@ TEST_CASE("Outputs that are pipes are written to and not read back", "[cli]") {
   }
 }
 
+TEST_CASE("A link to the standard output is written through, to a file and to a pipe", "[cli]") {
+  const Workplace place;
+  fs::create_symlink("/dev/stdout", place / "out.obj");
+  CHECK(shell(place, "\"$SUBVOL\" convert template.mesh -o out.obj --force --quiet > to_file.obj") == 0);
+  CHECK(shell(place, "\"$SUBVOL\" convert template.mesh -o out.obj --force --quiet | cat > to_pipe.obj") == 0);
+  CHECK(content_of(place / "to_file.obj").starts_with("#"));
+  CHECK(content_of(place / "to_file.obj") == content_of(place / "to_pipe.obj"));
+}
+
 TEST_CASE("A pipe that nobody reads is waited for until a signal comes", "[cli]") {
   const Workplace place;
   REQUIRE(mkfifo((place / "pipe").c_str(), 0600) == 0);
