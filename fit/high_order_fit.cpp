@@ -254,7 +254,9 @@ TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sampl
 std::size_t HighOrderFit::intersecting_pairs() const { return self_intersections(measured_boundary()).pairs.size(); }
 
 /// Whether the boundary intersects itself, but for folds that are about as small as what is between samples.
-bool HighOrderFit::is_folded() const { return !self_intersections(boundary(sample_intervals(order_) + 1)).pairs.empty(); }
+bool HighOrderFit::is_folded() const {
+  return !self_intersections(boundary(sample_intervals(order_) + 1)).pairs.empty();
+}
 
 double HighOrderFit::keep_mean(double distance) {
   mean_ = 100 * distance;

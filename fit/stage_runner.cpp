@@ -97,8 +97,8 @@ bool StageRunner::in_time(const std::string& work, FitReport& report) const {
 void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const {
   constexpr double kFarPercent = 10;
   if (mean_percent > kFarPercent)
-    report.warnings.push_back(
-        formatted("the result is far from its target, %.3g %% on the mean: is the template roughly in place?", mean_percent));
+    report.warnings.push_back(formatted(
+        "the result is far from its target, %.3g %% on the mean: is the template roughly in place?", mean_percent));
   const StageRecord* last = report.last_kept_stage();
   if (last && last->ended == MinimizerStop::infeasible_start) {
     report.stop_reason = StopReason::stalled;

@@ -40,7 +40,8 @@ const char* to_string(VolumeSource source);
 class TargetSurface {
  public:
   /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area, an
-  ///        extent that `require_length` takes, else InputError. Triangles without area are dropped; the others keep their order.
+  ///        extent that `require_length` takes, else InputError. Triangles without area are dropped; the others keep
+  ///        their order.
   explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
   /// InputError: as `cloud_geometry`, and an extent out of that range.
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);

@@ -78,7 +78,8 @@ void VolumeEnergy::find_pattern() {
   const VolumeMesh& mesh = *mesh_;
   pattern_ = clique_pattern(num_nodes_, mesh.cell_offsets, mesh.cell_vertices);
   if (pattern_.num_entries() > std::numeric_limits<Index>::max())
-    throw InputError("VolumeEnergy: a mesh of " + std::to_string(num_nodes_) + " vertices has more pairs of them than can be numbered");
+    throw InputError("VolumeEnergy: a mesh of " + std::to_string(num_nodes_) +
+                     " vertices has more pairs of them than can be numbered");
   pattern_.blocks = {};
   block_offsets_.assign(1, 0);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {

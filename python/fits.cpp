@@ -104,7 +104,8 @@ class Fit {
     });
     require_untangled(untangled, "fit");
     if (untangled.tangled > 0)
-      warnings_.push_back(std::to_string(untangled.tangled) + " cells were not valid; they were untangled before the fit");
+      warnings_.push_back(std::to_string(untangled.tangled) +
+                          " cells were not valid; they were untangled before the fit");
     template_ = std::move(mesh);
   }
 

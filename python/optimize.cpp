@@ -105,7 +105,8 @@ class Optimization {
     });
     require_untangled(untangled, "optimize");
     if (untangled.tangled > 0)
-      warnings_.push_back(std::to_string(untangled.tangled) + " cells were not valid; they were untangled before curving");
+      warnings_.push_back(std::to_string(untangled.tangled) +
+                          " cells were not valid; they were untangled before curving");
     HighOrderFitResult found = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       curving_.log = log;
       return fit_high_order(*target_, start, curving_);

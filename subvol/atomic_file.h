@@ -9,8 +9,8 @@ namespace subvol {
 /// Writes a whole file or nothing: into a temporary in the same folder, flushed to the disk, then renamed over `path`.
 ///
 /// path     symbolic links are followed (`behind_links`); an existing regular file keeps its permissions; anything else
-///          that exists and is no folder (a pipe, a device, an open file by its /proc/.../fd/N) cannot be renamed over and
-///          is written to directly.
+///          that exists and is no folder (a pipe, a device, an open file by its /proc/.../fd/N) cannot be renamed over
+///          and is written to directly.
 /// bytes    the whole content, possibly empty.
 ///
 /// Throws IoError that names the path, the step and the system's reason; the temporary is removed and an existing file

@@ -43,8 +43,8 @@ Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
   return box;
 }
 
-/// Along each axis the whole number of cells of the grid around a box, whether an integer holds it or not. Two layers of
-/// cells are to spare on all sides: one stays empty, one lets holes go around.
+/// Along each axis the whole number of cells of the grid around a box, whether an integer holds it or not. Two layers
+/// of cells are to spare on all sides: one stays empty, one lets holes go around.
 Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
   constexpr int kSpare = 2;
   return (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);

@@ -3,8 +3,8 @@
 
 namespace subvol {
 
-/// Sizes of meshes and targets: products of six lengths within, which certificates and areas have, are far from overflow
-/// and underflow.
+/// Sizes of meshes and targets: products of six lengths within, which certificates and areas have, are far from
+/// overflow and underflow.
 inline constexpr double kLeastLength = 1e-40, kMostLength = 1e40;
 
 /// InputError, naming what it is of, unless kLeastLength <= extent <= kMostLength.

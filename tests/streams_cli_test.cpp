@@ -128,9 +128,10 @@ TEST_CASE("A pipe that nobody reads is waited for until a signal comes", "[cli]"
   CHECK(place.run(kFit + "--levels 1 --checkpoint pipe -o out.mesh").status == 2);
   const pid_t child = place.start(kFit + "--levels 1 --max-iterations 1 -o out.mesh --report pipe");
   for (int i = 0; i < 600 && !place.has("out.mesh"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  for (siginfo_t ended{}; ended.si_pid == 0; waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT)) {
+  for (siginfo_t ended{}; ended.si_pid == 0;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1000));
     kill(child, SIGTERM);
+    waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT);
   }
   CHECK(place.finish(child).status == 130);
   CHECK(place.run("check out.mesh --quiet").status == 0);
