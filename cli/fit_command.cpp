@@ -136,13 +136,14 @@ void FitRun::write() {
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
   const auto write = [&](bool with_limit) {
-    write_each([&](const Output& output) {
-      if (shows_surface(output) != with_limit) return;
-      if (output.part == Part::animation)
-        write_animation(output, result_.cage, result_.states, writing);
-      else
-        write_output(output, result_.cage, result_.mesh, &limit_, writing);
-    });
+    write_each(
+        [&](const Output& output) {
+          if (output.part == Part::animation)
+            write_animation(output, result_.cage, result_.states, writing);
+          else
+            write_output(output, result_.cage, result_.mesh, &limit_, writing);
+        },
+        [&](const Output& output) { return shows_surface(output) == with_limit; });
   };
   write(false);  // where little memory is left the limit surface may be what does not fit
   limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, writing, progress); });

@@ -38,8 +38,9 @@ void LongRun::write_report(Json json, const Json& parts) const {
   cli::write_report(run_.report, json);
 }
 
-void LongRun::write_each(const std::function<void(const Output&)>& write) {
-  const std::vector<std::string> failures = cli::write_each(outputs_, write);
+void LongRun::write_each(const std::function<void(const Output&)>& write,
+                         const std::function<bool(const Output&)>& which) {
+  const std::vector<std::string> failures = cli::write_each(outputs_, write, which);
   failures_.insert(failures_.end(), failures.begin(), failures.end());
 }
 

@@ -57,7 +57,8 @@ class LongRun {
   /// Adds what every report ends with, and writes it if one was asked for. parts: seconds of parts of the work.
   void write_report(Json json, const Json& parts = Json::object()) const;
   /// As the function of that name, with what could not be written in the report's warnings.
-  void write_each(const std::function<void(const Output&)>& write);
+  void write_each(const std::function<void(const Output&)>& write,
+                  const std::function<bool(const Output&)>& which = {});
   void tell_outputs() const;
   /// At the end of a run, when all else is told: IoError if an output could not be written.
   void require_outputs() const { require_all_written(failures_); }

@@ -52,6 +52,12 @@ std::atomic<bool> has_run_out{false};
 /// program's first thread the language does not say which one it was.
 [[noreturn]] void end_in_order() {
   const char* what = has_run_out ? kOutOfMemory : "an error in a parallel loop";
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {  // of Eigen's, which asks elsewhere
+    what = kOutOfMemory;
+  } catch (...) {
+  }
   // Nothing is allocated any more, nothing unwound: other threads still run.
   delete_temporaries();
   (void)!write(STDERR_FILENO, "subvol: ", 8);

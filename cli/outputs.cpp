@@ -10,6 +10,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <iostream>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -129,20 +130,26 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
   return outputs;
 }
 
-std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write) {
+std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write,
+                                    const std::function<bool(const Output&)>& which) {
   std::vector<std::string> failures;
+  const auto note = [&](const Output& output, const std::string& why) {
+    const std::string name = output.path.string();
+    failures.push_back(why.find(name) == std::string::npos ? name + ": " + why : why);
+    std::cerr << "subvol: " << failures.back() << '\n';
+  };
   std::erase_if(outputs, [&](Output& output) {
+    if (which && !which(output)) return false;
     try {
       std::error_code ignored;
       if (output.is_new && fs::exists(output.path, ignored))
-        throw IoError(output.path.string() + ": not written: somebody else has made this file since the work began");
+        throw IoError("not written: somebody else has made this file since the work began");
       write(output);
-      output.is_new = false;
       return false;
     } catch (const IoError& error) {
-      failures.push_back(error.what());
+      note(output, error.what());
     } catch (const InputError& error) {
-      failures.push_back(error.what());
+      note(output, error.what());
     }
     return true;
   });
@@ -151,9 +158,8 @@ std::vector<std::string> write_each(std::vector<Output>& outputs, const std::fun
 
 void require_all_written(const std::vector<std::string>& failures) {
   if (failures.empty()) return;
-  std::string text = failures.front();
-  for (std::size_t i = 1; i < failures.size(); ++i) text += "\nsubvol: " + failures[i];
-  throw IoError(text);
+  throw IoError(std::to_string(failures.size()) + " of the outputs could not be written: " + failures.front() +
+                (failures.size() > 1 ? ", ..." : ""));
 }
 
 Json output_names(const std::vector<Output>& outputs) {

@@ -43,10 +43,12 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
 /// write.
 void require_free(const std::filesystem::path& file, bool force);
 
-/// write(output) for each of them. One that cannot be written does not cost the others: it is taken off the list, and
-/// what was said of it returned. Nor is one written over a file that was made since it was found that there is none.
-std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write);
-/// IoError, of all that could not be written; nothing where there is none.
+/// write(output) for each of those that `which` names, or all. One that cannot be written (IoError, InputError) does
+/// not cost the others: it is said to stderr and in what is returned, and taken off the list. Nor is one written over a
+/// file that somebody has made since it was found that there is none.
+std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write,
+                                    const std::function<bool(const Output&)>& which = {});
+/// IoError that tells of these once more; nothing where there are none.
 void require_all_written(const std::vector<std::string>& failures);
 
 /// The file names, as the report lists them.

@@ -46,8 +46,8 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const AutoTemplateResult result = make(arguments, target);
   if (result.cancelled) return kInterrupted;
   if (result.templates.empty()) {
-    std::cerr << "subvol: no grid of up to 20 times " << arguments.options.cells << " cells has the target's "
-              << to_string(result.wanted) << "\n";
+    std::cerr << "subvol: no grid that was tried, of up to 20 times " << arguments.options.cells
+              << " cells has the target's " << to_string(result.wanted) << "\n";
     return kFailed;
   }
   const AutoTemplate& made = result.templates.front();

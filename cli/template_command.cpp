@@ -32,9 +32,9 @@ int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Out
                    const VolumeMesh& mesh, const Json& details) {
   WritingOptions writing = run.writing;
   writing.options = options_of_result(verb);
+  const MeshCheck check = check_mesh(mesh);
   const std::vector<std::string> failures =
       write_each(outputs, [&](const Output& output) { write_output(output, mesh, writing); });
-  const MeshCheck check = check_mesh(mesh);
   if (!run.run.report.empty()) {
     Json json{{"subvol", version()}, {"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};
     json.update(details);

@@ -29,10 +29,10 @@ enum class GltfContainer {
 /// options.
 ///
 /// InputError, naming node and array: no nodes; a node without positions or indices; arrays of unequal length; an index
-/// out of range; a number that is not finite, or overflows float32; a normal whose length is not 1 within 1e-6; a
-/// colour outside [0, 1]; an attribute name that is not underscore and capitals; shapes of lines; metres_per_unit or
-/// seconds_per_shape not positive, or times of shapes that are the same in float32; text that is not UTF-8; more than
-/// 2^31 bytes.
+/// out of range; a number that is not finite, or overflows float32; positions that are all below 1e-30; a normal whose
+/// length is not 1 within 1e-6; a colour outside [0, 1]; an attribute name that is not underscore and capitals; shapes
+/// of lines; metres_per_unit or seconds_per_shape not positive, or times of shapes that are the same in float32; text
+/// that is not UTF-8; more than 2^31 bytes.
 std::string gltf_bytes(const Scene& scene, GltfContainer container);
 
 /// Writes `gltf_bytes` to a .glb or .gltf file, all of it or nothing.

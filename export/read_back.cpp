@@ -245,11 +245,12 @@ std::vector<double> usda_numbers(const WrittenFile& file, const std::string& byt
   return values;
 }
 
-PolygonMesh usda_polygons(const WrittenFile& file) {
+/// origin  receives what the file adds to its points.
+PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
   const std::string bytes = read_file(file.path());
   PolygonMesh mesh;
   const std::vector<double> points = usda_numbers(file, bytes, "point3f[] points");
-  Vec3 origin = Vec3::Zero();
+  origin = Vec3::Zero();
   const std::string translate = "double3 xformOp:translate";
   if (bytes.find(translate) != std::string::npos) {
     const std::vector<double> value = usda_numbers(file, bytes, translate, "()");
@@ -386,10 +387,10 @@ void require_written(const fs::path& path, const PolygonMesh& surface) {
   double reach = 0;
   for (const Vec3& p : surface.positions) reach = std::max(reach, p.cwiseAbs().maxCoeff());
   read_back(path, [&](const WrittenFile& file) {
-    if (lower_case_extension(path) == ".obj")
-      compare_polygons(file, obj_polygons(file), surface, 0);
-    else
-      compare_polygons(file, usda_polygons(file), surface, kRounding * reach);
+    Vec3 origin = Vec3::Zero();
+    const bool is_obj = lower_case_extension(path) == ".obj";
+    const PolygonMesh found = is_obj ? obj_polygons(file) : usda_polygons(file, origin);
+    compare_polygons(file, found, surface, origin.isZero(0) ? 0 : kRounding * reach);
   });
 }
 

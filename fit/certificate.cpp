@@ -2,8 +2,8 @@
 #include "fit/certificate.h"
 
 #include "fit/bernstein.h"
-#include "subvol/parallel_errors.h"
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <algorithm>
 #include <string>

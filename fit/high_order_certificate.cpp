@@ -2,9 +2,9 @@
 #include "fit/high_order_certificate.h"
 
 #include "fit/hex_boxes.h"
-#include "subvol/parallel_errors.h"
 #include "fit/simplex_boxes.h"
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <Eigen/LU>
 

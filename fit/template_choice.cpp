@@ -144,7 +144,7 @@ bool Chooser::try_count(std::size_t cells) {
   std::vector<AutoTemplate> plain = candidates(cells, false, kPlain);
   if (choice_.cancelled) return false;
   if (plain.empty())
-    throw InputError("target: no grid of up to 20 times " + std::to_string(cells) + " cells has its " +
+    throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(cells) + " cells has its " +
                      to_string(choice_.topology) + "; give a --template");
   if (plain.front().cells_asked != cells)
     choice_.warnings.push_back(std::to_string(cells) + " cells cannot carry the target's " +

@@ -30,7 +30,8 @@ namespace subvol {
 /// inverted, so that minimising it untangles them. No step is limited then, and no cell counts as uncertified.
 class VolumeEnergy final : public VolumeTerm {
  public:
-  /// mesh  must outlive the energy; its positions are not read.
+  /// mesh  must outlive the energy; its positions are not read. InputError: more pairs of vertices of one cell than an
+  ///       Index numbers (some 8e7 vertices of hexes).
   /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError. Cells weigh equally.
   /// points_per_direction  >= 2; 2: corners only.
   VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction);

@@ -100,7 +100,8 @@ class Fit {
     auto mesh = std::make_shared<VolumeMesh>(*template_);
     const UntangledStart untangled = work_.run("untangle", [&] {
       return untangle_before_fit(
-          *mesh, {.time_limit_seconds = time_limit_seconds, .progress = work_.progress()});
+          *mesh,
+          {.time_limit_seconds = time_limit_seconds, .progress = work_.progress(), .cancelled = work_.cancelled()});
     });
     require_untangled(untangled, "fit");
     if (untangled.tangled > 0)
@@ -118,6 +119,7 @@ class Fit {
 
   std::shared_ptr<const VolumeMesh> made_template() {
     choice_options_.progress = work_.progress();
+    choice_options_.cancelled = work_.cancelled();
     choice_ = work_.run("template", [&] { return choose_template(std::get<TriangleMesh>(target_), choice_options_); });
     if (choice_->cancelled) throw InputError("fit: ended before there was a template");
     warnings_ = choice_->warnings;
@@ -126,6 +128,7 @@ class Fit {
 
   void fit_subdivision(Fitted& result) {
     subdivision_.progress = work_.progress();
+    subdivision_.cancelled = work_.cancelled();
     FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       subdivision_.log = log;
       return std::visit(
@@ -154,6 +157,7 @@ class Fit {
 
   void fit_curved(Fitted& result) {
     high_order_.progress = work_.progress();
+    high_order_.cancelled = work_.cancelled();
     HighOrderFitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
       high_order_.log = log;
       return std::visit([&](const auto& target) { return fit_high_order(target, *template_, high_order_); }, target_);

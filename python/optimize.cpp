@@ -79,6 +79,7 @@ class Optimization {
 
   void optimize(Optimized& result) {
     options_.progress = work_.progress();
+    options_.cancelled = work_.cancelled();
     const TriangleMesh* target = target_ ? &*target_ : nullptr;
     OptimizeResult found = checkpoints_.run(work_, "optimize", warnings_, [&](StageLog* log) {
       options_.log = log;
@@ -95,10 +96,12 @@ class Optimization {
 
   void curve(Optimized& result) {
     curving_.progress = work_.progress();
+    curving_.cancelled = work_.cancelled();
     VolumeMesh start = *mesh_;
     OptimizeOptions options;
     options.time_limit_seconds = curving_.time_limit_seconds;
     options.progress = curving_.progress;
+    options.cancelled = curving_.cancelled;
     const UntangledStart untangled = checkpoints_.run(work_, "untangle", warnings_, [&](StageLog* log) {
       options.log = log;
       return untangle_before_fit(start, options);

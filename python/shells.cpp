@@ -38,6 +38,7 @@ class Growing {
   std::shared_ptr<Shelled> run() {
     const auto result = std::make_shared<Shelled>();
     options_.progress = work_.progress();
+    options_.cancelled = work_.cancelled();
     result->shell = work_.run("grow", [&] { return make_shell(surface_.polygons, options_); });
     if (curved_options_.order != 1) curve(*result);
     std::vector<std::string> warnings = result->shell.report.warnings;
@@ -96,6 +97,7 @@ class Growing {
       return curved_boundary(mesh, writing_.chord_percent);
     };
     curved_options_.progress = work_.progress();
+    curved_options_.cancelled = work_.cancelled();
     result.curved_shell = work_.run("curve", [&] { return curve_shell(shell, curved_options_); });
     cli::take_figures(*result.curved_shell, shell);
     result.curved = std::make_shared<CurvedMesh>(CurvedMesh{result.curved_shell->mesh, shell.mesh.references});

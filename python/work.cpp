@@ -37,6 +37,18 @@ bool Work::tell(const FitProgress& progress) {
   }
 }
 
+std::function<bool()> Work::cancelled() {
+  return [this, asked = Clock::now()]() mutable {
+    if (error_) return true;
+    if (Clock::now() - asked < std::chrono::milliseconds(100)) return false;
+    asked = Clock::now();
+    const py::gil_scoped_acquire locked;
+    if (PyErr_CheckSignals() == 0) return false;
+    error_.emplace();
+    return true;
+  };
+}
+
 void Work::raise_pending() {
   if (error_) throw py::error_already_set(*error_);
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();

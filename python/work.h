@@ -55,6 +55,8 @@ class Work {
   std::function<bool(const FitProgress&)> progress() {
     return [this](const FitProgress& told) { return tell(told); };
   }
+  /// Ctrl-C between what is told, within long steps: asks Python ten times a second. From the calling thread alone.
+  std::function<bool()> cancelled();
   /// The same for work that tells its parts: stage and fraction, no energy.
   WorkProgress parts() {
     return [this](const char* part, double share) { return tell({part, 0, 0, 0, share}); };

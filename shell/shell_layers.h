@@ -54,7 +54,7 @@ struct ShellLayers {
 };
 
 /// Shares of layers that grow away from the surface: layer k is `growth` times as thick as layer k - 1.
-/// num_layers >= 0, growth > 0, else InputError. Returns num_layers + 1 numbers from 0 to 1.
+/// num_layers >= 0, growth > 0, a sum that is finite, else InputError. Returns num_layers + 1 numbers from 0 to 1.
 std::vector<double> layer_shares(int num_layers, double growth);
 
 /// Pairs the surface's edges and checks what a shell needs of it.

@@ -109,16 +109,17 @@ struct Waiting {
   ~Waiting() { --num_waiting; }
 };
 
-void write_directly(const fs::path& path, std::string_view bytes) {
+/// path: what it is called in messages.
+void write_directly(const fs::path& target, const fs::path& path, std::string_view bytes) {
   const Waiting waiting;
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+  Descriptor file(::open(target.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (file.get() < 0) fail(path, "open for writing", errno);
   write_all(file.get(), bytes, path);
   if (!file.close()) fail(path, "close", errno);
 }
 
 /// Creates an empty file of a fresh name. Not mkstemp: that would hide the user's umask behind mode 0600.
-int create_temporary(const fs::path& target, Temporary& temporary) {
+int create_temporary(const fs::path& target, const fs::path& path, Temporary& temporary) {
   std::random_device random;
   for (int attempt = 0; attempt < 100; ++attempt) {
     fs::path candidate = target.parent_path() / (".subvol-" + std::to_string(random()) + ".tmp");
@@ -127,9 +128,9 @@ int create_temporary(const fs::path& target, Temporary& temporary) {
     if (fd >= 0) return fd;
     const int error = errno;
     temporary.forget();
-    if (error != EEXIST) fail(target, "create a temporary file in its folder", error);
+    if (error != EEXIST) fail(path, "create a temporary file in its folder", error);
   }
-  fail(target, "create a temporary file in its folder", EEXIST);
+  fail(path, "create a temporary file in its folder", EEXIST);
 }
 
 /// A rename is on the disk only when the folder is; a file system that cannot flush folders is not an error.
@@ -146,7 +147,10 @@ fs::path behind_links(const fs::path& path) {
   fs::path target = path;
   std::error_code ignored;
   for (int i = 0; i < kMostLinks; ++i) {
-    if (!fs::is_symlink(target, ignored) || target.native().starts_with("/proc/")) return target;
+    if (!fs::is_symlink(target, ignored)) return target;
+    // The folder may be a link, too: /dev/fd leads to one in /proc.
+    const fs::path folder = fs::canonical(target.has_parent_path() ? target.parent_path() : ".", ignored);
+    if (folder.native().starts_with("/proc/")) return folder / target.filename();
     target = target.parent_path() / fs::read_symlink(target, ignored);  // an absolute one stands by itself
   }
   fail(path, "write", ELOOP);
@@ -160,12 +164,13 @@ void write_file_atomically(const fs::path& path, std::string_view bytes) {
   struct stat status = {};
   const bool exists = ::stat(target.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) fail(path, "write", EISDIR);
-  if (exists && (!S_ISREG(status.st_mode) || fs::is_symlink(target, ignored))) return write_directly(target, bytes);
+  if (exists && (!S_ISREG(status.st_mode) || fs::is_symlink(target, ignored)))
+    return write_directly(target, path, bytes);
   // A rename would replace a write-protected file without asking.
   if (exists && ::access(target.c_str(), W_OK) != 0) fail(path, "replace", errno);
 
   Temporary temporary;
-  Descriptor file(create_temporary(target, temporary));
+  Descriptor file(create_temporary(target, path, temporary));
   if (exists) (void)::fchmod(file.get(), status.st_mode & 07777);
   write_all(file.get(), bytes, path);
   if (::fsync(file.get()) != 0) fail(path, "flush to the disk", errno);

@@ -32,7 +32,8 @@ struct Placement {
 /// Edges of cells that are tried, by the one that the count and the volume make.
 constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
 constexpr double kLeastSize = 0.9;
-/// Most cells of one grid, empty ones and those to spare counted in: a second and half a gigabyte per thread or less.
+/// Most cells of one grid, empty ones and those to spare counted in, where so many are asked for in the solid: half a
+/// gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
 
 /// The box around a surface, in the coordinates of a frame.
@@ -52,11 +53,12 @@ Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
 
 /// Those frames whose grids for so many cells in the solid have few enough in all. The farther apart the solid's parts
 /// are, or the thinner its walls, the more of a grid is empty.
-std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t cells, std::span<const Mat3> frames) {
+std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t cells, double most,
+                                        std::span<const Mat3> frames) {
   const double size = kLeastSize * std::cbrt(solid.volume / static_cast<double>(cells));
   std::vector<Mat3> result;
   for (const Mat3& frame : frames)
-    if (cells_around(box_in(frame, solid.surface), size).prod() <= most_grid_cells(cells)) result.push_back(frame);
+    if (cells_around(box_in(frame, solid.surface), size).prod() <= most) result.push_back(frame);
   return result;
 }
 
@@ -222,10 +224,10 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   result.wanted = solid.topology;
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
-    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, frames);
+    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_grid_cells(options.cells), frames);
     if (usable.empty() && rung == 0)
       throw InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
-                       std::to_string(std::lround(most_grid_cells(cells))) +
+                       std::to_string(std::lround(most_grid_cells(options.cells))) +
                        " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one "
                        "by one");
     if (usable.empty()) break;

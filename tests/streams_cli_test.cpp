@@ -120,6 +120,9 @@ TEST_CASE("A link to the standard output is written through, to a file and to a 
   CHECK(shell(place, "\"$SUBVOL\" convert template.mesh -o out.obj --force --quiet | cat > to_pipe.obj") == 0);
   CHECK(content_of(place / "to_file.obj").starts_with("#"));
   CHECK(content_of(place / "to_file.obj") == content_of(place / "to_pipe.obj"));
+  CHECK(shell(place, "export SUBVOL; bash -c '\"$SUBVOL\" template grid --box 0 0 0 1 1 1 --counts 1 1 1 --quiet "
+                     "--report >(cat > r.json); s=$?; sleep 1; exit $s'") == 0);
+  CHECK(place.json("r.json")["command"] == "template grid");
 }
 
 TEST_CASE("A pipe that nobody reads is waited for until a signal comes", "[cli]") {

@@ -252,8 +252,8 @@ TEST_CASE("surfaces without extent, or whose areas leave the range of a double, 
   CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e300 0 0\n0 1e300 0\n3 0 1 2\n"), Contains("1e+300"));
   CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e-200 0 0\n0 1e-200 0\n3 0 1 2\n"), Contains("1e-200"));
   CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"), Contains("no triangle has any area"));
-  CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e-60 0 0\n0 1e-60 0\n3 0 1 2\n").triangles.size() == 1);
-  CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e60 0 0\n0 1e60 0\n3 0 1 2\n").triangles.size() == 1);
+  CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e-39 0 0\n0 1e-39 0\n3 0 1 2\n").triangles.size() == 1);
+  CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e39 0 0\n0 1e39 0\n3 0 1 2\n").triangles.size() == 1);
 }
 
 TEST_CASE("an unknown surface extension is refused with the known ones") {
