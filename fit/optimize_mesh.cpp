@@ -381,9 +381,10 @@ void MeshOptimizer::finish(bool going) {
         formatted("the boundary is farther from its surface than asked for: mean %.4g %%, largest %.4g %%",
                   mean_percent_, max_percent_);
   } else {
+    const bool cut_short = steps_ran_out();
     report_.explanation = formatted("all cells are valid%s; boundary within %.4g %% of its surface",
-                                    gains_ended_ && !steps_ran_out() ? " and no longer gain" : "", max_percent_);
-    if (steps_ran_out())
+                                    gains_ended_ && !cut_short ? " and no longer gain" : "", max_percent_);
+    if (cut_short)
       report_.explanation += formatted("; stages took all of the %d steps allowed", options_.max_iterations);
   }
 }

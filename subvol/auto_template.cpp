@@ -31,7 +31,7 @@ struct Placement {
 
 /// Edges of cells that are tried, by the one that the count and the volume make.
 constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
-constexpr double kLeastSize = 0.9;
+constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
 /// Most cells of one grid, empty ones and those to spare counted in, where so many are asked for in the solid: half a
 /// gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
@@ -222,12 +222,13 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, 20};
   AutoTemplateResult result;
   result.wanted = solid.topology;
+  const double most_cells = most_grid_cells(options.cells);
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
-    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_grid_cells(options.cells), frames);
+    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_cells, frames);
     if (usable.empty() && rung == 0)
       throw InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
-                       std::to_string(std::lround(most_grid_cells(options.cells))) +
+                       std::to_string(std::lround(most_cells)) +
                        " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one "
                        "by one");
     if (usable.empty()) break;
