@@ -3,11 +3,28 @@
 
 #include "cli/exit_status.h"
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 namespace subvol::cli {
+
+namespace {
+
+/// Some editors begin a file with one.
+void pass_byte_order_mark(std::istream& input) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  const std::istream::pos_type begin = input.tellg();
+  std::array<char, kMark.size()> first{};
+  input.read(first.data(), first.size());
+  if (input && std::string_view(first.data(), first.size()) == kMark) return;
+  input.clear();
+  input.seekg(begin);
+}
+
+}  // namespace
 
 CLI::Validator regular_file() {
   const auto check = [](const std::string& name) -> std::string {
@@ -26,6 +43,7 @@ std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const 
     path.push_back(verb->get_name());
   }
   if (path.empty()) return {};  // the parser is about to ask for a verb
+  pass_byte_order_mark(input);
   const auto names_a_verb = [&](const std::string& name) {
     return !app_.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == name; }).empty();
   };

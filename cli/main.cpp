@@ -13,6 +13,7 @@
 #include <exception>
 #include <iostream>
 #include <new>
+#include <string_view>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -76,6 +77,15 @@ void keep_freed_memory() {
 #endif
 }
 
+/// `--report=` would take the next word for its value.
+void require_value_behind_sign(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word.starts_with("--") && word.find('=') == word.size() - 1)
+      throw UsageError(std::string(word.substr(0, word.size() - 1)) + ": expected a value, got nothing");
+  }
+}
+
 /// An unset variable of a script is no file name: without this, its option would count as not given.
 void require_values(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
@@ -90,6 +100,7 @@ int run(int argc, char** argv) {
   Action action;
   describe_program(app, action);
   require_known_verb(app, argc, argv);
+  require_value_behind_sign(argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

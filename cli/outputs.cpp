@@ -36,13 +36,16 @@ bool contains(const std::array<std::string_view, N>& list, std::string_view item
   return std::find(list.begin(), list.end(), item) != list.end();
 }
 
-/// The part that a text begins with, and the file behind it.
+/// The part that a text begins with, and the file behind it. UsageError: a word and a colon that name no part.
 std::pair<Part, std::string> part_and_file(const std::string& text) {
-  for (std::size_t part = 1; part < kPartNames.size(); ++part) {
-    const std::string prefix = std::string(kPartNames[part]) + ':';
-    if (text.starts_with(prefix)) return {static_cast<Part>(part), text.substr(prefix.size())};
-  }
-  return {Part::result, text};
+  const std::size_t colon = text.find(':');
+  const std::string name = text.substr(0, colon);
+  const auto is_letter = [](unsigned char c) { return std::isalpha(c) != 0; };
+  if (colon == std::string::npos || !std::all_of(name.begin(), name.end(), is_letter)) return {Part::result, text};
+  for (std::size_t part = 1; part < kPartNames.size(); ++part)
+    if (name == kPartNames[part]) return {static_cast<Part>(part), text.substr(colon + 1)};
+  throw UsageError("-o " + text + ": expected cage:, cutaway: or animation: before a file, not '" + name +
+                   ":'; the file of that name is ./" + text);
 }
 
 Output parse_output(const std::string& text) {

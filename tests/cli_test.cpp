@@ -324,6 +324,8 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   refuses(std::string(kFit) + "--order 3 -o out.usda", 2, "out.usda");
   refuses(std::string(kFit) + "--order 3 -o cage:out.mesh", 2, "cage");
   refuses(std::string(kFit) + "--order 10 -o out.msh", 3, "order");
+  refuses(std::string(kFit) + "-o cages:out.mesh", 2, "cages:");
+  refuses(std::string(kFit) + "-o out.mesh --report= target.off", 2, "--report: expected a value");
   refuses(std::string(kFit) + "-o out.docx", 2, "out.docx");
   refuses(std::string(kFit) + "-o out", 2, "out");
   refuses(std::string(kFit) + "-o out.mesh -o ./out.mesh", 2, "twice");
@@ -409,6 +411,7 @@ TEST_CASE("A folder that cannot be written to is found before the work", "[cli]"
 TEST_CASE("Options may come from a file; the command line wins and unknown keys are errors", "[cli]") {
   const Workplace place;
   place.file("good.toml", "levels = 1\ntarget = \"unused.off\"\n");
+  place.file("marked.toml", "\xEF\xBB\xBF[subdivide]\nlevels = 2\n");  // by an editor that begins files so
   place.file("table.toml", "[subdivide]\nlevels = 2\n[check]\njson = true\n");
   place.file("flat.toml", "levels = 2\n");
   place.file("wrong.toml", "levles = 2\n");
@@ -419,6 +422,8 @@ TEST_CASE("Options may come from a file; the command line wins and unknown keys 
   CHECK(subvol::read_volume_mesh(place / "b.mesh").num_cells() == 7 * 64);
   REQUIRE(place.run("subdivide template.mesh --config table.toml -o c.mesh").status == 0);
   CHECK(subvol::read_volume_mesh(place / "c.mesh").num_cells() == 7 * 64);
+  REQUIRE(place.run("subdivide template.mesh --config marked.toml -o e.mesh").status == 0);
+  CHECK(content_of(place / "e.mesh") == content_of(place / "c.mesh"));
   REQUIRE(place.run("subdivide template.mesh --config flat.toml --levels 1 -o d.mesh").status == 0);
   CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 7 * 8);
 }
