@@ -251,11 +251,13 @@ TriangleMesh HighOrderFit::boundary(int intervals) const {
 /// Sampled more densely than what is fitted.
 TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sample_intervals(order_) + 1); }
 
-std::size_t HighOrderFit::intersecting_pairs() const { return self_intersections(measured_boundary()).pairs.size(); }
+std::size_t HighOrderFit::intersecting_pairs() const {
+  return count_intersecting_pairs(measured_boundary(), [this] { return runner_.is_to_end(); });
+}
 
 /// Whether the boundary intersects itself, but for folds that are about as small as what is between samples.
 bool HighOrderFit::is_folded() const {
-  return !self_intersections(boundary(sample_intervals(order_) + 1)).pairs.empty();
+  return count_intersecting_pairs(boundary(sample_intervals(order_) + 1), [this] { return runner_.is_to_end(); }) > 0;
 }
 
 double HighOrderFit::keep_mean(double distance) {

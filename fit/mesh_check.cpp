@@ -136,9 +136,11 @@ bool begins(const char* part, double fraction, const WorkProgress& progress, Mes
 void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_of_triangle, const Compare& compare,
                     const WorkProgress& progress, MeshCheck& check) {
   if (!begins("self-intersections", 0.3, progress, check)) return;
+  const SelfIntersections found =
+      self_intersections(triangles, [&] { return !begins("self-intersections", 0.3, progress, check); });
+  if (check.ended_early) return;
   check.has_boundary_geometry = true;
   check.volume = enclosed_volume(triangles);
-  const SelfIntersections found = self_intersections(triangles);
   check.num_intersecting_triangle_pairs = found.pairs.size();
   check.num_degenerate_boundary_triangles = found.degenerate.size();
   auto& faces = check.intersecting_faces;
@@ -376,8 +378,10 @@ std::string to_text(const MeshCheck& check) {
     append(text, "volume              %.6g\n", check.volume);
     if (check.chord_error > 0)
       append(text, "curved boundary     looked at as triangles within %.3g of it\n", check.chord_error);
-    append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)\n",
-           check.intersecting_faces.size(), check.num_intersecting_triangle_pairs);
+    const bool all = check.num_intersecting_triangle_pairs < kMostIntersectingPairs;
+    append(text, "self-intersections  %zu pairs of boundary faces (%zu of triangles)%s\n",
+           check.intersecting_faces.size(), check.num_intersecting_triangle_pairs,
+           all ? "" : ", where the search ended");
     if (check.num_degenerate_boundary_triangles > 0)
       append(text, "without area        %zu boundary triangles\n", check.num_degenerate_boundary_triangles);
   }

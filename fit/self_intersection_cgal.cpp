@@ -48,10 +48,21 @@ class PairTest {
 
   /// Triangles that share their first corner meet elsewhere exactly when the edge opposite to it in one of them does.
   bool meet_beyond_corner(const Triangle& a, const Triangle& b) const {
-    // Most neighbours have the opposite edge strictly to one side of the other's plane.
+    // Most have their opposite edges far from each other, or strictly to one side of the other's plane.
+    if (boxes_are_apart(a, b) && boxes_are_apart(b, a)) return false;
     if (strictly_beside(a, b) || strictly_beside(b, a)) return false;
     return CGAL::do_intersect(triangle(a), Kernel::Segment_3(points_[b[1]], points_[b[2]])) ||
            CGAL::do_intersect(triangle(b), Kernel::Segment_3(points_[a[1]], points_[a[2]]));
+  }
+  /// Of the edge opposite to the first corner, and of a triangle.
+  bool boxes_are_apart(const Triangle& edge, const Triangle& triangle) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = [&](Index v) { return mesh_.positions[v][axis]; };
+      const auto [low, high] = std::minmax({at(edge[1]), at(edge[2])});
+      const auto [least, most] = std::minmax({at(triangle[0]), at(triangle[1]), at(triangle[2])});
+      if (high < least || most < low) return true;
+    }
+    return false;
   }
   bool strictly_beside(const Triangle& plane, const Triangle& other) const {
     const auto side = [&](Index v) {
@@ -86,25 +97,59 @@ std::vector<Point> checked_points(const TriangleMesh& mesh) {
   return points;
 }
 
-/// Pairs of triangles whose boxes meet, in no particular order.
-std::vector<Pair> candidates(std::vector<Box>& boxes) {
-  std::vector<const Box*> pointers;
-  for (const Box& box : boxes) pointers.push_back(&box);
-  std::vector<Pair> pairs;
-  constexpr std::ptrdiff_t kCutoff = 200;  // boxes below which all pairs are tested; measured: flat from 50 to 2000
-  CGAL::box_self_intersection_d(
-      pointers.begin(), pointers.end(),
-      [&](const Box* a, const Box* b) {
-        const Index i = a->info(), j = b->info();
-        pairs.push_back({std::min(i, j), std::max(i, j)});
-      },
-      kCutoff);
-  return pairs;
-}
+/// Tests the pairs of triangles whose boxes meet, some at a time: there may be too many of them to keep.
+class Search {
+ public:
+  Search(const PairTest& test, const std::function<bool()>& cancelled, SelfIntersections& result)
+      : test_(test), cancelled_(cancelled), result_(result) {}
+
+  void run(const std::vector<Box>& boxes) {
+    std::vector<const Box*> pointers;
+    for (const Box& box : boxes) pointers.push_back(&box);
+    constexpr std::ptrdiff_t kCutoff = 200;  // boxes below which all pairs are tested; measured: flat from 50 to 2000
+    try {
+      CGAL::box_self_intersection_d(
+          pointers.begin(), pointers.end(), [&](const Box* a, const Box* b) { take(a->info(), b->info()); }, kCutoff);
+      test_some();
+    } catch (const Ended&) {
+      result_.is_complete = false;
+    }
+    std::sort(result_.pairs.begin(), result_.pairs.end());
+  }
+
+ private:
+  struct Ended {};
+
+  void take(Index i, Index j) {
+    some_.push_back({std::min(i, j), std::max(i, j)});
+    if (some_.size() < kPairsAtATime) return;
+    test_some();
+    if (cancelled_ && cancelled_()) throw Ended();
+  }
+
+  void test_some() {
+    meet_.resize(some_.size());
+#pragma omp parallel for schedule(dynamic, 1024)
+    for (std::size_t i = 0; i < some_.size(); ++i) meet_[i] = test_.meet_improperly(some_[i][0], some_[i][1]);
+    for (std::size_t i = 0; i < some_.size(); ++i) {
+      if (!meet_[i]) continue;
+      if (result_.pairs.size() == kMostIntersectingPairs) throw Ended();
+      result_.pairs.push_back(some_[i]);
+    }
+    some_.clear();
+  }
+
+  static constexpr std::size_t kPairsAtATime = 1 << 18;
+  const PairTest& test_;
+  const std::function<bool()>& cancelled_;
+  SelfIntersections& result_;
+  std::vector<Pair> some_;
+  std::vector<char> meet_;
+};
 
 }  // namespace
 
-SelfIntersections self_intersections(const TriangleMesh& mesh) {
+SelfIntersections self_intersections(const TriangleMesh& mesh, const std::function<bool()>& cancelled) {
   const std::vector<Point> points = checked_points(mesh);
   SelfIntersections result;
   std::vector<Box> boxes;
@@ -116,15 +161,13 @@ SelfIntersections self_intersections(const TriangleMesh& mesh) {
     else
       boxes.emplace_back(points[a].bbox() + points[b].bbox() + points[c].bbox(), static_cast<Index>(t));
   }
-  const std::vector<Pair> pairs = candidates(boxes);
-  const PairTest test(mesh, points);
-  std::vector<char> meet(pairs.size());
-#pragma omp parallel for schedule(dynamic, 1024)
-  for (std::size_t i = 0; i < pairs.size(); ++i) meet[i] = test.meet_improperly(pairs[i][0], pairs[i][1]);
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    if (meet[i]) result.pairs.push_back(pairs[i]);
-  std::sort(result.pairs.begin(), result.pairs.end());
+  Search(PairTest(mesh, points), cancelled, result).run(boxes);
   return result;
+}
+
+std::size_t count_intersecting_pairs(const TriangleMesh& mesh, const std::function<bool()>& cancelled) {
+  const SelfIntersections found = self_intersections(mesh, cancelled);
+  return found.is_complete ? found.pairs.size() : kMostIntersectingPairs;
 }
 
 }  // namespace subvol

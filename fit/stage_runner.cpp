@@ -51,7 +51,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
   int iteration = 0;
-  minimizer.ended = [this] { return is_over() || (options_.cancelled && options_.cancelled()); };
+  minimizer.ended = [this] { return is_to_end(); };
   minimizer.progress = [&](const IterationRecord& step) {
     const double energy = step.surface_energy + stage.lambda * step.volume_energy;
     const bool wanted = !options_.progress ||

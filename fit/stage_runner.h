@@ -63,6 +63,9 @@ class StageRunner {
   /// Says how a fit ended whose stages are all done, at this mean distance.
   void conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const;
 
+  /// Whether what is under way is to be given up: the time is over, or the caller wants an end.
+  bool is_to_end() const { return is_over() || (options_.cancelled && options_.cancelled()); }
+
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
  private:

@@ -247,7 +247,8 @@ double SubdivisionFit::mean_scaled_jacobian() const { return measure_quality(cur
 
 std::size_t SubdivisionFit::intersecting_pairs() const {
   const VolumeMesh mesh = current_mesh();
-  return self_intersections(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))).pairs.size();
+  return count_intersecting_pairs(refined_triangles(boundary_surface(mesh, MeshTopology(mesh))),
+                                  [this] { return runner_.is_to_end(); });
 }
 
 bool SubdivisionFit::meets_tolerance() {

@@ -119,14 +119,14 @@ Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
 /// Fits a template a little and notes how that went. False where cancelled.
 bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
   const auto [surface, mean_scaled_jacobian] = options_.order > 0 ? fit_curved(mesh) : fit_subdivided(mesh);
+  TemplateTrial trial{.cells = mesh.num_cells(), .pillowed = pillowed};
+  trial.self_intersections = count_intersecting_pairs(surface, options_.cancelled);
   choice_.cancelled = choice_.cancelled || (options_.cancelled && options_.cancelled());
   if (choice_.cancelled) return false;
   const SurfaceDistance distance = surface_distance(surface, ClosestPoint(surface), target_, tree_);
-  TemplateTrial trial{.cells = mesh.num_cells(), .pillowed = pillowed};
   trial.mean_percent = 100 * distance.mean() / diagonal_;
   trial.max_percent = 100 * distance.max() / diagonal_;
   trial.mean_scaled_jacobian = mean_scaled_jacobian;
-  trial.self_intersections = self_intersections(surface).pairs.size();
   trial.merit = trial.max_percent / kGoodMaxPercent + trial.mean_percent / kGoodMeanPercent +
                 kShapeWeight * std::max(0.0, kGoodShape - trial.mean_scaled_jacobian) +
                 (trial.self_intersections > 0 ? 1 : 0);

@@ -148,7 +148,7 @@ void ShellMaker::require_no_intersections() const {
   polygons.face_vertices.resize(polygons.face_offsets.back());
   polygons.positions = cells_.positions;
   std::vector<Index> polygon;
-  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon));
+  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon), options_.cancelled);
   std::vector<Index> faces;
   for (const auto& [t, s] : found.pairs) faces.insert(faces.end(), {polygon[t], polygon[s]});
   for (const Index t : found.degenerate) faces.push_back(polygon[t]);

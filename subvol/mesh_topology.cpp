@@ -10,11 +10,18 @@ namespace subvol {
 
 namespace {
 
-/// Chains of entities hung on their smallest vertex: a lookup costs the (small) number of entities there.
+/// Chains of entities hung on that one of their vertices that has the fewest cells: a lookup costs the number of
+/// entities there, which is small even beside a vertex of all cells.
 struct Chains {
   explicit Chains(std::size_t num_vertices) : head(num_vertices, kNoIndex) {}
   std::vector<Index> head, next;
 };
+
+std::vector<Index> cells_at_vertices(const VolumeMesh& mesh) {
+  std::vector<Index> counts(mesh.num_vertices(), 0);
+  for (const Index v : mesh.cell_vertices) ++counts[v];
+  return counts;
+}
 
 /// Equality of sorted corners, in registers.
 bool same_corners(const std::array<Index, 4>& a, const std::array<Index, 4>& b) {
@@ -52,6 +59,8 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
   face_vertices_.reserve(4 * num_cells);
   face_cells_.reserve(4 * num_cells);
 
+  const std::vector<Index> num_cells_at = cells_at_vertices(mesh);
+  const auto with_fewer_cells = [&](Index a, Index b) { return num_cells_at[b] < num_cells_at[a] ? b : a; };
   Chains edge_chains(num_vertices_), face_chains(num_vertices_);
   std::vector<std::array<Index, 4>> face_keys;
   face_keys.reserve(4 * num_cells);
@@ -64,14 +73,15 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
     for (int i = 0; i < topology.num_edges; ++i) {
       Index a = cell[topology.edges[i][0]], b = cell[topology.edges[i][1]];
       if (a > b) std::swap(a, b);
-      Index e = edge_chains.head[a];
-      while (e != kNoIndex && edges_[e][1] != b) e = edge_chains.next[e];
+      const Index hook = with_fewer_cells(a, b);
+      Index e = edge_chains.head[hook];
+      while (e != kNoIndex && (edges_[e][0] != a || edges_[e][1] != b)) e = edge_chains.next[e];
       if (e == kNoIndex) {
         e = static_cast<Index>(edges_.size());
         edges_.push_back({a, b});
         edge_cell_counts_.push_back(0);
-        edge_chains.next.push_back(edge_chains.head[a]);
-        edge_chains.head[a] = e;
+        edge_chains.next.push_back(edge_chains.head[hook]);
+        edge_chains.head[hook] = e;
       }
       ++edge_cell_counts_[e];
       cell_edges_.push_back(e);
@@ -83,15 +93,17 @@ MeshTopology::MeshTopology(const VolumeMesh& mesh) : num_vertices_(mesh.num_vert
       std::array<Index, 4> corners = {kNoIndex, kNoIndex, kNoIndex, kNoIndex};
       for (int j = 0; j < size; ++j) corners[j] = cell[topology.faces[i][j]];
       const std::array<Index, 4> key = sorted_corners(corners, size);
-      Index f = face_chains.head[key[0]];
+      Index hook = key[0];
+      for (int j = 1; j < size; ++j) hook = with_fewer_cells(hook, key[j]);
+      Index f = face_chains.head[hook];
       while (f != kNoIndex && !same_corners(face_keys[f], key)) f = face_chains.next[f];
       if (f == kNoIndex) {
         f = static_cast<Index>(face_cells_.size());
         face_vertices_.push_back(corners);
         face_keys.push_back(key);
         face_cells_.push_back({static_cast<Index>(c), kNoIndex});
-        face_chains.next.push_back(face_chains.head[key[0]]);
-        face_chains.head[key[0]] = f;
+        face_chains.next.push_back(face_chains.head[hook]);
+        face_chains.head[hook] = f;
       } else {
         if (face_cells_[f][1] != kNoIndex)
           throw InputError("MeshTopology: cell " + std::to_string(c) +

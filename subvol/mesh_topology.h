@@ -13,7 +13,8 @@ namespace subvol {
 /// (cell by cell, in local order), so equal meshes get equal numbers.
 ///
 /// Expects index-correct cells (no `index_out_of_range`, `repeated_vertex` or `face_of_many_cells` of `validate`;
-/// the last is refused with InputError). Positions are not read. Cost: linear, with chains on the smallest vertex.
+/// the last is refused with InputError). Positions are not read. Cost: linear, even where one
+/// vertex has all cells.
 class MeshTopology {
  public:
   explicit MeshTopology(const VolumeMesh& mesh);

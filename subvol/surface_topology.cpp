@@ -17,15 +17,25 @@ std::string name_of(Index v, std::span<const Index> names) {
 std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
 
 void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind) {
-  // Corners leaving each vertex, as chains: a lookup costs the valence.
   const std::size_t num_corners = surface.corner_vertices.size();
-  std::vector<Index> head(num_vertices, kNoIndex), next_leaving(num_corners);
+  surface.vertex_corners.assign(num_vertices, kNoIndex);
+  std::vector<Index> valence(num_vertices, 0);
   for (std::size_t h = num_corners; h-- > 0;) {
-    Index& first = head[surface.corner_vertices[h]];
-    next_leaving[h] = first;
-    first = static_cast<Index>(h);
+    const Index v = surface.corner_vertices[h];
+    surface.vertex_corners[v] = static_cast<Index>(h);
+    ++valence[v];
   }
-  surface.vertex_corners = head;
+  // Corners as chains on that end of their edge that has fewer: a lookup is short even beside a vertex of all faces.
+  std::vector<Index> head(num_vertices, kNoIndex), next(num_corners);
+  const auto hook = [&](Index a, Index b) {
+    return valence[a] < valence[b] || (valence[a] == valence[b] && a < b) ? a : b;
+  };
+  for (std::size_t h = num_corners; h-- > 0;) {
+    const Index corner = static_cast<Index>(h);
+    Index& first = head[hook(surface.corner_vertices[h], surface.corner_vertices[surface.next(corner)])];
+    next[h] = first;
+    first = corner;
+  }
   surface.twins.assign(num_corners, kNoIndex);
   surface.corner_edges.assign(num_corners, kNoIndex);
   surface.edge_corners.reserve(num_corners / 2);
@@ -34,10 +44,11 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
     const Index from = surface.corner_vertices[h], to = surface.corner_vertices[surface.next(h)];
     Index twin = kNoIndex;
     int same = 0, opposite = 0;
-    for (Index g = head[to]; g != kNoIndex; g = next_leaving[g])
-      if (surface.corner_vertices[surface.next(g)] == from) twin = g, ++opposite;
-    for (Index g = head[from]; g != kNoIndex; g = next_leaving[g])
-      if (surface.corner_vertices[surface.next(g)] == to) ++same;
+    for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g]) {
+      const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
+      if (begin == to && end == from) twin = g, ++opposite;
+      if (begin == from && end == to) ++same;
+    }
     const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
     if (same != 1 || (opposite != 1 && !border)) {
       const std::string edge = prefix(kind) + "edge " + name_of(from, names) + "-" + name_of(to, names);

@@ -207,7 +207,9 @@ class Validator {
       for (int i = 0; i < 2; ++i) neighbors[edge[i]].push_back(edge[1 - i]);
     });
     for_each_edge([&](const std::array<Index, 2>& edge) {
-      const Index v = first_on_chain(neighbors, edge[0], edge[1]);
+      // From the end with fewer neighbours: a vertex may have as many as the mesh has edges.
+      const bool turned = neighbors[edge[1]].size() < neighbors[edge[0]].size();
+      const Index v = first_on_chain(neighbors, edge[turned], edge[!turned]);
       // A flat triangle of one cell is a degenerate cell, not a hanging vertex.
       if (v != kNoIndex && find_triangle({edge[0], v, edge[1]}) == kNoIndex)
         add(Kind::nonconforming_face, v, name_of(v) + " hangs in the edge " + list(edge) + " of a cell without it");

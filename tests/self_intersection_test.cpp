@@ -6,6 +6,8 @@
 #include <catch2/catch.hpp>
 #include <omp.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -93,6 +95,44 @@ TEST_CASE("self-intersections of a soup do not depend on threads, numbering or p
   std::reverse(reversed.triangles.begin(), reversed.triangles.end());
   for (Vec3& p : reversed.positions) p = 2 * Vec3(p[1], -p[2], p[0]);
   CHECK(self_intersections(reversed).pairs.size() == one.size());
+}
+
+TEST_CASE("many triangles round a vertex are told apart, a search in a heap has an end", "[self_intersection]") {
+  // Two cones of n triangles each on one circle; then with a vertex of it drawn through to beyond the other side.
+  constexpr int n = 300;
+  TriangleMesh cones{{{0, 0, 1}, {0, 0, -1}}, {}};
+  for (int i = 0; i < n; ++i) {
+    const double angle = 2 * M_PI * i / n;
+    cones.positions.emplace_back(std::cos(angle), std::sin(angle), 0);
+    const Index a = 2 + i, b = 2 + (i + 1) % n;
+    cones.triangles.push_back({a, b, 0});
+    cones.triangles.push_back({b, a, 1});
+  }
+  SelfIntersections found = self_intersections(cones);
+  CHECK(found.empty());
+  CHECK(found.is_complete);
+  TriangleMesh bent = cones;
+  bent.positions[2] = {-2, 0.004, 0.1};
+  found = self_intersections(bent);
+  CHECK(found.is_complete);
+  CHECK(!found.empty());
+  for (const auto& [t, s] : found.pairs) {
+    const auto& a = bent.triangles[t];
+    const auto& b = bent.triangles[s];
+    CHECK((std::count(a.begin(), a.end(), 2) > 0 || std::count(b.begin(), b.end(), 2) > 0));
+  }
+
+  TriangleMesh heap;
+  for (int i = 0; i < 1500; ++i) add(heap, {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+  found = self_intersections(heap);
+  CHECK(found.pairs.size() == kMostIntersectingPairs);
+  CHECK(!found.is_complete);
+  CHECK(std::is_sorted(found.pairs.begin(), found.pairs.end()));
+  found = self_intersections(heap, [] { return true; });
+  CHECK(!found.is_complete);
+  CHECK(found.pairs.size() < kMostIntersectingPairs);
+  CHECK(count_intersecting_pairs(heap, [] { return true; }) == kMostIntersectingPairs);
+  CHECK(count_intersecting_pairs(bent) == self_intersections(bent).pairs.size());
 }
 
 TEST_CASE("self-intersection refuses broken surfaces", "[self_intersection]") {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/mesh_topology.h"
 #include "subvol/volume_mesh.h"
 
 #include "tests/sample_meshes.h"
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 
 using namespace subvol;
@@ -108,6 +112,31 @@ TEST_CASE("a quad against two triangles is not conforming") {
   mesh.add_cell(CellKind::tet, std::array<Index, 4>{4, 5, 6, apex});
   mesh.add_cell(CellKind::tet, std::array<Index, 4>{4, 6, 7, apex});
   CHECK(has(validate(mesh), Kind::nonconforming_face));
+}
+
+TEST_CASE("a vertex of all cells may have any number") {
+  constexpr Index n = 2000;
+  for (const bool first : {true, false}) {  // prisms round an axis whose vertices are the first or the last
+    VolumeMesh mesh;
+    const Index axis = first ? 0 : 2 * n, rim = first ? 2 : 0;
+    mesh.positions.resize(2 * n + 2);
+    mesh.positions[axis] = {0, 0, 0};
+    mesh.positions[axis + 1] = {0, 0, 1};
+    for (Index i = 0; i < n; ++i) {
+      const double angle = 2 * M_PI * i / n;
+      for (const Index z : {0, 1}) mesh.positions[rim + z * n + i] = {std::cos(angle), std::sin(angle), double(z)};
+      const Index a = rim + i, b = rim + (i + 1) % n;
+      mesh.add_cell(CellKind::prism, std::array<Index, 6>{axis, a, b, axis + 1, a + n, b + n});
+    }
+    CHECK(validate(mesh).empty());
+    const MeshTopology topology(mesh);
+    CHECK(topology.num_faces() == 4 * n);
+    CHECK(topology.num_edges() == 1 + 5 * n);
+    CHECK(topology.boundary_faces().size() == 3 * n);
+    CHECK(topology.num_edge_cells(topology.find_edge(axis, axis + 1)) == n);
+    mesh.add_cell(CellKind::prism, std::array<Index, 6>{axis, rim, rim + 1, axis + 1, rim + n, rim + n + 1});
+    CHECK(!validate(mesh).empty());
+  }
 }
 
 TEST_CASE("two half hexes against a whole one leave hanging vertices, however the mesh lies in space") {
