@@ -77,7 +77,7 @@ struct MeshCheck {
   double chord_error = 0;                                    ///< of the triangles that stand for a curved boundary
   double volume = 0;                                         ///< enclosed by the boundary's triangles, signed
   std::vector<std::array<Index, 2>> intersecting_faces;      ///< places in `boundary_faces()`, ascending; may be equal
-  std::size_t num_intersecting_triangle_pairs = 0;
+  std::size_t num_intersecting_triangle_pairs = 0;           ///< `kMostIntersectingPairs`: that many or more
   std::size_t num_degenerate_boundary_triangles = 0;         ///< without area: not looked at for intersections
 
   std::optional<SurfaceDistance> distance;                   ///< a: boundary, b: target
