@@ -60,9 +60,10 @@ void read(const std::filesystem::path& file) {
   }
 }
 
-/// The fingerprint is made right: it would keep everything else from being looked at.
+/// The format's line and the fingerprint are made right: they would keep everything else from being looked at.
 void read_checkpoint_of(std::string_view bytes) {
-  const std::string name = "checkpoint", head = "subvol checkpoint 2\n";
+  const std::string name = "checkpoint", sample = subvol::checkpoint_bytes({}, {});
+  const std::string head = sample.substr(0, sample.find('\n') + 1);
   const std::string_view content = bytes.substr(std::min(bytes.size(), head.size() + 17));
   const std::string whole = head + subvol::Fingerprint().add(content).text() + '\n' + std::string(content);
   const subvol::Checkpoint read = subvol::parse_checkpoint(whole, name);

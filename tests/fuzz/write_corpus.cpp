@@ -101,7 +101,13 @@ void write_surfaces(const fs::path& folder) {
 
 void write_checkpoints(const fs::path& folder) {
   const SolvedStage stage{"level 1", 5, {Vec3(1, 2, 3)}, {MinimizerStop::converged, "why", {{1, 2, 1, 3, 4}}}, 0.5};
+  SolvedStage denser = stage;  // cells were given a denser quadrature, twice, and it is not over
+  denser.result.stop = MinimizerStop::cancelled;
+  denser.result.small_steps = 2;
+  denser.result.densified = {{0, 4}, {7}};
+  denser.result.densified_at = {Vec3(1, 2, 3), Vec3(4, 5, 6)};
   write(folder / "checkpoint", "one", checkpoint_bytes({{"--levels", "3"}, {"target", "ab"}}, {stage, stage}));
+  write(folder / "checkpoint", "denser", checkpoint_bytes({{"--levels", "3"}}, {stage, denser}));
   write(folder / "checkpoint", "empty", checkpoint_bytes({}, {}));
 }
 
