@@ -12,7 +12,6 @@
 #include "fit/option_checks.h"
 #include "fit/order_indicator.h"
 #include "fit/quadrature.h"
-#include "fit/self_intersection.h"
 #include "fit/stage_runner.h"
 #include "fit/staged_fit.h"
 #include "subvol/boundary.h"
@@ -96,7 +95,7 @@ class HighOrderFit : StagedFit {
   bool run_adaptive_orders();
   bool finish();
   bool lower_lambda(std::size_t pairs);
-  Outcome measured_outcome();
+  std::optional<Outcome> measured_outcome();
   bool improve_worst_places();
   bool is_better(const Outcome& next) const;
   Again run_again(double& setting, double value, int steps);
@@ -108,8 +107,8 @@ class HighOrderFit : StagedFit {
   TriangleMesh measured_boundary() const;
   double keep_mean(double distance);
   double measured_mean();
-  std::size_t intersecting_pairs() const override;
-  bool is_folded() const;
+  std::optional<std::size_t> intersecting_pairs() override;
+  std::optional<bool> is_folded();
   std::vector<Vec3>& unknowns() override { return mesh_.coefficients; }
   FitReport& report() override { return report_; }
 
@@ -251,13 +250,15 @@ TriangleMesh HighOrderFit::boundary(int intervals) const {
 /// Sampled more densely than what is fitted.
 TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sample_intervals(order_) + 1); }
 
-std::size_t HighOrderFit::intersecting_pairs() const {
-  return count_intersecting_pairs(measured_boundary(), [this] { return runner_.is_to_end(); });
+std::optional<std::size_t> HighOrderFit::intersecting_pairs() {
+  return runner_.intersecting_pairs(measured_boundary(), report_);
 }
 
-/// Whether the boundary intersects itself, but for folds that are about as small as what is between samples.
-bool HighOrderFit::is_folded() const {
-  return count_intersecting_pairs(boundary(sample_intervals(order_) + 1), [this] { return runner_.is_to_end(); }) > 0;
+/// Whether the boundary intersects itself, but for folds that are about as small as what is between samples. None when
+/// the fit must end.
+std::optional<bool> HighOrderFit::is_folded() {
+  const auto pairs = runner_.intersecting_pairs(boundary(sample_intervals(order_) + 1), report_);
+  return pairs ? std::optional(*pairs > 0) : std::nullopt;
 }
 
 double HighOrderFit::keep_mean(double distance) {
@@ -321,10 +322,12 @@ bool HighOrderFit::run_first_orders(int last) {
     for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
       if (!run_order(attempt.approach, order)) return false;
     if (schedule_.tries.size() == 1) return true;
+    const std::optional<bool> folded = is_folded();
+    if (!folded) return false;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
     const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
-    Arrival arrival{is_folded(), measured_mean(), distortion, energy, mesh_, ideal_boxes_, points_, approach_,
+    Arrival arrival{*folded, measured_mean(), distortion, energy, mesh_, ideal_boxes_, points_, approach_,
                     states_, start_, try_, stages_begin, report_.stages.size()};
     const bool better =
         !best || std::tuple(arrival.folded, arrival.energy) < std::tuple(best->folded, best->energy);
@@ -385,13 +388,12 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
   for (double lambda = lambda_ / 2; !meets_tolerance() && lambda >= 0.99 * least; lambda /= 2) {
     const double before = measured_mean();
     FitSnapshot stiffer = snapshot();
-    const bool going = run_final_stage(lambda);
-    const std::size_t pairs_now = going ? intersecting_pairs() : 0;
-    if (!going || pairs_now > pairs) {
+    const std::optional<std::size_t> pairs_now = run_final_stage(lambda) ? intersecting_pairs() : std::nullopt;
+    if (!pairs_now || *pairs_now > pairs) {
       go_back(std::move(stiffer));
-      return going;
+      return pairs_now.has_value();
     }
-    pairs = pairs_now;
+    pairs = *pairs_now;
     if (1 - measured_mean() / before < kLeastGain) break;
   }
   return true;
@@ -400,26 +402,32 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
 /// What is done once the orders are those of the finished mesh. Improving the worst places undoes small folds as well;
 /// only what is still folded then begins the last stage again.
 bool HighOrderFit::finish() {
-  const std::size_t folded = intersecting_pairs();
-  if (!lower_lambda(folded) || !improve_worst_places()) return false;
-  std::size_t pairs = folded > 0 ? intersecting_pairs() : 0;
-  if (pairs == 0) return true;
-  const std::size_t pairs_before = pairs;
+  std::optional<std::size_t> pairs = intersecting_pairs();
+  if (!pairs || !lower_lambda(*pairs) || !improve_worst_places()) return false;
+  if (*pairs > 0) pairs = intersecting_pairs();
+  if (!pairs || *pairs == 0) return pairs.has_value();
+  const std::size_t pairs_before = *pairs;
   emphasis_ = far_length_ = 0;
-  if (!unfold(start_, kMostUnfoldingLambdaOfOrders, pairs)) return false;
-  return pairs == pairs_before || (lower_lambda(pairs) && improve_worst_places());
+  if (!unfold(start_, kMostUnfoldingLambdaOfOrders, *pairs)) return false;
+  return *pairs == pairs_before || (lower_lambda(*pairs) && improve_worst_places());
 }
 
-HighOrderFit::Outcome HighOrderFit::measured_outcome() {
+/// None when the fit must end.
+std::optional<HighOrderFit::Outcome> HighOrderFit::measured_outcome() {
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance distance = target_.distance(measured_boundary());
-  return {quality.min_scaled_jacobian, keep_mean(distance.mean()), 100 * distance.max(), intersecting_pairs()};
+  const double mean = keep_mean(distance.mean());
+  const std::optional<std::size_t> pairs = intersecting_pairs();
+  if (!pairs) return {};
+  return Outcome{quality.min_scaled_jacobian, mean, 100 * distance.max(), *pairs};
 }
 
 /// The last stage again for the sake of few places, which matter little to the energies: both are means.
 bool HighOrderFit::improve_worst_places() {
   if (!options_.improve_worst_places || options_.order < 2) return true;
-  outcome_ = measured_outcome();
+  const std::optional<Outcome> first = measured_outcome();
+  if (!first) return false;
+  outcome_ = *first;
   most_max_ = kMostDistanceGrowth * outcome_.max_percent;
   most_mean_ = options_.tolerance_percent ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
                                           : kMostDistanceGrowth * outcome_.mean_percent;
@@ -446,17 +454,14 @@ HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int s
   const double setting_before = std::exchange(setting, value);
   Stage stage = schedule_.final_stage(lambda_);
   stage.max_iterations = steps;
-  const bool going = run_stage(stage);
-  if (going) {
-    const Outcome next = measured_outcome();
-    if (is_better(next)) {
-      outcome_ = next;
-      return Again::kept;
-    }
+  const std::optional<Outcome> next = run_stage(stage) ? measured_outcome() : std::nullopt;
+  if (next && is_better(*next)) {
+    outcome_ = *next;
+    return Again::kept;
   }
   go_back(std::move(before));
   setting = setting_before;
-  return going ? Again::undone : Again::ended;
+  return next ? Again::undone : Again::ended;
 }
 
 /// With more and more emphasis on places that are much farther off than the mean, as long as there are any.

@@ -3,6 +3,7 @@
 
 #include "fit/closest_point_energy.h"
 #include "fit/option_checks.h"
+#include "fit/self_intersection.h"
 #include "fit/surface_energy.h"
 #include "subvol/error.h"
 #include "subvol/fingerprint.h"
@@ -79,12 +80,22 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   record.stop = std::move(solved.result.explanation);
   const std::string name = record.name;
   report.stages.push_back(std::move(record));
-  if (going) return true;
-  if (in_time(name, report)) {
-    report.stop_reason = StopReason::cancelled;
-    report.explanation = "cancelled in " + name;
-  }
-  return false;
+  if (!going) give_up(name, report);
+  return going;
+}
+
+void StageRunner::give_up(const std::string& work, FitReport& report) const {
+  if (!in_time(work, report)) return;
+  report.stop_reason = StopReason::cancelled;
+  report.explanation = "cancelled in " + work;
+}
+
+std::optional<std::size_t> StageRunner::intersecting_pairs(const TriangleMesh& boundary, FitReport& report) const {
+  bool ended = false;
+  const SelfIntersections found = self_intersections(boundary, [&] { return ended = ended || is_to_end(); });
+  if (!ended) return found.pairs.size();
+  give_up("the search for self-intersections", report);
+  return {};
 }
 
 bool StageRunner::in_time(const std::string& work, FitReport& report) const {

@@ -60,6 +60,10 @@ class StageRunner {
   /// Asked before work that takes long. False, with the report's stop reason set, where the time is over.
   bool in_time(const std::string& work, FitReport& report) const;
 
+  /// The pairs of triangles of a fitted boundary that intersect. None, with the report's stop reason set, where the fit
+  /// must end: the search was given up.
+  std::optional<std::size_t> intersecting_pairs(const TriangleMesh& boundary, FitReport& report) const;
+
   /// Says how a fit ended whose stages are all done, at this mean distance.
   void conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const;
 
@@ -72,6 +76,8 @@ class StageRunner {
   using Clock = std::chrono::steady_clock;
 
   bool is_over() const { return options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds; }
+  /// Says that the fit must end in the midst of such work.
+  void give_up(const std::string& work, FitReport& report) const;
   /// From the stage's x, and what was done to get there, on.
   void solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const;
 

@@ -25,16 +25,15 @@ bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t
   for (double lambda = kFactor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= kFactor) {
     FitSnapshot softer = snapshot();
     unknowns() = start.x;
-    const bool going = run_final_stage(lambda);
-    const std::size_t pairs_now = going ? intersecting_pairs() : pairs;
-    if (pairs_now <= pairs / 2) {
-      pairs = pairs_now;
+    const std::optional<std::size_t> pairs_now = run_final_stage(lambda) ? intersecting_pairs() : std::nullopt;
+    if (pairs_now && *pairs_now <= pairs / 2) {
+      pairs = *pairs_now;
       report().undo_stages(start.num_stages, softer.num_stages);
       states_.resize(std::min(states_.size(), start.num_states + 1));  // up to the start, from which it went
     } else {
       go_back(std::move(softer));
     }
-    if (!going) return false;
+    if (!pairs_now) return false;
   }
   return true;
 }

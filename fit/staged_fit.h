@@ -34,8 +34,8 @@ class StagedFit {
   virtual FitReport& report() = 0;
   /// The last stage of all with this lambda. False when the fit must end.
   virtual bool run_final_stage(double lambda) = 0;
-  /// Of triangles of the boundary.
-  virtual std::size_t intersecting_pairs() const = 0;
+  /// Of triangles of the boundary. None when the fit must end.
+  virtual std::optional<std::size_t> intersecting_pairs() = 0;
 
   FitSnapshot snapshot();
   void go_back(FitSnapshot snapshot);

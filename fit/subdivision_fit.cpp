@@ -10,7 +10,6 @@
 #include "fit/memory_budget.h"
 #include "fit/option_checks.h"
 #include "fit/quality.h"
-#include "fit/self_intersection.h"
 #include "fit/stage_runner.h"
 #include "fit/staged_fit.h"
 #include "fit/volume_energy.h"
@@ -72,7 +71,7 @@ class SubdivisionFit : StagedFit {
   double measured_mean();
   VolumeMesh current_mesh() const;
   double mean_scaled_jacobian() const;
-  std::size_t intersecting_pairs() const override;
+  std::optional<std::size_t> intersecting_pairs() override;
   bool meets_tolerance();
   void store_result();
   void next_control();
@@ -245,10 +244,9 @@ VolumeMesh SubdivisionFit::current_mesh() const {
 
 double SubdivisionFit::mean_scaled_jacobian() const { return measure_quality(current_mesh()).mean_scaled_jacobian; }
 
-std::size_t SubdivisionFit::intersecting_pairs() const {
+std::optional<std::size_t> SubdivisionFit::intersecting_pairs() {
   const VolumeMesh mesh = current_mesh();
-  return count_intersecting_pairs(refined_triangles(boundary_surface(mesh, MeshTopology(mesh))),
-                                  [this] { return runner_.is_to_end(); });
+  return runner_.intersecting_pairs(refined_triangles(boundary_surface(mesh, MeshTopology(mesh))), result_.report);
 }
 
 bool SubdivisionFit::meets_tolerance() {
@@ -277,14 +275,14 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
     }
     const double gain = 1 - measured_mean() / mean, cost = volume > 0 ? distortion() / volume - 1 : 0;
     const double loss = shape - mean_scaled_jacobian();
-    const std::size_t pairs_now = intersecting_pairs();
-    if (pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
+    const std::optional<std::size_t> pairs_now = intersecting_pairs();
+    if (!pairs_now || *pairs_now > pairs || (!options_.tolerance_percent && loss > most_loss)) {
       go_back(std::move(stiffer));
-      break;
+      return pairs_now.has_value();
     }
     mean = measured_mean();
     volume = distortion();
-    pairs = pairs_now;
+    pairs = *pairs_now;
     if (gain < (options_.tolerance_percent ? kLeastGain : std::max(kLeastGain, cost))) break;
   }
   return true;
@@ -297,8 +295,8 @@ bool SubdivisionFit::run_stages() {
     if (stage.lambda <= options_.lambda_close && finest() && meets_tolerance()) break;
   }
   if (!finest()) return true;
-  std::size_t pairs = intersecting_pairs();
-  return unfold(start, kMostUnfoldingLambda, pairs) && lower_lambda(pairs);
+  std::optional<std::size_t> pairs = intersecting_pairs();
+  return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs);
 }
 
 /// All or nothing: memory may run out here.

@@ -178,7 +178,11 @@ void ShellMaker::find_thickness() {
 }
 
 void ShellMaker::start() {
-  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_);
+  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_, options_.cancelled);
+  if (thin.empty()) {
+    goes_on(true);
+    return;
+  }
   start_ = advance(layers_, check_, thin, straight_columns(layers_, directions_, thickness_));
   positions_ = start_;
 }
@@ -298,10 +302,14 @@ ShellResult ShellMaker::run(const PolygonMesh& surface) {
   timed("thickness", &ShellMaker::find_thickness);
   tell("start", 0, 0, 0.04);
   timed("start", &ShellMaker::start);
+  ShellResult result;
+  if (positions_.empty()) {
+    result.report = std::move(report_);
+    return result;
+  }
   if (options_.free_surface) target_.emplace(triangulate(layers_.surface));
   if (options_.optimize && !ended_) timed("solve", &ShellMaker::optimize);
   if (!options_.optimize) report_.explanation = "straight columns, no solve";
-  ShellResult result;
   finish(surface, result);
   return result;
 }

@@ -59,6 +59,7 @@ struct ShellResult {
 ///
 /// returns  a shell whose cells are certified and whose sheets do not meet, for every surface that is not refused, but
 ///          for rounding when the caller's coordinates are much larger than the surface; `failures` has the last word.
+///          Nothing but the report where the caller cancelled before there was a shell.
 /// InputError: options out of range; what `make_layers` refuses; a surface that meets itself; vertices from which not
 /// all faces around are seen from their front, or on which not even a very thin layer fits. Messages name the first of
 /// them. Same bits for any number of threads.

@@ -46,13 +46,14 @@ ShellCheck::ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, Check
       polygons_(sheet_polygons(layers, sheets_to_check(layers, sheets))),
       surface_moves_(surface_moves) {}
 
-ShellFailures ShellCheck::failures(std::span<const Vec3> positions) const {
+ShellFailures ShellCheck::failures(std::span<const Vec3> positions, const std::function<bool()>& cancelled) const {
   ShellFailures result;
   result.certificate = certify(positions, cells_);
   PolygonMesh polygons = polygons_;
   polygons.positions.assign(positions.begin(), positions.end());
   std::vector<Index> polygon;
-  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon));
+  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon), cancelled);
+  result.is_complete = found.is_complete;
   for (const auto& [t, s] : found.pairs) result.intersecting.push_back({polygon[t], polygon[s]});
   for (const Index t : found.degenerate) result.intersecting.push_back({polygon[t], polygon[t]});
   auto& pairs = result.intersecting;

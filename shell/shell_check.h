@@ -18,7 +18,8 @@ struct ShellFailures {
   /// Faces that meet improperly, numbers in `ShellCheck::polygons()`, smaller first, ascending. A face without area
   /// makes a pair with itself.
   std::vector<std::array<Index, 2>> intersecting;
-  bool none() const { return certificate.all_certified() && intersecting.empty(); }
+  bool is_complete = true;  ///< false: the search for pairs was ended, by the caller or as in `self_intersections`
+  bool none() const { return is_complete && certificate.all_certified() && intersecting.empty(); }
 };
 
 /// Which sheets are looked at for intersections. With all cells certified the two outer ones decide for all: a map that
@@ -36,7 +37,8 @@ class ShellCheck {
   ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets, bool surface_moves = false);
 
   /// positions  one per vertex of the cells. Exact but for what quads mean; same answer for any number of threads.
-  ShellFailures failures(std::span<const Vec3> positions) const;
+  /// cancelled  ends the search for pairs: as in `self_intersections`.
+  ShellFailures failures(std::span<const Vec3> positions, const std::function<bool()>& cancelled = {}) const;
 
   /// Strands of the cells and faces concerned, ascending.
   std::vector<Index> strands(const ShellFailures& failures) const;

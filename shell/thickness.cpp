@@ -124,7 +124,7 @@ MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const V
 }
 
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
-                                 std::span<const double> thickness) {
+                                 std::span<const double> thickness, const std::function<bool()>& cancelled) {
   constexpr double kShareOfEdge = 0.02;
   constexpr int kMaxHalvings = 30;
   const std::size_t n = layers.num_columns();
@@ -133,9 +133,12 @@ std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& ch
     for (const Index v : {a, b})
       for (double* t : {&thin[v], &thin[n + v]}) *t = std::min(*t, kShareOfEdge * length);
   });
+  bool ended = false;
+  const auto is_to_end = [&] { return ended = ended || (cancelled && cancelled()); };
   for (int halving = 0;; ++halving) {
     std::vector<Vec3> positions = straight_columns(layers, directions, thin);
-    const ShellFailures failures = check.failures(positions);
+    const ShellFailures failures = check.failures(positions, is_to_end);
+    if (ended) return {};
     if (failures.none()) return positions;
     const std::vector<Index> strands = check.strands(failures);
     if (halving == kMaxHalvings || strands.empty()) {

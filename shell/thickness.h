@@ -4,6 +4,7 @@
 #include "shell/shell_check.h"
 #include "shell/shell_layers.h"
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -25,8 +26,10 @@ void limit_slope(const ShellLayers& layers, std::span<double> thickness);
 /// Straight columns so thin that they are valid: the state from which a shell grows.
 ///
 /// thickness  per strand: none gets thicker. InputError, naming vertices, where nothing thin enough is found.
+/// cancelled  asked within long searches, from the calling thread; true ends the work; empty: none.
+/// returns  one position per vertex; none where the work was ended.
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
-                                 std::span<const double> thickness);
+                                 std::span<const double> thickness, const std::function<bool()>& cancelled = {});
 
 /// What the thickness of a shell came to, in the surface's unit.
 struct MeasuredThickness {

@@ -11,6 +11,7 @@ namespace subvol {
 namespace {
 
 constexpr double kLeastVisibility = 1e-6;
+constexpr std::size_t kFew = 64;  // normals whose cap is found in any order
 
 /// A cap of the unit sphere: all points p with axis . p >= cosine.
 struct Cap {
@@ -30,8 +31,13 @@ Cap cap_of(const Vec3& p, const Vec3& q, const Vec3& r) {
   return {axis, axis.dot(p)};
 }
 
+bool sees(const Vec3& direction, std::span<const Vec3> normals) {
+  return std::ranges::all_of(normals, [&](const Vec3& normal) { return direction.dot(normal) > kLeastVisibility; });
+}
+
 /// The smallest cap, as Welzl finds the smallest circle: a point outside lies on the border of the next larger one.
-Cap smallest_cap(std::span<const Vec3> points) {
+/// Cubic in an unlucky order, and where no half of the sphere holds the points, in any.
+Cap smallest_cap_of_few(std::span<const Vec3> points) {
   Cap cap{points[0], 1};
   for (std::size_t i = 1; i < points.size(); ++i) {
     if (cap.holds(points[i])) continue;
@@ -46,14 +52,26 @@ Cap smallest_cap(std::span<const Vec3> points) {
   return cap;
 }
 
+/// Of many points, that of a few of them: the one farthest out is added to these until their cap holds all, which takes
+/// a dozen rounds or so, or until nothing sees them.
+Cap smallest_cap(std::span<const Vec3> points) {
+  if (points.size() <= kFew) return smallest_cap_of_few(points);
+  std::vector<Vec3> few = {points[0]};
+  for (;;) {
+    const Cap cap = smallest_cap_of_few(few);
+    if (!sees(cap.axis, few)) return cap;
+    const Vec3& out = *std::ranges::min_element(points, {}, [&](const Vec3& p) { return cap.axis.dot(p); });
+    if (cap.holds(out) || std::find(few.begin(), few.end(), out) != few.end()) return cap;
+    few.push_back(out);
+  }
+}
+
 }  // namespace
 
 std::optional<Vec3> most_visible_direction(std::span<const Vec3> normals) {
   if (normals.empty()) throw InputError("most_visible_direction: expected at least one normal");
   const Cap cap = smallest_cap(normals);
-  const bool seen = std::all_of(normals.begin(), normals.end(),
-                                [&](const Vec3& normal) { return cap.axis.dot(normal) > kLeastVisibility; });
-  return seen ? std::optional<Vec3>(cap.axis) : std::nullopt;
+  return sees(cap.axis, normals) ? std::optional<Vec3>(cap.axis) : std::nullopt;
 }
 
 Vec3 corner_normal(const PolygonMesh& surface, std::size_t face, std::size_t corner) {

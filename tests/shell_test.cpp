@@ -92,12 +92,37 @@ TEST_CASE("The most visible direction is the middle of the smallest cap", "[shel
   CHECK_THROWS_AS(most_visible_direction({}), InputError);
 }
 
+TEST_CASE("The smallest cap of many normals is found in any order, and where there is none", "[shell]") {
+  constexpr int kNormals = 5000;
+  std::vector<Vec3> normals;  // of an elliptic cone, from its flat sides to its ends by turns: every one widens the cap
+  for (int i = 0; i < kNormals; ++i) {
+    const double angle = 0.5 * kPi * (1 - static_cast<double>(i) / (kNormals - 1));
+    normals.push_back(Vec3((i % 2 == 0 ? 1 : -1) * std::cos(angle), 0.2 * std::sin(angle), 1).normalized());
+  }
+  normals.push_back(Vec3(1, 0, 1).normalized());
+  normals.push_back(Vec3(-1, 0, 1).normalized());
+  const auto expected = most_visible_direction(normals);
+  REQUIRE(expected);
+  CHECK((*expected - Vec3::UnitZ()).norm() < 1e-12);
+  std::reverse(normals.begin(), normals.end());
+  CHECK((*most_visible_direction(normals) - Vec3::UnitZ()).norm() < 1e-12);
+
+  RandomPoints random(8);
+  for (Vec3& n : normals) n = random.point().normalized();
+  CHECK_FALSE(most_visible_direction(normals));
+  for (std::size_t i = 0; i < normals.size(); ++i)  // a round cone: all of them lie on the border
+    normals[i] = Vec3(std::cos(static_cast<double>(i)), std::sin(static_cast<double>(i)), 0.5).normalized();
+  CHECK((*most_visible_direction(normals) - Vec3::UnitZ()).norm() < 1e-5);
+}
+
 TEST_CASE("No direction sees a set of normals better than the one found", "[shell]") {
   RandomPoints random(3);
   for (int round = 0; round < 200; ++round) {
     std::vector<Vec3> normals;
     const Vec3 axis = random.point().normalized();
-    for (int i = 0; i < 9; ++i) normals.push_back((axis + 0.9 * random.point()).normalized());
+    const bool many = round % 4 == 3;
+    for (int i = 0; i < (many ? 200 : 9); ++i)
+      normals.push_back((axis + (many ? 0.6 : 0.9) * random.point()).normalized());
     const auto found = most_visible_direction(normals);
     const auto visibility = [&](const Vec3& n) {
       double least = 1;
@@ -335,6 +360,23 @@ TEST_CASE("A shell can be stopped at any step and is valid all the same", "[shel
   CHECK(calls == 3);
   CHECK(shell.report.stages.empty());
   check_valid(shell);
+}
+
+TEST_CASE("A shell that is cancelled in a long search, before there is any, has no cells", "[shell]") {
+  constexpr int n = 800;  // two cones on one circle: so many faces at an apex that the search asks whether to go on
+  PolygonMesh cones{{{0, 0, 1}, {0, 0, -1}}, {0}, {}};
+  for (int i = 0; i < n; ++i) {
+    cones.positions.emplace_back(std::cos(2 * kPi * i / n), std::sin(2 * kPi * i / n), 0);
+    const Index a = 2 + i, b = 2 + (i + 1) % n;
+    add_face(cones, {a, b, 0});
+    add_face(cones, {b, a, 1});
+  }
+  ShellOptions options{.thickness = 0.01, .optimize = false};
+  CHECK(make_shell(cones, options).failures.none());
+  options.cancelled = [] { return true; };
+  const ShellResult result = make_shell(cones, options);
+  CHECK(result.report.stop_reason == StopReason::cancelled);
+  CHECK(result.mesh.num_cells() == 0);
 }
 
 TEST_CASE("Surfaces and options that no shell can be made of are refused with their place", "[shell]") {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/stage_runner.h"
 #include "fit/staged_fit.h"
 
 #include <catch2/catch.hpp>
 
+#include <optional>
 #include <vector>
 
 using namespace subvol;
@@ -17,7 +19,7 @@ class FoldedFit : public StagedFit {
   bool unfold(double most_lambda) {
     const FitSnapshot start = snapshot();
     run_final_stage(0.01);
-    pairs = intersecting_pairs();
+    pairs = intersecting_pairs().value();
     return StagedFit::unfold(start, most_lambda, pairs);
   }
   double x() const { return x_[0][0]; }
@@ -31,7 +33,7 @@ class FoldedFit : public StagedFit {
   }
 
   std::size_t pairs = 0;
-  int most_stages = 100;
+  int most_stages = 100, most_searches = 100;
   std::vector<double> starts;
 
  private:
@@ -49,7 +51,9 @@ class FoldedFit : public StagedFit {
     report_.stages.push_back(record);
     return static_cast<int>(report_.stages.size()) < most_stages;
   }
-  std::size_t intersecting_pairs() const override { return pairs_at_(x()); }
+  std::optional<std::size_t> intersecting_pairs() override {
+    return --most_searches < 0 ? std::nullopt : std::optional(pairs_at_(x()));
+  }
 
   std::size_t (*pairs_at_)(double);
   std::vector<Vec3> x_;
@@ -102,4 +106,24 @@ TEST_CASE("unfolding ends at the most lambda, and where the fit must end", "[sta
   CHECK_FALSE(interrupted.unfold(1));
   CHECK(interrupted.x() == 0.01);  // as it was before the stage that was not done
   CHECK(interrupted.kept() == std::vector<double>{0.01});
+  FoldedFit unjudged(pairs_at);  // the search after the stage that unfolds is given up
+  unjudged.most_searches = 2;
+  CHECK_FALSE(unjudged.unfold(1));
+  CHECK(unjudged.x() == 0.01);
+}
+
+TEST_CASE("a search for self-intersections that is given up says why, and counts nothing", "[staged_fit]") {
+  TriangleMesh heap;  // so many pairs that the search asks whether to go on
+  for (Index i = 0; i < 800; ++i) {
+    heap.positions.insert(heap.positions.end(), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    heap.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  FitReport report;
+  CHECK(StageRunner({}).intersecting_pairs(heap, report) == 800 * 799 / 2);
+  CHECK(report.explanation.empty());
+  CHECK_FALSE(StageRunner({.cancelled = [] { return true; }}).intersecting_pairs(heap, report));
+  CHECK(report.stop_reason == StopReason::cancelled);
+  CHECK(report.explanation == "cancelled in the search for self-intersections");
+  CHECK_FALSE(StageRunner({.time_limit_seconds = 1e-9}).intersecting_pairs(heap, report));
+  CHECK(report.stop_reason == StopReason::time_limit);
 }
