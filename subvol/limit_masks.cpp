@@ -4,7 +4,7 @@
 #include "subvol/boundary_rules.h"
 #include "subvol/feature_tags.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,6 @@ namespace subvol {
 
 namespace {
 
-using Matrix = Eigen::MatrixXd;
 using Row = Eigen::RowVectorXd;
 
 /// Places in a ring of valence n.
@@ -25,32 +24,25 @@ struct Ring {
   int face(int i) const { return 1 + n + (i + n) % n; }
 };
 
-Row centroid(const Ring& ring, int i) {
-  Row row = Row::Zero(ring.size());
-  row[0] = row[ring.face(i)] = 0.25;
-  row[ring.edge(i)] += 0.25;
-  row[ring.edge(i + 1)] += 0.25;
-  return row;
-}
-
-/// The rules of one refinement on the ring.
-Matrix ring_matrix(const RingSharpness& sharpness) {
+/// Weights on the ring before one refinement, from those on the ring after it: times the matrix of the rules.
+Row before_refinement(const Row& mask, const RingSharpness& sharpness) {
   const Ring ring{static_cast<int>(sharpness.edges.size())};
-  Matrix matrix = Matrix::Zero(ring.size(), ring.size());
   const VertexWeights vertex = vertex_weights(BoundaryRule::catmull_clark, sharpness.corner, sharpness.edges);
-  matrix(0, 0) = vertex.self;
+  Row before = Row::Zero(ring.size()), centroids = Row::Zero(ring.n);
+  before[0] = mask[0] * vertex.self;
   for (int i = 0; i < ring.n; ++i) {
-    matrix(0, ring.edge(i)) += vertex.edge;
-    matrix.row(0) += vertex.face * centroid(ring, i);
     const EdgeWeights edge = edge_weights(BoundaryRule::catmull_clark, sharpness.edges[i], {4, 4});
-    matrix(ring.edge(i), 0) += edge.end;
-    matrix(ring.edge(i), ring.edge(i)) += edge.end;
-    matrix.row(ring.edge(i)) += edge.face[0] * centroid(ring, i - 1) + edge.face[1] * centroid(ring, i);
-    matrix.row(ring.face(i)) = centroid(ring, i);
+    const double on_edge = mask[ring.edge(i)];
+    before[0] += on_edge * edge.end;
+    before[ring.edge(i)] += on_edge * edge.end + mask[0] * vertex.edge;
+    centroids[(i + ring.n - 1) % ring.n] += on_edge * edge.face[0];
+    centroids[i] += on_edge * edge.face[1] + mask[ring.face(i)] + mask[0] * vertex.face;
   }
   if (vertex.crease != 0)
-    for (int end : vertex.crease_ends) matrix(0, ring.edge(end)) += vertex.crease;
-  return matrix;
+    for (const int end : vertex.crease_ends) before[ring.edge(end)] += mask[0] * vertex.crease;
+  for (int i = 0; i < ring.n; ++i)
+    for (const int corner : {0, ring.edge(i), ring.edge(i + 1), ring.face(i)}) before[corner] += centroids[i] / 4;
+  return before;
 }
 
 bool is_finite_sharp(float s) { return s > 0 && s < static_cast<float>(kInfiniteSharpness); }
@@ -66,16 +58,25 @@ std::vector<int> sharp_edges(const RingSharpness& ring) {
   return ends;
 }
 
-/// Refines until no finite sharpness is left; returns the product of the rules on the way.
-Matrix decay(RingSharpness& ring) {
-  const int size = Ring{static_cast<int>(ring.edges.size())}.size();
-  Matrix product = Matrix::Identity(size, size);
-  while (!is_stationary(ring)) {
-    product = ring_matrix(ring) * product;
-    ring.corner = child_sharpness(ring.corner);
-    for (float& s : ring.edges) s = child_sharpness(s);
+/// The ring as it is once no finite sharpness is left, and what it was in the refinements on the way.
+struct Decay {
+  RingSharpness stationary;
+  std::vector<RingSharpness> steps;
+  /// Weights on the ring at the start, from those on the stationary one.
+  RingMask at_start(Row mask) const {
+    for (auto step = steps.rbegin(); step != steps.rend(); ++step) mask = before_refinement(mask, *step);
+    return {mask.data(), mask.data() + mask.size()};
   }
-  return product;
+};
+
+Decay decay(const RingSharpness& ring) {
+  Decay result{ring, {}};
+  while (!is_stationary(result.stationary)) {
+    result.steps.push_back(result.stationary);
+    result.stationary.corner = child_sharpness(result.stationary.corner);
+    for (float& s : result.stationary.edges) s = child_sharpness(s);
+  }
+  return result;
 }
 
 Row smooth_limit(const Ring& ring) {
@@ -94,10 +95,10 @@ Row crease_limit(const Ring& ring, int a, int b) {
 }
 
 Row dart_limit(const RingSharpness& sharpness) {
-  constexpr int kSquarings = 9;  // 512 refinements: the next eigenvalue of any usual valence has vanished
-  Matrix power = ring_matrix(sharpness);
-  for (int i = 0; i < kSquarings; ++i) power = (power * power).eval();
-  return power.row(0) / power.row(0).sum();
+  constexpr int kRefinements = 512;  // the next eigenvalue of any usual valence has vanished
+  Row mask = Row::Unit(2 * static_cast<int>(sharpness.edges.size()) + 1, 0);
+  for (int i = 0; i < kRefinements; ++i) mask = before_refinement(mask, sharpness);
+  return mask / mask.sum();
 }
 
 Row stationary_limit(const RingSharpness& sharpness) {
@@ -180,42 +181,44 @@ std::array<Row, 2> sector_tangents(const Ring& ring, int first, int count, bool 
   return tangents;
 }
 
-std::vector<double> to_mask(const Row& row) { return {row.data(), row.data() + row.size()}; }
+/// No closed form: the differences that are left after many refinements, scaled back to size.
+std::array<Row, 2> dart_tangents(const RingSharpness& sharpness) {
+  constexpr int kRefinements = 24;
+  std::array<Row, 2> tangents = smooth_tangents({static_cast<int>(sharpness.edges.size())});
+  for (Row& tangent : tangents)
+    for (int i = 0; i < kRefinements; ++i) tangent = 2 * before_refinement(tangent, sharpness);
+  return tangents;
+}
+
+std::array<Row, 2> stationary_tangents(const RingSharpness& sharpness, const TangentSector& sector) {
+  const Ring ring{static_cast<int>(sharpness.edges.size())};
+  const std::size_t num_ends = sharp_edges(sharpness).size();
+  if (num_ends == 0) return smooth_tangents(ring);
+  if (num_ends == 1) return dart_tangents(sharpness);
+  return sector_tangents(ring, sector.first, sector.count, sharpness.corner > 0 || num_ends > 2);
+}
 
 }  // namespace
 
 RingMask limit_mask(const RingSharpness& sharpness) {
-  if (is_stationary(sharpness)) return to_mask(stationary_limit(sharpness));
-  RingSharpness ring = sharpness;
-  const Matrix before = decay(ring);
-  return to_mask(stationary_limit(ring) * before);
+  const Decay ring = decay(sharpness);
+  return ring.at_start(stationary_limit(ring.stationary));
 }
 
-std::vector<TangentSector> tangent_masks(const RingSharpness& sharpness) {
-  RingSharpness stationary = sharpness;
-  Matrix before = decay(stationary);
-  const Ring ring{static_cast<int>(sharpness.edges.size())};
-  const std::vector<int> ends = sharp_edges(stationary);
+std::vector<TangentSector> tangent_sectors(const RingSharpness& sharpness) {
+  const int n = static_cast<int>(sharpness.edges.size());
+  const std::vector<int> ends = sharp_edges(decay(sharpness).stationary);
+  if (ends.size() < 2) return {{0, n}};
   std::vector<TangentSector> sectors;
-  const auto add = [&](int first, int count, const std::array<Row, 2>& tangents) {
-    sectors.push_back({first, count, to_mask(tangents[0] * before), to_mask(tangents[1] * before)});
-  };
-  if (ends.size() < 2) {
-    if (ends.size() == 1) {
-      // No closed form: the differences that are left after many refinements, scaled back to size.
-      constexpr int kRefinements = 24;
-      const Matrix step = ring_matrix(stationary);
-      for (int i = 0; i < kRefinements; ++i) before = (2 * (step * before)).eval();
-    }
-    add(0, ring.n, smooth_tangents(ring));
-    return sectors;
-  }
-  const bool corner = stationary.corner > 0 || ends.size() > 2;
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    const int first = ends[i], count = (ends[(i + 1) % ends.size()] - first + ring.n) % ring.n;
-    add(first, count, sector_tangents(ring, first, count, corner));
-  }
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    sectors.push_back({ends[i], (ends[(i + 1) % ends.size()] - ends[i] + n) % n});
   return sectors;
+}
+
+std::array<RingMask, 2> tangent_masks(const RingSharpness& sharpness, const TangentSector& sector) {
+  const Decay ring = decay(sharpness);
+  const std::array<Row, 2> tangents = stationary_tangents(ring.stationary, sector);
+  return {ring.at_start(tangents[0]), ring.at_start(tangents[1])};
 }
 
 }  // namespace subvol

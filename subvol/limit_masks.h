@@ -22,23 +22,24 @@ struct RingSharpness {
 ///   smooth (n^2 v + 4 sum e_i + sum f_i) / (n (n + 5)),  crease (e_a + 4 v + e_b) / 6,  corner v
 ///
 /// Exact for semi-sharp features (the rules of the levels until they decay are multiplied out) and for darts (the
-/// left eigenvector of eigenvalue 1 of the dart's own ring rules, by repeated squaring). Cost: O(n) weights, O(n^3)
-/// work for semi-sharp and dart rings.
+/// left eigenvector of eigenvalue 1 of the dart's own ring rules, by power iteration). Cost: O(n); darts take 512 steps
+/// of that.
 RingMask limit_mask(const RingSharpness& ring);
 
-/// One side of the surface at v: two directions that span the tangent plane of the quads from `first` to
-/// first + count - 1 (modulo n). u x v points outward, but may be reversed in a sector of more than 180 degrees.
+/// A smooth piece of the surface at v: the quads from `first` to first + count - 1 (modulo n).
 struct TangentSector {
   int first, count;
-  RingMask u, v;
 };
 
-/// Tangents at v, one sector per smooth piece of the surface there (the whole ring if fewer than two edges stay sharp
-/// for ever). Weights of each mask sum to 0.
+/// Those at v: from each edge that stays sharp for ever to the next, the whole ring where these are fewer than two.
+std::vector<TangentSector> tangent_sectors(const RingSharpness& ring);
+
+/// Two directions u, v that span the tangent plane of the surface at v in one of its sectors. Weights of each mask sum
+/// to 0. u x v points outward, but may be reversed in a sector of more than 180 degrees.
 ///
 /// Smooth and crease tangents are the left eigenvectors of the dominant eigenvalues; normals at darts are good to 2e-5.
 /// At corners they are the crease edges (for up to two quads), which is where the surface ends up. A crease side of one
-/// quad flattens out only logarithmically: its mean direction is used, good to a few hundredths.
-std::vector<TangentSector> tangent_masks(const RingSharpness& ring);
+/// quad flattens out only logarithmically: its mean direction is used, good to a few hundredths. Cost: O(n).
+std::array<RingMask, 2> tangent_masks(const RingSharpness& ring, const TangentSector& sector);
 
 }  // namespace subvol

@@ -48,8 +48,11 @@ class VertexRing {
   /// Of the smooth piece that the corner belongs to.
   Vec3 normal() const {
     const int valence = static_cast<int>(sharpness_.edges.size());
-    for (const TangentSector& sector : tangent_masks(sharpness_))
-      if ((valence - sector.first) % valence < sector.count) return unit_normal(apply(sector.u), apply(sector.v));
+    for (const TangentSector& sector : tangent_sectors(sharpness_)) {
+      if ((valence - sector.first) % valence >= sector.count) continue;
+      const auto [u, v] = tangent_masks(sharpness_, sector);
+      return unit_normal(apply(u), apply(v));
+    }
     return Vec3::Zero();
   }
 

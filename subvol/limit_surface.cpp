@@ -133,13 +133,14 @@ Tangents tangent_rows(const SurfaceTopology& surface, std::span<const Index> col
   RowBuilder row(num_cols);
   for (std::size_t v = 0; v < surface.num_vertices(); ++v) {
     const RingRow ring(surface, static_cast<Index>(v), columns);
-    for (const TangentSector& sector : tangent_masks(ring.sharpness())) {
+    for (const TangentSector& sector : tangent_sectors(ring.sharpness())) {
       const Index site = static_cast<Index>(tangents.u.num_rows());
       for (int i = 0; i < sector.count; ++i)
         tangents.corner_sites[ring.corners()[(sector.first + i) % ring.corners().size()]] = site;
-      ring.add(sector.u, row);
+      const std::array<RingMask, 2> masks = tangent_masks(ring.sharpness(), sector);
+      ring.add(masks[0], row);
       append_row(tangents.u, row);
-      ring.add(sector.v, row);
+      ring.add(masks[1], row);
       append_row(tangents.v, row);
     }
   }

@@ -36,6 +36,22 @@ VolumeMesh voxels(int nx, int ny, int nz, Keep&& keep) {
   return mesh;
 }
 
+/// n prisms round the axis z from 0 to 1, of radius 1; the axis's two vertices are the first or the last.
+inline VolumeMesh prisms_round_axis(Index n, bool axis_first) {
+  VolumeMesh mesh;
+  const Index axis = axis_first ? 0 : 2 * n, rim = axis_first ? 2 : 0;
+  mesh.positions.resize(2 * n + 2);
+  mesh.positions[axis] = {0, 0, 0};
+  mesh.positions[axis + 1] = {0, 0, 1};
+  for (Index i = 0; i < n; ++i) {
+    const double angle = 2 * M_PI * i / n;
+    for (const Index z : {0, 1}) mesh.positions[rim + z * n + i] = {std::cos(angle), std::sin(angle), double(z)};
+    const Index a = rim + i, b = rim + (i + 1) % n;
+    mesh.add_cell(CellKind::prism, std::array<Index, 6>{axis, a, b, axis + 1, a + n, b + n});
+  }
+  return mesh;
+}
+
 inline VolumeMesh lattice(int nx, int ny, int nz) {
   return voxels(nx, ny, nz, [](int, int, int) { return true; });
 }

@@ -139,6 +139,24 @@ TEST_CASE("strips of patches are cut only as finely as they need") {
   CHECK(*std::max_element(counts.begin(), counts.end()) >= 64);
 }
 
+TEST_CASE("any number of patches may meet at a vertex, smooth or between creases") {
+  constexpr Index n = 2000;
+  for (const bool creased : {false, true}) {
+    VolumeMesh cage = prisms_round_axis(n, true);
+    if (creased)
+      for (Index i = 0; i < n; ++i) cage.tags.creases.push_back({1, 2 + n + i, kInfiniteSharpness});
+    const TessellatedSurface surface = tessellate(cage, 0.1);
+    bool at_top = false;
+    for (std::size_t i = 0; i < surface.positions.size(); ++i) {
+      CHECK(surface.positions[i].allFinite());
+      if (surface.positions[i].head<2>().norm() > 1e-9 || surface.positions[i].z() < 0.5) continue;
+      CHECK((surface.normals[i] - Vec3::UnitZ()).norm() < 1e-9);
+      at_top = true;
+    }
+    CHECK(at_top);
+  }
+}
+
 TEST_CASE("infinite creases part the normals, nothing else does") {
   VolumeMesh cube = lattice(1, 1, 1);
   tag_creases(cube, 40);

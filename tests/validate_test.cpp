@@ -116,18 +116,9 @@ TEST_CASE("a quad against two triangles is not conforming") {
 
 TEST_CASE("a vertex of all cells may have any number") {
   constexpr Index n = 2000;
-  for (const bool first : {true, false}) {  // prisms round an axis whose vertices are the first or the last
-    VolumeMesh mesh;
+  for (const bool first : {true, false}) {
+    VolumeMesh mesh = prisms_round_axis(n, first);
     const Index axis = first ? 0 : 2 * n, rim = first ? 2 : 0;
-    mesh.positions.resize(2 * n + 2);
-    mesh.positions[axis] = {0, 0, 0};
-    mesh.positions[axis + 1] = {0, 0, 1};
-    for (Index i = 0; i < n; ++i) {
-      const double angle = 2 * M_PI * i / n;
-      for (const Index z : {0, 1}) mesh.positions[rim + z * n + i] = {std::cos(angle), std::sin(angle), double(z)};
-      const Index a = rim + i, b = rim + (i + 1) % n;
-      mesh.add_cell(CellKind::prism, std::array<Index, 6>{axis, a, b, axis + 1, a + n, b + n});
-    }
     CHECK(validate(mesh).empty());
     const MeshTopology topology(mesh);
     CHECK(topology.num_faces() == 4 * n);
