@@ -6,8 +6,10 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace subvol {
 namespace {
@@ -38,25 +40,28 @@ std::vector<Vec3> area_vectors(const PolygonMesh& mesh) {
   return areas;
 }
 
-bool share_edge(const Corner& a, const Corner& b) {
-  return a.before == b.after || a.after == b.before || a.before == b.before || a.after == b.after;
-}
-
 /// The first corner of the group of each corner: groups grow over smooth edges.
 std::vector<std::size_t> smooth_groups(const std::vector<Corner>& corners, const std::vector<Vec3>& areas,
                                        double cos_angle) {
-  std::vector<std::size_t> group(corners.size());
+  std::vector<std::pair<Index, std::size_t>> spokes;  // other end of an edge at the vertex, corner
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    group[i] = i;
-    for (std::size_t j = 0; j < i; ++j) {
-      const Vec3 &a = areas[corners[i].face], &b = areas[corners[j].face];
-      if (group[i] == group[j] || !share_edge(corners[i], corners[j]) || !(a.dot(b) > cos_angle * a.norm() * b.norm()))
-        continue;
-      const std::size_t keep = std::min(group[i], group[j]), drop = std::max(group[i], group[j]);
-      for (std::size_t k = 0; k <= i; ++k)
-        if (group[k] == drop) group[k] = keep;
-    }
+    spokes.push_back({corners[i].before, i});
+    spokes.push_back({corners[i].after, i});
   }
+  std::sort(spokes.begin(), spokes.end());
+  std::vector<std::size_t> group(corners.size());
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (group[i] != i) i = group[i] = group[group[i]];
+    return i;
+  };
+  for (std::size_t s = 0; s < spokes.size(); ++s)
+    for (std::size_t t = s + 1; t < spokes.size() && spokes[t].first == spokes[s].first; ++t) {
+      const std::size_t i = root(spokes[s].second), j = root(spokes[t].second);
+      const Vec3 &a = areas[corners[spokes[t].second].face], &b = areas[corners[spokes[s].second].face];
+      if (i != j && a.dot(b) > cos_angle * a.norm() * b.norm()) group[std::max(i, j)] = std::min(i, j);
+    }
+  for (std::size_t& g : group) g = root(g);
   return group;
 }
 

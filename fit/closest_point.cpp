@@ -14,6 +14,7 @@ namespace subvol {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t kFewTriangles = 1000;  // which threads would take longer for than one of them
 
 Vec3 closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 ab = b - a;
@@ -137,7 +138,7 @@ void ClosestPoint::fit_boxes() {
   };
   const auto inverse = [](double x) { return x > 0 ? 1 / x : 0; };
   std::vector<Box> of_leaf(leaves_.size()), of_node(nodes_.size());
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (triangles_.size() > kFewTriangles)
   for (std::size_t i = 0; i < leaves_.size(); ++i) {
     const Range range = leaf_ranges_[i];
     Leaf& leaf = leaves_[i];
@@ -176,7 +177,7 @@ ClosestPoint::ClosestPoint(const TriangleMesh& mesh)
   check(mesh);
   const Index count = static_cast<Index>(triangles_.size());
   std::vector<Item> items(count);
-#pragma omp parallel
+#pragma omp parallel if (triangles_.size() > kFewTriangles)
   {
 #pragma omp for schedule(static)
     for (Index t = 0; t < count; ++t) {
@@ -199,7 +200,7 @@ void ClosestPoint::move(std::span<const Vec3> positions) {
                      std::to_string(num_vertices_) + " vertices");
   for (const auto& triangle : triangles_)
     for (Index v : triangle) check_finite(positions, v);
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (triangles_.size() > kFewTriangles)
   for (std::size_t t = 0; t < triangles_.size(); ++t)
     for (int k = 0; k < 3; ++k) corners_[t][k] = positions[triangles_[t][k]];
   fit_boxes();
@@ -296,7 +297,7 @@ void ClosestPoint::closest(std::span<const Vec3> points, std::span<Hit> hits) co
                      " points");
   constexpr std::size_t kRun = 256;  // hints do not pass from one run to the next, whatever thread takes it
   const std::size_t num_runs = (points.size() + kRun - 1) / kRun;
-#pragma omp parallel for schedule(dynamic)
+#pragma omp parallel for schedule(dynamic) if (num_runs > 1)
   for (std::size_t run = 0; run < num_runs; ++run) {
     Index before = kNoIndex;
     for (std::size_t i = run * kRun; i < std::min((run + 1) * kRun, points.size()); ++i) {

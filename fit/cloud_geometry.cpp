@@ -17,7 +17,8 @@ namespace subvol {
 namespace {
 
 constexpr std::size_t kNeighbors = 16;
-constexpr double kLeastShare = 1e-20;  // of the first guess at a squared radius
+constexpr double kLeastShare = 1e-20;   // of the squared radius that would suit points all over a box's diagonal
+constexpr double kSlack = 1 + 1e-14;    // the tree sums up squared distances in another order
 
 /// A point of the tree by its distance from the one that is looked at.
 struct Neighbor {
@@ -31,21 +32,23 @@ class NeighborSearch {
  public:
   NeighborSearch(const SiteTree& tree, std::size_t k, double least) : tree_(tree), k_(k), least_(least) {}
 
-  /// squared_radius  a guess at how far they are, >= least; receives a good one for points near by, >= least > 0 even
-  ///                 where points lie on each other.
+  /// squared_radius  a guess at how far they are, >= least, on which the result does not depend: one that is much too
+  ///                 large looks at too many points. Receives a good one for points near by, >= least > 0 even where
+  ///                 points lie on each other.
   const std::vector<Neighbor>& operator()(Index place, double& squared_radius) {
     const Vec3& centre = tree_.position(place);
     for (;; squared_radius *= 4) {
       places_.clear();
       const SiteTree::Ball ball{centre, squared_radius};
       tree_.gather({&ball, 1}, tree_.num_sites(), places_);
-      if (places_.size() > k_) break;
+      if (places_.size() <= k_) continue;
+      found_.clear();
+      for (Index other : places_)
+        if (other != place) found_.push_back({(tree_.position(other) - centre).squaredNorm(), other});
+      std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
+      found_.resize(k_);
+      if (found_.back().squared_distance * kSlack <= squared_radius) break;
     }
-    found_.clear();
-    for (Index other : places_)
-      if (other != place) found_.push_back({(tree_.position(other) - centre).squaredNorm(), other});
-    std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
-    found_.resize(k_);
     squared_radius = std::max({2 * found_.back().squared_distance, 1e-12 * squared_radius, least_});
     return found_;
   }
@@ -92,12 +95,16 @@ CloudGeometry cloud_geometry(std::span<const Vec3> points) {
   result.normals.resize(n);
   result.areas.resize(n);
   constexpr std::size_t kRun = 256;  // radii are handed on inside a run, whatever thread takes it
-  const double first_radius = (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
+  const double least = kLeastShare * (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < (n + kRun - 1) / kRun; ++run) {
-    NeighborSearch neighbors(tree, k, kLeastShare * first_radius);
-    double squared_radius = first_radius;
-    for (std::size_t i = run * kRun; i < std::min(n, (run + 1) * kRun); ++i) {
+    NeighborSearch neighbors(tree, k, least);
+    // What is beside a point in the tree is near it. The bounding box tells nothing: one point far away would put the
+    // whole cloud within reach.
+    const std::size_t first = run * kRun, beside = first + 1 < n ? first + 1 : first - 1;
+    double squared_radius = std::max(
+        least, (tree.position(static_cast<Index>(beside)) - tree.position(static_cast<Index>(first))).squaredNorm());
+    for (std::size_t i = first; i < std::min(n, first + kRun); ++i) {
       const auto place = static_cast<Index>(i);
       const std::vector<Neighbor>& found = neighbors(place, squared_radius);
       const auto point = static_cast<std::size_t>(tree.site(place));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/crease_paths.h"
 
+#include "fit/site_tree.h"
 #include "subvol/features.h"
 #include "subvol/mesh_topology.h"
 
@@ -110,6 +111,7 @@ class PathFinder {
     struct Pair {
       double distance;
       Index corner, vertex;
+      auto operator<=>(const Pair&) const = default;
     };
     std::vector<Pair> pairs;
     const FeatureCurves& curves = curves_;
@@ -118,15 +120,23 @@ class PathFinder {
       positions[curve.vertices.front()] = curve.points.front();
       positions[curve.vertices.back()] = curve.points.back();
     }
+    std::vector<Vec3> sites;
+    for (Index v : graph_.vertices) sites.push_back(mesh_.positions[v]);
+    const SiteTree tree(sites);
+    const double reach = kCornerShare * graph_.mean_length;
+    std::vector<Index> near;
     for (std::size_t i = 0; i < curves.corners.size(); ++i) {
       if (curves.corner_edges[i] == 1) continue;
       const Index corner = curves.corners[i];
-      for (Index v : graph_.vertices) {
-        const double distance = (mesh_.positions[v] - positions[corner]).norm();
-        if (distance < kCornerShare * graph_.mean_length) pairs.push_back({distance, corner, v});
+      const SiteTree::Ball ball{positions[corner], 1.01 * reach * reach};  // a bit more: the tree rounds otherwise
+      near.clear();
+      tree.gather({&ball, 1}, sites.size(), near);
+      for (Index place : near) {
+        const double distance = (tree.position(place) - ball.centre).norm();
+        if (distance < reach) pairs.push_back({distance, corner, graph_.vertices[tree.site(place)]});
       }
     }
-    std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+    std::sort(pairs.begin(), pairs.end());
     for (const Pair& pair : pairs) {
       if (taken_[pair.vertex] || vertex_of_corner_.count(pair.corner)) continue;
       taken_[pair.vertex] = 1;

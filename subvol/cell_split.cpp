@@ -136,6 +136,7 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
     }
     return ends;
   };
+  std::vector<char> seen(mesh.num_cells(), 0);
   std::vector<std::size_t> column;
   for (std::size_t seed = 0; seed < mesh.num_cells(); ++seed) {
     if (axes[seed] == kNoIndex)
@@ -145,6 +146,7 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
     const auto face = topology.face(first);
     cut_at[first] = *std::min_element(face.begin(), face.end());
     column.assign(1, seed);
+    seen[seed] = 1;
     for (std::size_t q = 0; q < column.size(); ++q) {
       const std::size_t c = column[q];
       const auto corners = upright(c);
@@ -156,9 +158,10 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
       }
       for (Index f : ends)
         for (Index other : topology.face_cells(f))
-          if (other != kNoIndex &&
-              std::find(column.begin(), column.end(), static_cast<std::size_t>(other)) == column.end())
+          if (other != kNoIndex && !seen[other]) {
+            seen[other] = 1;
             column.push_back(static_cast<std::size_t>(other));
+          }
     }
   }
   VolumeMesh result;

@@ -107,7 +107,7 @@ std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::s
 }
 
 /// Turns triangles to agree with their neighbours; the majority of a component stays as it is. Returns the component of
-/// each triangle.
+/// each triangle; one without neighbours has none (-1).
 std::vector<int> orient(TriangleMesh& mesh, SolidBoundary& result) {
   const auto neighbors = neighbors_of(mesh, sorted_half_edges(mesh));
   std::vector<int> component(mesh.triangles.size(), -1);
@@ -115,7 +115,7 @@ std::vector<int> orient(TriangleMesh& mesh, SolidBoundary& result) {
   std::vector<Index> queue;
   int count = 0;
   for (std::size_t seed = 0; seed < mesh.triangles.size(); ++seed) {
-    if (component[seed] >= 0) continue;
+    if (component[seed] >= 0 || neighbors[seed].empty()) continue;
     queue.assign(1, static_cast<Index>(seed));
     component[seed] = count;
     for (std::size_t q = 0; q < queue.size(); ++q) {
@@ -146,6 +146,19 @@ std::vector<int> orient(TriangleMesh& mesh, SolidBoundary& result) {
   return component;
 }
 
+/// Drops the triangles of no component.
+void drop_loners(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary& result) {
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < component.size(); ++t) {
+    if (component[t] < 0) continue;
+    mesh.triangles[kept] = mesh.triangles[t];
+    component[kept++] = component[t];
+  }
+  result.dropped_triangles += component.size() - kept;
+  mesh.triangles.resize(kept);
+  component.resize(kept);
+}
+
 /// Closes every loop of edges with one triangle by a fan.
 void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary& result) {
   std::vector<std::array<Index, 3>> rims;  // from, to, triangle
@@ -155,24 +168,22 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
           {run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
   });
   std::sort(rims.begin(), rims.end());
-  std::vector<char> used(rims.size(), 0);
+  std::vector<std::size_t> left(mesh.positions.size(), rims.size());  // the first of a vertex's rims that is in no loop
+  for (std::size_t i = rims.size(); i-- > 0;) left[rims[i][0]] = i;
   for (std::size_t start = 0; start < rims.size(); ++start) {
-    if (used[start]) continue;
+    if (start < left[rims[start][0]]) continue;
     std::vector<std::size_t> loop;
     Vec3 mean = Vec3::Zero();
     // Each rim vertex has as many edges out as in, so a walk comes back to where it began.
-    for (std::size_t at = start; !used[at];) {
-      used[at] = 1;
+    for (std::size_t at = start;;) {
+      left[rims[at][0]] = at + 1;
       loop.push_back(at);
       mean += mesh.positions[rims[at][0]];
       const Index next = rims[at][1];
       if (next == rims[start][0]) break;
-      std::size_t i = static_cast<std::size_t>(
-          std::lower_bound(rims.begin(), rims.end(), std::array<Index, 3>{next, kNoIndex, kNoIndex}) - rims.begin());
-      while (i < rims.size() && rims[i][0] == next && used[i]) ++i;
-      if (i == rims.size() || rims[i][0] != next)
+      at = left[next];
+      if (at == rims.size() || rims[at][0] != next)
         throw InputError("surface: the rim of a hole does not close at vertex " + std::to_string(next));
-      at = i;
     }
     const auto centre = static_cast<Index>(mesh.positions.size());
     mesh.positions.push_back(mean / static_cast<double>(loop.size()));
@@ -220,7 +231,7 @@ struct Component {
 
 std::vector<Component> measured(const TriangleMesh& mesh, std::span<const int> component, int count) {
   std::vector<Component> result(static_cast<std::size_t>(count));
-  const Vec3 origin = mesh.positions.front();
+  const Vec3 origin = mesh.positions[mesh.triangles.front()[0]];
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     Component& c = result[component[t]];
     std::array<Vec3, 3> p;
@@ -233,16 +244,54 @@ std::vector<Component> measured(const TriangleMesh& mesh, std::span<const int> c
   return result;
 }
 
+/// Boxes to be asked whether one of them holds another one: a tree with the largest box of each branch at its root.
+class BoxTree {
+ public:
+  explicit BoxTree(std::vector<Eigen::AlignedBox3d> boxes) : boxes_(std::move(boxes)), hulls_(boxes_.size()) {
+    arrange(0, boxes_.size());
+  }
+  bool holds(const Eigen::AlignedBox3d& box) const { return holds(0, boxes_.size(), box); }
+
+ private:
+  /// Branch: boxes first .. last - 1, that at `first` and two branches of half of the others each.
+  static std::size_t middle(std::size_t first, std::size_t last) { return first + 1 + (last - first - 1) / 2; }
+
+  void arrange(std::size_t first, std::size_t last) {
+    if (first == last) return;
+    const auto at = [&](std::size_t i) { return boxes_.begin() + static_cast<std::ptrdiff_t>(i); };
+    for (std::size_t i = first; i < last; ++i) hulls_[first].extend(boxes_[i]);
+    std::iter_swap(at(first), std::max_element(at(first), at(last), [](const auto& a, const auto& b) {
+      return a.diagonal().maxCoeff() < b.diagonal().maxCoeff();
+    }));
+    int axis = 0;
+    hulls_[first].diagonal().maxCoeff(&axis);
+    const std::size_t half = middle(first, last);
+    std::nth_element(at(first + 1), at(half), at(last),
+                     [&](const auto& a, const auto& b) { return a.min()[axis] < b.min()[axis]; });
+    arrange(first + 1, half);
+    arrange(half, last);
+  }
+  bool holds(std::size_t first, std::size_t last, const Eigen::AlignedBox3d& box) const {
+    if (first == last || !hulls_[first].contains(box)) return false;
+    const std::size_t half = middle(first, last);
+    return boxes_[first].contains(box) || holds(first + 1, half, box) || holds(half, last, box);
+  }
+
+  std::vector<Eigen::AlignedBox3d> boxes_;
+  std::vector<Eigen::AlignedBox3d> hulls_;  ///< of the branch that begins there
+};
+
 /// Void walls are the components that were oriented against the whole and lie inside another one's box.
 std::vector<char> find_cavities(std::span<const Component> parts) {
   const double total =
       std::accumulate(parts.begin(), parts.end(), 0.0, [](double s, const Component& c) { return s + c.volume; });
+  const auto with_whole = [&](const Component& part) { return part.volume * total > 0; };
+  std::vector<Eigen::AlignedBox3d> outer;
+  for (const Component& part : parts)
+    if (with_whole(part)) outer.push_back(part.box);
+  const BoxTree tree(std::move(outer));
   std::vector<char> cavity(parts.size(), 0);
-  for (std::size_t c = 0; c < parts.size(); ++c) {
-    if (parts[c].volume * total > 0) continue;
-    for (std::size_t other = 0; other < parts.size(); ++other)
-      if (other != c && parts[other].volume * total > 0 && parts[other].box.contains(parts[c].box)) cavity[c] = 1;
-  }
+  for (std::size_t c = 0; c < parts.size(); ++c) cavity[c] = !with_whole(parts[c]) && tree.holds(parts[c].box);
   return cavity;
 }
 
@@ -259,8 +308,9 @@ std::string to_string(const BettiNumbers& numbers) {
 SolidBoundary solid_boundary(const TriangleMesh& surface) {
   SolidBoundary result;
   TriangleMesh mesh = welded(surface, result.dropped_triangles);
-  if (mesh.triangles.empty()) throw InputError("surface: it has no triangles");
   std::vector<int> component = orient(mesh, result);
+  drop_loners(mesh, component, result);
+  if (mesh.triangles.empty()) throw InputError("surface: it has no triangles that share an edge");
   close_holes(mesh, component, result);
   const int count = *std::max_element(component.begin(), component.end()) + 1;
   const std::vector<Component> parts = measured(mesh, component, count);

@@ -35,8 +35,8 @@ struct SolidBoundary {
 /// they were discs. Triangles with two equal corners, and those without a neighbour, are dropped.
 ///
 /// InputError, naming an edge: more than two triangles at an edge, a surface that cannot be oriented, or one that
-/// encloses no volume. A vertex with several fans of triangles counts as that many. Cost: sorts of the vertices and
-/// edges.
+/// encloses no volume. A vertex with several fans of triangles counts as that many. Cost: sorts of the vertices, edges
+/// and components.
 SolidBoundary solid_boundary(const TriangleMesh& surface);
 
 }  // namespace subvol

@@ -4,6 +4,7 @@
 #include "subvol/error.h"
 #include "subvol/mesh_topology.h"
 #include "subvol/template_edit.h"
+#include "subvol/text_scanner.h"
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace subvol {
@@ -18,6 +20,18 @@ namespace subvol {
 namespace {
 
 using Corners = std::vector<Index>;
+
+bool are_distinct(Corners corners) {
+  std::sort(corners.begin(), corners.end());
+  return std::adjacent_find(corners.begin(), corners.end()) == corners.end();
+}
+
+/// What the corners of a cell become.
+Corners merged_corners(const VolumeMesh& mesh, std::size_t c, std::span<const Index> target) {
+  Corners corners;
+  for (Index v : mesh.cell(c)) corners.push_back(target[v]);
+  return corners;
+}
 
 /// A face without corners that repeat the one before; empty where nothing of it is left.
 Corners reduced_face(const CellTopology& local, int f, std::span<const Index> corners) {
@@ -27,10 +41,7 @@ Corners reduced_face(const CellTopology& local, int f, std::span<const Index> co
     if (face.empty() || face.back() != v) face.push_back(v);
   }
   while (face.size() > 1 && face.front() == face.back()) face.pop_back();
-  Corners sorted = face;
-  std::sort(sorted.begin(), sorted.end());
-  const bool folded = std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end();
-  return face.size() < 3 || folded ? Corners{} : face;
+  return face.size() < 3 || !are_distinct(face) ? Corners{} : face;
 }
 
 /// Whether the faces that are left cover each other in pairs.
@@ -82,14 +93,10 @@ std::optional<std::array<Index, 6>> prism_of(const CellTopology& hex, std::span<
 VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target, const std::string& name) {
   VolumeMesh merged;
   merged.positions = mesh.positions;
-  Corners corners;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    corners.clear();
-    for (Index v : mesh.cell(c)) corners.push_back(target[v]);
-    Corners sorted = corners;
-    std::sort(sorted.begin(), sorted.end());
+    const Corners corners = merged_corners(mesh, c, target);
     const CellTopology& local = cell_topology(mesh.kinds[c]);
-    if (std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end()) {
+    if (are_distinct(corners)) {
       merged.add_cell(mesh.kinds[c], corners);
     } else if (is_flat(local, corners)) {
       continue;
@@ -136,11 +143,17 @@ VolumeMesh joined(const VolumeMesh& a, const VolumeMesh& b) {
 VolumeMesh glue(const VolumeMesh& mesh, double distance) {
   if (!(distance >= 0) || !std::isfinite(distance)) throw InputError("merge: the distance must be finite and >= 0");
   const MeshTopology topology(mesh);
-  std::vector<Index> order;
-  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
-    if (topology.is_boundary_vertex(static_cast<Index>(v))) order.push_back(static_cast<Index>(v));
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Index a, Index b) { return mesh.positions[a].x() < mesh.positions[b].x(); });
+  // Swept along a direction in which few vertices of a grid are level with each other.
+  const Vec3 along = Vec3(1, std::sqrt(2.0), std::sqrt(3.0)).normalized();
+  std::vector<std::pair<double, Index>> order;  // height, vertex
+  double largest = 0;
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) {
+    if (!topology.is_boundary_vertex(static_cast<Index>(v))) continue;
+    order.push_back({along.dot(mesh.positions[v]), static_cast<Index>(v)});
+    largest = std::max(largest, mesh.positions[v].norm());
+  }
+  std::stable_sort(order.begin(), order.end());
+  const double reach = distance + 4e-15 * largest;  // heights are rounded
   std::vector<Index> target(mesh.num_vertices());
   std::iota(target.begin(), target.end(), 0);
   const auto root = [&](Index v) {
@@ -148,14 +161,19 @@ VolumeMesh glue(const VolumeMesh& mesh, double distance) {
     return v;
   };
   for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = i + 1; j < order.size(); ++j) {
-      const Vec3 &p = mesh.positions[order[i]], &q = mesh.positions[order[j]];
-      if (q.x() - p.x() > distance) break;
-      if (!((q - p).norm() <= distance)) continue;
-      const Index a = root(order[i]), b = root(order[j]);
+    for (std::size_t j = i + 1; j < order.size() && order[j].first - order[i].first <= reach; ++j) {
+      const Index v = order[i].second, w = order[j].second;
+      if (!((mesh.positions[w] - mesh.positions[v]).norm() <= distance)) continue;
+      const Index a = root(v), b = root(w);
       target[std::max(a, b)] = std::min(a, b);
     }
   for (std::size_t v = 0; v < target.size(); ++v) target[v] = root(static_cast<Index>(v));
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (!are_distinct(merged_corners(mesh, c, target))) {
+      std::string message = "merge: two corners of cell " + std::to_string(c) + " would become one at the distance ";
+      append_number(message, distance);
+      throw InputError(message + ", which must be well below the shortest edge");
+    }
   return merge_vertices(mesh, target, "merge");
 }
 

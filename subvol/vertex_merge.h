@@ -21,7 +21,9 @@ namespace subvol {
 VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target, const std::string& name);
 
 /// Glues faces that lie on each other: boundary vertices within a distance become one, the one of the smaller number.
-/// distance  >= 0, well below the shortest edge, else InputError. InputError as `merge_vertices`.
+/// distance  >= 0; well below the shortest edge, so that the corners of every cell stay distinct, else InputError.
+/// InputError as `merge_vertices`. Cost: sorts of the vertices and edges; for a distance that is not small beside the
+/// mesh, up to the square of the boundary's vertices.
 VolumeMesh glue(const VolumeMesh& mesh, double distance);
 
 /// Two meshes as one, the second's vertices and cells after the first's. Nothing is glued.

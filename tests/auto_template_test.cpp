@@ -18,6 +18,7 @@
 
 #include <functional>
 #include <limits>
+#include <numbers>
 
 using namespace subvol;
 
@@ -97,6 +98,82 @@ TEST_CASE("A soup with holes and flipped triangles becomes a solid's boundary", 
   fan.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
   CHECK_THROWS_AS(solid_boundary(fan), InputError);
   CHECK_THROWS_AS(solid_boundary({{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)}, {{0, 1, 2}}}), InputError);
+}
+
+TEST_CASE("Of many parts, those turned inward within another one's box are cavities", "[templates]") {
+  test::RandomPoints random(5);
+  TriangleMesh surface;
+  std::vector<Eigen::AlignedBox3d> outward, inward;
+  const auto add = [&](TriangleMesh part, const Vec3& centre, double size, bool inside_out) {
+    const auto first = static_cast<Index>(surface.positions.size());
+    Eigen::AlignedBox3d box;
+    for (Vec3& p : part.positions) box.extend(p = centre + size * p);
+    surface.positions.insert(surface.positions.end(), part.positions.begin(), part.positions.end());
+    for (const auto& t : part.triangles)
+      surface.triangles.push_back({first + t[0], first + t[inside_out ? 2 : 1], first + t[inside_out ? 1 : 2]});
+    (inside_out ? inward : outward).push_back(box);
+  };
+  const TriangleMesh cube = test::cube_surface(1, false);
+  const TriangleMesh octahedron{
+      {-Vec3::UnitX(), Vec3::UnitX(), -Vec3::UnitY(), Vec3::UnitY(), -Vec3::UnitZ(), Vec3::UnitZ()},
+      {{1, 3, 5}, {3, 0, 5}, {0, 2, 5}, {2, 1, 5}, {3, 1, 4}, {0, 3, 4}, {2, 0, 4}, {1, 2, 4}}};
+  // In the plane of the first vertex, a square encloses exactly nothing. (A triangle alone would be dropped.)
+  const TriangleMesh flat{{Vec3(-1, -1, 0), Vec3(1, -1, 0), Vec3(1, 1, 0), Vec3(-1, 1, 0)}, {{0, 1, 2}, {0, 2, 3}}};
+  add(cube, Vec3(0, 0, 0.25), 0.25, false);
+  for (int i = 0; i < 1500; ++i)
+    add(i % 3 == 0 ? octahedron : cube, random.point(), std::pow(10, random.number(-4, -0.7)), random.number() < -0.2);
+  const std::size_t boxes_alike = outward.size();
+  add(cube, Vec3(9, 0, 0), 2, false);
+  add(octahedron, Vec3(9, 0, 0), 2, true);
+  add(flat, Vec3(0.1, 0, 0), 0.1, true);
+  add(flat, Vec3(0, 9, 0), 0.1, true);
+
+  int cavities = 0;
+  for (const Eigen::AlignedBox3d& box : inward)
+    cavities += std::ranges::any_of(outward, [&](const auto& other) { return other.contains(box); });
+  REQUIRE(outward[boxes_alike].isApprox(inward[inward.size() - 3], 0));
+  const SolidBoundary solid = solid_boundary(surface);
+  CHECK(solid.topology.cavities == cavities);
+  CHECK(solid.topology.components == static_cast<int>(outward.size() + inward.size()) - cavities);
+  CHECK(solid.closed_holes == 2);
+  CHECK(cavities > 100);
+  CHECK(solid.topology.components > 900);
+}
+
+TEST_CASE("A triangle without a neighbour is no part of a solid and no void in it", "[templates]") {
+  const TriangleMesh cube = test::cube_surface(4, false);
+  for (const double place : {0.1, 5.0}) {  // inside and outside
+    TriangleMesh stray = cube;
+    for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(0.1, 0, 0), Vec3(0, 0.1, 0)})
+      stray.positions.push_back(corner + Vec3::Constant(place));
+    const auto first = static_cast<Index>(cube.positions.size());
+    stray.triangles.insert(stray.triangles.begin() + 7, {first, first + 1, first + 2});
+    const SolidBoundary solid = solid_boundary(stray);
+    CHECK(solid.topology == BettiNumbers{1, 0, 0});
+    CHECK(solid.dropped_triangles == 1);
+    CHECK(solid.closed_holes == 0);
+    CHECK(solid.surface.triangles.size() == cube.triangles.size());
+    CHECK(solid.volume == solid_boundary(cube).volume);
+  }
+}
+
+TEST_CASE("Holes that meet at one vertex are closed each by itself, however many", "[templates]") {
+  // A cone of which every second triangle at the top is missing.
+  constexpr Index kHoles = 200000;
+  TriangleMesh cone;
+  cone.positions.push_back(Vec3(0, 0, 0));
+  for (Index i = 0; i < 2 * kHoles; ++i) {
+    const double angle = std::numbers::pi * i / kHoles;
+    cone.positions.push_back(Vec3(std::cos(angle), std::sin(angle), 0));
+    cone.triangles.push_back({i + 1, 0, i + 1 < 2 * kHoles ? i + 2 : 1});
+  }
+  cone.positions.push_back(Vec3(0, 0, 1));
+  for (Index i = 0; i < 2 * kHoles; i += 2) cone.triangles.push_back({2 * kHoles + 1, i + 1, i + 2});
+  const SolidBoundary solid = solid_boundary(cone);
+  CHECK(solid.topology == BettiNumbers{1, 0, 0});
+  CHECK(solid.closed_holes == kHoles);
+  CHECK(solid.surface.triangles.size() == cone.triangles.size() + 3 * kHoles);
+  CHECK(solid.volume == Approx(std::numbers::pi / 3));
 }
 
 TEST_CASE("Solid fractions add up to the volume and agree with counting points", "[templates]") {

@@ -8,10 +8,14 @@
 #include "subvol/subdivision.h"
 #include "tests/glb_reader.h"
 #include "tests/sample_meshes.h"
+#include "tests/surface_fixtures.h"
 
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
 
 using namespace subvol;
 using namespace subvol::test;
@@ -132,6 +136,78 @@ TEST_CASE("normals are averaged across blunt edges and parted at sharp ones") {
   const Vec3 ridge = smooth.normals[smooth.corner_vertices[1]];
   CHECK((ridge - Vec3(1, 0, 2).normalized()).norm() < 1e-12);  // areas 1 and sqrt(2)
   CHECK_THROWS_AS(shade_polygons(roof, 181), InputError);
+}
+
+TEST_CASE("corners are shaded together where smooth edges lead from one to the other") {
+  RandomPoints random(6);
+  PolygonMesh soup;  // edges of many faces, faces that come to a vertex twice
+  soup.positions = random.points(9);
+  soup.face_offsets = {0};
+  for (int f = 0; f < 60; ++f) {
+    for (int k = 0; k < 3 + f % 3; ++k)
+      soup.face_vertices.push_back(static_cast<Index>(random.number(0, static_cast<double>(soup.positions.size()))));
+    soup.face_offsets.push_back(soup.face_vertices.size());
+  }
+  const auto area = [&](std::size_t f) {
+    const auto at = [&](std::size_t k) { return soup.positions[soup.face_vertices[k]]; };
+    Vec3 sum = Vec3::Zero();
+    for (std::size_t k = soup.face_offsets[f] + 1; k + 1 < soup.face_offsets[f + 1]; ++k)
+      sum += (at(k) - at(soup.face_offsets[f])).cross(at(k + 1) - at(soup.face_offsets[f]));
+    return sum;
+  };
+  struct Corner {
+    Index vertex, before, after;
+    std::size_t face;
+  };
+  std::vector<Corner> corners;
+  for (std::size_t f = 0; f < soup.num_faces(); ++f)
+    for (std::size_t first = soup.face_offsets[f], end = soup.face_offsets[f + 1], k = first; k < end; ++k)
+      corners.push_back({soup.face_vertices[k], soup.face_vertices[k == first ? end - 1 : k - 1],
+                         soup.face_vertices[k + 1 == end ? first : k + 1], f});
+  for (const double angle : {5.0, 15.0, 40.0}) {
+    // Each corner's group: the least number that gets to it.
+    std::vector<std::size_t> group(corners.size());
+    for (std::size_t i = 0; i < group.size(); ++i) group[i] = i;
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (std::size_t i = 0; i < corners.size(); ++i)
+        for (std::size_t j = 0; j < corners.size(); ++j) {
+          const Corner &a = corners[i], &b = corners[j];
+          if (a.vertex != b.vertex || group[i] <= group[j]) continue;
+          if (a.before != b.before && a.before != b.after && a.after != b.before && a.after != b.after) continue;
+          const Vec3 p = area(a.face), q = area(b.face);
+          if (!(p.dot(q) > std::cos(angle * std::numbers::pi / 180) * p.norm() * q.norm())) continue;
+          group[i] = group[j];
+          changed = true;
+        }
+    }
+    const ShadedPolygons shaded = shade_polygons(soup, angle);
+    std::size_t groups = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      groups += group[i] == i;
+      CHECK(shaded.corner_vertices[i] == shaded.corner_vertices[group[i]]);
+    }
+    CHECK(shaded.positions.size() == groups);
+    CHECK(groups > soup.positions.size());
+    CHECK(groups < corners.size());
+  }
+}
+
+TEST_CASE("a vertex of very many faces is shaded by its sharp edges alone") {
+  constexpr Index kFaces = 5000;
+  PolygonMesh cone;  // two thirds of its faces lie flat
+  cone.positions = {{0, 0, 0}};
+  cone.face_offsets = {0};
+  for (Index k = 0; k < kFaces; ++k) {
+    const double angle = 2 * std::numbers::pi * k / kFaces;
+    cone.positions.push_back({std::cos(angle), std::sin(angle), 3 * k < kFaces ? 0.5 : 0});
+    cone.face_vertices.insert(cone.face_vertices.end(), {0, k + 1, (k + 1) % kFaces + 1});
+    cone.face_offsets.push_back(cone.face_vertices.size());
+  }
+  const ShadedPolygons shaded = shade_polygons(cone, 30);
+  std::set<Index> at_tip;
+  for (std::size_t k = 0; k < cone.face_vertices.size(); k += 3) at_tip.insert(shaded.corner_vertices[k]);
+  CHECK(at_tip.size() == 4);  // flat, steep, and the two faces between
 }
 
 TEST_CASE("options out of range are refused") {

@@ -7,6 +7,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -101,6 +102,46 @@ TEST_CASE("a displaced lattice follows every edge of a cube") {
     const FeatureCurve& curve = curves.curves[path.curve];
     CHECK((mesh.positions[path.vertices.front()] - curve.points.front()).norm() < 0.3);
     CHECK((mesh.positions[path.vertices.back()] - curve.points.back()).norm() < 0.3);
+  }
+}
+
+TEST_CASE("each of many cubes gets its paths, whatever its vertices' numbers") {
+  constexpr int kCubes = 2;
+  const auto in_cube = [](int i) { return i % 4 < 2; };
+  constexpr int kLength = 4 * kCubes - 2;
+  VolumeMesh mesh = voxels(kLength, kLength, kLength,
+                           [&](int i, int j, int k) { return in_cube(i) && in_cube(j) && in_cube(k); });
+  for (Vec3& p : mesh.positions) p += Vec3(0.15, -0.1, 0.12);
+  TriangleMesh target;
+  for (int n = 0; n < kCubes * kCubes * kCubes; ++n) {
+    const TriangleMesh cube = cube_surface(2, false);
+    const auto first = static_cast<Index>(target.positions.size());
+    const Vec3 centre = Vec3::Ones() + 4 * Vec3(n % kCubes, n / kCubes % kCubes, n / kCubes / kCubes);
+    for (const Vec3& p : cube.positions) target.positions.push_back(centre + p);
+    for (const auto& t : cube.triangles) target.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  }
+  const FeatureCurves curves = feature_curves(target, 40);
+  const std::vector<CreasePath> paths = follow_curves(mesh, curves);
+  CHECK(paths.size() == 12 * 8);
+  for (const CreasePath& path : paths) {
+    const FeatureCurve& curve = curves.curves[path.curve];
+    CHECK((mesh.positions[path.vertices.front()] - curve.points.front()).norm() < 0.3);
+    CHECK((mesh.positions[path.vertices.back()] - curve.points.back()).norm() < 0.3);
+  }
+  const FeatureTags tags = tags_of_paths(paths, curves);
+  CHECK(tags.creases.size() == 24 * 8);
+  CHECK(tags.corners.size() == 8 * 8);
+
+  const auto last = static_cast<Index>(mesh.num_vertices()) - 1;
+  VolumeMesh backward = mesh;
+  std::reverse(backward.positions.begin(), backward.positions.end());
+  for (Index& v : backward.cell_vertices) v = last - v;
+  std::vector<CreasePath> others = follow_curves(backward, curves);
+  REQUIRE(others.size() == paths.size());
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (Index& v : others[i].vertices) v = last - v;
+    CHECK(others[i].curve == paths[i].curve);
+    CHECK(others[i].vertices == paths[i].vertices);
   }
 }
 

@@ -70,6 +70,31 @@ TEST_CASE("Neighbours tell a cloud's normals, area and volume") {
   CHECK(target.samples() == cloud.points);
 }
 
+TEST_CASE("Areas are those of all distances sorted, and a point far away changes nothing for the others") {
+  PointCloud cloud = on_sphere(20000);
+  const CloudGeometry alone = cloud_geometry(cloud.points);
+  cloud.points.push_back(Vec3(1e6, 0, 0));
+  CloudGeometry beside = cloud_geometry(cloud.points);
+  CHECK(beside.areas.back() > 1e10);
+  beside.areas.pop_back();
+  beside.normals.pop_back();
+  CHECK(beside.areas == alone.areas);
+  CHECK(beside.normals == alone.normals);
+
+  std::vector<Vec3> lattice;  // many are equally far
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 60; ++j) lattice.emplace_back(0.1 * i, 0.1 * j, 0.7);
+  for (const std::vector<Vec3>& points : {on_sphere(3000).points, lattice}) {
+    const CloudGeometry geometry = cloud_geometry(points);
+    for (std::size_t i = 0; i < points.size(); i += 100) {
+      std::vector<double> squared;
+      for (const Vec3& p : points) squared.push_back((p - points[i]).squaredNorm());
+      std::sort(squared.begin(), squared.end());
+      CHECK(geometry.areas[i] == Approx(std::numbers::pi * squared[16] / 16).epsilon(1e-12));
+    }
+  }
+}
+
 TEST_CASE("By area, a dense part of a cloud weighs no more than a sparse one") {
   PointCloud cloud = on_sphere(8000);
   std::erase_if(cloud.points, [n = 0](const Vec3& p) mutable { return p.z() < 0 && n++ % 10 != 0; });

@@ -198,6 +198,30 @@ TEST_CASE("Merging glues coincident faces and keeps tags that stay on the bounda
   CHECK_THROWS_AS(glue(joined(left, left), 1e-9), InputError);  // the same cells twice
 }
 
+TEST_CASE("Merging refuses a distance at which cells would go or change their kind", "[templates]") {
+  VolumeMesh thin = test::lattice(1, 1, 1), apart = test::lattice(2, 2, 2);
+  for (Vec3& p : thin.positions) p.z() *= 0.005;
+  for (Vec3& p : apart.positions) p.x() += 5;
+  const VolumeMesh both = joined(apart, thin);
+  CHECK(glue(both, 0.004).num_cells() == 9);
+  CHECK_THROWS_WITH(glue(both, 0.06), Catch::Contains("corners of cell 8") && Catch::Contains("0.06"));
+  VolumeMesh wedge = test::lattice(1, 1, 1);  // nearly a prism
+  for (Vec3& p : wedge.positions)
+    if (p.x() > 0) p.z() *= 0.005;
+  CHECK_THROWS_AS(glue(wedge, 0.06), InputError);
+  CHECK(glue(wedge, 0.004).kinds == wedge.kinds);
+}
+
+TEST_CASE("Merging takes boundaries of many vertices in one plane", "[templates]") {
+  const VolumeMesh below = test::lattice(300, 300, 1);
+  VolumeMesh above = below;
+  for (Vec3& p : above.positions) p.z() += 1;
+  const VolumeMesh glued = glue(joined(below, above), 1e-6);
+  CHECK(glued.num_cells() == 2 * 300 * 300);
+  CHECK(glued.num_vertices() == 3 * 301 * 301);
+  CHECK(volume_of(glued) == Approx(2 * 300 * 300));
+}
+
 TEST_CASE("Hexes become tets and prisms without new vertices", "[templates]") {
   VolumeMesh lattice = tagged_lattice(3, 2, 2);
   test::jitter(lattice, 0.1);
@@ -217,6 +241,11 @@ TEST_CASE("Hexes become tets and prisms without new vertices", "[templates]") {
     CHECK(prisms.num_cells() == 24);
     check_mesh_is(prisms, 1, 12);
   }
+  const VolumeMesh column = test::lattice(1, 1, 2000);
+  const VolumeMesh prisms =
+      split_into_prisms(column, vertex_at(column, Vec3(0, 0, 0)), vertex_at(column, Vec3(0, 0, 1)));
+  CHECK(prisms.num_cells() == 4000);
+  check_mesh_is(prisms, 1, 2000);
   CHECK_THROWS_AS(split_into_prisms(straight, 0, 100), InputError);
   CHECK_THROWS_AS(split_into_prisms(test::mixed_cells(), 0, 1), InputError);
 }
