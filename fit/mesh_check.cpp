@@ -87,17 +87,6 @@ double enclosed_volume(const TriangleMesh& surface) {
   return sum / 6;
 }
 
-/// Volumes and distances are numbers then. Positions that are not finite are a defect, and told as one.
-void require_extent(std::span<const Vec3> points, const char* what) {
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-  for (const Vec3& p : points) {
-    if (!p.allFinite()) continue;
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  if (const double extent = (high - low).maxCoeff(); extent > 0) require_length(extent, what);
-}
-
 /// How the boundary's triangles are compared with a target; empty: there is none.
 using Compare = std::function<void(const TriangleMesh& boundary, MeshCheck& check)>;
 
@@ -147,7 +136,8 @@ void check_boundary(const TriangleMesh& triangles, std::span<const Index> face_o
   for (const auto& [t, s] : found.pairs) faces.push_back({face_of_triangle[t], face_of_triangle[s]});
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  if (compare && begins("distance", 0.6, progress, check)) compare(triangles, check);
+  const bool to_compare = compare && !triangles.triangles.empty();
+  if (to_compare && begins("distance", 0.6, progress, check)) compare(triangles, check);
 }
 
 MeshCheck count_cells(const VolumeMesh& mesh) {
@@ -336,6 +326,17 @@ OrderSummary order_summary(const ElementSpace& space) {
   for (std::size_t c = 0; c < space.num_cells(); ++c)
     nodes += static_cast<std::size_t>(num_modes(entity_shape(space.kind(c)), order));
   return summary;
+}
+
+// Volumes and distances are numbers then.
+void require_extent(std::span<const Vec3> points, const char* what) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Vec3& p : points) {
+    if (!p.allFinite()) continue;
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  if (const double extent = (high - low).maxCoeff(); extent > 0) require_length(extent, what);
 }
 
 MeshCheck check_mesh(const VolumeMesh& mesh, const TriangleMesh* target, const MeshCheckOptions& options) {

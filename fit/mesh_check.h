@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,9 @@ enum class QuadTriangles {
 struct MeshCheckOptions {
   int samples_per_direction = 5;   ///< of the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
-  int distance_samples = 50000;    ///< `SurfaceDistanceOptions::num_samples`
-  /// Told "quality", "topology", "self-intersections" and, where there is a target, "distance" before each.
+  int distance_samples = SurfaceDistanceOptions{}.num_samples;  ///< its `num_samples`
+  /// Told "quality", "topology", "self-intersections" and, where there are a target and a boundary, "distance" before
+  /// each.
   WorkProgress progress{};
 };
 
@@ -80,7 +82,7 @@ struct MeshCheck {
   std::size_t num_intersecting_triangle_pairs = 0;           ///< `kMostIntersectingPairs`: that many or more
   std::size_t num_degenerate_boundary_triangles = 0;         ///< without area: not looked at for intersections
 
-  std::optional<SurfaceDistance> distance;                   ///< a: boundary, b: target
+  std::optional<SurfaceDistance> distance;                   ///< a: boundary, b: target; none without a boundary
   double target_diagonal = 0;                                ///< of the target's bounding box: 100 per cent
 
   /// Usable as it is: sound but for unused vertices, every cell certified, the boundary's triangles (those with an
@@ -92,6 +94,10 @@ struct MeshCheck {
  private:
   double in_percent(double length) const { return target_diagonal > 0 ? 100 * length / target_diagonal : 0; }
 };
+
+/// InputError, naming what it is of, where `check_mesh` would refuse a mesh with these vertices: an extent of more than
+/// nothing that `require_length` refuses. Those that are not finite are left out: they are a defect, and told as one.
+void require_extent(std::span<const Vec3> points, const char* what);
 
 /// Looks at everything: defects, topology, quality, certificate, self-intersection, distance.
 ///

@@ -8,6 +8,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace subvol {
 
@@ -43,6 +44,19 @@ constexpr VtkType kVtkTypes[] = {
     {"vtktypeuint32", kUInt32},
 };
 
+/// An attribute that nothing is made of: keyword, name, number of components where it is given, type unless it is
+/// colours. Then so many values for each point, cell or, after its size, entry of a lookup table.
+struct VtkAttribute {
+  const char* keyword;
+  std::size_t components;  ///< 0: given
+  bool is_colors = false;  ///< bytes in binary files, fractions in text
+};
+constexpr VtkAttribute kSkippedAttributes[] = {
+    {"vectors", 3},    {"normals", 3},      {"tensors", 9},    {"tensors6", 6},
+    {"global_ids", 1}, {"pedigree_ids", 1}, {"edge_flags", 1}, {"texture_coordinates", 0},
+    {"color_scalars", 0, true}, {"lookup_table", 4, true},
+};
+
 class VtkParser {
  public:
   VtkParser(const std::string& name, std::string_view bytes) : scan_(name, bytes, TextScanner::Comments::none) {}
@@ -59,7 +73,7 @@ class VtkParser {
       else if (keyword == "field") read_field(nullptr);
       else if (keyword == "metadata") skip_metadata();
       else scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
-      if (stray_attribute_) break;  // of a kind not read here; the mesh itself stands before its attributes
+      if (stray_attribute_) break;  // the mesh itself stands before its attributes
     }
     if (!has_points_) scan_.fail("the file ends without POINTS");
     if (!has_cells_) scan_.fail("the file ends without CELLS");
@@ -91,10 +105,16 @@ class VtkParser {
 
   ValueType read_type() {
     const std::string_view word = scan_.word("a data type");
+    const auto type = type_of(word);
+    if (!type) scan_.fail("unknown data type " + in_quotes(word));
+    return *type;
+  }
+
+  static std::optional<ValueType> type_of(std::string_view word) {
     const std::string name = lower_case(word);
     for (const VtkType& type : kVtkTypes)
       if (name == type.name) return type.type;
-    scan_.fail("unknown data type " + in_quotes(word));
+    return std::nullopt;
   }
 
   /// A count of things of which each takes at least one word or byte.
@@ -121,14 +141,14 @@ class VtkParser {
     for (std::size_t i = 0; i < n; ++i) visit(i, decode(bytes.data() + i * type.size, type, std::endian::big));
   }
 
+  /// Those beyond 1e15 come as 1e15: nothing counted here is as large.
   std::vector<std::int64_t> read_whole_numbers(std::size_t n, ValueType type, const char* what) {
     if (type.is_real()) scan_.fail(std::string(what) + " must be of a whole-number type");
     std::vector<std::int64_t> numbers;
     numbers.reserve(std::min(n, scan_.bytes_left()));
     read_values(n, type, what, [&](std::size_t, double value) {
-      if (value != std::floor(value) || std::abs(value) > 1e15)
-        scan_.fail(std::string(what) + " must be whole numbers");
-      numbers.push_back(static_cast<std::int64_t>(value));
+      if (value != std::floor(value)) scan_.fail(std::string(what) + " must be whole numbers");
+      numbers.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
     });
     return numbers;
   }
@@ -218,13 +238,37 @@ class VtkParser {
       if (keyword == "scalars") read_scalars(expected, of_cells ? &references_ : nullptr);
       else if (keyword == "field") read_field(of_cells ? &references_ : nullptr);
       else if (keyword == "metadata") skip_metadata();
-      else stray_attribute_ = true;
+      else if (!references_.empty()) stray_attribute_ = true;  // nothing more is wanted
+      else if (!skip_attribute(keyword, expected)) end_attributes(*word);
     }
   }
 
+  /// False: its kind or type is not known.
+  bool skip_attribute(const std::string& keyword, std::size_t n) {
+    const auto* attribute = std::find_if(std::begin(kSkippedAttributes), std::end(kSkippedAttributes),
+                                         [&](const VtkAttribute& a) { return keyword == a.keyword; });
+    if (attribute == std::end(kSkippedAttributes)) return false;
+    scan_.word("the name of an attribute");
+    std::size_t components = attribute->components;
+    if (components == 0) components = read_count("the number of components");
+    if (keyword == "lookup_table") n = read_count("the size of a lookup table");
+    const auto type = attribute->is_colors ? std::optional(binary_ ? kUInt8 : kFloat32)
+                                           : type_of(scan_.word("a data type"));
+    if (type) read_array(n, components, *type, nullptr);
+    return type.has_value();
+  }
+
+  /// At one that cannot be passed over.
+  void end_attributes(std::string_view word) {
+    stray_attribute_ = true;
+    if (references_.empty())
+      parsed_.warnings.push_back("attributes from " + in_quotes(word) + " on are not read");
+  }
+
   void read_scalars(std::size_t n, std::vector<std::int64_t>* references) {
-    scan_.word("the name of the scalars");
-    const ValueType type = read_type();
+    const std::string_view name = scan_.word("the name of the scalars");
+    const auto type = type_of(scan_.word("a data type"));
+    if (!type) return end_attributes(name);
     std::int64_t components = 1;
     if (const auto word = scan_.peek(); word && parse_integer(*word)) components = *parse_integer(*scan_.next());
     if (components < 1 || components > 4) scan_.fail("scalars have 1 to 4 components");
@@ -232,7 +276,7 @@ class VtkParser {
       scan_.next();
       scan_.word("the name of a lookup table");
     }
-    read_array(n, static_cast<std::size_t>(components), type, references);
+    read_array(n, static_cast<std::size_t>(components), *type, references);
   }
 
   void read_field(std::vector<std::int64_t>* references) {
@@ -252,14 +296,12 @@ class VtkParser {
         for (std::size_t j = 0; j < components * n; ++j) skip_string();
         continue;
       }
-      const auto* type = std::find_if(std::begin(kVtkTypes), std::end(kVtkTypes),
-                                      [&](const VtkType& t) { return lower_case(type_name) == t.name; });
-      if (type == std::end(kVtkTypes)) {
+      const auto type = type_of(type_name);
+      if (!type) {
         if (!has_types_) scan_.fail("unknown data type " + in_quotes(type_name));
-        stray_attribute_ = true;
-        return;
+        return end_attributes(name);
       }
-      read_array(n, components, type->type, references);
+      read_array(n, components, *type, references);
     }
   }
 
@@ -319,6 +361,9 @@ class VtkParser {
     }
     if (num_skipped_ > 0)
       parsed_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
+    if (num_beyond_ > 0)
+      parsed_.warnings.push_back("the references of " + std::to_string(num_beyond_) +
+                                 " cells are beyond 32 bits, and become 0");
     auto& references = parsed_.mesh.references;
     if (std::all_of(references.begin(), references.end(), [](int r) { return r == 0; })) references.clear();
   }
@@ -341,13 +386,14 @@ class VtkParser {
     const std::int64_t reference = references_.empty() ? 0 : references_[c];
     const bool fits = reference >= std::numeric_limits<int>::min() && reference <= std::numeric_limits<int>::max();
     parsed_.mesh.references.push_back(fits ? static_cast<int>(reference) : 0);
+    num_beyond_ += !fits;
   }
 
   TextScanner scan_;
   ParsedMesh parsed_;
   int major_ = 0;
   bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false;
-  std::size_t num_cells_ = 0, num_skipped_ = 0, cells_line_ = 0, types_line_ = 0;
+  std::size_t num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
   std::vector<std::size_t> offsets_{0};
   std::vector<std::int64_t> corners_, types_, references_;
 };

@@ -37,10 +37,16 @@ std::size_t num_binary_facets(std::string_view bytes) {
   return static_cast<std::size_t>(decode(bytes.data() + kHeaderBytes - 4, kUInt32, std::endian::little));
 }
 
+/// Text may have blanks and a byte order mark first, and capitals.
+bool begins_as_text(std::string_view bytes) {
+  const auto word = TextScanner("", bytes.substr(0, kHeaderBytes), TextScanner::Comments::none).next();
+  return bytes.starts_with("solid") || (word && lower_case(*word) == "solid");
+}
+
 /// Binary files too may begin with "solid": what tells is whether the size is that of the facets announced.
 bool is_binary(std::string_view bytes) {
   if (bytes.size() < kHeaderBytes) return false;
-  return !bytes.starts_with("solid") || bytes.size() == kHeaderBytes + kFacetBytes * num_binary_facets(bytes);
+  return !begins_as_text(bytes) || bytes.size() == kHeaderBytes + kFacetBytes * num_binary_facets(bytes);
 }
 
 PolygonMesh parse_binary(const std::string& name, std::string_view bytes) {

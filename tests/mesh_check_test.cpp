@@ -141,6 +141,20 @@ TEST_CASE("whatever is wrong with a mesh, its check returns", "[mesh_check]") {
   twice.add_cell(CellKind::hex, vertices);
   CHECK_FALSE(check_mesh(twice).valid());
   CHECK_FALSE(to_text(check_mesh(twice)).empty());
+  VolumeMesh closed = lattice(1, 1, 1);  // the same cell twice: there is no boundary
+  closed.add_cell(CellKind::hex, vertices);
+  const TriangleMesh surface = boundary_triangles(lattice(1, 1, 1));
+  PointCloud points;
+  points.points = surface.positions;
+  for (const MeshCheck& found : {check_mesh(closed, &surface), check_mesh(closed, &points)}) {
+    CHECK_FALSE(found.valid());
+    CHECK(has(found, MeshDefect::Kind::duplicate_cell));
+    CHECK(found.has_boundary_geometry);
+    CHECK(found.volume == 0);
+    CHECK_FALSE(found.distance);
+    CHECK_FALSE(found.ended_early);
+    CHECK_FALSE(to_text(found).empty());
+  }
   VolumeMesh mirrored = lattice(2, 1, 1);  // its second cell has bottom and top exchanged
   std::swap_ranges(mirrored.cell_vertices.begin() + 8, mirrored.cell_vertices.begin() + 12,
                    mirrored.cell_vertices.begin() + 12);

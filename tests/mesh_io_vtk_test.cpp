@@ -138,6 +138,55 @@ TEST_CASE("whole-number cell data become references, in whatever form they come"
   CHECK(read_bytes(base + after).references == std::vector<int>{5, 6, 7});
 }
 
+TEST_CASE("cell data become references whatever attributes stand before them") {
+  const bool binary = GENERATE(false, true);
+  const auto numbers = [&](std::size_t n) { return array_of(std::vector<float>(n, -0.5f), binary); };
+  const auto colours = [&](std::size_t n) { return binary ? std::string(n, '\x7f') + "\n" : numbers(n); };
+  const auto ids = [&](std::size_t n) { return array_of(std::vector<std::int64_t>(n, 1'000'000'000'000), binary); };
+  const std::string bytes =
+      vtk_file({"3.0", binary}, kPoints, kCells, kTypes) + "POINT_DATA 11\nVECTORS v float\n" + numbers(3 * 11) +
+      "NORMALS n float\n" + numbers(3 * 11) + "METADATA\nINFORMATION 0\n\nTENSORS t float\n" + numbers(9 * 11) +
+      "TEXTURE_COORDINATES uv 2 float\n" + numbers(2 * 11) + "SCALARS q float\nLOOKUP_TABLE table\n" + numbers(11) +
+      "LOOKUP_TABLE table 3\n" + colours(4 * 3) + "COLOR_SCALARS c 3\n" + colours(3 * 11) +
+      "GLOBAL_IDS g vtktypeint64\n" + ids(11) + "CELL_DATA 5\nGLOBAL_IDS g vtktypeint64\n" + ids(5) +
+      "VECTORS v float\n" + numbers(3 * 5) + "SCALARS part int\nLOOKUP_TABLE default\n" +
+      array_of(std::vector<std::int32_t>{5, 6, 7, 8, 9}, binary);
+  std::vector<std::string> warnings;
+  CHECK(read_bytes(bytes, &warnings).references == std::vector<int>{5, 6, 7});
+  CHECK(warnings.size() == 1);  // of the quad and the vertex
+}
+
+TEST_CASE("attributes that cannot be passed over end the reading of a VTK file, and that is said") {
+  const std::string base = vtk_file({}, kPoints, kCells, kTypes);
+  const std::string part = "SCALARS part int\nLOOKUP_TABLE default\n5 6 7 8 9\n";
+  for (const std::string attribute : {"NEW_KIND v int\n1 2 3 4 5\n", "VECTORS v of\n", "SCALARS v bit\n1 0 1 0 1\n",
+                                       "FIELD f 1\nv 1 5 bit\n1 0 1 0 1\n"}) {
+    CAPTURE(attribute);
+    std::vector<std::string> warnings;
+    CHECK(read_bytes(base + "CELL_DATA 5\n" + attribute + part, &warnings).references.empty());
+    REQUIRE(warnings.size() == 2);
+    CHECK_THAT(warnings[0] + warnings[1], Contains("attributes from"));
+    warnings.clear();
+    CHECK(read_bytes(base + "CELL_DATA 5\n" + part + attribute, &warnings).references == std::vector<int>{5, 6, 7});
+    CHECK(warnings.size() == 1);
+  }
+  CHECK_THAT(refusal(base + "POINT_DATA 11\nVECTORS v float\n1 2 3\n"), Contains("the file ends"));
+  CHECK_THAT(refusal(base + "POINT_DATA 11\nLOOKUP_TABLE t 999999999\n"), Contains("999999999"));
+  CHECK_THAT(refusal(base + "POINT_DATA 11\nCOLOR_SCALARS c -1\n"), Contains("negative"));
+}
+
+TEST_CASE("references that do not fit become 0, with a warning") {
+  const bool binary = GENERATE(false, true);
+  const std::vector<std::int64_t> values{5, 3'000'000'000, -9'000'000'000'000'000'000, 8, 9};
+  std::vector<std::string> warnings;
+  const VolumeMesh mesh = read_bytes(vtk_file({"3.0", binary}, kPoints, kCells, kTypes) +
+                                         "CELL_DATA 5\nFIELD f 1\nid 1 5 vtktypeint64\n" + array_of(values, binary),
+                                     &warnings);
+  CHECK(mesh.references == std::vector<int>{5, 0, 0});
+  REQUIRE(warnings.size() == 2);
+  CHECK_THAT(warnings[0] + warnings[1], Contains("references of 2 cells"));
+}
+
 TEST_CASE("a mesh of all kinds survives a VTK round trip bit by bit") {
   VolumeMesh mesh = mixed_cells();
   jitter(mesh, 0.05);

@@ -131,7 +131,10 @@ TEST_CASE("OBJ is read with negative numbers, textures, forward references and l
 
 TEST_CASE("STL is read as text and binary, also when a binary file begins with solid") {
   // Welding numbers the vertices by first appearance: 0 2 1 3.
-  for (const std::string& bytes : {text_stl(), binary_stl("a header"), binary_stl("solid but binary")}) {
+  const std::string capitals = replaced(replaced(text_stl(), "solid", "SOLID"), "endsolid", "EndSolid");
+  for (const std::string& bytes :
+       {text_stl(), capitals, "\r\n " + text_stl(), "\xEF\xBB\xBF" + text_stl(), binary_stl("a header"),
+        binary_stl("solid but binary"), binary_stl("SOLID but binary"), binary_stl("Solid_made_elsewhere") + "more"}) {
     const TriangleMesh mesh = read_triangles("a.stl", bytes);
     REQUIRE(mesh.positions.size() == 4);
     CHECK(mesh.positions[1] == kTetPoints[2]);
@@ -218,6 +221,7 @@ TEST_CASE("what is malformed in an STL file is refused with its line or byte") {
   CHECK_THAT(refusal("a.stl", replaced(text_stl(), "outer", "inner")), Contains(":3:") && Contains("'inner'"));
   CHECK_THAT(refusal("a.stl", replaced(text_stl(), "vertex 0", "vertex x")), Contains(":4:"));
   CHECK_THAT(refusal("a.stl", replaced(text_stl(), "endsolid", "")), Contains("facet or endsolid"));
+  CHECK_THAT(refusal("a.stl", replaced(" SOLID" + text_stl().substr(5), "outer", "inner")), Contains("'inner'"));
   std::string bytes = binary_stl("x");
   CHECK_THAT(refusal("a.stl", bytes.substr(0, bytes.size() - 1)), Contains("byte 80"));
   bytes[83] = '\x7f';
