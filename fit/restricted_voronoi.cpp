@@ -3,11 +3,13 @@
 
 #include "fit/triangle_cutter.h"
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <omp.h>
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace subvol {
 
@@ -87,40 +89,46 @@ void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const
   };
   std::vector<Segment> segments(num_chunks);
   std::vector<std::vector<VoronoiPiece>> found(static_cast<std::size_t>(omp_get_max_threads()));
+  const auto cut = [&](std::size_t chunk, int thread, TriangleCutter& cutter, std::vector<VoronoiPiece>& mine) {
+    segments[chunk] = {thread, mine.size(), 0, 0};
+    for (std::size_t t = chunk * kChunk; t < std::min(triangles.size(), (chunk + 1) * kChunk); ++t) {
+      const auto& v = triangles[t];
+      cutter.cut(static_cast<Index>(t), {moved[v[0]], moved[v[1]], moved[v[2]]},
+                 {nearest[v[0]], nearest[v[1]], nearest[v[2]]}, mine);
+    }
+    segments[chunk].end = mine.size();
+  };
+  const auto make_room = [&] {
+    std::size_t total = 0;
+    for (Segment& s : segments) {
+      s.target = total;
+      total += s.end - s.begin;
+    }
+    pieces.resize(total);
+  };
+  const auto join = [&](const Segment& s) {
+    const auto from = found[s.thread].begin();
+    std::copy(from + static_cast<std::ptrdiff_t>(s.begin), from + static_cast<std::ptrdiff_t>(s.end),
+              pieces.begin() + static_cast<std::ptrdiff_t>(s.target));
+  };
+  ParallelErrors errors;
 #pragma omp parallel
   {
     const int thread = omp_get_thread_num();
     std::vector<VoronoiPiece>& mine = omp_get_num_threads() == 1 ? pieces : found[thread];
     mine.clear();
-    TriangleCutter cutter(tree_);
+    std::optional<TriangleCutter> cutter;
+    errors.guard([&] { cutter.emplace(tree_); });
 #pragma omp for schedule(dynamic)
-    for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
-      segments[chunk] = {thread, mine.size(), 0, 0};
-      for (std::size_t t = chunk * kChunk; t < std::min(triangles.size(), (chunk + 1) * kChunk); ++t) {
-        const auto& v = triangles[t];
-        cutter.cut(static_cast<Index>(t), {moved[v[0]], moved[v[1]], moved[v[2]]},
-                   {nearest[v[0]], nearest[v[1]], nearest[v[2]]}, mine);
-      }
-      segments[chunk].end = mine.size();
-    }
+    for (std::size_t chunk = 0; chunk < num_chunks; ++chunk)
+      errors.guard([&] { cut(chunk, thread, *cutter, mine); });
 #pragma omp single
-    if (omp_get_num_threads() > 1) {
-      std::size_t total = 0;
-      for (Segment& s : segments) {
-        s.target = total;
-        total += s.end - s.begin;
-      }
-      pieces.resize(total);
-    }
+    if (omp_get_num_threads() > 1) errors.guard(make_room);
     if (omp_get_num_threads() > 1)
 #pragma omp for schedule(dynamic)
-      for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
-        const Segment& s = segments[chunk];
-        const auto from = found[s.thread].begin();
-        std::copy(from + static_cast<std::ptrdiff_t>(s.begin), from + static_cast<std::ptrdiff_t>(s.end),
-                  pieces.begin() + static_cast<std::ptrdiff_t>(s.target));
-      }
+      for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) errors.guard([&] { join(segments[chunk]); });
   }
+  errors.rethrow();
 }
 
 std::vector<VoronoiPiece> RestrictedVoronoi::compute(std::span<const Vec3> positions,

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/parallel_errors.h"
 #include "subvol/sparse_map.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -82,8 +84,8 @@ void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 
 /// Builds a map row by row, in parallel: fill(i, builder) adds the weights of row i.
 ///
-/// `fill` must depend on i only and not throw. Chunks of rows are independent and joined in order, so the result does
-/// not depend on the thread count.
+/// `fill` must depend on i only. Chunks of rows are independent and joined in order, so the result does not depend on
+/// the thread count. Throws what `fill` throws, and std::bad_alloc.
 template <class Fill>
 SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill) {
   constexpr std::size_t kChunkRows = 256, kWaveChunks = 8;
@@ -101,31 +103,36 @@ SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill)
   map.values.reserve(kExpectedRowSize * num_rows);
   prefer_large_pages(map.columns);
   prefer_large_pages(map.values);
+  const auto fill_chunk = [&](Chunk& chunk, std::size_t first, RowBuilder& row) {
+    chunk.columns.clear();
+    chunk.values.clear();
+    for (std::size_t i = first; i < std::min(num_rows, first + kChunkRows); ++i) {
+      fill(i, row);
+      row.flush(chunk.columns, chunk.values);
+      map.offsets[i + 1] = chunk.columns.size();
+    }
+  };
+  const auto join = [&](const Chunk& chunk, std::size_t first) {
+    const std::size_t start = map.columns.size();
+    for (std::size_t i = first; i < std::min(num_rows, first + kChunkRows); ++i) map.offsets[i + 1] += start;
+    map.columns.insert(map.columns.end(), chunk.columns.begin(), chunk.columns.end());
+    map.values.insert(map.values.end(), chunk.values.begin(), chunk.values.end());
+  };
+  ParallelErrors errors;
 #pragma omp parallel if (num_rows > kChunkRows)
   {
-    RowBuilder row(num_cols);
+    std::optional<RowBuilder> row;
+    errors.guard([&] { row.emplace(num_cols); });
     for (std::size_t wave = 0; wave < num_rows; wave += kWaveChunks * kChunkRows) {
 #pragma omp for schedule(dynamic)
-      for (std::size_t c = 0; c < kWaveChunks; ++c) {
-        Chunk& chunk = chunks[c];
-        chunk.columns.clear();
-        chunk.values.clear();
-        const std::size_t first = std::min(num_rows, wave + c * kChunkRows);
-        for (std::size_t i = first; i < std::min(num_rows, first + kChunkRows); ++i) {
-          fill(i, row);
-          row.flush(chunk.columns, chunk.values);
-          map.offsets[i + 1] = chunk.columns.size();
-        }
-      }
+      for (std::size_t c = 0; c < kWaveChunks; ++c)
+        errors.guard([&] { fill_chunk(chunks[c], wave + c * kChunkRows, *row); });
 #pragma omp single
-      for (std::size_t c = 0; c < kWaveChunks; ++c) {
-        const std::size_t start = map.columns.size(), first = std::min(num_rows, wave + c * kChunkRows);
-        for (std::size_t i = first; i < std::min(num_rows, first + kChunkRows); ++i) map.offsets[i + 1] += start;
-        map.columns.insert(map.columns.end(), chunks[c].columns.begin(), chunks[c].columns.end());
-        map.values.insert(map.values.end(), chunks[c].values.begin(), chunks[c].values.end());
-      }
+      for (std::size_t c = 0; c < kWaveChunks; ++c)
+        errors.guard([&] { join(chunks[c], wave + c * kChunkRows); });
     }
   }
+  errors.rethrow();
   return map;
 }
 

@@ -4,6 +4,7 @@
 #include "sample_meshes.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
+#include "subvol/row_assembly.h"
 #include "subvol/subdivision.h"
 
 #include <catch2/catch.hpp>
@@ -61,6 +62,16 @@ std::vector<VolumeMesh> some_meshes() {
 }
 
 }  // namespace
+
+TEST_CASE("what a row throws, or no memory for it, leaves the assembly of a map") {
+  for (const std::size_t thrower : {3, 5000, 9999})
+    CHECK_THROWS_AS(assemble_rows(10000, 10,
+                                  [&](std::size_t i, RowBuilder& row) {
+                                    row.add(static_cast<Index>(i % 10), 1);
+                                    if (i == thrower) throw std::bad_alloc();
+                                  }),
+                    std::bad_alloc);
+}
 
 TEST_CASE("rows of the subdivision matrix sum to one and no weight is negative", "[subdivision]") {
   for (const VolumeMesh& untagged : some_meshes())
