@@ -10,6 +10,10 @@ Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
 
 }  // namespace
 
+std::vector<Index> not_certified_cells(const MeshCheck& check) {
+  return check.quality ? check.quality->certificate.not_certified : std::vector<Index>{};
+}
+
 Json quality_json(const QualityReport& quality) {
   Json worst = Json::array();
   for (const auto& cell : quality.worst_cells) {

@@ -7,10 +7,15 @@
 #include "fit/surface_distance.h"
 #include "subvol/audit.h"
 
+#include <vector>
+
 namespace subvol::cli {
 
 /// A check as it stands in reports: defects, topology, quality, certificate, self-intersections, distance.
 Json check_json(const MeshCheck& check);
+
+/// Cells that are not proved positive, ascending; none where that was not looked at.
+std::vector<Index> not_certified_cells(const MeshCheck& check);
 
 /// Shape of the cells, and what is proved of them.
 Json quality_json(const QualityReport& quality);

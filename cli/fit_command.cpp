@@ -10,6 +10,7 @@
 #include "cli/report.h"
 #include "cli/untangling.h"
 #include "cli/writing.h"
+#include "cli/written_result.h"
 #include "fit/subdivision_fit.h"
 #include "subvol/auto_template.h"
 #include "subvol/mesh_io.h"
@@ -150,23 +151,16 @@ void FitRun::write() {
   write(true);
 }
 
-// What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
 void FitRun::check() {
-  VolumeMesh reread;
-  const VolumeMesh* mesh = &result_.mesh;
-  for (const Output& output : outputs_) {
-    if (output.part != Part::result || output.extension != ".mesh" || !std::filesystem::is_regular_file(output.path))
-      continue;
-    reread = read_volume_mesh(output.path, {.check = false});
-    mesh = &reread;
-    break;
-  }
+  const std::optional<VolumeMesh> written = written_cells(outputs_);
+  const VolumeMesh& mesh = written ? *written : result_.mesh;
   std::visit(
       [&](const auto& target) {
-        mesh_check_ = watched([&](auto progress) { return check_mesh(*mesh, &target, {.progress = progress}); });
+        mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target, {.progress = progress}); });
         limit_distance_ = surface_distance(triangles_of(limit_), target);
       },
       target_);
+  hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
 }
 
 Json FitRun::report() const {

@@ -10,6 +10,7 @@
 #include "cli/progress.h"
 #include "cli/report.h"
 #include "cli/untangling.h"
+#include "cli/written_result.h"
 #include "fit/mesh_check.h"
 #include "fit/quality.h"
 #include "subvol/error.h"
@@ -19,6 +20,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iostream>
+#include <optional>
 
 namespace subvol::cli {
 namespace {
@@ -58,15 +60,13 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
   return result;
 }
 
-// What counts is what is on the disk: the first .vtu is read back and checked in place of the result in memory.
+/// chord_percent: of the scenes; coarse ones do not make a coarse check.
 MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const Target& target,
                 double chord_percent, const RunOptions& run) {
   ProgressTeller teller(run.progress, run.quiet);
-  const auto file = std::find_if(outputs.begin(), outputs.end(), [](const Output& output) {
-    return output.extension == ".vtu" && std::filesystem::is_regular_file(output.path);
-  });
-  const HighOrderMesh mesh = file == outputs.end() ? result : read_high_order(file->path).mesh;
-  const CurvedBoundary boundary = curved_boundary(mesh, chord_percent);
+  const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
+  const HighOrderMesh& mesh = written ? *written : result;
+  const CurvedBoundary boundary = curved_boundary(mesh, std::min(chord_percent, WritingOptions{}.chord_percent));
   const MeshCheckOptions options{.progress = teller.work()};
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
@@ -147,7 +147,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   HighOrderFitResult result = fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start),
                                   target, template_mesh);
   const double fit_seconds = seconds_since(fit_start);
-  const FitReport& report = result.report;
+  FitReport& report = result.report;
   checkpointing.finish(warnings);
   warnings.insert(warnings.end(), report.warnings.begin(), report.warnings.end());
   tell_warnings();
@@ -167,15 +167,13 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
 
   const Clock::time_point check_start = Clock::now();
   const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent, arguments.run);
+  hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
   if (!arguments.run.report.empty()) {
     Json json = report_json(arguments.command, verb, std::move(input), report, file.mesh, mesh_check);
-    if (arguments.untangles)
-      json["not_certified_cells"] =
-          mesh_check.quality ? mesh_check.quality->certificate.not_certified : std::vector<Index>{};
+    if (arguments.untangles) json["not_certified_cells"] = not_certified_cells(mesh_check);
     if (loaded.choice) json["template"] = choice_json(*loaded.choice);
     checkpointing.describe(json);
-    json["warnings"] = warnings;
-    for (const std::string& failure : failures) json["warnings"].push_back(as_utf8(failure));
+    json["warnings"] = warnings_json(warnings, failures);
     Json seconds{{"read", read_seconds},
                  {arguments.untangles ? "untangle" : "template", template_seconds + untangle_seconds},
                  {"fit", fit_seconds},

@@ -44,16 +44,19 @@ TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vect
 }
 
 TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
   std::vector<Index> volume_vertex;
-  TaggedPolygons boundary{boundary_surface(mesh, MeshTopology(mesh), &volume_vertex), {}};
+  TaggedPolygons boundary{boundary_surface(mesh, topology, &volume_vertex), {}};
   // volume_vertex ascends, so the order of tags is kept.
   const auto number = [&](Index v) {
     return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
   };
   for (const CreaseEdge& crease : mesh.tags.creases)
-    boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
+    if (const Index e = topology.find_edge(crease.v0, crease.v1); e != kNoIndex && topology.is_boundary_edge(e))
+      boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
   for (const CornerVertex& corner : mesh.tags.corners)
-    boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
+    if (topology.is_boundary_vertex(corner.vertex))
+      boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
   return boundary;
 }
 

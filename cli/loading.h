@@ -35,7 +35,7 @@ struct TaggedPolygons {
   PolygonMesh polygons;
   FeatureTags tags;
 };
-/// The boundary of a volume mesh.
+/// The boundary of a volume mesh, with those of its tags that are on it.
 TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
 /// `load_polygons` with the tags of a volume mesh; those of a surface file are none.
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);

@@ -30,8 +30,7 @@ void LongRun::write_report(Json json, const Json& parts) const {
   Json seconds = seconds_;
   seconds.update(parts);
   seconds["total"] = this->seconds();
-  json["warnings"] = warnings_;
-  for (const std::string& failure : failures_) json["warnings"].push_back(as_utf8(failure));
+  json["warnings"] = warnings_json(warnings_, failures_);
   json["seconds"] = std::move(seconds);
   json["peak_memory_bytes"] = peak_memory_bytes();
   json["outputs"] = output_names(outputs_);

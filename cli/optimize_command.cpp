@@ -8,6 +8,7 @@
 #include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/writing.h"
+#include "cli/written_result.h"
 #include "fit/boundary_triangles.h"
 #include "fit/curve_mesh.h"
 #include "fit/optimize_mesh.h"
@@ -60,7 +61,7 @@ class OptimizeRun : public LongRun {
 void OptimizeRun::load() {
   mesh_ = load_volume(arguments_.mesh, warnings_);
   if (!arguments_.target.empty()) target_ = load_surface(arguments_.target, warnings_);
-  surface_ = target_ ? *target_ : refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
+  surface_ = target_ ? *target_ : fan_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   before_ = measure_quality(mesh_);
   tell_warnings();
 }
@@ -88,14 +89,13 @@ void OptimizeRun::write() {
   write_each([&](const Output& output) { write_output(output, result_.mesh, writing); });
 }
 
-// What counts is what is on the disk: the first .mesh is read back and checked in place of the result in memory.
 void OptimizeRun::check() {
-  const auto is_mesh = [](const Output& output) {
-    return output.extension == ".mesh" && std::filesystem::is_regular_file(output.path);
-  };
-  const auto file = std::find_if(outputs_.begin(), outputs_.end(), is_mesh);
-  const VolumeMesh mesh = file == outputs_.end() ? result_.mesh : read_volume_mesh(file->path, {.check = false});
+  const std::optional<VolumeMesh> written = written_cells(outputs_);
+  const VolumeMesh& mesh = written ? *written : result_.mesh;
   mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &surface_, {.progress = progress}); });
+  const OptimizeOptions& asked = arguments_.optimize;
+  if (!asked.fixed_boundary)
+    hold_to({asked.mean_tolerance_percent, asked.max_tolerance_percent}, mesh_check_, result_.report);
 }
 
 Json OptimizeRun::report() const {
@@ -107,8 +107,7 @@ Json OptimizeRun::report() const {
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
   checkpointing_->describe(json);
-  json["not_certified_cells"] =
-      mesh_check_.quality ? mesh_check_.quality->certificate.not_certified : std::vector<Index>{};
+  json["not_certified_cells"] = not_certified_cells(mesh_check_);
   return json;
 }
 
@@ -118,7 +117,7 @@ void OptimizeRun::summarise() const {
             << "before: " << before_.inverted_cells << " cells inverted, scaled Jacobian min "
             << before_.min_scaled_jacobian << ", mean " << before_.mean_scaled_jacobian << '\n'
             << to_text(mesh_check_);
-  const std::vector<Index>& left = result_.uncertified;
+  const std::vector<Index> left = not_certified_cells(mesh_check_);
   for (std::size_t i = 0; i < std::min(left.size(), kMostNamed); ++i)
     std::cerr << "cell " << left[i] << " is not proved positive\n";
   tell_outputs();

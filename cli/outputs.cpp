@@ -165,6 +165,12 @@ void require_all_written(const std::vector<std::string>& failures) {
                 (failures.size() > 1 ? ", ..." : ""));
 }
 
+Json warnings_json(const std::vector<std::string>& warnings, const std::vector<std::string>& failures) {
+  Json json = warnings;
+  for (const std::string& failure : failures) json.push_back(as_utf8(failure));
+  return json;
+}
+
 Json output_names(const std::vector<Output>& outputs) {
   Json names = Json::array();
   for (const Output& output : outputs) names.push_back(as_utf8(output.path.string()));

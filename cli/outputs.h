@@ -51,6 +51,9 @@ std::vector<std::string> write_each(std::vector<Output>& outputs, const std::fun
 /// IoError that tells of these once more; nothing where there are none.
 void require_all_written(const std::vector<std::string>& failures);
 
+/// The warnings of a report: those of the work, and which outputs could not be written.
+Json warnings_json(const std::vector<std::string>& warnings, const std::vector<std::string>& failures);
+
 /// The file names, as the report lists them.
 Json output_names(const std::vector<Output>& outputs);
 

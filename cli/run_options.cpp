@@ -2,6 +2,7 @@
 #include "cli/run_options.h"
 
 #include "cli/exit_status.h"
+#include "subvol/text_scanner.h"
 
 #include <omp.h>
 #include <sys/resource.h>
@@ -101,7 +102,7 @@ double parse_length(const std::string& option, const std::string& text, double d
   const std::string number = percent ? text.substr(0, text.size() - 1) : text;
   const std::string error = number_in(1e-300, 1e300)(std::string(number));
   if (!error.empty()) throw UsageError(option + ": must be a positive length, or a percentage as 2%, not " + text);
-  return std::stod(number) * (percent ? diagonal / 100 : 1);
+  return *parse_number(number) * (percent ? diagonal / 100 : 1);
 }
 
 std::string as_utf8(const std::string& text) {

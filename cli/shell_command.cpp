@@ -7,13 +7,13 @@
 #include "cli/report.h"
 #include "cli/shell_output.h"
 #include "cli/writing.h"
+#include "cli/written_result.h"
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "shell/shell.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/features.h"
-#include "subvol/mesh_io.h"
 #include "subvol/subdivision.h"
 #include "subvol/surface_io.h"
 #include "subvol/version.h"
@@ -116,6 +116,8 @@ void ShellRun::grow() {
   } catch (const InputError& error) {
     throw InputError(arguments_.surface + ": " + error.what());
   }
+  if (result_.mesh.num_cells() == 0)
+    throw EndedEarly(arguments_.surface + ": the work was ended before there was a shell", kInterrupted);
   add_warnings(result_.report.warnings);
 }
 
@@ -151,23 +153,20 @@ void ShellRun::write() {
   });
 }
 
-// What counts is what is on the disk: the first .mesh, of curved cells the first .vtu, is read back and checked in
-// place of the result in memory.
+// All numbers of cells in a report are those of the layers, whatever order the cells have in the file.
 void ShellRun::check() {
   failures_ = result_.failures;
-  for (const Output& output : outputs_) {
-    if (!std::filesystem::is_regular_file(output.path)) continue;
-    if (curved_ && output.part == Part::result && output.extension == ".vtu") {
-      const HighOrderMesh reread = read_high_order(output.path).mesh;
-      const MeshCheck found = check_mesh(reread, curved_boundary(reread, arguments_.writing.chord_percent));
-      failures_ = {found.quality->certificate, found.intersecting_faces};
-      break;
-    }
-    if (curved_ || output.extension != ".mesh") continue;
-    const VolumeMesh reread = read_volume_mesh(output.path, {.check = false});
-    failures_ = ShellCheck(result_.layers, reread, CheckedSheets::all).failures(reread.positions);
-    break;
+  if (curved_) {
+    const std::optional<HighOrderMesh> written = written_curved_cells(outputs_);
+    if (!written) return;
+    const MeshCheck found = check_mesh(*written, curved_boundary(*written, arguments_.writing.chord_percent));
+    failures_ = {found.quality->certificate, found.intersecting_faces};
+    return;
   }
+  std::optional<VolumeMesh> written = written_cells(outputs_);
+  if (!written) written = written_cells(outputs_, Part::cage);  // the same cells
+  if (!written) return;
+  failures_ = ShellCheck(result_.layers, result_.mesh, CheckedSheets::all).failures(written->positions);
 }
 
 // Who asks for a control mesh will subdivide it: valid cells may turn inverted then.

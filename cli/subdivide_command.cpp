@@ -3,18 +3,16 @@
 #include "cli/exit_status.h"
 #include "cli/loading.h"
 #include "cli/outputs.h"
-#include "cli/report.h"
 #include "cli/writing.h"
-#include "fit/quality.h"
+#include "cli/written_result.h"
 #include "subvol/features.h"
 #include "subvol/mesh_io.h"
 #include "subvol/repeated_subdivision.h"
-#include "subvol/version.h"
 
 #include <algorithm>
-#include <iostream>
 #include <memory>
 #include <optional>
+#include <utility>
 
 namespace subvol::cli {
 namespace {
@@ -45,34 +43,13 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
   if (std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
-  const std::vector<std::string> failures =
-      write_each(outputs, [&](const Output& output) { write_output(output, cage, fine, &limit, writing); });
-
-  const QualityReport quality = measure_quality(fine);
-  if (!arguments.run.report.empty()) {
-    write_report(arguments.run.report, {{"subvol", version()},
-                                        {"command", "subdivide"},
-                                        {"options", options_in_force(verb)},
-                                        {"input", {{"mesh", describe(arguments.mesh, cage)}}},
-                                        {"result", describe("", fine)},
-                                        {"quality",
-                                         {{"cells", quality.num_cells},
-                                          {"min_scaled_jacobian", quality.min_scaled_jacobian},
-                                          {"mean_scaled_jacobian", quality.mean_scaled_jacobian},
-                                          {"inverted_cells", quality.inverted_cells},
-                                          {"certified_cells", quality.certificate.certified}}},
-                                        {"warnings", warnings},
-                                        {"peak_memory_bytes", peak_memory_bytes()},
-                                        {"outputs", output_names(outputs)}});
-  }
-  if (!arguments.run.quiet) {
-    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
-    std::cerr << fine.num_cells() << " cells, " << fine.num_vertices() << " vertices; scaled Jacobian at least "
-              << quality.min_scaled_jacobian << "; " << quality.certificate.not_certified.size()
-              << " cells not proved valid\n";
-  }
-  require_all_written(failures);
-  return kDone;
+  return write_checked(
+      arguments.run, std::move(outputs), fine,
+      [&](const Output& output) { write_output(output, cage, fine, &limit, writing); }, warnings,
+      {{"command", "subdivide"},
+       {"options", options_in_force(verb)},
+       {"input", {{"mesh", describe(arguments.mesh, cage)}}},
+       {"result", describe("", fine)}});
 }
 
 }  // namespace
@@ -98,7 +75,8 @@ void add_subdivide_command(CLI::App& app, Action& action) {
                          "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given\n"
                          "several times");
   add_writing_options(*verb, arguments->writing);
-  verb->add_option("--report", arguments->run.report, "Write what was done")->type_name("FILE.json");
+  verb->add_option("--report", arguments->run.report, "Write what was done and what is true of the result")
+      ->type_name("FILE.json");
   verb->footer(R"(Example:
   subvol subdivide cage.mesh --levels 2 --crease-angle 40 -o fine.mesh -o fine.glb)");
   verb->callback(

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/template_command.h"
 
-#include "cli/check_report.h"
 #include "cli/exit_status.h"
 #include "cli/outputs.h"
-#include "cli/report.h"
-#include "fit/mesh_check.h"
-#include "subvol/version.h"
+#include "cli/written_result.h"
 
-#include <iostream>
+#include <utility>
 
 namespace subvol::cli {
 
@@ -32,25 +29,11 @@ int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Out
                    const VolumeMesh& mesh, const Json& details) {
   WritingOptions writing = run.writing;
   writing.options = options_of_result(verb);
-  const MeshCheck check = check_mesh(mesh);
-  const std::vector<std::string> failures =
-      write_each(outputs, [&](const Output& output) { write_output(output, mesh, writing); });
-  if (!run.run.report.empty()) {
-    Json json{{"subvol", version()}, {"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};
-    json.update(details);
-    json.update(check_json(check));
-    json["warnings"] = run.warnings;
-    json["peak_memory_bytes"] = peak_memory_bytes();
-    json["outputs"] = output_names(outputs);
-    write_report(run.run.report, json);
-  }
-  if (!run.run.quiet) {
-    for (const std::string& warning : run.warnings) std::cerr << "subvol: warning: " << warning << '\n';
-    std::cerr << to_text(check);
-    for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
-  }
-  require_all_written(failures);
-  return check.valid() ? kDone : kFailed;
+  Json report{{"command", "template " + verb.get_name()}, {"options", options_in_force(verb)}};
+  report.update(details);
+  return write_checked(
+      run.run, std::move(outputs), mesh, [&](const Output& output) { write_output(output, mesh, writing); },
+      run.warnings, report);
 }
 
 void add_template_command(CLI::App& app, Action& action) {

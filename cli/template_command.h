@@ -24,8 +24,7 @@ void add_template_options(CLI::App& verb, TemplateRun& run);
 /// The outputs of a verb under `template`, checked before any work. UsageError: none.
 std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& verb);
 
-/// Writes a template, its report (`details` and what `check_mesh` finds) and a summary. Returns kDone, or kFailed where
-/// the mesh is not valid.
+/// Writes a template, its report (`details` and what all have) and a summary, as `write_checked`.
 int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs,
                    const VolumeMesh& mesh, const Json& details);
 

@@ -13,6 +13,7 @@
 #include "fit/high_order_quality.h"
 #include "fit/quality.h"
 #include "subvol/mesh_io.h"
+#include "subvol/text_scanner.h"
 
 #include <algorithm>
 
@@ -65,7 +66,7 @@ std::string parse_cut(const std::string& text, CutPlane& cut) {
   cut.axis = text[0] - 'x';
   if (text.size() == 1) return {};
   if (!number_in(1e-9, 1 - 1e-9)(text.substr(2)).empty()) return error;
-  cut.share = std::stod(text.substr(2));
+  cut.share = *parse_number(text.substr(2));
   return {};
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/fit_problem.h"
+#include "fit/option_checks.h"
 #include "fit/vector_math.h"
 #include "subvol/error.h"
 
@@ -7,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 namespace subvol {
@@ -116,12 +116,6 @@ int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient,
     for (std::size_t i = 0; i < n; ++i) p[i] = z[i] + beta * p[i];
   }
   return iteration;
-}
-
-std::string describe(const char* form, double value) {
-  char text[128];
-  std::snprintf(text, sizeof text, form, value);
-  return text;
 }
 
 /// Cells of `now` that are not in `before` (both ascending).
@@ -290,7 +284,7 @@ bool NewtonRun::is_done(const IterationRecord& record) {
   const double decrease = (energy_ - trial_) / energy_;
   result_.small_steps = decrease < options_.relative_decrease ? result_.small_steps + 1 : 0;
   if (result_.small_steps < 2) return false;
-  stop(MinimizerStop::converged, describe("relative decrease of the energy %.2g in two steps running", decrease));
+  stop(MinimizerStop::converged, formatted("relative decrease of the energy %.2g in two steps running", decrease));
   return true;
 }
 

@@ -278,6 +278,7 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   const bool going =
       runner_.run(problem, {lambda, kTangentialWeight, steps}, record(name), fraction, x, report_);
   problem.apply_nodes(x, mesh_.positions);
+  if (!going) return false;
   if (auto* surface = dynamic_cast<ClosestPointEnergy*>(problem.surface.get())) {
     std::vector<Vec3> samples(problem.samples.num_rows());
     problem.apply_samples(x, samples);
@@ -289,7 +290,7 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
     report_.stages.back().mean_distance_percent = mean_percent_;
     relieve_far_cells(surface->triangle_distances());
   }
-  return going;
+  return true;
 }
 
 /// The cells beside places that are too far off count half as much from now on, and their faces are seen at more
@@ -349,13 +350,10 @@ bool MeshOptimizer::improve() {
   return true;
 }
 
-/// Distances of the result, exactly where the stages only sampled them.
+/// Distances of the result as `check_mesh` measures them, where the stages only looked at their own samples.
 void MeshOptimizer::measure_distance() {
-  constexpr int kSamples = 20000;
   if (options_.fixed_boundary) return;
-  const TriangleMesh boundary = refined_triangles(boundary_surface(mesh_, topology_));
-  const SurfaceDistance distance =
-      surface_distance(boundary, ClosestPoint(boundary), target_.mesh, *target_.tree, {.num_samples = kSamples});
+  const SurfaceDistance distance = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
   mean_percent_ = 100 * distance.mean();
   max_percent_ = 100 * distance.max();
 }

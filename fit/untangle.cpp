@@ -2,11 +2,11 @@
 #include "fit/untangle.h"
 
 #include "fit/certificate.h"
+#include "fit/option_checks.h"
 #include "fit/regularised_barrier.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace subvol {
 
@@ -23,12 +23,6 @@ constexpr int kSteps = 5;
 constexpr double kRelativeDecrease = 1e-2;
 /// A round without fewer failing cells gains if the worst determinant rises by this share.
 constexpr double kLeastRise = 0.01;
-
-std::string name_of(const StageRecord& record, double epsilon) {
-  char text[64];
-  std::snprintf(text, sizeof text, ", epsilon %.3g", epsilon);
-  return record.name + text;
-}
 
 /// The cells of a problem between rounds.
 class TangledCells {
@@ -99,7 +93,7 @@ UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const Untan
   for (int round = 0; round < options.max_rounds && idle < options.patience; ++round) {
     cells.set_epsilon(epsilon);
     StageRecord stage = record;
-    stage.name = name_of(record, epsilon);
+    stage.name = record.name + formatted(", epsilon %.3g", epsilon);
     const double before = cells.energy(x);
     const Stage weights{problem.lambda, options.tangential_weight, kSteps, kRelativeDecrease};
     const bool going = runner.run(problem, weights, std::move(stage), fraction, x, report);

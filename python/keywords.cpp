@@ -8,6 +8,13 @@
 
 namespace subvol::python {
 
+std::optional<bool> truth_of(const py::object& object) {
+  const bool is_truth =
+      py::isinstance<py::bool_>(object) || py::isinstance(object, py::module_::import("numpy").attr("bool_"));
+  if (!is_truth) return std::nullopt;
+  return object.cast<bool>();
+}
+
 py::object Keywords::find(const char* name) {
   taken_.emplace_back(name);
   return given_.contains(name) ? py::object(given_[name]) : py::none();
@@ -44,11 +51,9 @@ void Keywords::refuse_word(const char* name, const py::handle& value, const std:
 }
 
 void Keywords::read(const char* name, const py::object& given, bool& value) const {
-  // NumPy's booleans are no bools.
-  if (!py::isinstance<py::bool_>(given) && !py::hasattr(given, "dtype")) refuse_type(name, given, "True or False");
-  const int truth = PyObject_IsTrue(given.ptr());
-  if (truth < 0) throw py::error_already_set();
-  value = truth != 0;
+  const std::optional<bool> truth = truth_of(given);
+  if (!truth) refuse_type(name, given, "True or False");
+  value = *truth;
 }
 
 long long Keywords::whole_number(const char* name, const py::object& given) const {

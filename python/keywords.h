@@ -21,6 +21,9 @@ namespace py = pybind11;
 template <class Value>
 using Choices = std::vector<std::pair<const char*, Value>>;
 
+/// True or False of Python or NumPy; nothing for what is neither.
+std::optional<bool> truth_of(const py::object& object);
+
 /// Keyword arguments of one call, taken one by one under the names of the command line ("-" being "_").
 ///
 /// What a value may be is the library's to say; here only its type is looked at. None stands for the default.

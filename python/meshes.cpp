@@ -9,7 +9,6 @@
 #include "subvol/features.h"
 #include "subvol/sound_points.h"
 #include "subvol/surface_io.h"
-#include "subvol/template_edit.h"
 
 #include <algorithm>
 #include <array>
@@ -39,14 +38,6 @@ void require_finite(const std::vector<Vec3>& points, const char* name) {
   for (std::size_t i = 0; i < points.size(); ++i)
     if (!points[i].allFinite())
       throw InputError(std::string(name) + ": points[" + std::to_string(i) + "] is not finite");
-}
-
-/// The boundary with those tags that are on it: meshes made here may have others.
-SurfaceMesh boundary_of(const VolumeMesh& mesh) {
-  if (mesh.tags.empty()) return cli::tagged_polygons(mesh);
-  VolumeMesh copy = mesh;
-  drop_lost_tags(copy);
-  return cli::tagged_polygons(copy);
 }
 
 // --- Tags -----------------------------------------------------------------------------------------------------------
@@ -201,7 +192,7 @@ Takes the arrays named above.)");
     return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
   }, "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
   add_tags(type);
-  type.def("boundary", &boundary_of,
+  type.def("boundary", &cli::tagged_polygons,
            "boundary($self)\n--\n\nThe boundary as it stands: a SurfaceMesh with the mesh's tags.");
   type.def("copy", [](const VolumeMesh& mesh) { return std::make_shared<VolumeMesh>(mesh); },
            "copy($self)\n--\n\nA mesh of its own with the same content.");
@@ -373,7 +364,7 @@ SurfaceMesh surface_from(const py::object& object, const char* name) {
   if (py::isinstance<VolumeMesh>(object)) {
     const auto& mesh = object.cast<const VolumeMesh&>();
     require_finite(mesh.positions, name);
-    return boundary_of(mesh);
+    return cli::tagged_polygons(mesh);
   }
   if (!is_path(object)) refuse(object, name, "a SurfaceMesh, a VolumeMesh");
   return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {

@@ -2,6 +2,7 @@
 #include "python/module.h"
 
 #include "cli/exit_status.h"
+#include "cli/run_options.h"
 #include "python/work.h"
 #include "subvol/error.h"
 #include "subvol/version.h"
@@ -25,6 +26,9 @@ PyObject* new_error(py::module_& module, const char* name, const char* help, std
   return error;
 }
 
+// Names of files need not be UTF-8.
+void set_error(PyObject* error, const char* text) { PyErr_SetString(error, cli::as_utf8(text).c_str()); }
+
 void add_errors(py::module_& module) {
   errors.any = new_error(module, "Error", "What subvol raises, but for TypeError and what Python itself raises.",
                          {PyExc_Exception});
@@ -37,11 +41,11 @@ void add_errors(py::module_& module) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const InputError& error) {
-      PyErr_SetString(errors.input, error.what());
+      set_error(errors.input, error.what());
     } catch (const cli::UsageError& error) {
-      PyErr_SetString(errors.input, error.what());
+      set_error(errors.input, error.what());
     } catch (const IoError& error) {
-      PyErr_SetString(errors.io, error.what());
+      set_error(errors.io, error.what());
     }
   });
 }

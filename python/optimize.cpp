@@ -87,7 +87,7 @@ class Optimization {
     });
     const MeshCheck checked = work_.run("check", [&] {
       const TriangleMesh surface =
-          target_ ? *target_ : refined_triangles(boundary_surface(*mesh_, MeshTopology(*mesh_)));
+          target_ ? *target_ : fan_triangles(boundary_surface(*mesh_, MeshTopology(*mesh_)));
       return check_mesh(found.mesh, &surface);
     });
     add(found.report, checked);
@@ -125,7 +125,7 @@ class Optimization {
     json_.update(cli::fit_json(report));
     json_.update(cli::check_json(checked));
     checkpoints_.describe(json_);
-    json_["not_certified_cells"] = checked.quality ? checked.quality->certificate.not_certified : std::vector<Index>{};
+    json_["not_certified_cells"] = cli::not_certified_cells(checked);
     warnings_.insert(warnings_.end(), report.warnings.begin(), report.warnings.end());
   }
 

@@ -19,7 +19,7 @@ py::object to_python(const Json& json) {
       for (const Json& value : json) list.append(to_python(value));
       return list;
     }
-    case Json::value_t::string: return py::str(json.get<std::string>());
+    case Json::value_t::string: return py::str(cli::as_utf8(json.get<std::string>()));
     case Json::value_t::boolean: return py::bool_(json.get<bool>());
     case Json::value_t::number_integer: return py::int_(json.get<long long>());
     case Json::value_t::number_unsigned: return py::int_(json.get<unsigned long long>());

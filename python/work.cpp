@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/work.h"
 
+#include "cli/run_options.h"
 #include "fit/option_checks.h"
 
 #include <omp.h>
@@ -30,7 +31,7 @@ bool Work::tell(const FitProgress& progress) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (callback_.is_none()) return true;
     const Progress told{progress.stage, progress.level, progress.iteration, progress.energy, progress.fraction};
-    return !callback_(told).is(py::bool_(false));
+    return truth_of(callback_(told)).value_or(true);
   } catch (py::error_already_set& error) {
     error_.emplace(std::move(error));
     return false;
@@ -56,7 +57,7 @@ void Work::raise_pending() {
 
 void warn(const std::vector<std::string>& texts) {
   for (const std::string& text : texts)
-    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+    if (PyErr_WarnEx(PyExc_UserWarning, cli::as_utf8(text).c_str(), 1) != 0) throw py::error_already_set();
 }
 
 }  // namespace subvol::python

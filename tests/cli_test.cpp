@@ -409,7 +409,7 @@ TEST_CASE("A folder that cannot be written to is found before the work", "[cli]"
 }
 
 TEST_CASE("Options may come from a file; the command line wins and unknown keys are errors", "[cli]") {
-  const Workplace place;
+  const Workplace place(subvol::samples::bracket_sample());
   place.file("good.toml", "levels = 1\ntarget = \"unused.off\"\n");
   place.file("marked.toml", "\xEF\xBB\xBF[subdivide]\nlevels = 2\n");  // by an editor that begins files so
   place.file("table.toml", "[subdivide]\nlevels = 2\n[check]\njson = true\n");
@@ -419,13 +419,13 @@ TEST_CASE("Options may come from a file; the command line wins and unknown keys 
   CHECK(place.run("--config wrong.toml subdivide template.mesh -o a.mesh").status == 2);
   CHECK(!place.has("a.mesh"));
   REQUIRE(place.run("subdivide template.mesh --config flat.toml -o b.mesh").status == 0);
-  CHECK(subvol::read_volume_mesh(place / "b.mesh").num_cells() == 7 * 64);
+  CHECK(subvol::read_volume_mesh(place / "b.mesh").num_cells() == 10 * 64);
   REQUIRE(place.run("subdivide template.mesh --config table.toml -o c.mesh").status == 0);
-  CHECK(subvol::read_volume_mesh(place / "c.mesh").num_cells() == 7 * 64);
+  CHECK(subvol::read_volume_mesh(place / "c.mesh").num_cells() == 10 * 64);
   REQUIRE(place.run("subdivide template.mesh --config marked.toml -o e.mesh").status == 0);
   CHECK(content_of(place / "e.mesh") == content_of(place / "c.mesh"));
   REQUIRE(place.run("subdivide template.mesh --config flat.toml --levels 1 -o d.mesh").status == 0);
-  CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 7 * 8);
+  CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 10 * 8);
 }
 
 TEST_CASE("Every verb explains itself", "[cli]") {
@@ -489,6 +489,34 @@ TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
   CHECK(!fine.tags.creases.empty());
   CHECK(place.json("r.json").at("result").at("cells") == 640);
   CHECK(place.run("subdivide template.mesh --boundary averaging -o plain.mesh").status == 0);
+}
+
+TEST_CASE("subdivide checks what it has written", "[cli]") {
+  const Workplace place;
+  subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
+  for (const std::size_t v : {4, 5, 6, 7}) mesh.positions[v].z() = 2.5;  // the upper cell stands on its head
+  subvol::write_volume_mesh(place / "cage.mesh", mesh);
+  for (const std::string file : {"fine.mesh", "fine.vtk", "fine.vtu"}) {
+    const Run run = place.run("subdivide cage.mesh --levels 1 --force --report r.json -o " + file);
+    INFO(file << ": " << run.err);
+    CHECK(run.status == 1);
+    CHECK(run.err.find("NOT VALID") != std::string::npos);
+    const auto report = place.json("r.json");
+    CHECK(report.at("valid") == false);
+    CHECK(report.at("result").at("cells") == 16);
+    CHECK(report.at("quality").at("inverted_cells") > 0);
+    if (file == "fine.vtu") continue;
+    const auto found = nlohmann::json::parse(place.run("check " + file + " --json").out);
+    for (const char* entry : {"inverted_at", "quality", "defects", "topology"})
+      CHECK(report.at(entry) == found.at(entry));
+  }
+
+  // Refused before anything is written: volumes would be no numbers.
+  for (subvol::Vec3& p : mesh.positions) p *= 1e-60;
+  subvol::write_volume_mesh(place / "tiny.mesh", mesh);
+  CHECK(place.run("subdivide tiny.mesh --levels 1 -o x.mesh").status == 3);
+  CHECK(place.run("template grid --box 0 0 0 1e-60 1e-60 1e-60 --counts 1 1 1 -o x.mesh").status == 3);
+  CHECK_FALSE(place.has("x.mesh"));
 }
 
 TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][data]") {

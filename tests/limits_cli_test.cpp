@@ -85,6 +85,17 @@ TEST_CASE("A run that was interrupted before anything was done leaves a checkpoi
   CHECK(place.run(kFit + "--levels 3 --time-limit 1 -o out.mesh --resume c --force").status == 4);
 }
 
+TEST_CASE("A checkpoint whose template depends on the time is kept with a warning", "[cli][checkpoint]") {
+  const Workplace place;
+  const auto is_warned = [&](const std::string& words) {
+    return place.run("fit target.off --levels 1 --report r.json --force " + words).err.find("--resume") !=
+           std::string::npos;
+  };
+  CHECK(is_warned("--time-limit 0.1 --checkpoint c"));
+  CHECK_FALSE(is_warned("--time-limit 0.1"));
+  CHECK_FALSE(is_warned("--time-limit 0.1 --checkpoint c --template template.mesh"));
+}
+
 TEST_CASE("A checkpoint of another run is refused, and said why", "[cli][checkpoint]") {
   const Workplace place;
   REQUIRE(place.run(kShort + "--levels 1 --report r.json --checkpoint c").status == kStepsRanOut);

@@ -190,6 +190,7 @@ TEST_CASE("Optimisation gives the same bits for any number of threads, and can b
   const OptimizeResult cancelled =
       optimize_mesh(start, nullptr, {.progress = [](const FitProgress&) { return false; }});
   CHECK(cancelled.report.stop_reason == StopReason::cancelled);
+  CHECK(cancelled.report.stages.back().mean_distance_percent < 0);  // nobody goes on from there: not measured
   CHECK(cancelled.uncertified == certify(cancelled.mesh).not_certified);
 }
 

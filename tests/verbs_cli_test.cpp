@@ -10,9 +10,36 @@
 
 #include <catch2/catch.hpp>
 
+#include <array>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
 using subvol::test::content_of;
 using subvol::test::Run;
 using subvol::test::Workplace;
+
+namespace {
+
+/// An inverted tet, cell 0, and a sound cube beside it: in a .mesh, where hexes come first, the tet is cell 1.
+subvol::VolumeMesh inverted_tet_and_cube() {
+  subvol::VolumeMesh mesh;
+  mesh.positions = {{5, 0, 0}, {5, 1, 0}, {6, 0, 0}, {5, 0, 1}};
+  mesh.add_cell(subvol::CellKind::tet, std::array<subvol::Index, 4>{0, 1, 2, 3});
+  const subvol::VolumeMesh cube = subvol::test::lattice(1, 1, 1);
+  std::vector<subvol::Index> corners(cube.cell(0).begin(), cube.cell(0).end());
+  for (subvol::Index& v : corners) v += 4;
+  mesh.positions.insert(mesh.positions.end(), cube.positions.begin(), cube.positions.end());
+  mesh.add_cell(subvol::CellKind::hex, corners);
+  return mesh;
+}
+
+/// What `check` finds in a file.
+nlohmann::json found_in(const Workplace& place, const std::string& file) {
+  return nlohmann::json::parse(place.run("check " + file + " --json").out);
+}
+
+}  // namespace
 
 TEST_CASE("A shell goes from a surface to cells, named sheets and a report that tells the truth", "[cli]") {
   const Workplace place;
@@ -94,6 +121,23 @@ TEST_CASE("A shell is a control mesh that can be subdivided", "[cli]") {
   CHECK(report["subdivided_once"]["not_certified_cells"] == 0);
   CHECK(place.run("subdivide cage.mesh --levels 1 -o fine.mesh").status == 0);
   CHECK(place.run("check fine.mesh").status == 0);
+}
+
+TEST_CASE("A shell of hexes and prisms numbers its cells layer by layer", "[cli]") {
+  const Workplace place;
+  place.file("mixed.obj",  // triangles before quads: prisms before hexes
+             "v 0 0 0\nv 1 0 0.1\nv 1 1 0\nv 0 1 0.1\nv 2 0 0\nv 2 1 0.2\nf 1 2 3\nf 1 3 4\nf 2 5 6 3\n");
+  REQUIRE(place.run("shell mixed.obj --thickness 0.1 -o s.mesh -o s.vtk --report s.json").status == 0);
+  const subvol::VolumeMesh by_layer = subvol::read_volume_mesh(place / "s.vtk");
+  CHECK(subvol::read_volume_mesh(place / "s.mesh").kinds[0] == subvol::CellKind::hex);
+  const auto worst = place.json("s.json").at("quality").at("worst_cells");
+  REQUIRE(worst.size() == 3);
+  for (const auto& cell : worst) {
+    const auto corners = by_layer.cell(cell.at("cell").get<std::size_t>());
+    subvol::Vec3 centre = subvol::Vec3::Zero();
+    for (const subvol::Index v : corners) centre += by_layer.positions[v] / static_cast<double>(corners.size());
+    for (int k = 0; k < 3; ++k) CHECK(cell.at("centre")[k].get<double>() == Approx(centre[k]));
+  }
 }
 
 TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
@@ -190,6 +234,61 @@ TEST_CASE("optimize untangles a mesh, proves it, and says which cells it could n
   CHECK(place.run("optimize tangled.mesh").status == 2);
   CHECK(place.run("optimize tangled.mesh --fixed-boundary --target target.off -o a.mesh").status == 2);
   CHECK(place.run("optimize tangled.mesh --order 2 -o a.vtu").status == 2);
+}
+
+TEST_CASE("Reports number cells as their file does", "[cli]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "mixed.vtk", inverted_tet_and_cube());
+  for (const std::string verb : {"template carve mixed.vtk --list 0,1", "optimize mixed.vtk --fixed-boundary"})
+    for (const auto& [file, tet] : {std::pair("a.mesh", 1), std::pair("a.vtk", 0)}) {
+      const Run run = place.run(verb + " --force --report r.json -o a.glb -o " + file);
+      INFO(verb << ' ' << file << ": " << run.err);
+      CHECK(run.status == 1);
+      const auto report = place.json("r.json"), found = found_in(place, file);
+      CHECK(report.at("inverted_at").at(0).at("cell") == tet);
+      CHECK(report.at("valid") == false);
+      for (const char* entry : {"inverted_at", "quality", "defects", "topology"})
+        CHECK(report.at(entry) == found.at(entry));
+      if (verb.starts_with("template")) continue;
+      CHECK(report.at("not_certified_cells") == nlohmann::json{tet});
+      CHECK(run.err.find("cell " + std::to_string(tet) + " is not proved positive") != std::string::npos);
+    }
+}
+
+TEST_CASE("The distances that optimize decides by are those of its file", "[cli]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "tangled.mesh", subvol::samples::tangled_ball());
+  const std::string with_target = "template.mesh --target target.off";
+  for (const std::string& words :
+       {with_target, with_target + " --tolerance 9 --max-tolerance 9", std::string("tangled.mesh")}) {
+    const Run run = place.run("optimize " + words + " --force -o o.mesh --report r.json --progress none");
+    INFO(words << ": " << run.err);
+    const auto report = place.json("r.json");
+    const double mean = report.at("distance").at("mean_percent"), max = report.at("distance").at("max_percent");
+    const auto& options = report.at("options");
+    const bool within = mean <= options.at("tolerance") && max <= options.at("max-tolerance");
+    CHECK(report.at("converged") == within);
+    CHECK(run.status == (within ? 0 : 4));
+    char figure[40];
+    std::snprintf(figure, sizeof figure, within ? "boundary within %.4g %%" : "largest %.4g %%", max);
+    CHECK(report.at("explanation").get<std::string>().find(figure) != std::string::npos);
+  }
+}
+
+TEST_CASE("A fit of curved cells converges only where its file is within the tolerance", "[cli]") {
+  const Workplace place;
+  const std::string fit = "fit target.off --template template.mesh --order 3 --force --progress none -o c.vtu ";
+  place.run(fit + "--report r.json");
+  const double reached = place.json("r.json").at("distance").at("mean_percent");
+  for (const double share : {0.9, 0.99, 1.01, 1.5}) {
+    const Run run = place.run(fit + "--report r.json --tolerance " + std::to_string(share * reached));
+    const auto report = place.json("r.json");
+    INFO(share << ": " << run.err);
+    const bool within = report.at("distance").at("mean_percent") <= report.at("options").at("tolerance");
+    CHECK((run.status == 0 || run.status == 4));
+    CHECK(report.at("converged") == (run.status == 0));
+    CHECK((within || run.status == 4));
+  }
 }
 
 TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {

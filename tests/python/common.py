@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the tests of the Python module share: a folder with the bundled samples, and the program."""
+"""What the tests of the Python module share: a folder with the bundled samples, the program, a locale."""
 
+import contextlib
+import locale
 import os
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
+import unittest.mock
 import warnings
 
 import numpy as np
@@ -22,6 +26,26 @@ CUBE = np.arange(8).reshape(1, 8)
 
 def cube():
     return subvol.VolumeMesh(CUBE_POINTS, hexes=CUBE)
+
+
+@contextlib.contextmanager
+def decimal_comma():
+    """The C library's numbers have a decimal comma within, by a locale made here; skips where that cannot be."""
+    before = locale.setlocale(locale.LC_NUMERIC)
+    with tempfile.TemporaryDirectory() as folder, unittest.mock.patch.dict(os.environ, LOCPATH=folder):
+        os.mkdir(f"{folder}/comma")
+        with open(f"{folder}/comma/LC_NUMERIC", "wb") as file:  # as glibc's localedef writes it
+            file.write(struct.pack("=8I4s2I", 0x20031115 ^ locale.LC_NUMERIC, 6, 32, 34, 35, 36, 40, 44,
+                                   b",", ord(","), 0) + b"ANSI_X3.4-1968\0")
+        try:
+            locale.setlocale(locale.LC_NUMERIC, "comma")
+        except locale.Error:
+            raise unittest.SkipTest("the C library takes no locale but its own")
+        try:
+            assert locale.localeconv()["decimal_point"] == ","
+            yield
+        finally:
+            locale.setlocale(locale.LC_NUMERIC, before)
 
 
 class InFolder(unittest.TestCase):

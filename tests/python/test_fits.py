@@ -99,6 +99,11 @@ class Fits(InFolder):
         options = subvol.fit(*BALL, **given).report["options"]
         self.assertEqual((options["solver"], options["tolerance"]), ("newton", None))
 
+    def test_booleans_may_be_numpys(self):
+        for value in (np.True_, np.False_):
+            report = subvol.fit(*BALL, levels=1, max_iterations=1, cage_only=value).report
+            self.assertIs(report["options"]["cage_only"], bool(value))
+
     def test_a_tolerance_that_is_missed_is_told(self):
         report = subvol.fit(*BALL, levels=1, tolerance=1e-6).report
         self.assertEqual((report["stop_reason"], report["converged"]), ("tolerance_missed", False))
@@ -188,6 +193,15 @@ class States(InFolder):
         with self.assertRaisesRegex(subvol.InputError, "no such file"):
             subvol.fit(*BALL, levels=1, resume="none.checkpoint")
 
+    def test_names_of_checkpoints_need_not_be_utf_8(self):
+        part = subvol.fit(*BALL, levels=1, checkpoint=b"ball\xe9", progress=lambda p: p.iteration < 2)
+        self.assertEqual(part.report["stop_reason"], "cancelled")
+        resumed = subvol.fit(*BALL, levels=1, resume=b"ball\xe9", checkpoint=b"nowhere\xe9/ball")
+        self.assertEqual(resumed.report["resumed_from"], "ball\ufffd")
+        self.assertRegex(resumed.report["warnings"][-1], "not up to date: nowhere\ufffd/ball")
+        with self.assertRaisesRegex(subvol.InputError, "ball\ufffd: .*levels"):
+            subvol.fit(*BALL, levels=2, resume=b"ball\xe9")
+
     def test_a_checkpoint_is_there_after_an_error_of_the_callback(self):
         def fails(progress):
             if progress.level == 2:
@@ -256,6 +270,13 @@ class Running(InFolder):
         self.assertEqual(len(steps), 3)
         self.assertEqual(fit.report["stop_reason"], "cancelled")
         self.assertEqual(len(fit.cage.hexes), 60)
+
+    def test_false_may_be_numpys_and_nothing_else_ends_a_fit(self):
+        for said, ends in ((False, True), (np.False_, True), (np.True_, False), (None, False), (0, False),
+                           (np.float64(0), False), (np.zeros(2, bool), False)):
+            told = []
+            subvol.fit(*BALL, levels=1, max_iterations=2, progress=lambda p: told.append(p) or said)
+            self.assertEqual(len(told) == 1, ends, repr(said))
 
     def test_an_error_of_the_callback_comes_out(self):
         calls = []

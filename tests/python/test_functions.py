@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+import contextlib
 import os
 import unittest
 
 import numpy as np
 
 import subvol
-from common import CUBE, CUBE_POINTS, InFolder, cube
+from common import CUBE, CUBE_POINTS, InFolder, cube, decimal_comma
 
 
 def times(matrix, points):
@@ -274,6 +275,63 @@ class Checks(InFolder):
         with self.assertRaises(subvol.InputError):
             subvol.write("x.glb", cube(), unit=float("nan"))
         self.assertFalse(os.path.exists("x.glb"))
+
+
+class Locales(InFolder):
+    """Programs that set their user's locale get what others do."""
+
+    def assert_same(self, work):
+        """work() returns the same with a decimal comma."""
+        result = work()
+        with decimal_comma():
+            self.assertEqual(work(), result)
+        return result
+
+    def written(self, name, mesh, **options):
+        subvol.write(name, mesh, **options)
+        with open(name.split(":")[-1], "rb") as file:
+            return file.read()
+
+    def test_words_that_hold_numbers(self):
+        for thickness in ("2.5%", "0.05"):
+            self.assert_same(lambda: subvol.shell("bowl.obj", thickness, straight=True).mesh.points.tolist())
+        cut = {place: self.assert_same(lambda: self.written("cutaway:a.glb", self.grid(), cut=place))
+               for place in ("x:0.2", "x:0.6")}
+        self.assertNotEqual(cut["x:0.2"], cut["x:0.6"])
+
+    def test_what_is_said(self):
+        def said():
+            with self.assertRaises(subvol.InputError) as caught:
+                subvol.fit("ball_target.off", "ball_template.mesh", tolerance=-0.5)
+            report = subvol.fit("ball_target.off", "ball_template.mesh", levels=1).report
+            return str(caught.exception), report["explanation"], [stage["name"] for stage in report["stages"]]
+
+        self.assertIn("-0.5", self.assert_same(said)[0])
+
+    def test_checkpoints(self):
+        for options in (dict(levels=1), dict(order=2)):
+            given = dict(target="ball_target.off", template="ball_template.mesh", max_iterations=2, **options)
+            for first, then in ((decimal_comma, contextlib.nullcontext), (contextlib.nullcontext, decimal_comma)):
+                with first():
+                    report = subvol.fit(**given, checkpoint="ball.checkpoint").report
+                with then():
+                    again = subvol.fit(**given, resume="ball.checkpoint").report
+                self.assertEqual(again["recalled_stages"], len(report["stages"]))
+
+    def grid(self):
+        grid = subvol.template.grid(box=[0, 0, 0, 4, 1, 1], counts=[4, 2, 2])
+        grid.points[:] /= 3
+        return grid
+
+    def test_files(self):
+        names = [f"a.{extension}" for extension in "mesh vtk vtu msh glb gltf obj usda".split()]
+        for name in names:
+            self.assert_same(lambda: self.written(name, self.grid(), unit=0.01))
+        for name in ("a.vtu", "a.msh"):
+            self.assert_same(lambda: self.written(name, subvol.HighOrderMesh(self.grid(), 2)))
+        for name in ("a.mesh", "a.vtk", "a.obj"):
+            self.assert_same(lambda: subvol.read(name).points.tolist())
+        self.assert_same(lambda: subvol.read("a.vtu").coefficients.tolist())
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import gc
+import os
 import unittest
 import weakref
 
@@ -144,6 +145,20 @@ class SurfaceMeshes(InFolder):
         np.testing.assert_array_equal(boundary.creases, [[0, 1]])
         np.testing.assert_array_equal(boundary.corners, [6])
 
+    def test_tags_off_the_boundary_are_left_out(self):
+        grid = subvol.template.grid(box=[0, 0, 0, 2, 2, 2], counts=[2, 2, 2])
+        centre = 13
+        np.testing.assert_array_equal(grid.points[centre], [1, 1, 1])
+        mesh = subvol.VolumeMesh(grid.points, hexes=grid.hexes, creases=[[4, centre], [25, 26]], corners=[centre, 14])
+        boundary = mesh.boundary()
+        np.testing.assert_array_equal(boundary.points[boundary.corners], grid.points[[14]])
+        np.testing.assert_array_equal(boundary.points[boundary.creases], [grid.points[[25, 26]]])
+        subvol.write("tags.usda", mesh)
+        with open("tags.usda") as file:
+            text = file.read()
+        self.assertIn(f"cornerIndices = {boundary.corners.tolist()}", text)
+        self.assertIn(f"creaseIndices = {boundary.creases[0].tolist()}", text)
+
     def test_files(self):
         surface = subvol.read("torus_target.off")
         self.assertIsInstance(surface, subvol.SurfaceMesh)
@@ -195,6 +210,21 @@ class SurfaceMeshes(InFolder):
             file.write("OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n5 5 5\n3 0 1 2\n3 0 0 1\n")
         with self.assertWarnsRegex(UserWarning, "twice.off"):
             subvol.read("twice.off")
+
+    def test_names_of_files_need_not_be_utf_8(self):
+        with open(b"caf\xe9.off", "w") as file:
+            file.write("OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n5 5 5\n3 0 1 2\n")
+        for name in (b"caf\xe9.off", os.fsdecode(b"caf\xe9.off")):
+            with self.assertWarnsRegex(UserWarning, "caf\ufffd.off.*vert"):
+                self.assertEqual(len(subvol.read(name).triangles), 1)
+        with self.assertRaisesRegex(subvol.InputError, "no\ufffd.off: no such file"):
+            subvol.read(b"no\xe9.off")
+        with self.assertRaisesRegex(subvol.InputError, "what\ufffd.xyz"):
+            subvol.write(b"what\xe9.xyz", cube())
+        with self.assertRaisesRegex(subvol.IoError, "nowhere\ufffd"):
+            subvol.write(b"nowhere\xe9/cube.mesh", cube())
+        for extension in "mesh vtk vtu msh glb gltf obj usda".split():
+            subvol.write(b"caf\xe9." + extension.encode(), cube())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/written_result.h"
+
+#include "cli/check_report.h"
+#include "cli/exit_status.h"
+#include "cli/report.h"
+#include "export/high_order_file.h"
+#include "fit/option_checks.h"
+#include "subvol/mesh_io.h"
+#include "subvol/version.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <string_view>
+
+namespace subvol::cli {
+namespace {
+
+/// The first that is a file of this kind, and no pipe; null: none.
+const Output* first_file(std::span<const Output> outputs, Part part, std::string_view extension) {
+  const auto found = std::find_if(outputs.begin(), outputs.end(), [&](const Output& output) {
+    return output.part == part && output.extension == extension && std::filesystem::is_regular_file(output.path);
+  });
+  return found == outputs.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+std::optional<VolumeMesh> written_cells(std::span<const Output> outputs, Part part) {
+  for (const char* extension : {".mesh", ".vtk"})
+    if (const Output* file = first_file(outputs, part, extension))
+      return read_volume_mesh(file->path, {.check = false});
+  return {};
+}
+
+std::optional<HighOrderMesh> written_curved_cells(std::span<const Output> outputs) {
+  if (const Output* file = first_file(outputs, Part::result, ".vtu")) return read_high_order(file->path).mesh;
+  return {};
+}
+
+int write_checked(const RunOptions& run, std::vector<Output> outputs, const VolumeMesh& mesh,
+                  const std::function<void(const Output&)>& write, const std::vector<std::string>& warnings,
+                  const Json& details) {
+  require_extent(mesh.positions, "mesh to be written");
+  const std::vector<std::string> failures = write_each(outputs, write);
+  const std::optional<VolumeMesh> written = written_cells(outputs);
+  const MeshCheck check = check_mesh(written ? *written : mesh);
+  if (!run.report.empty()) {
+    Json json{{"subvol", version()}};
+    json.update(details);
+    json.update(check_json(check));
+    json["warnings"] = warnings_json(warnings, failures);
+    json["peak_memory_bytes"] = peak_memory_bytes();
+    json["outputs"] = output_names(outputs);
+    write_report(run.report, json);
+  }
+  if (!run.quiet) {
+    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
+    std::cerr << to_text(check);
+    for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
+  }
+  require_all_written(failures);
+  return check.valid() ? kDone : kFailed;
+}
+
+void hold_to(const DistancesAsked& asked, const MeshCheck& found, FitReport& report) {
+  if (!found.distance) return;
+  const auto hold = [&](const char* which, double percent, std::optional<double> most) {
+    if (report.stop_reason != StopReason::converged || !most || percent <= *most) return;
+    report.stop_reason = StopReason::tolerance_missed;
+    report.explanation =
+        formatted("as written, the %s distance of %.6g %% is above the tolerance of %.6g %%", which, percent, *most);
+  };
+  hold("mean", found.mean_distance_percent(), asked.mean_percent);
+  hold("largest", found.max_distance_percent(), asked.max_percent);
+}
+
+}  // namespace subvol::cli
