@@ -152,6 +152,10 @@ void FitRun::write() {
 }
 
 void FitRun::check() {
+  WritingOptions fine;
+  fine.chord_percent = measured_chord_percent(arguments_.writing);
+  if (fine.chord_percent < arguments_.writing.chord_percent)
+    limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, fine, progress); });
   const std::optional<VolumeMesh> written = written_cells(outputs_);
   const VolumeMesh& mesh = written ? *written : result_.mesh;
   std::visit(
@@ -161,6 +165,9 @@ void FitRun::check() {
       },
       target_);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
+  if (arguments_.surface == "limit")
+    hold_to(arguments_.fit.tolerance_percent, "limit surface's mean",
+            100 * limit_distance_.mean() / mesh_check_.target_diagonal, result_.report);
 }
 
 Json FitRun::report() const {

@@ -60,13 +60,12 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
   return result;
 }
 
-/// chord_percent: of the scenes; coarse ones do not make a coarse check.
 MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const Target& target,
-                double chord_percent, const RunOptions& run) {
+                const WritingOptions& writing, const RunOptions& run) {
   ProgressTeller teller(run.progress, run.quiet);
   const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
   const HighOrderMesh& mesh = written ? *written : result;
-  const CurvedBoundary boundary = curved_boundary(mesh, std::min(chord_percent, WritingOptions{}.chord_percent));
+  const CurvedBoundary boundary = curved_boundary(mesh, measured_chord_percent(writing));
   const MeshCheckOptions options{.progress = teller.work()};
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
@@ -166,7 +165,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const double write_seconds = seconds_since(write_start);
 
   const Clock::time_point check_start = Clock::now();
-  const MeshCheck mesh_check = check(outputs, file.mesh, target, writing.chord_percent, arguments.run);
+  const MeshCheck mesh_check = check(outputs, file.mesh, target, writing, arguments.run);
   hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
   if (!arguments.run.report.empty()) {
     Json json = report_json(arguments.command, verb, std::move(input), report, file.mesh, mesh_check);

@@ -133,7 +133,7 @@ void ShellRun::curve() {
   if (const double limit = arguments_.shell.time_limit_seconds; limit > 0)
     options.time_limit_seconds = std::max(1e-3, limit - seconds());
   options.boundary = [&](const HighOrderMesh& mesh) {
-    return curved_boundary(mesh, arguments_.writing.chord_percent);
+    return curved_boundary(mesh, measured_chord_percent(arguments_.writing));
   };
   curved_ = followed([&](auto progress) {
     options.progress = progress;
@@ -159,7 +159,7 @@ void ShellRun::check() {
   if (curved_) {
     const std::optional<HighOrderMesh> written = written_curved_cells(outputs_);
     if (!written) return;
-    const MeshCheck found = check_mesh(*written, curved_boundary(*written, arguments_.writing.chord_percent));
+    const MeshCheck found = check_mesh(*written, curved_boundary(*written, measured_chord_percent(arguments_.writing)));
     failures_ = {found.quality->certificate, found.intersecting_faces};
     return;
   }

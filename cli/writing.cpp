@@ -183,6 +183,10 @@ bool has_animation(std::span<const Output> outputs) {
   return std::any_of(outputs.begin(), outputs.end(), [](const Output& o) { return o.part == Part::animation; });
 }
 
+double measured_chord_percent(const WritingOptions& options) {
+  return std::min(options.chord_percent, WritingOptions{}.chord_percent);
+}
+
 TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options,
                                      const WorkProgress& progress) {
   return tessellate(cage, chord_length(cage, {.max_chord_percent = options.chord_percent}), kMostQuads, progress);

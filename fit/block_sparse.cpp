@@ -3,6 +3,8 @@
 
 #include "subvol/error.h"
 
+#include <omp.h>
+
 #include <algorithm>
 
 namespace subvol {
@@ -76,9 +78,11 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
 
 void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
                          std::span<Mat3> diagonal) {
+  // Of each thread, column j of M, scattered. Made here, where a lack of memory can be told.
+  std::vector<std::vector<double>> weights(omp_get_max_threads(), std::vector<double>(map.num_rows(), 0.0));
 #pragma omp parallel
   {
-    std::vector<double> weight(map.num_rows(), 0.0);  // column j of M, scattered
+    std::vector<double>& weight = weights[omp_get_thread_num()];
 #pragma omp for schedule(dynamic, 64)
     for (std::size_t j = 0; j < map.num_cols; ++j) {
       const auto rows = map_transposed.row_columns(j);

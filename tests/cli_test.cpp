@@ -13,6 +13,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <set>
@@ -265,6 +266,27 @@ TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "
   CHECK(run.status == 4);
   CHECK(place.has("out.mesh"));
   CHECK(place.json("report.json").at("converged") == false);
+}
+
+TEST_CASE("A fit converges only where its file and its limit surface are within the tolerance", "[cli]") {
+  const Workplace place;
+  const std::string fit = std::string(kFit) + "--levels 1 --chord 5 --force -o out.mesh -o out.glb --report r.json ";
+  const auto farthest = [](const nlohmann::json& report) {
+    const auto& limit = report.at("limit_surface_distance");
+    CHECK(limit.at("chord_error_percent") < 0.01);  // whatever the scene's are
+    const double of_mesh = report.at("distance").at("mean_percent"), of_limit = limit.at("mean_percent");
+    return std::max(of_mesh, of_limit);
+  };
+  place.run(fit);
+  const double reached = farthest(place.json("r.json"));
+  for (const double share : {0.9, 0.99, 1.01, 1.5}) {
+    const Run run = place.run(fit + "--tolerance " + std::to_string(share * reached));
+    const auto report = place.json("r.json");
+    INFO(share << ": " << run.err);
+    CHECK((run.status == 0 || run.status == 4));
+    CHECK(report.at("converged") == (run.status == 0));
+    CHECK((farthest(report) <= report.at("options").at("tolerance") || run.status == 4));
+  }
 }
 
 TEST_CASE("A time limit ends with status 4 and the best result", "[cli]") {
