@@ -166,7 +166,7 @@ void FitRun::check() {
       target_);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
   if (arguments_.surface == "limit")
-    hold_to(arguments_.fit.tolerance_percent, "limit surface's mean",
+    hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
             100 * limit_distance_.mean() / mesh_check_.target_diagonal, result_.report);
 }
 

@@ -30,7 +30,7 @@ struct WritingOptions {
   int linear_intervals = 0;       ///< of a curved cell's edges in .mesh and .vtk; 0: its mesh's largest order
 };
 
-/// The same of surfaces that are measured: coarse scenes do not make a coarse check.
+/// Largest chord error of surfaces that are measured, per cent as above: coarse scenes do not make a coarse check.
 double measured_chord_percent(const WritingOptions& options);
 
 /// --chord, --unit, --up, --cut, --no-wireframe, --quantize.

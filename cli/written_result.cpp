@@ -66,15 +66,15 @@ int write_checked(const RunOptions& run, std::vector<Output> outputs, const Volu
 
 void hold_to(const DistancesAsked& asked, const MeshCheck& found, FitReport& report) {
   if (!found.distance) return;
-  hold_to(asked.mean_percent, "mean", found.mean_distance_percent(), report);
-  hold_to(asked.max_percent, "largest", found.max_distance_percent(), report);
+  hold_to(asked.mean_percent, "as written, the mean", found.mean_distance_percent(), report);
+  hold_to(asked.max_percent, "as written, the largest", found.max_distance_percent(), report);
 }
 
 void hold_to(std::optional<double> most_percent, const char* which, double percent, FitReport& report) {
   if (report.stop_reason != StopReason::converged || !most_percent || percent <= *most_percent) return;
   report.stop_reason = StopReason::tolerance_missed;
-  report.explanation = formatted("as written, the %s distance of %.6g %% is above the tolerance of %.6g %%", which,
-                                 percent, *most_percent);
+  report.explanation =
+      formatted("%s distance of %.6g %% is above the tolerance of %.6g %%", which, percent, *most_percent);
 }
 
 }  // namespace subvol::cli

@@ -44,7 +44,7 @@ struct DistancesAsked {
 /// Holds a fit that says it converged to what was found in its file: where that is farther off than was asked for, the
 /// tolerance was missed, and the explanation says by how much.
 void hold_to(const DistancesAsked& asked, const MeshCheck& found, FitReport& report);
-/// The same of one distance. which: its name, such as "mean". most_percent: none holds to nothing.
+/// The same of one distance. which: what it is called, such as "the mean". most_percent: none holds to nothing.
 void hold_to(std::optional<double> most_percent, const char* which, double percent, FitReport& report);
 
 }  // namespace subvol::cli
