@@ -30,9 +30,9 @@ void untangle_template(const std::string& path, const RunOptions& run, OptimizeO
   catch_interrupt();
   try {
     const UntangledStart start = untangle_before_fit(mesh, options);
-    if (start.left > 0)
-      throw EndedEarly(path + ": the work was ended before its cells were valid; " + std::to_string(start.left) +
-                           " were not, and there is nothing to write",
+    if (start.ended_early())
+      throw EndedEarly(path + ": the work was ended while its cells were made valid; " + std::to_string(start.left) +
+                           " were not yet, and there is nothing to write",
                        start.stop_reason == StopReason::cancelled ? kInterrupted : kNotConverged);
     if (start.tangled > 0)
       warnings.push_back(path + ": " + std::to_string(start.tangled) +

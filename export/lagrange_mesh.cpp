@@ -3,6 +3,7 @@
 
 #include "fit/pattern_table.h"
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <algorithm>
 #include <array>
@@ -149,19 +150,22 @@ void evaluate(const HighOrderMesh& mesh, const std::map<LatticeKey, Lattice>& la
     const std::vector<Index>& cells = members;  // Clang before 16 takes no structured binding into a parallel region
     const PatternTable table(mesh.space, key.first,
                              lattices.at({mesh.space.pattern_kind(key.first), key.second}).points);
+    const auto sample = [&](Index c, std::vector<Vec3>& x) {
+      x.resize(table.num_points());
+      table.positions(mesh, c, x);
+      const auto nodes = out.cell(c);
+      for (std::size_t q = 0; q < x.size(); ++q)
+        if (first_cell[nodes[q]] == c && static_cast<std::size_t>(nodes[q]) >= num_vertices)
+          out.positions[nodes[q]] = x[q];
+    };
+    ParallelErrors errors;
 #pragma omp parallel
     {
-      std::vector<Vec3> x(table.num_points());
+      std::vector<Vec3> x;
 #pragma omp for schedule(static)
-      for (std::size_t i = 0; i < cells.size(); ++i) {
-        const Index c = cells[i];
-        table.positions(mesh, c, x);
-        const auto nodes = out.cell(c);
-        for (std::size_t q = 0; q < x.size(); ++q)
-          if (first_cell[nodes[q]] == c && static_cast<std::size_t>(nodes[q]) >= num_vertices)
-            out.positions[nodes[q]] = x[q];
-      }
+      for (std::size_t i = 0; i < cells.size(); ++i) errors.guard([&] { sample(cells[i], x); });
     }
+    errors.rethrow();
   }
 }
 

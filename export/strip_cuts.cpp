@@ -2,6 +2,7 @@
 #include "export/strip_cuts.h"
 
 #include "export/chord_distance.h"
+#include "subvol/parallel_errors.h"
 
 #include <algorithm>
 #include <bit>
@@ -186,11 +187,14 @@ CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t 
   double share = 0;  // each round takes about half of what is left
   while (std::any_of(changed.begin(), changed.end(), [](char c) { return c != 0; })) {
     patches.prepare(depth_of(cuts) + std::countr_zero(static_cast<unsigned>(kCellSteps)));
+    ParallelErrors errors;
 #pragma omp parallel for schedule(dynamic, 64)
     for (std::size_t p = 0; p < states.size(); ++p) {
       const auto& [u, v] = cuts.strips(static_cast<Index>(p));
-      if (changed[u] || changed[v]) states[p] = PatchJudge(patches, cuts, static_cast<Index>(p)).judge(max_chord_error);
+      if (changed[u] || changed[v])
+        errors.guard([&] { states[p] = PatchJudge(patches, cuts, static_cast<Index>(p)).judge(max_chord_error); });
     }
+    errors.rethrow();
     share = (1 + share) / 2;
     if (!goes_on(progress, "tessellation", share)) break;
     const Demand demand = total_demand(cuts, states);

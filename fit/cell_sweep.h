@@ -15,7 +15,10 @@ class CellSweep {
  public:
   explicit CellSweep(const CellGroup& group)
       : group_(group), m_(group.order + 1), n_(group.points_per_direction), coefficients_(3 * group.num_modes) {
-    if (group.kind != CellKind::hex) return;
+    if (group.kind != CellKind::hex) {
+      dense_sums_.resize(coefficients_.size());
+      return;
+    }
     const std::size_t lines = static_cast<std::size_t>(m_) * m_ * n_ * 6, planes = 9 * m_ * num_columns();
     lines_ = std::make_unique_for_overwrite<Wide[]>(lines);
     planes_ = std::make_unique_for_overwrite<Wide[]>(planes);
@@ -46,7 +49,7 @@ class CellSweep {
 
   template <bool kBack, class Op>
   void run_dense(Op&& op) {
-    if constexpr (kBack) dense_sums_.assign(coefficients_.size(), Wide{});
+    if constexpr (kBack) std::fill(dense_sums_.begin(), dense_sums_.end(), Wide{});
     const std::size_t num_points = group_.num_points();
     for (std::size_t first = 0; first < num_points; first += kPoints) {
       const bool all = first + kPoints <= num_points;

@@ -15,8 +15,7 @@ UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& opti
   OptimizeResult result = optimize_mesh(mesh, nullptr, options);
   const std::vector<Index>& left = result.uncertified;
   const StopReason reason = result.report.stop_reason;
-  if (!left.empty() && (reason == StopReason::cancelled || reason == StopReason::time_limit))
-    return {tangled, left.size(), reason};
+  if (reason == StopReason::cancelled || reason == StopReason::time_limit) return {tangled, left.size(), reason};
   if (!left.empty())
     throw InputError(std::to_string(left.size()) + " cells could not be made valid before the fit, the first is cell " +
                      std::to_string(left[0]));

@@ -16,8 +16,10 @@ inline constexpr double kCurvingLambda = 0.0025;
 
 struct UntangledStart {
   std::size_t tangled = 0;  ///< cells that were not certified
-  std::size_t left = 0;     ///< of them, those that are not yet; above 0: the work was ended, and the mesh is as it was
-  StopReason stop_reason = StopReason::converged;  ///< where some are left: cancelled or time_limit
+  std::size_t left = 0;     ///< of them, those that were not when the work was ended early
+  StopReason stop_reason = StopReason::converged;  ///< cancelled or time_limit where it was: the mesh is as it was then
+
+  bool ended_early() const { return stop_reason != StopReason::converged; }
 };
 
 /// Makes the cells of a mesh valid over its own boundary, where they are not, before it is fitted to a target.

@@ -36,6 +36,9 @@ const char* to_string(StopReason reason);
 /// Why one minimisation ended; infeasible_start: at once, for E is infinite there.
 enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
 
+/// Why work ended that is done with one minimisation, the last. Without a step, and from no start: stalled.
+StopReason stop_reason(MinimizerStop stop);
+
 /// One Newton (or L-BFGS) step.
 struct IterationRecord {
   double surface_energy = 0, volume_energy = 0;  ///< E_S and E_W (dimensionless), E = E_S + lambda E_W   Paper: Eq. 1

@@ -6,6 +6,7 @@
 #include "fit/high_order_certificate.h"
 #include "fit/step_limit.h"
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <Eigen/LU>
 #include <omp.h>
@@ -15,6 +16,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 namespace subvol {
 
@@ -158,12 +160,16 @@ double HighOrderEnergy::sum_batches(PerBatch&& per_batch) const {
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const CellGroup& group = groups_[g];
     std::vector<double> sums(group.batches.size());
+    ParallelErrors errors;
 #pragma omp parallel
     {
-      CellSweep sweep(group);
+      std::optional<CellSweep> sweep;
+      errors.guard([&] { sweep.emplace(group); });
 #pragma omp for schedule(dynamic)
-      for (std::size_t b = 0; b < group.batches.size(); ++b) sums[b] = per_batch(g, b, sweep);
+      for (std::size_t b = 0; b < group.batches.size(); ++b)
+        if (sweep) sums[b] = per_batch(g, b, *sweep);
     }
+    errors.rethrow();
     for (double s : sums) total += s;
   }
   return total;
@@ -311,11 +317,12 @@ void HighOrderEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap&
 template <class PerPoint>
 void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction,
                                     const PerPoint& per_point) const {
-  std::vector<std::vector<Wide>> jacobians(omp_get_max_threads());
+  std::size_t most_points = 0;
+  for (const CellGroup& group : groups_) most_points = std::max(most_points, group.num_points());
+  std::vector<std::vector<Wide>> jacobians(omp_get_max_threads(), std::vector<Wide>(9 * most_points));
   sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
     std::vector<Wide>& kept = jacobians[omp_get_thread_num()];
-    kept.resize(9 * group.num_points());
     sweep.load(b, nodes);
     sweep.run<false>([&](std::size_t first, int count, const Wide (*j)[9]) {
       std::copy_n(j[0], 9 * count, &kept[9 * first]);

@@ -316,14 +316,37 @@ bool HighOrderFit::run_first_orders(int last) {
   };
   std::optional<Arrival> best;
   const std::size_t stages_before = report_.stages.size();
-  for (const HighOrderTry& attempt : schedule_.tries) {
-    const std::size_t stages_begin = report_.stages.size();
+  const auto take_best = [&] {  // allocates nothing
+    mesh_ = std::move(best->mesh);
+    ideal_boxes_ = std::move(best->ideal_boxes);
+    points_ = std::move(best->points);
+    approach_ = best->approach;
+    states_ = std::move(best->states);
+    start_ = std::move(best->start);
+    try_ = best->number;
+    report_.undo_stages(stages_before, best->stages_begin);
+    report_.undo_stages(best->stages_end, report_.stages.size());
+  };
+  const auto arrive = [&](const HighOrderTry& attempt) -> std::optional<bool> {  // folded; none when the fit must end
     begin_try(attempt);
     for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
-      if (!run_order(attempt.approach, order)) return false;
+      if (!run_order(attempt.approach, order)) return {};
+    return schedule_.tries.size() == 1 ? false : is_folded();
+  };
+  for (const HighOrderTry& attempt : schedule_.tries) {
+    const std::size_t stages_begin = report_.stages.size();
+    std::optional<bool> folded;
+    try {
+      folded = arrive(attempt);
+    } catch (const std::bad_alloc&) {
+      if (best) take_best();
+      throw;
+    }
+    if (!folded) {
+      if (best) take_best();
+      return false;
+    }
     if (schedule_.tries.size() == 1) return true;
-    const std::optional<bool> folded = is_folded();
-    if (!folded) return false;
     const auto& steps = report_.stages.back().iterations;
     const double distortion = steps.empty() ? 0 : steps.back().volume_energy;
     const double energy = steps.empty() ? 0 : steps.back().surface_energy + lambda_ * distortion;
@@ -335,15 +358,7 @@ bool HighOrderFit::run_first_orders(int last) {
     const bool fair = last < kTellingOrder || best->mean <= kFairDistancePercent || best->distortion <= kFairDistortion;
     if (!best->folded && fair) break;
   }
-  mesh_ = std::move(best->mesh);
-  ideal_boxes_ = std::move(best->ideal_boxes);
-  points_ = std::move(best->points);
-  approach_ = best->approach;
-  states_ = std::move(best->states);
-  start_ = std::move(best->start);
-  try_ = best->number;
-  report_.undo_stages(stages_before, best->stages_begin);
-  report_.undo_stages(best->stages_end, report_.stages.size());
+  take_best();
   set_orders(EntityOrders(mesh_.space.orders()));
   return true;
 }
@@ -388,7 +403,8 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
   for (double lambda = lambda_ / 2; !meets_tolerance() && lambda >= 0.99 * least; lambda /= 2) {
     const double before = measured_mean();
     FitSnapshot stiffer = snapshot();
-    const std::optional<std::size_t> pairs_now = run_final_stage(lambda) ? intersecting_pairs() : std::nullopt;
+    const std::optional<std::size_t> pairs_now =
+        or_back(stiffer, [&] { return run_final_stage(lambda) ? intersecting_pairs() : std::nullopt; });
     if (!pairs_now || *pairs_now > pairs) {
       go_back(std::move(stiffer));
       return pairs_now.has_value();
@@ -454,7 +470,8 @@ HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int s
   const double setting_before = std::exchange(setting, value);
   Stage stage = schedule_.final_stage(lambda_);
   stage.max_iterations = steps;
-  const std::optional<Outcome> next = run_stage(stage) ? measured_outcome() : std::nullopt;
+  const std::optional<Outcome> next =
+      or_back(before, [&] { return run_stage(stage) ? measured_outcome() : std::nullopt; });
   if (next && is_better(*next)) {
     outcome_ = *next;
     return Again::kept;

@@ -6,12 +6,14 @@
 #include "fit/pattern_table.h"
 #include "fit/quadrature.h"
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 namespace subvol {
 namespace {
@@ -41,22 +43,26 @@ void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<co
     const std::size_t size = std::min(kChunk, points.size() - begin);
     const PatternTable table(mesh.space, pattern, std::span(points).subspan(begin, size),
                              PatternTable::Derivatives::first);
+    const auto sample = [&](Index c, std::vector<Mat3>& jacobians) {
+      jacobians.resize(size);
+      table.jacobians(mesh, c, jacobians);
+      Sampled& sampled = samples[c];
+      for (std::size_t q = 0; q < size; ++q) {
+        const double value =
+            scaled_jacobian(jacobians[q], reference ? Mat3(reference(c, points[begin + q]).inverse()) : inverse);
+        sampled.least = std::min(sampled.least, value);
+        sampled.mean += rule.weights[begin + q] * value;
+      }
+      sampled.count += size;
+    };
+    ParallelErrors errors;
 #pragma omp parallel
     {
-      std::vector<Mat3> jacobians(size);
+      std::vector<Mat3> jacobians;
 #pragma omp for schedule(static)
-      for (std::size_t i = 0; i < cells.size(); ++i) {
-        table.jacobians(mesh, cells[i], jacobians);
-        Sampled& sampled = samples[cells[i]];
-        for (std::size_t q = 0; q < size; ++q) {
-          const double value = scaled_jacobian(
-              jacobians[q], reference ? Mat3(reference(cells[i], points[begin + q]).inverse()) : inverse);
-          sampled.least = std::min(sampled.least, value);
-          sampled.mean += rule.weights[begin + q] * value;
-        }
-        sampled.count += size;
-      }
+      for (std::size_t i = 0; i < cells.size(); ++i) errors.guard([&] { sample(cells[i], jacobians); });
     }
+    errors.rethrow();
   }
 }
 

@@ -2,8 +2,10 @@
 #include "fit/pattern_table.h"
 
 #include "subvol/error.h"
+#include "subvol/parallel_errors.h"
 
 #include <cassert>
+#include <optional>
 
 namespace subvol {
 
@@ -19,20 +21,24 @@ PatternTable::PatternTable(const ElementSpace& space, std::size_t pattern, std::
   const bool with_derivatives = derivatives == Derivatives::first;
   if (with_derivatives)
     for (Table& table : derivatives_) table.resize(rows, cols);
+  const auto tabulate = [&](Eigen::Index q, ShapeFunctions& shapes) {
+    shapes.set_point(points[static_cast<std::size_t>(q)]);
+    Vec3 gradient;
+    for (Eigen::Index a = 0; a < cols; ++a) {
+      values_(q, a) = shapes.value(modes[static_cast<std::size_t>(a)], gradient);
+      if (with_derivatives)
+        for (int d = 0; d < 3; ++d) derivatives_[d](q, a) = gradient[d];
+    }
+  };
+  ParallelErrors errors;
 #pragma omp parallel
   {
-    ShapeFunctions shapes(space.pattern_kind(pattern), space.basis(), space.pattern_order(pattern));
+    std::optional<ShapeFunctions> shapes;
+    errors.guard([&] { shapes.emplace(space.pattern_kind(pattern), space.basis(), space.pattern_order(pattern)); });
 #pragma omp for schedule(static)
-    for (Eigen::Index q = 0; q < rows; ++q) {
-      shapes.set_point(points[static_cast<std::size_t>(q)]);
-      Vec3 gradient;
-      for (Eigen::Index a = 0; a < cols; ++a) {
-        values_(q, a) = shapes.value(modes[static_cast<std::size_t>(a)], gradient);
-        if (with_derivatives)
-          for (int d = 0; d < 3; ++d) derivatives_[d](q, a) = gradient[d];
-      }
-    }
+    for (Eigen::Index q = 0; q < rows; ++q) errors.guard([&] { tabulate(q, *shapes); });
   }
+  errors.rethrow();
 }
 
 Eigen::MatrixX3d PatternTable::gathered(const HighOrderMesh& mesh, std::size_t c) const {

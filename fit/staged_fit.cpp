@@ -24,8 +24,10 @@ bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t
   constexpr double kFactor = 4;
   for (double lambda = kFactor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= kFactor) {
     FitSnapshot softer = snapshot();
-    unknowns() = start.x;
-    const std::optional<std::size_t> pairs_now = run_final_stage(lambda) ? intersecting_pairs() : std::nullopt;
+    const std::optional<std::size_t> pairs_now = or_back(softer, [&] {
+      unknowns() = start.x;
+      return run_final_stage(lambda) ? intersecting_pairs() : std::nullopt;
+    });
     if (pairs_now && *pairs_now <= pairs / 2) {
       pairs = *pairs_now;
       report().undo_stages(start.num_stages, softer.num_stages);

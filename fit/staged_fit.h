@@ -6,7 +6,9 @@
 #include "subvol/types.h"
 
 #include <cstddef>
+#include <new>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace subvol {
@@ -39,6 +41,16 @@ class StagedFit {
 
   FitSnapshot snapshot();
   void go_back(FitSnapshot snapshot);
+  /// What `work` returns. Where memory runs out in it the fit is back at `before`, for which none is needed.
+  template <class Work>
+  auto or_back(FitSnapshot& before, const Work& work) {
+    try {
+      return work();
+    } catch (const std::bad_alloc&) {
+      go_back(std::move(before));
+      throw;
+    }
+  }
   /// Keeps where the unknowns are, under the name of what they came from; if states are kept.
   void keep_state();
   /// The last stage again from `start`, with more weight on the cells' shape up to most_lambda, while there are `pairs`

@@ -46,6 +46,11 @@ void check_options(const FitOptions& options) {
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
 }
 
+/// Stages in a report.
+struct StageRange {
+  std::size_t begin = 0, end = 0;
+};
+
 /// The recursive fit, in normalised coordinates.
 class SubdivisionFit : StagedFit {
  public:
@@ -97,6 +102,8 @@ class SubdivisionFit : StagedFit {
   FitLevel level_;
   std::optional<BoundaryRefinement> limit_check_;  ///< of level_.mesh, made when first measured
   FitResult result_;
+  std::size_t try_begin_ = 0;      ///< stages in the report when the try began
+  StageRange result_stages_;       ///< those that led to what is stored in result_
   std::map<std::string, double> seconds_;
   MemoryBudget memory_;
   StageRunner runner_;
@@ -189,10 +196,13 @@ bool SubdivisionFit::start_level() {
   double t = 0;
   for (int round = 0; round < kMaxRounds; ++round) {
     double next = 1;
-    while (next - t > kLeastProgress && !feasible(next)) next = t + kBackOff * (next - t);
+    while (next > t && !feasible(next)) {
+      next = t + kBackOff * (next - t);
+      if (next - t <= kLeastProgress) next = t;
+    }
     // Cells that stop the way need better shapes before they can follow.
     const bool slow = next - t < kSlowShare * (1 - t);
-    if (next - t > kLeastProgress) t = next;
+    if (next > t) t = next;
     else if (stage.lambda >= options_.lambda_far) break;
     if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
     level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
@@ -314,6 +324,7 @@ void SubdivisionFit::store_result() {
   result_.cage = std::move(stored.cage);
   result_.mesh = std::move(stored.mesh);
   result_.states = std::move(stored.states);
+  result_stages_ = {try_begin_, result_.report.stages.size()};
 }
 
 /// The refined mesh becomes the next control mesh (paper: section 4.3), unless the unknowns stay where they are.
@@ -336,6 +347,7 @@ void SubdivisionFit::next_control() {
 /// Unknowns are the template's vertices.
 void SubdivisionFit::begin(double own_box_share) {
   ++try_;
+  try_begin_ = result_.report.stages.size();
   own_box_share_ = own_box_share;
   control_ = cage_ = template_;
   creases_ = template_creases_;
@@ -383,27 +395,47 @@ bool SubdivisionFit::run_levels() {
 FitResult SubdivisionFit::run() {
   look_over_template();
   bool done = false;
-  std::optional<FitResult> best;  // of the tries that stalled: the one that got to the finest mesh
+  struct Stalled {
+    FitResult result;
+    StageRange stages;
+  };
+  std::optional<Stalled> best;  // the try that got to the finest mesh
   for (double share : schedule_.own_box_shares) {
     begin(share);
     done = run_levels();
-    if (done || result_.report.stop_reason != StopReason::stalled) {
-      best.reset();
-      break;
-    }
-    if (!best || result_.mesh.num_cells() > best->mesh.num_cells()) best = result_;
+    if (done || result_.report.stop_reason != StopReason::stalled) break;
+    if (!best || result_.mesh.num_cells() > best->result.mesh.num_cells()) best = {result_, result_stages_};
   }
-  if (best) {
-    best->report.stages = std::move(result_.report.stages);
-    result_ = std::move(*best);
+  const bool stalled = result_.report.stop_reason == StopReason::stalled;
+  if (best && !done && (stalled || best->result.mesh.num_cells() > result_.mesh.num_cells())) {
+    FitReport last = std::exchange(result_, std::move(best->result)).report;
+    result_stages_ = best->stages;
+    result_.report.stages = std::move(last.stages);
+    if (!stalled) {  // the fit was ended in a later try
+      result_.report.stop_reason = last.stop_reason;
+      result_.report.explanation = std::move(last.explanation);
+    }
   }
   FitReport& report = result_.report;
+  report.undo_stages(0, result_stages_.begin);
+  report.undo_stages(result_stages_.end, report.stages.size());
   if (done) runner_.conclude(measured_mean(), options_.tolerance_percent, report);
   report.seconds.assign(seconds_.begin(), seconds_.end());
   return std::move(result_);
 }
 
 }  // namespace
+
+StopReason stop_reason(MinimizerStop stop) {
+  switch (stop) {
+    case MinimizerStop::converged: return StopReason::converged;
+    case MinimizerStop::iteration_limit: return StopReason::iteration_limit;
+    case MinimizerStop::cancelled: return StopReason::cancelled;
+    case MinimizerStop::no_step:
+    case MinimizerStop::infeasible_start: break;
+  }
+  return StopReason::stalled;
+}
 
 const char* to_string(StopReason reason) {
   switch (reason) {

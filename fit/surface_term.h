@@ -4,9 +4,13 @@
 #include "fit/block_sparse.h"
 #include "fit/crease_energy.h"
 
+#include <omp.h>
+
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace subvol {
@@ -109,9 +113,13 @@ template <class AddRow>
 void SurfaceTerm::assemble(double scale, const AddRow& add_row) {
   const std::size_t n = num_samples();
   std::vector<double> to_surface(n), to_target(n);
+  std::size_t longest = 0;
+  for (std::size_t i = 0; i < n; ++i) longest = std::max(longest, hessian_.offsets[i + 1] - hessian_.offsets[i]);
+  std::vector<Row> rows(omp_get_max_threads());  // made here, where a lack of memory can be told
+  for (Row& row : rows) row.blocks.reserve(longest);
 #pragma omp parallel
   {
-    Row row;
+    Row row = std::move(rows[omp_get_thread_num()]);
 #pragma omp for schedule(dynamic, 256)
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t begin = hessian_.offsets[i], size = hessian_.offsets[i + 1] - begin;

@@ -59,7 +59,7 @@ class Fit {
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     untangle_template(time_limit);
     // What is left of it: a template may have been made.
-    if (time_limit > 0) time_limit = std::max(1e-3, time_limit - work_.seconds());
+    time_limit = work_.time_left(time_limit);
     checkpoints_.begin("fit", keywords_,
                        {{"target", cli::fingerprint(target_)}, {"template", cli::fingerprint(*template_)}});
   }
@@ -264,9 +264,9 @@ HighOrderFitOptions high_order_options(Keywords& keywords) {
 }
 
 void require_untangled(const UntangledStart& start, const char* function) {
-  if (start.left > 0)
-    throw InputError(std::string(function) + ": the work was ended before the mesh was valid; " +
-                     std::to_string(start.left) + " cells were not");
+  if (start.ended_early())
+    throw InputError(std::string(function) + ": the work was ended while the mesh was made valid; " +
+                     std::to_string(start.left) + " cells were not yet");
 }
 
 void take_chord(Keywords& keywords, cli::WritingOptions& writing) { keywords.take("chord", writing.chord_percent); }

@@ -107,6 +107,7 @@ class Optimization {
       return untangle_before_fit(start, options);
     });
     require_untangled(untangled, "optimize");
+    curving_.time_limit_seconds = work_.time_left(curving_.time_limit_seconds);
     if (untangled.tangled > 0)
       warnings_.push_back(std::to_string(untangled.tangled) +
                           " cells were not valid; they were untangled before curving");

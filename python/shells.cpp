@@ -91,8 +91,7 @@ class Growing {
       shell.report.warnings.push_back("the cells were left straight, for the shell is not valid");
       return;
     }
-    if (options_.time_limit_seconds > 0)
-      curved_options_.time_limit_seconds = std::max(1e-3, options_.time_limit_seconds - work_.seconds());
+    curved_options_.time_limit_seconds = work_.time_left(options_.time_limit_seconds);
     curved_options_.boundary = [this](const HighOrderMesh& mesh) {
       return curved_boundary(mesh, writing_.chord_percent);
     };

@@ -7,6 +7,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include <algorithm>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -62,6 +63,8 @@ class Work {
     return [this](const char* part, double share) { return tell({part, 0, 0, 0, share}); };
   }
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  /// Of a limit in seconds, for what comes next. 0 stays 0: there is none.
+  double time_left(double limit) const { return limit > 0 ? std::max(1e-3, limit - seconds()) : limit; }
   const std::vector<std::pair<std::string, double>>& seconds_by_part() const { return seconds_; }
 
  private:

@@ -144,8 +144,10 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
   record.order = options.order;
   record.cells = mesh.space.num_cells();
   if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultIterations}, std::move(record), 0.97, unknowns,
-                 report))
+                 report)) {
+    report.stop_reason = stop_reason(report.stages.back().ended);
     report.explanation = report.stages.back().stop;
+  }
   problem.apply_nodes(unknowns, mesh.coefficients);
 }
 

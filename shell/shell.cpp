@@ -274,11 +274,9 @@ void ShellMaker::optimize() {
     apart = failures.none();
     if (apart && report_.explanation.empty()) {
       report_.explanation = report_.stages.back().stop;
-      if (stop == MinimizerStop::iteration_limit) report_.stop_reason = StopReason::iteration_limit;
-      if (stop == MinimizerStop::no_step || stop == MinimizerStop::infeasible_start)
-        report_.stop_reason = StopReason::stalled;
+      report_.stop_reason = stop_reason(stop);
     }
-    if (apart) break;
+    if (apart || round + 1 == kMaxRounds) break;  // no solve follows that would aim at less
     for (const Index strand : check_.strands(failures)) thickness_[strand] *= kShrink;
     limit_slope(layers_, thickness_);
   }

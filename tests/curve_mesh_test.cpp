@@ -5,6 +5,9 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <string_view>
+
 namespace subvol::test {
 
 TEST_CASE("a mesh is untangled before it is curved, and left alone where it is valid", "[optimize]") {
@@ -23,9 +26,16 @@ TEST_CASE("a mesh is untangled before it is curved, and left alone where it is v
   CHECK(ended.tangled == tangled);
   CHECK(ended.left > 0);
   CHECK(mesh.positions == before.positions);
+  OptimizeOptions late;  // all are valid by then, but not improved
+  late.progress = [](const FitProgress& progress) { return !std::string_view(progress.stage).starts_with("round 1"); };
+  const UntangledStart improving = untangle_before_fit(mesh, late);
+  CHECK(improving.ended_early());
+  CHECK(improving.left == 0);
+  CHECK(mesh.positions == before.positions);
   const UntangledStart done = untangle_before_fit(mesh, {});
   CHECK(done.tangled == tangled);
   CHECK(done.left == 0);
+  CHECK_FALSE(done.ended_early());
   CHECK(certify(mesh).all_certified());
 }
 

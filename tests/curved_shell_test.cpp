@@ -140,6 +140,14 @@ TEST_CASE("A shell whose curving is stopped is valid", "[shell]") {
   check_valid(shell, curved);
 }
 
+TEST_CASE("A curved shell says when the steps allowed were not enough", "[shell]") {
+  const ShellResult shell = make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .layers = 2});
+  const CurvedShell curved = curve_shell(shell, {.order = 2, .max_iterations = 1});
+  CHECK(curved.report.stop_reason == StopReason::iteration_limit);
+  check_valid(shell, curved);
+  CHECK(curve_shell(shell, {.order = 2}).report.stop_reason == StopReason::converged);
+}
+
 TEST_CASE("Shells that cannot be curved are refused", "[shell]") {
   ShellResult shell = make_shell(plane(Faces::quads), {.thickness = 0.1});
   CHECK_THROWS_AS(curve_shell(shell, {.order = 0}), InputError);

@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <new>
 #include <optional>
 #include <vector>
 
@@ -126,4 +127,15 @@ TEST_CASE("a search for self-intersections that is given up says why, and counts
   CHECK(report.explanation == "cancelled in the search for self-intersections");
   CHECK_FALSE(StageRunner({.time_limit_seconds = 1e-9}).intersecting_pairs(heap, report));
   CHECK(report.stop_reason == StopReason::time_limit);
+}
+
+TEST_CASE("a fit whose memory runs out in a stage that was not judged yet is as it was before", "[staged_fit]") {
+  FoldedFit fit([](double lambda) -> std::size_t {
+    if (lambda > 0.1) throw std::bad_alloc();
+    return 5;
+  });
+  CHECK_THROWS_AS(fit.unfold(1), std::bad_alloc);
+  CHECK(fit.x() == 0.01);
+  CHECK(fit.lambda() == 0.01);
+  CHECK(fit.kept() == std::vector<double>{0.01});
 }
