@@ -24,7 +24,9 @@ void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outp
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.input, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) {
-    if (arguments.limit && shows_surface(output)) {
+    if (arguments.limit && output.extension == ".obj") {
+      write_polygons(output, tessellated_limit(mesh, writing), writing);
+    } else if (arguments.limit && shows_surface(output)) {
       const TessellatedSurface limit = tessellated_limit(mesh, writing);
       write_output(output, mesh, mesh, &limit, writing);
     } else {
@@ -36,12 +38,15 @@ void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outp
 void convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs,
                         const WritingOptions& writing) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
+  for (const Output& output : outputs) require_for_curved_cells(output);
   const HighOrderFile file = read_high_order(arguments.input);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
 }
 
 void convert_surface(const ConvertArguments& arguments, std::vector<Output>& outputs,
                      const WritingOptions& writing, std::vector<std::string>& warnings) {
+  if (arguments.limit)
+    throw UsageError("--limit: " + arguments.input + " is a surface, and the limit surface is that of cells");
   for (const Output& output : outputs) {
     if (output.part == Part::cutaway)
       throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");

@@ -33,8 +33,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
                        const VolumeMesh& cells) {
   for (const Output& output : outputs) {
-    if (output.extension == ".usda")
-      throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+    require_for_curved_cells(output);
     if (output.extension == ".msh")
       msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
   }
@@ -70,11 +69,26 @@ MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result,
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
 
-Json report_json(const char* command, const CLI::App& verb, Json input, const FitReport& report,
-                 const HighOrderMesh& mesh, const MeshCheck& mesh_check) {
+/// Of linear cells that were written in the place of the curved ones; none: there is no such file.
+std::optional<MeshCheck> check_linear(const std::vector<Output>& outputs, const Target& target, const RunOptions& run) {
+  const std::optional<VolumeMesh> written = written_cells(outputs);
+  if (!written) return {};
+  ProgressTeller teller(run.progress, run.quiet);
+  const MeshCheckOptions options{.progress = teller.work()};
+  return std::visit([&](const auto& geometry) { return check_mesh(*written, &geometry, options); }, target);
+}
+
+/// With lambda, whose default depends on the order.
+Json options_used(const HighOrderFitArguments& arguments, Json options) {
+  options[arguments.untangles ? "lambda" : "lambda-close"] = arguments.fit.lambda_close;
+  return options;
+}
+
+Json report_json(const char* command, Json options, Json input, const FitReport& report, const HighOrderMesh& mesh,
+                 const MeshCheck& mesh_check) {
   Json json{{"subvol", version()},
             {"command", command},
-            {"options", options_in_force(verb)},
+            {"options", std::move(options)},
             {"input", std::move(input)},
             {"mesh", describe("", mesh)}};
   json.update(fit_json(report));
@@ -82,9 +96,9 @@ Json report_json(const char* command, const CLI::App& verb, Json input, const Fi
   return json;
 }
 
-int status(const FitReport& report, const MeshCheck& mesh_check) {
+int status(const FitReport& report, bool valid) {
   if (report.stop_reason == StopReason::cancelled) return kInterrupted;
-  if (!mesh_check.valid()) return kFailed;
+  if (!valid) return kFailed;
   return report.stop_reason == StopReason::converged ? kDone : kNotConverged;
 }
 
@@ -154,7 +168,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Clock::time_point write_start = Clock::now();
   WritingOptions writing = arguments.writing;
   writing.source = arguments.target;
-  writing.options = options_of_result(verb);
+  writing.options = options_used(arguments, options_of_result(verb));
   const HighOrderFile file{std::move(result.mesh), template_mesh.references};
   const std::vector<std::string> failures = write_each(outputs, [&](const Output& output) {
     if (output.part == Part::animation)
@@ -167,8 +181,20 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Clock::time_point check_start = Clock::now();
   const MeshCheck mesh_check = check(outputs, file.mesh, target, writing, arguments.run);
   hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
+  const std::optional<MeshCheck> linear = check_linear(outputs, target, arguments.run);
+  if (linear) {
+    const std::vector<std::string> found = linear_cells_warnings(*linear);
+    warnings.insert(warnings.end(), found.begin(), found.end());
+    tell_warnings();
+    const bool stands_alone = std::none_of(outputs.begin(), outputs.end(), [](const Output& output) {
+      return output.extension == ".vtu" || output.extension == ".msh";
+    });
+    if (stands_alone) hold_to({.mean_percent = arguments.fit.tolerance_percent}, *linear, report);
+  }
   if (!arguments.run.report.empty()) {
-    Json json = report_json(arguments.command, verb, std::move(input), report, file.mesh, mesh_check);
+    Json json = report_json(arguments.command, options_used(arguments, options_in_force(verb)), std::move(input),
+                            report, file.mesh, mesh_check);
+    if (linear) json["linear_cells"] = check_json(*linear);
     if (arguments.untangles) json["not_certified_cells"] = not_certified_cells(mesh_check);
     if (loaded.choice) json["template"] = choice_json(*loaded.choice);
     checkpointing.describe(json);
@@ -190,7 +216,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
   }
   require_all_written(failures);
-  return status(report, mesh_check);
+  return status(report, mesh_check.valid() && (!linear || linear->valid()));
 }
 
 }  // namespace subvol::cli

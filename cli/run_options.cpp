@@ -109,6 +109,16 @@ std::string as_utf8(const std::string& text) {
   return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
 }
 
+namespace {
+
+/// Whether one was given that this one does not go with.
+bool is_excluded(const CLI::Option& option) {
+  const auto& others = option.get_excludes();
+  return std::any_of(others.begin(), others.end(), [](const CLI::Option* other) { return other->count() > 0; });
+}
+
+}  // namespace
+
 Json options_in_force(const CLI::App& verb) {
   Json all = Json::object();
   for (const CLI::Option* option : verb.get_options()) {
@@ -117,6 +127,8 @@ Json options_in_force(const CLI::App& verb) {
     const auto& given = option->results();
     if (!given.empty()) {
       all[name] = option->get_items_expected_max() > 1 ? typed(given) : typed(given.back());
+    } else if (is_excluded(*option)) {
+      continue;
     } else if (option->get_expected_min() == 0) {
       all[name] = false;
     } else if (!option->get_default_str().empty()) {

@@ -64,6 +64,7 @@ class ShellRun : public LongRun {
   ShellResult result_;
   std::optional<CurvedShell> curved_;
   ShellFailures failures_;
+  std::optional<MeshCheck> linear_;  ///< of linear cells that were written in the place of the curved ones
   std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
 };
 
@@ -157,6 +158,10 @@ void ShellRun::write() {
 void ShellRun::check() {
   failures_ = result_.failures;
   if (curved_) {
+    if (const std::optional<VolumeMesh> linear = written_cells(outputs_)) {
+      linear_ = check_mesh(*linear);
+      add_warnings(linear_cells_warnings(*linear_));
+    }
     const std::optional<HighOrderMesh> written = written_curved_cells(outputs_);
     if (!written) return;
     const MeshCheck found = check_mesh(*written, curved_boundary(*written, measured_chord_percent(arguments_.writing)));
@@ -198,6 +203,7 @@ Json ShellRun::report() const {
             {"boundary_self_intersections", failures_.intersecting.size()},
             {"intersecting_faces", failures_.intersecting},
             {"mesh", curved_ ? describe("", curved_->mesh) : describe("", result_.mesh)}};
+  if (linear_) json["linear_cells"] = check_json(*linear_);
   if (subdivided_)
     json["subdivided_once"] = {{"certified_cells", subdivided_->certified},
                                {"not_certified_cells", subdivided_->not_certified.size()}};
@@ -239,7 +245,7 @@ int ShellRun::run() {
   write_report(report(), seconds_json(result_.report));
   if (!arguments_.run.quiet) summarise();
   require_outputs();
-  return status(result_.report, failures_.none());
+  return status(result_.report, failures_.none() && (!linear_ || linear_->valid()));
 }
 
 void add_shell_options(CLI::App& verb, ShellArguments& arguments) {

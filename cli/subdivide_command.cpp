@@ -31,6 +31,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings);
+  const Json input{{"mesh", describe(arguments.mesh, cage)}};
   if (arguments.crease_angle_degrees) {
     cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
   }
@@ -42,13 +43,20 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.source = arguments.mesh;
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
-  if (std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
+  const bool has_limit = rule == BoundaryRule::catmull_clark;  // averaging ends in another surface
+  if (has_limit && std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
   return write_checked(
       arguments.run, std::move(outputs), fine,
-      [&](const Output& output) { write_output(output, cage, fine, &limit, writing); }, warnings,
+      [&](const Output& output) {
+        if (has_limit || output.part == Part::cage)
+          write_output(output, cage, fine, &limit, writing);
+        else
+          write_output(output, fine, writing);
+      },
+      warnings,
       {{"command", "subdivide"},
        {"options", options_in_force(verb)},
-       {"input", {{"mesh", describe(arguments.mesh, cage)}}},
+       {"input", input},
        {"result", describe("", fine)}});
 }
 

@@ -16,6 +16,8 @@
 #include "subvol/text_scanner.h"
 
 #include <algorithm>
+#include <array>
+#include <map>
 
 namespace subvol::cli {
 namespace {
@@ -53,6 +55,22 @@ PolygonMesh polygons_of(const CurvedBoundary& boundary) {
   for (std::size_t t = 0; t < triangles.size(); t += 2) {
     mesh.face_vertices.insert(mesh.face_vertices.end(), triangles[t].begin(), triangles[t].end());
     mesh.face_vertices.push_back(triangles[t + 1][2]);
+    mesh.face_offsets.push_back(mesh.face_vertices.size());
+  }
+  return mesh;
+}
+
+/// Points that a crease doubled, for the sake of their normals, are one again.
+PolygonMesh polygons_of(const TessellatedSurface& surface) {
+  PolygonMesh mesh{{}, {0}, {}};
+  std::map<std::array<double, 3>, Index> places;
+  for (const auto& quad : surface.quads) {
+    for (const Index corner : quad) {
+      const Vec3& p = surface.positions[corner];
+      const auto [place, added] = places.try_emplace({p[0], p[1], p[2]}, static_cast<Index>(mesh.positions.size()));
+      if (added) mesh.positions.push_back(p);
+      mesh.face_vertices.push_back(place->second);
+    }
     mesh.face_offsets.push_back(mesh.face_vertices.size());
   }
   return mesh;
@@ -127,6 +145,11 @@ void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const H
   require_written(output.path, mesh, options);
 }
 
+void require_for_curved_cells(const Output& output) {
+  if (output.extension == ".usda")
+    throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+}
+
 bool shows_surface(const Output& output) { return output.part == Part::result && output.is_scene(); }
 
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
@@ -149,8 +172,7 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
   const HighOrderMesh& mesh = file.mesh;
-  if (output.extension == ".usda")
-    throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+  require_for_curved_cells(output);
   if (output.extension == ".obj")
     return write_polygons(output, polygons_of(curved_boundary(mesh, options.chord_percent)), {}, options);
   const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
@@ -167,6 +189,10 @@ void write_output(const Output& output, const PolygonMesh& surface, const Writin
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
   if (output.is_scene()) return write_scene(output.path, polygon_scene(surface, {}, scene_options(output, options)));
   write_polygons(output, surface, {}, options);
+}
+
+void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options) {
+  write_polygons(output, polygons_of(limit), {}, options);
 }
 
 void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,

@@ -60,6 +60,12 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 /// quality (.glb, .gltf) or as quads (.obj), a cutaway. UsageError: .usda, which holds subdivision cages.
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options);
 
+/// UsageError, before the work: curved cells are not written to such a file (.usda).
+void require_for_curved_cells(const Output& output);
+
+/// Writes a limit surface's quads, as .obj or .usda.
+void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options);
+
 /// Writes a fit as it went: a scene of its surface, from the template on.
 void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
                      const WritingOptions& options);

@@ -39,6 +39,16 @@ std::optional<HighOrderMesh> written_curved_cells(std::span<const Output> output
   return {};
 }
 
+std::vector<std::string> linear_cells_warnings(const MeshCheck& check) {
+  if (check.valid()) return {};
+  std::string found;
+  if (check.quality)
+    found = formatted(": %zu of %zu are inverted, %zu pairs of triangles of their boundary intersect",
+                      check.quality->inverted_cells, check.quality->num_cells, check.num_intersecting_triangle_pairs);
+  return {"the linear cells that were written for the curved ones are not valid" + found + "; --intervals of " +
+          "`convert` makes smaller ones of a .vtu"};
+}
+
 int write_checked(const RunOptions& run, std::vector<Output> outputs, const VolumeMesh& mesh,
                   const std::function<void(const Output&)>& write, const std::vector<std::string>& warnings,
                   const Json& details) {

@@ -27,6 +27,10 @@ std::optional<VolumeMesh> written_cells(std::span<const Output> outputs, Part pa
 /// The same of curved cells: of the first .vtu.
 std::optional<HighOrderMesh> written_curved_cells(std::span<const Output> outputs);
 
+/// What to tell of linear cells that were written in the place of curved ones, of which `check` is: they follow those
+/// only as far as they are small. None where they are valid.
+std::vector<std::string> linear_cells_warnings(const MeshCheck& check);
+
 /// Writes a mesh that was made, write(output) for each, and tells on stderr and in the report what `check_mesh` finds
 /// in what was written.
 ///

@@ -127,7 +127,11 @@ void append_geometry(std::string& text, const PolygonMesh& cage) {
   Vec3 low = cage.positions[0], high = low;
   for (const Vec3& p : cage.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
   const Vec3 origin = origin_of(low, high);
-  const auto placed = [&](const Vec3& p) { point(p - origin); };
+  const auto placed = [&](const Vec3& p) {
+    if (!(p - origin).cast<float>().allFinite())
+      throw InputError("usd: positions: expected coordinates in the range of float32");
+    point(p - origin);
+  };
   if (!origin.isZero(0)) {
     text += "    double3 xformOp:translate = ";
     point(origin);

@@ -28,9 +28,9 @@ struct UsdOptions {
 ///          are written all the same. Of a cage that is far from the origin they are relative to its middle, where an
 ///          xformOp:translate puts them.
 ///
-/// InputError: a mesh without faces or with indices out of range or coordinates that are not finite; a tag that names
-/// no vertex or no edge of the cage, or has a sharpness that is not positive; a name that is no USD identifier;
-/// metres_per_unit not positive.
+/// InputError: a mesh without faces or with indices out of range or coordinates that are not finite, or such as are
+/// written not in the range of float32; a tag that names no vertex or no edge of the cage, or has a sharpness that is not
+/// positive; a name that is no USD identifier; metres_per_unit not positive.
 std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options = {});
 
 /// Writes `usd_text` to a .usda file, all of it or nothing. InputError: another extension. IoError: the file cannot be

@@ -117,6 +117,7 @@ class MeshOptimizer {
   bool run_stage(const std::string& name, double lambda, int steps, double fraction);
   void relieve_far_cells(std::span<const double> triangle_distances);
   void weigh_cells(std::span<const double> least_jacobians);
+  void measure_start();
   void measure_distance();
   bool steps_ran_out() const;
   void finish(bool going);
@@ -350,6 +351,14 @@ bool MeshOptimizer::improve() {
   return true;
 }
 
+/// Nothing to measure where the target is the mesh's own boundary.
+void MeshOptimizer::measure_start() {
+  if (own_boundary_) return;
+  const SurfaceDistance start = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
+  report_.initial_distance_mean_percent = 100 * start.mean();
+  report_.initial_distance_max_percent = 100 * start.max();
+}
+
 /// Distances of the result as `check_mesh` measures them, where the stages only looked at their own samples.
 void MeshOptimizer::measure_distance() {
   if (options_.fixed_boundary) return;
@@ -388,6 +397,7 @@ void MeshOptimizer::finish(bool going) {
 }
 
 OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
+  measure_start();
   find_features();
   find_sizes();
   uncertified_ = certify(mesh_).not_certified;

@@ -101,6 +101,12 @@ TEST_CASE("a .usda cage read back has the same points and faces and is a Catmull
   CHECK(file.numbers("extent") == std::vector<double>{0, 0, 0, 1, 1, 1});
 }
 
+TEST_CASE("a .usda cage beyond single precision is refused") {
+  PolygonMesh mesh = cube();
+  for (Vec3& p : mesh.positions) p *= 1e39;
+  CHECK_THROWS_AS(usd_text(mesh, {}), InputError);
+}
+
 TEST_CASE("a .usda cage far from the origin keeps its shape in single precision") {
   PolygonMesh mesh = cube();
   for (Vec3& p : mesh.positions) p = 0.5 * p + Vec3(5e6, 5e6, 100);

@@ -192,7 +192,8 @@ TEST_CASE("check and convert take a high-order .vtu", "[cli]") {
   const subvol_tests::GlbFile glb(content_of(place / "out.glb"));
   CHECK(glb.attribute<float>("surface", "_SCALED_JACOBIAN").size() > straight.num_cells());
 
-  CHECK(place.run("convert curved.vtu -o out.usda").status == 2);
+  CHECK(place.run("convert curved.vtu -o first.mesh -o out.usda").status == 2);
+  CHECK_FALSE(std::filesystem::exists(place / "first.mesh"));
   CHECK(place.run("convert curved.vtu --limit -o more.glb").status == 2);
   place.file("alien.vtu", "<VTKFile type=\"UnstructuredGrid\"></VTKFile>");
   const Run alien = place.run("check alien.vtu");
@@ -322,6 +323,28 @@ TEST_CASE("The report of optimize has the same entries for straight and for curv
   CHECK(curved.at("input").at("quality") == straight.at("input").at("quality"));
   CHECK(curved.at("seconds").contains("untangle"));
   CHECK(curved.at("not_certified_cells").empty());
+  for (const auto& report : {straight, curved}) CHECK(report.at("initial_distance").at("mean_percent") > 1);
+  CHECK(curved.at("options").at("lambda") == 0.0025);
+  CHECK(straight.at("options").contains("max-tolerance"));
+  CHECK_FALSE(curved.at("options").contains("max-tolerance"));
+}
+
+TEST_CASE("Linear cells in the place of curved ones are judged on their own", "[cli]") {
+  const Workplace place;
+  const std::string fit = "fit target.off --template template.mesh --order 2 --max-iterations 3 --progress none ";
+  place.run(fit + "-o both.vtu --report curved.json");
+  const nlohmann::json curved = place.json("curved.json");
+  CHECK_FALSE(curved.contains("linear_cells"));
+  const double mean = curved.at("distance").at("mean_percent");
+  const std::string tolerance = "--tolerance " + std::to_string(1.05 * mean) + ' ';
+  CHECK(place.run(fit + tolerance + "-o a.vtu -o a.mesh --report a.json").status == 0);
+  const Run alone = place.run(fit + tolerance + "-o b.mesh --report b.json");
+  CHECK(alone.status == 4);  // their chords are farther off
+  const nlohmann::json a = place.json("a.json"), b = place.json("b.json");
+  CHECK(a.at("linear_cells") == b.at("linear_cells"));
+  CHECK(a.at("linear_cells").at("valid") == true);
+  CHECK(a.at("linear_cells").at("distance").at("mean_percent") > 1.05 * mean);
+  CHECK(b.at("stop_reason") == "tolerance_missed");
 }
 
 TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][templates]") {
