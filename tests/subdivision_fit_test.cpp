@@ -227,8 +227,6 @@ TEST_CASE("A fit says when the steps allowed were not enough, and when its start
         StopReason::converged);
   const FitReport inverted = fit_subdivision_volume(sample.target, hex_inverted_inside(), quick(1)).report;
   CHECK(inverted.stop_reason == StopReason::stalled);
-  REQUIRE(inverted.stages.size() == 3);  // one of each try, none of which got farther than the first
-  for (const StageRecord& stage : inverted.stages) CHECK(stage.kept == !stage.name.starts_with("try "));
 }
 
 TEST_CASE("Sharp edges of the target stay sharp, whether an angle or the template's tags tell of them") {
