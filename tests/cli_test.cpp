@@ -4,7 +4,6 @@
 #include "samples/shapes.h"
 #include "subvol/mesh_io.h"
 #include "subvol/mesh_topology.h"
-#include "subvol/surface_io.h"
 #include "tests/data.h"
 #include "tests/glb_reader.h"
 #include "tests/sample_meshes.h"
@@ -487,89 +486,6 @@ TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]")
   const Run bad = place.run("check inverted.mesh --json");
   CHECK(bad.status == 1);
   CHECK(nlohmann::json::parse(bad.out).at("quality").at("inverted_cells") == 7);
-}
-
-namespace {
-
-bool is_closed(const subvol::PolygonMesh& mesh) {
-  std::set<std::pair<subvol::Index, subvol::Index>> edges;
-  for (std::size_t f = 0; f < mesh.num_faces(); ++f)
-    for (std::size_t begin = mesh.face_offsets[f], end = mesh.face_offsets[f + 1], k = begin; k < end; ++k)
-      edges.insert({mesh.face_vertices[k], mesh.face_vertices[k + 1 < end ? k + 1 : begin]});
-  return std::ranges::all_of(edges, [&](const auto& edge) { return edges.contains({edge.second, edge.first}); });
-}
-
-}  // namespace
-
-TEST_CASE("convert writes every format, and what can be read back is the same", "[cli]") {
-  const Workplace place(subvol::samples::bracket_sample());
-  const Run run =
-      place.run("convert template.mesh -o a.mesh -o a.vtk -o a.vtu -o a.msh -o a.obj -o a.usda -o a.glb -o a.gltf");
-  INFO(run.err);
-  REQUIRE(run.status == 0);
-  const subvol::VolumeMesh mesh = subvol::read_volume_mesh(place / "template.mesh");
-  CHECK(subvol::read_volume_mesh(place / "a.mesh").tags == mesh.tags);
-  CHECK(subvol::read_volume_mesh(place / "a.vtk").cell_vertices == mesh.cell_vertices);
-  CHECK_NOTHROW(subvol_tests::GlbFile(content_of(place / "a.glb")));
-  CHECK(place.run("convert target.off -o t.obj -o t.glb -o t.usda").status == 0);
-  CHECK(place.run("convert template.mesh --limit -o l.glb").status == 0);
-  CHECK(content_of(place / "l.glb") != content_of(place / "a.glb"));
-  REQUIRE(place.run("convert template.mesh --limit -o l.obj").status == 0);
-  const subvol::PolygonMesh limit = subvol::read_polygon_mesh(place / "l.obj");
-  CHECK(limit.num_faces() > subvol::read_polygon_mesh(place / "a.obj").num_faces());
-  CHECK(is_closed(limit));  // along its creases too
-  CHECK(place.run("convert target.off --limit -o t2.glb").status == 2);
-}
-
-TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
-  const Workplace place(subvol::samples::bracket_sample());
-  REQUIRE(place.run("subdivide template.mesh --levels 2 -o fine.mesh -o fine.glb --report r.json").status == 0);
-  const subvol::VolumeMesh fine = subvol::read_volume_mesh(place / "fine.mesh");
-  CHECK(fine.num_cells() == 640);
-  CHECK(!fine.tags.creases.empty());
-  CHECK(place.json("r.json").at("result").at("cells") == 640);
-  CHECK(place.run("subdivide template.mesh --boundary averaging -o plain.mesh").status == 0);
-}
-
-TEST_CASE("subdivide shows the surface of the rule it is given, and tells of the mesh that was read", "[cli]") {
-  const Workplace place;
-  REQUIRE(place.run("subdivide template.mesh --boundary averaging --crease-angle 40 -o fine.mesh -o fine.glb --up y "
-                    "--report r.json").status == 0);
-  CHECK(place.json("r.json").at("input").at("mesh").at("creases") == 0);
-  double highest_point = 0, highest_shown = 0;
-  for (const subvol::Vec3& p : subvol::read_volume_mesh(place / "fine.mesh").positions)
-    highest_point = std::max(highest_point, p.y());
-  const auto shown = subvol_tests::GlbFile(content_of(place / "fine.glb")).attribute<float>("surface", "POSITION");
-  for (std::size_t i = 1; i < shown.size(); i += 3) highest_shown = std::max<double>(highest_shown, shown[i]);
-  CHECK(highest_shown == Approx(highest_point));
-}
-
-TEST_CASE("subdivide checks what it has written", "[cli]") {
-  const Workplace place;
-  subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
-  for (const std::size_t v : {4, 5, 6, 7}) mesh.positions[v].z() = 2.5;  // the upper cell stands on its head
-  subvol::write_volume_mesh(place / "cage.mesh", mesh);
-  for (const std::string file : {"fine.mesh", "fine.vtk", "fine.vtu"}) {
-    const Run run = place.run("subdivide cage.mesh --levels 1 --force --report r.json -o " + file);
-    INFO(file << ": " << run.err);
-    CHECK(run.status == 1);
-    CHECK(run.err.find("NOT VALID") != std::string::npos);
-    const auto report = place.json("r.json");
-    CHECK(report.at("valid") == false);
-    CHECK(report.at("result").at("cells") == 16);
-    CHECK(report.at("quality").at("inverted_cells") > 0);
-    if (file == "fine.vtu") continue;
-    const auto found = nlohmann::json::parse(place.run("check " + file + " --json").out);
-    for (const char* entry : {"inverted_at", "quality", "defects", "topology"})
-      CHECK(report.at(entry) == found.at(entry));
-  }
-
-  // Refused before anything is written: volumes would be no numbers.
-  for (subvol::Vec3& p : mesh.positions) p *= 1e-60;
-  subvol::write_volume_mesh(place / "tiny.mesh", mesh);
-  CHECK(place.run("subdivide tiny.mesh --levels 1 -o x.mesh").status == 3);
-  CHECK(place.run("template grid --box 0 0 0 1e-60 1e-60 1e-60 --counts 1 1 1 -o x.mesh").status == 3);
-  CHECK_FALSE(place.has("x.mesh"));
 }
 
 TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][data]") {
