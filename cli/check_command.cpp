@@ -30,6 +30,9 @@ struct Checked {
   MeshCheck check;
   Json input;                             ///< what the mesh is
   std::optional<SubdivisionAudit> audit;  ///< of a mesh that may be subdivided
+  std::optional<LagrangeCheck> lagrange;  ///< of curved cells
+
+  bool valid() const { return check.valid() && (!lagrange || lagrange->valid()); }
 };
 
 /// check(geometry) with a pointer to the target's, whatever it is; null where there is none.
@@ -43,7 +46,7 @@ Checked check_linear(const CheckArguments& arguments, const std::optional<Target
                      std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
   Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
-                  describe(arguments.mesh, mesh), std::nullopt};
+                  describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
   return checked;
 }
@@ -53,7 +56,7 @@ Checked check_high_order(const CheckArguments& arguments, const std::optional<Ta
   const HighOrderMesh mesh = read_high_order(arguments.mesh).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
   return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
-          describe(arguments.mesh, mesh), std::nullopt};
+          describe(arguments.mesh, mesh), std::nullopt, check_lagrange_cells(arguments.mesh, mesh)};
 }
 
 Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Checked& checked,
@@ -62,13 +65,23 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Ch
             {"command", "check"},
             {"options", options_in_force(verb)},
             {"input", {{"mesh", checked.input}}},
-            {"valid", checked.check.valid()}};
+            {"valid", checked.valid()}};
   if (!arguments.target.empty()) json["input"]["target"] = arguments.target;
   json.update(check_json(checked.check));
+  json["valid"] = checked.valid();
+  if (checked.lagrange) json["lagrange_cells"] = lagrange_json(*checked.lagrange);
   if (checked.audit) json["audit"] = audit_json(*checked.audit);
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = peak_memory_bytes();
   return json;
+}
+
+/// The verdict last, as in the text of the check itself.
+std::string text_of(const Checked& checked) {
+  std::string text = to_text(checked.check);
+  if (!checked.lagrange) return text;
+  const std::size_t verdict = text.rfind('\n', text.size() - 2) + 1;
+  return text.substr(0, verdict) + to_text(*checked.lagrange) + (checked.valid() ? "valid\n" : "NOT VALID\n");
 }
 
 int run_check(const CheckArguments& arguments, const CLI::App& verb) {
@@ -89,9 +102,9 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   if (arguments.json) {
     print(json_text(json));
   } else if (!arguments.run.quiet) {
-    print(to_text(checked.check));
+    print(text_of(checked));
   }
-  return checked.check.valid() ? kDone : kFailed;
+  return checked.valid() ? kDone : kFailed;
 }
 
 }  // namespace

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/check_report.h"
 
+#include "export/high_order_file.h"
+#include "fit/high_order_quality.h"
+#include "fit/option_checks.h"
+#include "fit/polynomial_map.h"
+
+#include <algorithm>
 #include <sstream>
 
 namespace subvol::cli {
@@ -28,6 +34,33 @@ Json quality_json(const QualityReport& quality) {
           {"undecided_cells", quality.certificate.undecided},
           {"worst_cells", std::move(worst)},
           {"histogram", quality.histogram}};
+}
+
+LagrangeCheck check_lagrange_cells(const std::filesystem::path& path, const HighOrderMesh& mesh) {
+  // Rounding of points and of the interpolation through them (`polynomials_of`), far below any distance that matters.
+  constexpr double kRoundingPercent = 1e-7;
+  const HighOrderMesh cells = read_lagrange_cells(path);
+  LagrangeCheck check;
+  const int samples = 2 * std::max(mesh.space.max_order(), cells.space.max_order()) + 1;
+  check.difference_percent = 100 * sampled_distance(mesh, cells, samples) / vertex_diagonal(mesh);
+  check.differs = !(check.difference_percent <= kRoundingPercent);
+  check.quality = measure_quality(cells);
+  return check;
+}
+
+Json lagrange_json(const LagrangeCheck& check) {
+  return {{"valid", check.valid()},
+          {"differs_from_map", check.differs},
+          {"difference_from_map_percent", check.difference_percent},
+          {"quality", quality_json(check.quality)}};
+}
+
+std::string to_text(const LagrangeCheck& check) {
+  if (!check.differs && check.valid()) return "Lagrange cells      as other programs read them: the same map\n";
+  return formatted("Lagrange cells      as other programs read them: up to %.3g %% of the diagonal from the map, %zu of %zu "
+                   "certified, scaled Jacobian min %.4f%s\n",
+                   check.difference_percent, check.quality.certificate.certified, check.quality.num_cells,
+                   check.quality.min_scaled_jacobian, check.valid() ? "" : ": NOT VALID");
 }
 
 namespace {

@@ -3,16 +3,32 @@
 
 #include "cli/run_options.h"
 #include "fit/crease_distance.h"
+#include "fit/high_order_mesh.h"
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "subvol/audit.h"
 
+#include <filesystem>
+#include <string>
 #include <vector>
 
 namespace subvol::cli {
 
 /// A check as it stands in reports: defects, topology, quality, certificate, self-intersections, distance.
 Json check_json(const MeshCheck& check);
+
+/// The Lagrange cells of a .vtu, as VTK and others read them, beside the curved cells that its field data hold.
+struct LagrangeCheck {
+  double difference_percent = 0;  ///< largest distance found between the two, of the diagonal of the vertices' box
+  bool differs = false;           ///< by more than rounding
+  QualityReport quality;          ///< of the Lagrange cells as polynomials, with their certificate
+
+  bool valid() const { return quality.certificate.all_certified(); }
+};
+/// mesh: what `read_high_order` read from the same file.
+LagrangeCheck check_lagrange_cells(const std::filesystem::path& path, const HighOrderMesh& mesh);
+Json lagrange_json(const LagrangeCheck& check);
+std::string to_text(const LagrangeCheck& check);
 
 /// Cells that are not proved positive, ascending; none where that was not looked at.
 std::vector<Index> not_certified_cells(const MeshCheck& check);

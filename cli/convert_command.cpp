@@ -4,6 +4,7 @@
 #include "cli/loading.h"
 #include "cli/outputs.h"
 #include "cli/writing.h"
+#include "cli/written_result.h"
 #include "subvol/mesh_io.h"
 #include "subvol/surface_io.h"
 
@@ -35,12 +36,20 @@ void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outp
   }));
 }
 
-void convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs,
-                        const WritingOptions& writing) {
+/// returns  an ExitStatus: that of the polynomial cells that were written.
+int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs, const WritingOptions& writing,
+                       std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   for (const Output& output : outputs) require_for_curved_cells(output);
   const HighOrderFile file = read_high_order(arguments.input);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
+  const std::vector<PolynomialCells> polynomials =
+      check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, [&](const HighOrderMesh& mesh) {
+        return check_mesh(mesh, curved_boundary(mesh, measured_chord_percent(writing)));
+      });
+  for (const PolynomialCells& cells : polynomials)
+    for (const std::string& warning : polynomial_cells_warnings(cells)) warnings.push_back(warning);
+  return polynomial_cells_status(polynomials);
 }
 
 void convert_surface(const ConvertArguments& arguments, std::vector<Output>& outputs,
@@ -65,8 +74,9 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   writing.source = arguments.input;
   writing.options = options_of_result(verb);
   std::vector<std::string> warnings;
+  int status = kDone;
   if (is_high_order_file(arguments.input)) {
-    convert_high_order(arguments, outputs, writing);
+    status = convert_high_order(arguments, outputs, writing, warnings);
   } else if (is_volume_file(arguments.input)) {
     convert_volume(arguments, outputs, writing, warnings);
   } else {
@@ -75,7 +85,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
   }
-  return kDone;
+  return status;
 }
 
 }  // namespace
@@ -93,6 +103,7 @@ void add_convert_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(0, 64))
       ->type_name("N")
       ->capture_default_str();
+  add_map_tolerance(*verb, arguments->writing);
   add_output_options(*verb, arguments->run,
                      "Where to, the extension choosing the format: " + output_formats() +
                          "; cutaway:FILE.glb for the cells inside; may be given several times");

@@ -34,7 +34,7 @@ struct FitArguments {
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
   std::string point_weights = "equal", energy = "hencky";
   int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
-  std::string basis = "fourier";
+  std::string basis = to_string(HighOrderFitOptions{}.basis);
   bool adaptive = false;
 };
 
@@ -258,6 +258,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
       ->capture_default_str()
       ->needs(order)
       ->group(group);
+  add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
   verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
       ->needs(order)
       ->group(group);

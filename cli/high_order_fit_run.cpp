@@ -59,11 +59,8 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
   return result;
 }
 
-MeshCheck check(const std::vector<Output>& outputs, const HighOrderMesh& result, const Target& target,
-                const WritingOptions& writing, const RunOptions& run) {
+MeshCheck check(const HighOrderMesh& mesh, const Target& target, const WritingOptions& writing, const RunOptions& run) {
   ProgressTeller teller(run.progress, run.quiet);
-  const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
-  const HighOrderMesh& mesh = written ? *written : result;
   const CurvedBoundary boundary = curved_boundary(mesh, measured_chord_percent(writing));
   const MeshCheckOptions options{.progress = teller.work()};
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
@@ -179,22 +176,31 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const double write_seconds = seconds_since(write_start);
 
   const Clock::time_point check_start = Clock::now();
-  const MeshCheck mesh_check = check(outputs, file.mesh, target, writing, arguments.run);
+  const auto check_curved = [&](const HighOrderMesh& mesh) { return check(mesh, target, writing, arguments.run); };
+  const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
+  const MeshCheck mesh_check = check_curved(written ? *written : file.mesh);
   hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
+  const std::vector<PolynomialCells> polynomials =
+      check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, check_curved);
+  for (const PolynomialCells& cells : polynomials) {
+    hold_to({.mean_percent = arguments.fit.tolerance_percent}, cells.check, report);
+    const std::vector<std::string> found = polynomial_cells_warnings(cells);
+    warnings.insert(warnings.end(), found.begin(), found.end());
+  }
+  tell_warnings();
   const std::optional<MeshCheck> linear = check_linear(outputs, target, arguments.run);
   if (linear) {
     const std::vector<std::string> found = linear_cells_warnings(*linear);
     warnings.insert(warnings.end(), found.begin(), found.end());
     tell_warnings();
-    const bool stands_alone = std::none_of(outputs.begin(), outputs.end(), [](const Output& output) {
-      return output.extension == ".vtu" || output.extension == ".msh";
-    });
+    const bool stands_alone = std::none_of(outputs.begin(), outputs.end(), holds_polynomial_cells);
     if (stands_alone) hold_to({.mean_percent = arguments.fit.tolerance_percent}, *linear, report);
   }
   if (!arguments.run.report.empty()) {
     Json json = report_json(arguments.command, options_used(arguments, options_in_force(verb)), std::move(input),
                             report, file.mesh, mesh_check);
     if (linear) json["linear_cells"] = check_json(*linear);
+    if (!polynomials.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials);
     if (arguments.untangles) json["not_certified_cells"] = not_certified_cells(mesh_check);
     if (loaded.choice) json["template"] = choice_json(*loaded.choice);
     checkpointing.describe(json);
@@ -216,7 +222,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
   }
   require_all_written(failures);
-  return status(report, mesh_check.valid() && (!linear || linear->valid()));
+  const int of_fit = status(report, mesh_check.valid() && (!linear || linear->valid()));
+  return of_fit == kDone ? polynomial_cells_status(polynomials) : of_fit;
 }
 
 }  // namespace subvol::cli

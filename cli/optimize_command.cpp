@@ -29,7 +29,7 @@ struct OptimizeArguments {
   RunOptions run;
   WritingOptions writing;
   OptimizeOptions optimize;
-  std::string mesh, target, sizes = "local", basis = "fourier";
+  std::string mesh, target, sizes = "local", basis = to_string(HighOrderFitOptions{}.basis);
   int order = 1;
 };
 
@@ -208,6 +208,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->capture_default_str()
       ->needs(order)
       ->group(group);
+  add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
   for (CLI::Option* other : {fixed, sizes, angle, max}) order->excludes(other);
 }
 

@@ -93,6 +93,10 @@ void require_free(const fs::path& file, bool force) {
 bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }
 bool Output::is_scene() const { return contains(kSceneExtensions, extension); }
 
+bool holds_polynomial_cells(const Output& output) {
+  return output.extension == ".vtu" || output.extension == ".msh";
+}
+
 std::string output_formats() {
   std::string list;
   for (std::string_view extension : kVolumeExtensions) list.append(list.empty() ? "" : " ").append(extension);

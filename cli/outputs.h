@@ -28,6 +28,9 @@ struct Output {
   bool is_scene() const;        ///< a format that holds scenes
 };
 
+/// Whether curved cells are written to it as polynomials (.vtu, .msh).
+bool holds_polynomial_cells(const Output& output);
+
 /// Formats that can be written, for help and messages.
 std::string output_formats();
 

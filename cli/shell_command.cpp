@@ -64,6 +64,7 @@ class ShellRun : public LongRun {
   ShellResult result_;
   std::optional<CurvedShell> curved_;
   ShellFailures failures_;
+  std::vector<PolynomialCells> polynomials_;
   std::optional<MeshCheck> linear_;  ///< of linear cells that were written in the place of the curved ones
   std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
 };
@@ -162,9 +163,15 @@ void ShellRun::check() {
       linear_ = check_mesh(*linear);
       add_warnings(linear_cells_warnings(*linear_));
     }
+    const auto check_curved = [&](const HighOrderMesh& mesh) {
+      return check_mesh(mesh, curved_boundary(mesh, measured_chord_percent(arguments_.writing)));
+    };
+    polynomials_ =
+        check_polynomial_cells(outputs_, curved_->mesh, arguments_.writing.map_tolerance_percent, check_curved);
+    for (const PolynomialCells& cells : polynomials_) add_warnings(polynomial_cells_warnings(cells));
     const std::optional<HighOrderMesh> written = written_curved_cells(outputs_);
     if (!written) return;
-    const MeshCheck found = check_mesh(*written, curved_boundary(*written, measured_chord_percent(arguments_.writing)));
+    const MeshCheck found = check_curved(*written);
     failures_ = {found.quality->certificate, found.intersecting_faces};
     return;
   }
@@ -204,6 +211,7 @@ Json ShellRun::report() const {
             {"intersecting_faces", failures_.intersecting},
             {"mesh", curved_ ? describe("", curved_->mesh) : describe("", result_.mesh)}};
   if (linear_) json["linear_cells"] = check_json(*linear_);
+  if (!polynomials_.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials_);
   if (subdivided_)
     json["subdivided_once"] = {{"certified_cells", subdivided_->certified},
                                {"not_certified_cells", subdivided_->not_certified.size()}};
@@ -245,7 +253,8 @@ int ShellRun::run() {
   write_report(report(), seconds_json(result_.report));
   if (!arguments_.run.quiet) summarise();
   require_outputs();
-  return status(result_.report, failures_.none() && (!linear_ || linear_->valid()));
+  const int of_shell = status(result_.report, failures_.none() && (!linear_ || linear_->valid()));
+  return of_shell == kDone ? polynomial_cells_status(polynomials_) : of_shell;
 }
 
 void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
@@ -288,6 +297,7 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
       ->type_name("fourier|legendre")
       ->capture_default_str()
       ->needs(order);
+  add_map_tolerance(verb, arguments.writing)->needs(order);
   verb.add_option("--max-iterations", shell.max_iterations, "Steps per solve (default: 60)")
       ->check(CLI::Range(1, 1'000'000))
       ->type_name("N");

@@ -140,8 +140,10 @@ void write_shell(const Output& output, const ShellResult& shell, const CurvedShe
     const std::vector<VertexField> fields = thickness_fields(shell);
     return write_curved_cells(output, curved.mesh,
                               {.cell_minima = curved.quality.cell_minima,
+                               .reference = shell_reference(shell.layers, shell.limited),
                                .references = shell.mesh.references,
-                               .fields = fields});
+                               .fields = fields,
+                               .map_tolerance_percent = options.map_tolerance_percent});
   }
   write_output(output, HighOrderFile{curved.mesh, shell.mesh.references}, options);
 }

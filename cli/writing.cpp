@@ -135,6 +135,16 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->group(group);
 }
 
+CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options) {
+  return verb
+      .add_option("--map-tolerance", options.map_tolerance_percent,
+                  "Largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, in\n"
+                  "per cent of the diagonal; if it is larger, the program says so and ends with status 4")
+      ->check(number_in(0.0, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
+}
+
 void write_scene(const std::filesystem::path& path, const Scene& scene) {
   write_gltf(path, scene);
   require_written(path, scene);
@@ -180,9 +190,11 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
   if (output.part == Part::cutaway)
     return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
   if (output.is_scene()) return write_scene(output.path, surface_scene(mesh, minima, scene_options(output, options)));
-  write_curved_cells(
-      output, mesh,
-      {.cell_minima = minima, .references = file.references, .linear_intervals = options.linear_intervals});
+  write_curved_cells(output, mesh,
+                     {.cell_minima = minima,
+                      .references = file.references,
+                      .linear_intervals = options.linear_intervals,
+                      .map_tolerance_percent = options.map_tolerance_percent});
 }
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {

@@ -27,6 +27,7 @@ struct WritingOptions {
   CutPlane cut{};                 ///< of cutaways
   bool no_wireframe = false;      ///< scenes without the cells' edges
   bool quantize = false;          ///< scenes in small whole numbers
+  double map_tolerance_percent = kMapTolerancePercent;  ///< of polynomial cells in the place of curved ones
   int linear_intervals = 0;       ///< of a curved cell's edges in .mesh and .vtk; 0: its mesh's largest order
 };
 
@@ -35,6 +36,9 @@ double measured_chord_percent(const WritingOptions& options);
 
 /// --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
+
+/// --map-tolerance.
+CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);
 
 /// Reads where a cutaway is cut: x, y or z, also with a place as "z:0.3". Returns what is wrong, or nothing.
 std::string parse_cut(const std::string& text, CutPlane& cut);

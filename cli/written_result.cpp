@@ -49,6 +49,54 @@ std::vector<std::string> linear_cells_warnings(const MeshCheck& check) {
           "`convert` makes smaller ones of a .vtu"};
 }
 
+std::vector<PolynomialCells> check_polynomial_cells(std::span<const Output> outputs, const HighOrderMesh& mesh,
+                                                    double map_tolerance_percent,
+                                                    const std::function<MeshCheck(const HighOrderMesh&)>& check) {
+  std::vector<PolynomialCells> all;
+  for (const Output& output : outputs) {
+    if (output.part != Part::result || !holds_polynomial_cells(output)) continue;
+    const PolynomialMap written = file_cells(mesh, output.extension, map_tolerance_percent);
+    if (written.distance_bound == 0) continue;
+    const double percent = 100 * written.distance_bound / vertex_diagonal(mesh);
+    all.push_back({output.path.string(), percent, percent <= map_tolerance_percent, check(written.mesh)});
+  }
+  return all;
+}
+
+std::vector<std::string> polynomial_cells_warnings(const PolynomialCells& cells) {
+  std::vector<std::string> warnings;
+  if (!cells.is_close)
+    warnings.push_back(cells.file + formatted(": its polynomial cells are up to %.3g %% of the diagonal away from the "
+                                              "curved cells, which is more than --map-tolerance; the basis legendre "
+                                              "needs no such approximation up to order %d",
+                                              cells.distance_percent, kMaxVtkOrder));
+  if (!cells.check.valid())
+    warnings.push_back(cells.file + ": its polynomial cells, which other programs compute with, are not valid" +
+                       (cells.check.quality ? formatted(": %zu of %zu are not certified",
+                                                        cells.check.quality->certificate.not_certified.size(),
+                                                        cells.check.quality->num_cells)
+                                            : std::string()));
+  return warnings;
+}
+
+Json polynomial_cells_json(std::span<const PolynomialCells> all) {
+  Json json = Json::array();
+  for (const PolynomialCells& cells : all) {
+    Json one{{"file", as_utf8(cells.file)},
+             {"distance_from_map_percent", cells.distance_percent},
+             {"within_map_tolerance", cells.is_close}};
+    one.update(check_json(cells.check));
+    json.push_back(std::move(one));
+  }
+  return json;
+}
+
+int polynomial_cells_status(std::span<const PolynomialCells> all) {
+  const auto count = [&](auto is_wrong) { return std::count_if(all.begin(), all.end(), is_wrong); };
+  if (count([](const PolynomialCells& cells) { return !cells.check.valid(); }) > 0) return kFailed;
+  return count([](const PolynomialCells& cells) { return !cells.is_close; }) > 0 ? kNotConverged : kDone;
+}
+
 int write_checked(const RunOptions& run, std::vector<Output> outputs, const VolumeMesh& mesh,
                   const std::function<void(const Output&)>& write, const std::vector<std::string>& warnings,
                   const Json& details) {

@@ -31,6 +31,24 @@ std::optional<HighOrderMesh> written_curved_cells(std::span<const Output> output
 /// only as far as they are small. None where they are valid.
 std::vector<std::string> linear_cells_warnings(const MeshCheck& check);
 
+/// The polynomial cells of a .vtu or .msh, where they are not the curved cells themselves (`file_cells`): this is what
+/// other programs compute with.
+struct PolynomialCells {
+  std::string file;
+  double distance_percent = 0;  ///< from the curved cells, at most; of the diagonal of the box of the vertices
+  bool is_close = false;        ///< whether that is within --map-tolerance
+  MeshCheck check;
+};
+/// Checks such cells of all outputs, check(polynomials) for each.
+std::vector<PolynomialCells> check_polynomial_cells(std::span<const Output> outputs, const HighOrderMesh& mesh,
+                                                    double map_tolerance_percent,
+                                                    const std::function<MeshCheck(const HighOrderMesh&)>& check);
+/// Warnings about cells that are not close to the map or not valid.
+std::vector<std::string> polynomial_cells_warnings(const PolynomialCells& cells);
+Json polynomial_cells_json(std::span<const PolynomialCells> all);
+/// kDone; kFailed if some are not valid; kNotConverged if some are not close.
+int polynomial_cells_status(std::span<const PolynomialCells> all);
+
 /// Writes a mesh that was made, write(output) for each, and tells on stderr and in the report what `check_mesh` finds
 /// in what was written.
 ///

@@ -2,9 +2,11 @@
 #include "export/high_order_file.h"
 
 #include "export/cell_text.h"
+#include "export/lagrange_cells.h"
 #include "export/lagrange_mesh.h"
 #include "export/text_format.h"
 #include "export/vtu_reader.h"
+#include "fit/high_order_quality.h"
 #include "subvol/atomic_file.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
@@ -60,12 +62,20 @@ void append_orders(std::string& text, const char* name, const std::vector<int>& 
       text, std::string("Name=\"") + name + "\" NumberOfTuples=\"" + std::to_string(bytes.size()) + '"', bytes);
 }
 
-std::string field_data(const HighOrderMesh& mesh) {
+/// `cell_minima` of the cells that are written, if there are any.
+std::vector<double> minima_of(const PolynomialMap& cells, const HighOrderFileOptions& options) {
+  if (options.cell_minima.empty() || cells.distance_bound == 0)
+    return {options.cell_minima.begin(), options.cell_minima.end()};
+  return measure_quality(cells.mesh, 0, options.reference).cell_minima;
+}
+
+std::string field_data(const HighOrderMesh& mesh, double cells_distance) {
   const ElementSpace& space = mesh.space;
   const std::int64_t format[] = {kFormatVersion, space.basis() == Basis::legendre,
                                  static_cast<std::int64_t>(space.num_vertices())};
   std::string text;
   append_data_array<std::int64_t>(text, "Name=\"subvol_format\" NumberOfTuples=\"3\"", format);
+  append_data_array<double>(text, "Name=\"subvol_cells_distance\" NumberOfTuples=\"1\"", {&cells_distance, 1});
   append_orders(text, "subvol_edge_orders", space.orders().edges);
   append_orders(text, "subvol_face_orders", space.orders().faces);
   append_orders(text, "subvol_cell_orders", space.orders().cells);
@@ -74,6 +84,19 @@ std::string field_data(const HighOrderMesh& mesh) {
                                 std::to_string(mesh.coefficients.size()) + '"',
                             {mesh.coefficients.data()->data(), 3 * mesh.coefficients.size()});
   return text;
+}
+
+/// Refuses orders that Gmsh does not evaluate: a mesh lowered to these would lose much of its shape.
+void require_gmsh_orders(const ElementSpace& space) {
+  for (std::size_t c = 0; c < space.num_cells(); ++c) {
+    const CellKind kind = space.kind(c);
+    const int order = space.pattern_order(space.pattern(c));
+    if (order > max_gmsh_order(kind))
+      throw InputError("cell " + std::to_string(c) + " is a " + cell_topology(kind).name + " of order " +
+                       std::to_string(order) + ", but Gmsh evaluates a " + cell_topology(kind).name +
+                       " up to order " + std::to_string(max_gmsh_order(kind)) +
+                       " only; write a .vtu, or a .mesh of many linear cells");
+  }
 }
 
 // --- Reading --------------------------------------------------------------------------------------------------------
@@ -182,27 +205,33 @@ VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& op
   return cells;
 }
 
+PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension, double map_tolerance_percent) {
+  const double wanted = map_tolerance_percent / 100 * vertex_diagonal(mesh);
+  if (extension == ".vtu") return polynomial_map(mesh, {kMaxVtkOrder, kMaxVtkOrder, kMaxVtkOrder}, wanted);
+  if (extension == ".msh")
+    return polynomial_map(mesh,
+                          {max_gmsh_order(CellKind::tet), max_gmsh_order(CellKind::prism), max_gmsh_order(CellKind::hex)},
+                          wanted);
+  throw InputError("file_cells: expected the extension .vtu or .msh, found " + extension);
+}
+
 std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
   require_writable(mesh, options);
-  const std::vector<int> orders = lagrange_orders(mesh.space, kMaxVtkOrder);
-  const LagrangeMesh cells = lagrange_mesh(mesh, orders, NodeOrdering::vtk);
-  return vtu_document(view_of(cells, options.references), options.cell_minima,
-                      fields_at_points(mesh, orders, NodeOrdering::vtk, options.fields), field_data(mesh));
+  const PolynomialMap written = file_cells(mesh, ".vtu", options.map_tolerance_percent);
+  const std::vector<int> orders = lagrange_orders(written.mesh.space, kMaxVtkOrder);
+  const LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::vtk);
+  return vtu_document(view_of(cells, options.references), minima_of(written, options),
+                      fields_at_points(mesh, orders, NodeOrdering::vtk, options.fields),
+                      field_data(mesh, written.distance_bound));
 }
 
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
   require_writable(mesh, options);
-  const std::vector<int> orders = lagrange_orders(mesh.space, kMaxOrder);
-  for (std::size_t c = 0; c < orders.size(); ++c) {
-    const CellKind kind = mesh.space.kind(c);
-    if (orders[c] > max_gmsh_order(kind))
-      throw InputError("cell " + std::to_string(c) + " is a " + cell_topology(kind).name + " of order " +
-                       std::to_string(orders[c]) + ", but Gmsh evaluates a " + cell_topology(kind).name +
-                       " up to order " + std::to_string(max_gmsh_order(kind)) +
-                       " only; write a .vtu, or a .mesh of many linear cells");
-  }
-  const LagrangeMesh cells = lagrange_mesh(mesh, orders, NodeOrdering::gmsh);
-  return msh_document(view_of(cells, options.references), options.cell_minima,
+  require_gmsh_orders(mesh.space);
+  const PolynomialMap written = file_cells(mesh, ".msh", options.map_tolerance_percent);
+  const std::vector<int> orders = lagrange_orders(written.mesh.space, kMaxOrder);
+  const LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::gmsh);
+  return msh_document(view_of(cells, options.references), minima_of(written, options),
                       fields_at_points(mesh, orders, NodeOrdering::gmsh, options.fields));
 }
 
@@ -247,6 +276,46 @@ HighOrderFile read_high_order(const std::filesystem::path& path) {
   } catch (const InputError& error) {
     file.fail(error.what());
   }
+}
+
+HighOrderMesh read_lagrange_cells(const std::filesystem::path& path) {
+  if (lower_case_extension(path) != ".vtu") throw InputError(path.string() + ": expected the extension .vtu");
+  const std::string bytes = read_file(path);
+  const VtuArrays file(path.string(), bytes);
+  const auto coordinates = file.get<double>("Points");
+  const auto connectivity = file.get<std::int64_t>("connectivity"), ends = file.get<std::int64_t>("offsets");
+  const auto types = file.get<std::uint8_t>("types");
+  if (coordinates.size() % 3 != 0) file.fail("Points: expected three coordinates for each point");
+  if (ends.size() != types.size() || types.empty()) file.fail("expected one offset and one type for each cell");
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < coordinates.size(); i += 3) {
+    points.emplace_back(&coordinates[i]);
+    if (!points.back().allFinite()) file.fail("Points: expected finite numbers");
+  }
+  std::vector<CellKind> kinds;
+  std::vector<int> orders;
+  std::vector<std::size_t> offsets{0};
+  std::vector<Index> nodes;
+  for (const std::int64_t node : connectivity) {
+    if (node < 0 || node >= static_cast<std::int64_t>(points.size()))
+      file.fail("connectivity: expected a number of a point, found " + std::to_string(node));
+    nodes.push_back(static_cast<Index>(node));
+  }
+  for (std::size_t c = 0; c < types.size(); ++c) {
+    const CellKind kind = kind_of(file, types[c]);
+    if (ends[c] < static_cast<std::int64_t>(offsets.back()) || ends[c] > static_cast<std::int64_t>(nodes.size()))
+      file.fail("offsets: cell " + std::to_string(c) + ": expected ascending numbers within the connectivity");
+    const auto size = static_cast<std::size_t>(ends[c]) - offsets.back();
+    int order = 1;
+    while (order < kMaxVtkOrder && num_lattice_points(kind, order) < size) ++order;
+    if (num_lattice_points(kind, order) != size)
+      file.fail("offsets: cell " + std::to_string(c) + ": " + std::to_string(size) + " nodes are those of no " +
+                cell_topology(kind).name + " of an order from 1 to " + std::to_string(kMaxVtkOrder));
+    kinds.push_back(kind);
+    orders.push_back(order);
+    offsets.push_back(static_cast<std::size_t>(ends[c]));
+  }
+  return polynomials_of({points, kinds, orders, offsets, nodes, {}}, NodeOrdering::vtk);
 }
 
 }  // namespace subvol

@@ -153,4 +153,10 @@ std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering or
   return points;
 }
 
+std::size_t num_lattice_points(CellKind kind, int order) {
+  const auto n = static_cast<std::size_t>(order) + 1;
+  if (kind == CellKind::tet) return n * (n + 1) * (n + 2) / 6;
+  return kind == CellKind::prism ? n * n * (n + 1) / 2 : n * n * n;
+}
+
 }  // namespace subvol

@@ -25,4 +25,7 @@ enum class NodeOrdering {
 /// and faces run and in what is inside: rows, or again a smaller cell of the same kind with its corners first.
 std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering ordering);
 
+/// The number of these points.
+std::size_t num_lattice_points(CellKind kind, int order);
+
 }  // namespace subvol

@@ -372,7 +372,8 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
   if (extension == ".mesh" || extension == ".vtk") return require_written(path, small_cells(mesh, options));
   read_back(path, [&](const WrittenFile& file) {
     const bool is_vtu = extension == ".vtu";
-    const LagrangeMesh cells = lagrange_mesh(mesh, lagrange_orders(mesh.space, is_vtu ? kMaxVtkOrder : kMaxOrder),
+    const HighOrderMesh written = file_cells(mesh, extension, options.map_tolerance_percent).mesh;
+    const LagrangeMesh cells = lagrange_mesh(written, lagrange_orders(written.space, kMaxOrder),
                                              is_vtu ? NodeOrdering::vtk : NodeOrdering::gmsh);
     compare_cells(
         file, extension,

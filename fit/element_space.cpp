@@ -93,6 +93,15 @@ void EntityOrders::raise_borders(const MeshTopology& topology) {
   for_each_face_edge(topology, [&](std::size_t f, std::size_t e) { edges[e] = std::max(edges[e], faces[f]); });
 }
 
+void EntityOrders::lower_interiors(const MeshTopology& topology) {
+  check_orders("edge", edges, topology.num_edges());
+  check_orders("face", faces, topology.num_faces());
+  check_orders("cell", cells, topology.num_cells());
+  for_each_face_edge(topology, [&](std::size_t f, std::size_t e) { faces[f] = std::min(faces[f], edges[e]); });
+  for (std::size_t c = 0; c < topology.num_cells(); ++c)
+    for (const Index f : topology.cell_faces(c)) cells[c] = std::min(cells[c], faces[f]);
+}
+
 ElementSpace::Cells::Cells(const VolumeMesh& mesh)
     : topology(mesh), kinds(mesh.kinds), vertex_offsets(mesh.cell_offsets), vertices(mesh.cell_vertices) {
   face_frames.reserve(topology.num_faces());

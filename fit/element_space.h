@@ -23,6 +23,10 @@ struct EntityOrders {
   static EntityOrders uniform(const MeshTopology& topology, int order);
   /// Raises edges to their faces and faces to their cells until the rule holds.
   void raise_borders(const MeshTopology& topology);
+  /// Lowers faces to their edges and cells to their faces until the rule holds.
+  void lower_interiors(const MeshTopology& topology);
+
+  bool operator==(const EntityOrders&) const = default;
 };
 
 /// Nodes of a high-order mesh: which exist, how they are numbered, and how every cell sees them.

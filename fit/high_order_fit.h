@@ -12,7 +12,9 @@ namespace subvol {
 
 struct HighOrderFitOptions {
   int order = 4;                                 ///< of the finished mesh, 1..kMaxOrder
-  Basis basis = Basis::fourier;
+  /// Legendre modes are polynomials, which .vtu and .msh hold exactly; Fourier modes (paper: section 3.2) are written
+  /// there as polynomials that approximate them.
+  Basis basis = Basis::legendre;
   /// Orders rise only where the energy asks for it, up to `order`, and only until the tolerance is met.
   bool adaptive = false;
   std::optional<double> tolerance_percent;       ///< lambda is lowered until the mean distance is below; > 0

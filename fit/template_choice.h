@@ -19,7 +19,7 @@ struct TemplateChoiceOptions {
   std::optional<std::size_t> cells;  ///< about so many; empty: as many as the trials ask for, from kFirstCells on
   std::optional<double> crease_angle_degrees;  ///< as `FitOptions` has it; not for curved elements
   int order = 0;                 ///< of the curved elements that the template is for; 0: for a subdivision volume
-  Basis basis = Basis::fourier;  ///< of these
+  Basis basis = Basis::legendre;  ///< of these
   double time_limit_seconds = 0; ///< of the trials; 0: none
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
   std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none

@@ -23,6 +23,7 @@ struct CheckedMesh {
       const std::string path = path_from(object);
       const py::gil_scoped_release unlocked;
       curved = std::make_shared<const CurvedMesh>(read_high_order(path));
+      lagrange = cli::check_lagrange_cells(path, curved->mesh);
     } else {
       linear = volume_from(object, "mesh", false);
     }
@@ -30,6 +31,7 @@ struct CheckedMesh {
 
   std::shared_ptr<const VolumeMesh> linear;
   std::shared_ptr<const CurvedMesh> curved;
+  std::optional<cli::LagrangeCheck> lagrange;  ///< of a .vtu
 };
 
 py::dict check(const py::object& object, const py::object& target_object, const py::kwargs& given) {
@@ -51,6 +53,10 @@ py::dict check(const py::object& object, const py::object& target_object, const 
     return std::visit([&](const auto& geometry) { return check_against(&geometry); }, *target);
   });
   py::dict report = to_python(cli::check_json(found));
+  if (mesh.lagrange) {
+    report["valid"] = found.valid() && mesh.lagrange->valid();
+    report["lagrange_cells"] = to_python(cli::lagrange_json(*mesh.lagrange));
+  }
   if (found.subdivision_audit) report["audit"] = to_python(cli::audit_json(*found.subdivision_audit));
   if (!found.quality) return report;
   report["not_certified_cells"] = moved(std::move(found.quality->certificate.not_certified));

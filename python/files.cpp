@@ -2,6 +2,8 @@
 #include "cli/outputs.h"
 #include "cli/shell_output.h"
 #include "cli/writing.h"
+#include "cli/written_result.h"
+#include "fit/mesh_check.h"
 #include "fit/quality.h"
 #include "python/fit_options.h"
 #include "python/module.h"
@@ -45,6 +47,8 @@ struct Writing {
     keywords.take("quantize", options.quantize);
     keywords.take("limit", limit);
     keywords.take("intervals", options.linear_intervals);
+    keywords.take("map_tolerance", options.map_tolerance_percent);
+    if (!(options.map_tolerance_percent >= 0)) throw InputError("map_tolerance: expected 0 or more");
     keywords.finish();
     file.outputs = {path_from(path)};
     file.force = true;
@@ -53,8 +57,19 @@ struct Writing {
   cli::Output output(const std::vector<cli::Part>& parts) const { return cli::checked_outputs(file, parts).front(); }
 
   cli::RunOptions file;
+  /// Adds warnings if polynomial cells that were written for curved ones are far from these or not valid.
+  void judge(const cli::Output& output, const HighOrderMesh& mesh) {
+    const auto check = [&](const HighOrderMesh& cells) {
+      return check_mesh(cells, curved_boundary(cells, options.chord_percent));
+    };
+    for (const cli::PolynomialCells& cells :
+         cli::check_polynomial_cells({&output, 1}, mesh, options.map_tolerance_percent, check))
+      for (const std::string& warning : cli::polynomial_cells_warnings(cells)) warnings.push_back(warning);
+  }
+
   cli::WritingOptions options;
   bool limit = false;
+  std::vector<std::string> warnings;
 
  private:
   void take_cut(Keywords& keywords) {
@@ -72,11 +87,13 @@ void write_volume_mesh(const Writing& writing, const VolumeMesh& mesh) {
   cli::write_output(output, mesh, mesh, &limit, writing.options);
 }
 
-void write_curved(const Writing& writing, const CurvedMesh& curved) {
-  cli::write_output(writing.output({cli::Part::cutaway}), curved, writing.options);
+void write_curved(Writing& writing, const CurvedMesh& curved) {
+  const cli::Output output = writing.output({cli::Part::cutaway});
+  cli::write_output(output, curved, writing.options);
+  writing.judge(output, curved.mesh);
 }
 
-void write_fit(const Writing& writing, const Fitted& fit) {
+void write_fit(Writing& writing, const Fitted& fit) {
   std::vector<cli::Part> parts{cli::Part::cutaway};
   if (!fit.curved) parts.push_back(cli::Part::cage);
   if (!fit.states.empty()) parts.push_back(cli::Part::animation);
@@ -84,18 +101,20 @@ void write_fit(const Writing& writing, const Fitted& fit) {
   if (output.part == cli::Part::animation)
     return fit.curved ? cli::write_animation(output, fit.curved->mesh, fit.states, writing.options)
                       : cli::write_animation(output, *fit.cage, fit.states, writing.options);
-  if (fit.curved) return cli::write_output(output, *fit.curved, writing.options);
+  if (fit.curved) {
+    cli::write_output(output, *fit.curved, writing.options);
+    return writing.judge(output, fit.curved->mesh);
+  }
   TessellatedSurface limit;
   if (cli::shows_surface(output)) limit = cli::tessellated_limit(*fit.cage, writing.options);
   cli::write_output(output, *fit.cage, *fit.mesh, &limit, writing.options);
 }
 
-void write_shell(const Writing& writing, const Shelled& result) {
+void write_shell(Writing& writing, const Shelled& result) {
   const cli::Output output = writing.output({cli::Part::cage, cli::Part::cutaway});
-  if (result.curved_shell)
-    cli::write_shell(output, result.shell, *result.curved_shell, writing.options);
-  else
-    cli::write_shell(output, result.shell, writing.options);
+  if (!result.curved_shell) return cli::write_shell(output, result.shell, writing.options);
+  cli::write_shell(output, result.shell, *result.curved_shell, writing.options);
+  writing.judge(output, result.curved_shell->mesh);
 }
 
 /// object as a Thing that is written by write(thing), without Python's lock.
@@ -128,6 +147,7 @@ void write(const py::object& path, const py::object& object, const py::kwargs& g
   if (!done)
     throw py::type_error("write: expected a mesh or a result, not " +
                          std::string(py::str(py::type::of(object).attr("__name__"))));
+  warn(writing.warnings);
 }
 
 }  // namespace
@@ -143,7 +163,7 @@ SurfaceMesh (.off, .obj, .stl, .ply).
 check  refuse volume meshes that are not sound, but for inverted cells and unused points)");
   module.def("write", &write, py::arg("path"), py::arg("what"),
              R"(write(path, what, *, chord=0.005, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True,
-    quantize=False)
+    quantize=False, map_tolerance=0.001)
 --
 
 Writes a mesh or a result; the extension chooses the format: .mesh .vtk .vtu .msh .glb .gltf .obj .usda. A file of that
@@ -159,7 +179,9 @@ cut        where a cutaway is cut: the axis 'x', 'y' or 'z' that the plane stand
 wireframe  scenes show the edges of the cells
 quantize   scenes in 16 and 8 bits (KHR_mesh_quantization)
 limit      a VolumeMesh is a control mesh: scenes show its limit surface
-intervals  of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order)");
+intervals  of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order
+map_tolerance  largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, per cent
+           of the diagonal; a warning tells if it is larger, or if these cells are not valid)");
 }
 
 }  // namespace subvol::python

@@ -205,7 +205,7 @@ constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
     boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, lambda_close=None,
     correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
-    time_limit=0.0, order=None, basis='fourier', adaptive=False, keep_states=False, checkpoint=None, every=60.0,
+    time_limit=0.0, order=None, basis='legendre', adaptive=False, keep_states=False, checkpoint=None, every=60.0,
     resume=None, chord=0.005, progress=None, threads=None)
 --
 
@@ -223,7 +223,7 @@ crease_angle  degrees: keep edges of the target sharper than this sharp
 lambda_far    weight of the cells' shape far from the target
 
 With order, 1 .. 16, curved cells:
-basis     'fourier' or 'legendre'
+basis     'legendre' or 'fourier'
 adaptive  raise orders only where it pays
 
 And with both:

@@ -47,9 +47,9 @@ void add_high_order_mesh(py::module_& module) {
 
 mesh   VolumeMesh or its path: the cells start straight
 order  of every edge, face and cell, 1 .. 16
-basis  'fourier' or 'legendre')");
+basis  'legendre' or 'fourier')");
   type.def(py::init(&make_curved), py::arg("mesh"), py::arg("order"),
-           R"(__init__(self, mesh, order, *, basis='fourier')
+           R"(__init__(self, mesh, order, *, basis='legendre')
 --
 
 Straight cells to begin with.)");
@@ -57,7 +57,7 @@ Straight cells to begin with.)");
     return shown_points(self.cast<const CurvedMesh&>().mesh.coefficients, self);
   }, "(nodes, 3) float64: positions of the points, then displacements. A view that can be written.");
   type.def_property_readonly("basis", [](const CurvedMesh& curved) { return to_string(curved.mesh.space.basis()); },
-                             "'fourier' or 'legendre'.");
+                             "'legendre' or 'fourier'.");
   type.def_property_readonly("order", [](const CurvedMesh& curved) { return curved.mesh.space.max_order(); },
                              "Largest order of its edges, faces and cells.");
   type.def_property_readonly("edge_orders", orders_shown(&EntityOrders::edges), "Of each edge: (n,) int32. A view.");

@@ -145,7 +145,7 @@ class Optimization {
 
 constexpr const char* kHelp =
     R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
-    max_tolerance=0.5, lambda_=None, order=None, basis='fourier', max_iterations=0, time_limit=0.0, checkpoint=None,
+    max_tolerance=0.5, lambda_=None, order=None, basis='legendre', max_iterations=0, time_limit=0.0, checkpoint=None,
     every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
@@ -160,7 +160,7 @@ tolerance       mean distance from the surface to keep within, per cent of its d
 max_tolerance   the same for the largest distance
 lambda_         weight of the cells' shape; None: 0.1, with order 0.0025
 order           curve the cells to this order, 2 .. 16; needs a target, and straight cells' options do not go with it
-basis           of curved cells: 'fourier' or 'legendre'
+basis           of curved cells: 'legendre' or 'fourier'
 
 max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
 

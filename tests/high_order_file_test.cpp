@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/high_order_file.h"
 
+#include "export/cell_text.h"
 #include "export/lagrange_mesh.h"
+#include "fit/quadrature.h"
 #include "fit/quality.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
@@ -12,9 +14,12 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <numeric>
 #include <set>
+#include <utility>
 
 #include <sys/wait.h>
 
@@ -74,42 +79,61 @@ int run_python(const std::string& script, const std::filesystem::path& mesh, con
   return kSkippedStatus;
 }
 
-void write_query(std::ostream& out, const std::string& what, const Vec3& at, const Vec3& position) {
+/// The cell's position and derivatives at a point, for the readers.
+void write_query(std::ostream& out, const std::string& what, const HighOrderMesh& mesh, std::size_t c, const Vec3& at) {
+  const Vec3 position = mesh.position(c, at);
+  const Mat3 jacobian = mesh.jacobian(c, at);
   out.precision(17);
   out << what;
   for (const double x : at) out << ' ' << x;
   for (const double x : position) out << ' ' << x;
+  for (int column = 0; column < 3; ++column)
+    for (const double x : jacobian.col(column)) out << ' ' << x;
   out << '\n';
 }
 
 const std::vector<int> kVtkTypes{71, 73, 72};  // by CellKind
 
-/// Every grid point of every cell and, where the cells are exact, some points between them.
-void write_vtk_queries(const std::filesystem::path& path, const HighOrderMesh& mesh, PointSource& source) {
-  std::ofstream out(path);
-  const std::vector<int> orders = lagrange_orders(mesh.space, kMaxVtkOrder);
-  for (std::size_t c = 0; c < orders.size(); ++c) {
-    const CellKind kind = mesh.space.kind(c);
-    const auto grid = cell_lattice(kind, orders[c], NodeOrdering::rows);
-    const std::string what = std::to_string(c) + ' ' + std::to_string(kVtkTypes[static_cast<std::size_t>(kind)]) + ' ' +
-                             std::to_string(grid.size());
-    for (const LatticePoint& p : grid) {
-      const Vec3 at = p.cast<double>() / orders[c];
-      write_query(out, what, at, mesh.position(c, at));
-    }
-    if (mesh.space.basis() == Basis::legendre)
-      for (int i = 0; i < 5; ++i) {
-        const Vec3 at = source.inside(kind);
-        write_query(out, what, at, mesh.position(c, at));
-      }
-  }
-}
+/// Points between the nodes of any order, and on the cell's border.
+std::vector<Vec3> dense_points(CellKind kind) { return make_quadrature(kind, QuadratureRule::trapezoidal, 7).points; }
 
-int compare_with_vtk(const HighOrderMesh& mesh, PointSource& source) {
+/// Whether VTK finds in a written file what `file_cells` says that it holds: the polynomials that are certified.
+int compare_with_vtk(const HighOrderMesh& mesh) {
   const TemporaryFolder folder;
   write_volume(folder / "mesh.vtu", mesh);
-  write_vtk_queries(folder / "queries", mesh, source);
+  const HighOrderMesh cells = file_cells(mesh, ".vtu").mesh;
+  {
+    std::ofstream out(folder / "queries");
+    const std::vector<int> orders = lagrange_orders(cells.space, kMaxVtkOrder);
+    for (std::size_t c = 0; c < orders.size(); ++c) {
+      const CellKind kind = cells.space.kind(c);
+      const std::string what = std::to_string(c) + ' ' + std::to_string(kVtkTypes[static_cast<std::size_t>(kind)]) +
+                               ' ' + std::to_string(num_lattice_points(kind, orders[c]));
+      for (const Vec3& at : dense_points(kind)) write_query(out, what, cells, c, at);
+    }
+  }
   return run_python("vtk_reader.py", folder / "mesh.vtu", folder / "queries");
+}
+
+/// Cells side by side, each of its own kind and order, with random modes that fall off as those of fitted meshes do.
+HighOrderMesh separate_cells(Basis basis, const std::vector<std::pair<CellKind, int>>& kinds_and_orders,
+                             PointSource& source) {
+  VolumeMesh cells;
+  std::vector<int> cell_orders;
+  for (const auto& [kind, order] : kinds_and_orders) {
+    std::vector<Index> corners;
+    for (const Vec3& p : single_cell(kind).positions) {
+      corners.push_back(static_cast<Index>(cells.num_vertices()));
+      cells.positions.push_back(p + Vec3(0.1 * order, 0, 0));
+    }
+    cells.add_cell(kind, corners);
+    cell_orders.push_back(order);
+  }
+  const MeshTopology topology(cells);
+  EntityOrders orders = EntityOrders::uniform(topology, 1);
+  orders.cells = cell_orders;
+  orders.raise_borders(topology);
+  return random_mesh(ElementSpace(cells, basis, orders), source);
 }
 
 }  // namespace
@@ -193,81 +217,70 @@ TEST_CASE("orders beyond VTK's reload too") {
   CHECK(read_high_order(folder / "mesh.vtu").mesh.coefficients == mesh.coefficients);
 }
 
-TEST_CASE("VTK evaluates the cells of a high-order .vtu as the map does") {
+TEST_CASE("high_order_file: VTK reconstructs the cells that are certified, between their points too", "[export]") {
   PointSource source(5);
   int status = 0;
   for (const Basis basis : kBothBases) {
     if (status == kSkippedStatus) break;
-    // One file for each kind and order would start Python forty times: orders side by side, as cells of one mesh.
-    VolumeMesh cells;
-    std::vector<int> cell_orders;
+    // One file for each kind and order would start Python seventy times.
+    std::vector<std::pair<CellKind, int>> kinds_and_orders;
     for (const CellKind kind : kAllKinds)
-      for (int order = 1; order <= 6; ++order) {
-        const VolumeMesh one = single_cell(kind);
-        std::vector<Index> corners;
-        for (const Vec3& p : one.positions) {
-          corners.push_back(static_cast<Index>(cells.num_vertices()));
-          cells.positions.push_back(p + Vec3(2 * order, 0, 0));
-        }
-        cells.add_cell(kind, corners);
-        cell_orders.push_back(order);
-      }
-    const MeshTopology topology(cells);
-    EntityOrders orders = EntityOrders::uniform(topology, 1);
-    orders.cells = cell_orders;
-    orders.raise_borders(topology);
-    status = compare_with_vtk(random_mesh(ElementSpace(cells, basis, orders), source), source);
+      for (int order = 1; order <= kMaxVtkOrder; ++order) kinds_and_orders.emplace_back(kind, order);
+    status = compare_with_vtk(separate_cells(basis, kinds_and_orders, source));
     if (status != kSkippedStatus) CHECK(status == 0);
-    if (status != kSkippedStatus) CHECK(compare_with_vtk(mixed_orders(basis, 6, source), source) == 0);
+    if (status != kSkippedStatus) CHECK(compare_with_vtk(mixed_orders(basis, 6, source)) == 0);
   }
   if (status == kSkippedStatus) WARN("SKIPPED: needs a Python with VTK (python3-vtk9)");
 }
 
-TEST_CASE("Gmsh has the nodes of a high-order .msh where the map has them") {
+TEST_CASE("high_order_file: Gmsh reconstructs the cells that are certified, between their points too", "[export]") {
   const TemporaryFolder folder;
   PointSource source(6);
-  // Elements are numbered by order, then by kind.
-  VolumeMesh cells;
-  struct Cell {
-    CellKind kind;
-    int order, type;
-  };
-  const std::vector<Cell> list{{CellKind::tet, 1, 4},   {CellKind::prism, 1, 6}, {CellKind::hex, 1, 5},
-                               {CellKind::tet, 2, 11},  {CellKind::prism, 2, 13}, {CellKind::hex, 2, 12},
-                               {CellKind::tet, 3, 29},  {CellKind::hex, 3, 92},  {CellKind::tet, 4, 30},
-                               {CellKind::hex, 4, 93},  {CellKind::tet, 5, 31},  {CellKind::hex, 9, 98},
-                               {CellKind::tet, 10, 75}};
-  std::vector<int> cell_orders;
-  for (const Cell& cell : list) {
-    std::vector<Index> corners;
-    for (const Vec3& p : single_cell(cell.kind).positions) {
-      corners.push_back(static_cast<Index>(cells.num_vertices()));
-      cells.positions.push_back(p);
-    }
-    cells.add_cell(cell.kind, corners);
-    cell_orders.push_back(cell.order);
-  }
-  const MeshTopology topology(cells);
-  EntityOrders orders = EntityOrders::uniform(topology, 1);
-  orders.cells = cell_orders;
-  orders.raise_borders(topology);
-  const HighOrderMesh mesh = random_mesh(ElementSpace(cells, Basis::legendre, orders), source);
-  write_volume(folder / "mesh.msh", mesh);
-  {
-    std::ofstream out(folder / "queries");
-    for (std::size_t c = 0; c < list.size(); ++c)
-      for (const LatticePoint& p : cell_lattice(list[c].kind, list[c].order, NodeOrdering::rows)) {
-        const Vec3 at = p.cast<double>() / list[c].order;
-        write_query(out,
-                    std::to_string(list[c].type) + ' ' + std::to_string(c + 1) + ' ' + std::to_string(list[c].order),
-                    at, mesh.position(c, at));
+  std::vector<std::pair<CellKind, int>> kinds_and_orders;
+  for (const CellKind kind : kAllKinds)
+    for (int order = 1; order <= max_gmsh_order(kind); ++order) kinds_and_orders.emplace_back(kind, order);
+  for (const Basis basis : kBothBases) {
+    const HighOrderMesh mesh = separate_cells(basis, kinds_and_orders, source);
+    write_volume(folder / "mesh.msh", mesh);
+    const HighOrderMesh cells = file_cells(mesh, ".msh").mesh;
+    const std::vector<int> orders = lagrange_orders(cells.space, kMaxOrder);
+    std::vector<std::size_t> numbered(orders.size());  // elements are numbered by order, then by kind
+    std::iota(numbered.begin(), numbered.end(), std::size_t{0});
+    std::stable_sort(numbered.begin(), numbered.end(), [&](std::size_t a, std::size_t b) {
+      return std::pair(orders[a], cells.space.kind(a)) < std::pair(orders[b], cells.space.kind(b));
+    });
+    {
+      std::ofstream out(folder / "queries");
+      for (std::size_t i = 0; i < numbered.size(); ++i) {
+        const std::size_t c = numbered[i];
+        const CellKind kind = cells.space.kind(c);
+        const std::string what = std::to_string(gmsh_type(kind, orders[c])) + ' ' + std::to_string(i + 1);
+        for (const Vec3& at : dense_points(kind)) write_query(out, what, cells, c, at);
       }
-  }
-  const int status = run_python("gmsh_reader.py", folder / "mesh.msh", folder / "queries");
-  if (status == kSkippedStatus)
-    WARN("SKIPPED: needs a Python with Gmsh (python3-gmsh)");
-  else
+    }
+    const int status = run_python("gmsh_reader.py", folder / "mesh.msh", folder / "queries");
+    if (status == kSkippedStatus) {
+      WARN("SKIPPED: needs a Python with Gmsh (python3-gmsh)");
+      break;
+    }
     CHECK(status == 0);
+  }
+}
+
+TEST_CASE("high_order_file: the Lagrange cells of a file are read as they stand", "[export]") {
+  PointSource source(14);
+  const TemporaryFolder folder;
+  for (const Basis basis : kBothBases)
+    for (const int order : {1, 2, 4, 7}) {
+      CAPTURE(to_string(basis), order);
+      const HighOrderMesh mesh = mixed_orders(basis, order, source);
+      write_volume(folder / "mesh.vtu", mesh);
+      const PolynomialMap written = file_cells(mesh, ".vtu");
+      const HighOrderMesh read = read_lagrange_cells(folder / "mesh.vtu");
+      CHECK(sampled_distance(written.mesh, read, 15) < 1e-9);
+      CHECK(sampled_distance(mesh, read, 15) <= written.distance_bound + 1e-9);
+      if (basis == Basis::legendre) CHECK(written.distance_bound == 0);
+    }
 }
 
 TEST_CASE("tags that do not end are refused where they begin") {

@@ -290,6 +290,7 @@ def write(
     up: Literal["y", "z"] = "y",
     limit: bool = False,
     intervals: int = 0,
+    map_tolerance: float = 0.001,
     cut: Optional[str] = None,
     wireframe: bool = True,
     quantize: bool = False,

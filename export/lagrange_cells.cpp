@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/lagrange_cells.h"
+
+#include "fit/pattern_table.h"
+#include "subvol/error.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+namespace subvol {
+namespace {
+
+/// Values at the nodes of one kind and order -> coefficients of the modes of a cell.
+class Interpolation {
+ public:
+  Interpolation(const ElementSpace& space, std::size_t pattern, NodeOrdering ordering)
+      : order_(space.pattern_order(pattern)), is_hex_(space.pattern_kind(pattern) == CellKind::hex) {
+    const CellKind kind = space.pattern_kind(pattern);
+    for (const LatticePoint& at : cell_lattice(kind, order_, ordering)) lattice_.push_back(at);
+    if (is_hex_) {
+      factor(line_values(space.basis()));
+    } else {
+      ShapeFunctions shapes(kind, space.basis(), order_);
+      const auto modes = space.pattern_modes(pattern);
+      Eigen::MatrixXd values(lattice_.size(), modes.size());
+      for (std::size_t q = 0; q < lattice_.size(); ++q) {
+        shapes.set_point(lattice_[q].cast<double>() / order_);
+        for (std::size_t a = 0; a < modes.size(); ++a) values(q, a) = shapes.value(modes[a]);
+      }
+      factor(values);
+    }
+  }
+
+  std::size_t num_nodes() const { return lattice_.size(); }
+
+  /// values: one row per node. returns one row per mode, without the cell's signs.
+  Eigen::MatrixX3d coefficients(const Eigen::MatrixX3d& values) const {
+    return is_hex_ ? of_hex(values) : Eigen::MatrixX3d(factors_.solve(values));
+  }
+
+ private:
+  void factor(const Eigen::MatrixXd& values) { factors_.compute(values); }
+
+  /// N_a at the points q / p.
+  Eigen::MatrixXd line_values(Basis basis) const {
+    const int n = order_ + 1;
+    Eigen::MatrixXd result(n, n);
+    std::array<double, kMaxOrder + 1> values, derivatives;
+    for (int q = 0; q < n; ++q) {
+      line_functions(basis, order_, static_cast<double>(q) / order_, values.data(), derivatives.data());
+      for (int a = 0; a < n; ++a) result(q, a) = values[static_cast<std::size_t>(a)];
+    }
+    return result;
+  }
+
+  /// A hex has the modes N_i N_j N_k, i fastest: it is solved along one axis after the other.
+  Eigen::MatrixX3d of_hex(const Eigen::MatrixX3d& values) const {
+    const int n = order_ + 1;
+    const auto place = [n](int i, int j, int k) { return (k * n + j) * n + i; };
+    Eigen::MatrixX3d grid(values.rows(), 3);
+    for (std::size_t q = 0; q < lattice_.size(); ++q)
+      grid.row(place(lattice_[q][0], lattice_[q][1], lattice_[q][2])) = values.row(static_cast<Eigen::Index>(q));
+    Eigen::MatrixX3d line(n, 3);
+    const std::array<int, 3> strides{1, n, n * n};
+    for (const int stride : strides)
+      for (int first = 0; first < n * n * n; ++first) {
+        if (first / stride % n != 0) continue;
+        for (int a = 0; a < n; ++a) line.row(a) = grid.row(first + a * stride);
+        line = factors_.solve(line).eval();
+        for (int a = 0; a < n; ++a) grid.row(first + a * stride) = line.row(a);
+      }
+    return grid;
+  }
+
+  int order_;
+  bool is_hex_;
+  std::vector<LatticePoint> lattice_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;  // of a hex: along one axis
+};
+
+/// Every cell with vertices of its own, at its first nodes: readers list the corners first.
+VolumeMesh separate_cells(const CellView& cells) {
+  VolumeMesh mesh;
+  std::vector<Index> corners;
+  for (std::size_t c = 0; c < cells.kinds.size(); ++c) {
+    const auto num_corners = static_cast<std::size_t>(cell_topology(cells.kinds[c]).num_vertices);
+    if (cells.offsets[c + 1] < cells.offsets[c] + num_corners)
+      throw InputError("cell " + std::to_string(c) + ": expected at least its corners");
+    corners.clear();
+    for (std::size_t k = 0; k < num_corners; ++k) {
+      const Index node = cells.nodes[cells.offsets[c] + k];
+      if (node < 0 || static_cast<std::size_t>(node) >= cells.positions.size())
+        throw InputError("cell " + std::to_string(c) + ": node " + std::to_string(node) + " has no point");
+      corners.push_back(static_cast<Index>(mesh.positions.size()));
+      mesh.positions.push_back(cells.positions[static_cast<std::size_t>(node)]);
+    }
+    mesh.add_cell(cells.kinds[c], corners);
+  }
+  return mesh;
+}
+
+EntityOrders orders_of_cells(const MeshTopology& topology, const CellView& cells) {
+  EntityOrders result = EntityOrders::uniform(topology, 1);
+  for (std::size_t c = 0; c < cells.num_cells(); ++c) {
+    const int order = cells.order(c);
+    if (order < 1 || order > kMaxOrder)
+      throw InputError("cell " + std::to_string(c) + ": the order is " + std::to_string(order) + ", expected 1 to " +
+                       std::to_string(kMaxOrder));
+    result.cells[c] = order;
+    for (const Index f : topology.cell_faces(c)) result.faces[f] = order;
+    for (const Index e : topology.cell_edges(c)) result.edges[e] = order;
+  }
+  return result;
+}
+
+}  // namespace
+
+HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering) {
+  if (ordering == NodeOrdering::rows) throw InputError("polynomials_of: expected cells whose corners come first");
+  const VolumeMesh corners = separate_cells(cells);
+  HighOrderMesh mesh(ElementSpace(corners, Basis::legendre, orders_of_cells(MeshTopology(corners), cells)),
+                     corners);
+  const ElementSpace& space = mesh.space;
+  const auto by_pattern = cells_by_pattern(space);
+  for (std::size_t pattern = 0; pattern < by_pattern.size(); ++pattern) {
+    if (by_pattern[pattern].empty()) continue;
+    const Interpolation interpolation(space, pattern, ordering);
+    const auto num_nodes = interpolation.num_nodes();
+    Eigen::MatrixX3d values(num_nodes, 3);
+    for (const Index c : by_pattern[pattern]) {
+      const auto nodes = cells.cell(static_cast<std::size_t>(c));
+      if (nodes.size() != num_nodes)
+        throw InputError("cell " + std::to_string(c) + ": expected " + std::to_string(num_nodes) +
+                         " nodes for its kind and order, found " + std::to_string(nodes.size()));
+      for (std::size_t q = 0; q < num_nodes; ++q) {
+        if (nodes[q] < 0 || static_cast<std::size_t>(nodes[q]) >= cells.positions.size())
+          throw InputError("cell " + std::to_string(c) + ": node " + std::to_string(nodes[q]) + " has no point");
+        values.row(static_cast<Eigen::Index>(q)) = cells.positions[static_cast<std::size_t>(nodes[q])];
+      }
+      const Eigen::MatrixX3d found = interpolation.coefficients(values);
+      const auto into = space.nodes(static_cast<std::size_t>(c));
+      const auto signs = space.signs(static_cast<std::size_t>(c));
+      for (std::size_t a = 0; a < into.size(); ++a)
+        if (static_cast<std::size_t>(into[a]) >= space.num_vertices())
+          mesh.coefficients[into[a]] = signs[a] * found.row(static_cast<Eigen::Index>(a)).transpose();
+    }
+  }
+  return mesh;
+}
+
+}  // namespace subvol
