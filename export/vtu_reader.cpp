@@ -17,6 +17,7 @@ std::string_view attribute(std::string_view tag, const std::string& key) {
 }  // namespace
 
 VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move(name)) {
+  require_no_utf16(name_, bytes);
   const std::size_t begin = bytes.find("<VTKFile");
   if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
     fail("expected a whole VTK XML file");

@@ -11,11 +11,17 @@
 
 namespace subvol {
 
+/// Polygons as the file says, and what there is to remark (without the file's name).
+struct ParsedSurface {
+  PolygonMesh mesh;
+  std::vector<std::string> warnings;
+};
+
 /// `name` is the file's name for messages. Errors: InputError, as `read_polygon_mesh` documents for the file itself.
-PolygonMesh parse_off(const std::string& name, std::string_view bytes);
-PolygonMesh parse_obj(const std::string& name, std::string_view bytes);
-PolygonMesh parse_stl(const std::string& name, std::string_view bytes);
-PolygonMesh parse_ply(const std::string& name, std::string_view bytes);
+ParsedSurface parse_off(const std::string& name, std::string_view bytes);
+ParsedSurface parse_obj(const std::string& name, std::string_view bytes);
+ParsedSurface parse_stl(const std::string& name, std::string_view bytes);
+ParsedSurface parse_ply(const std::string& name, std::string_view bytes);
 /// One value of a vertex property per vertex; InputError where there is no such property.
 std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute);
 

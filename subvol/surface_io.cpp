@@ -26,7 +26,7 @@ constexpr double kNoArea = 1e-15;
 struct Format {
   const char* extension;
   const char* description;
-  PolygonMesh (*parse)(const std::string& name, std::string_view bytes);
+  ParsedSurface (*parse)(const std::string& name, std::string_view bytes);
 };
 constexpr Format kFormats[] = {{".off", "OFF text", parse_off},
                                {".obj", "Wavefront OBJ polygons", parse_obj},
@@ -39,6 +39,10 @@ class Remarks {
   Remarks(std::string name, std::vector<std::string>* warnings) : name_(std::move(name)), warnings_(warnings) {}
   void count(std::size_t n, const char* what) {
     if (n > 0 && warnings_) warnings_->push_back(name_ + ": " + std::to_string(n) + " " + what);
+  }
+  void tell(const std::vector<std::string>& remarks) {
+    if (!warnings_) return;
+    for (const std::string& remark : remarks) warnings_->push_back(name_ + ": " + remark);
   }
   [[noreturn]] void fail(const std::string& message) const { throw InputError(name_ + ": " + message); }
 
@@ -177,11 +181,13 @@ PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* wa
     throw InputError(path.string() + ": unknown surface extension " + in_quotes(extension) + ", expected " +
                      surface_formats());
   Remarks remarks(path.string(), warnings);
-  PolygonMesh mesh = format->parse(path.string(), read_file(path));
+  ParsedSurface parsed = format->parse(path.string(), read_file(path));
+  remarks.tell(parsed.warnings);
+  PolygonMesh& mesh = parsed.mesh;
   drop_bad_faces(mesh, remarks);
   remarks.count(drop_unused(mesh.positions, mesh.face_vertices), "vertices belong to no face: dropped");
   check_extent(mesh.positions, remarks);
-  return mesh;
+  return std::move(mesh);
 }
 
 TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* warnings) {
@@ -210,7 +216,7 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
     cloud.points = parse_xyz(path.string(), read_file(path), longer_lines);
     remarks.count(longer_lines, "lines have more than three columns: the rest is skipped");
   } else if (extension == ".ply") {
-    PolygonMesh mesh = parse_ply(path.string(), read_file(path));
+    PolygonMesh mesh = parse_ply(path.string(), read_file(path)).mesh;
     remarks.count(mesh.num_faces(), "faces are skipped: only the points are read");
     cloud.points = std::move(mesh.positions);
   } else {

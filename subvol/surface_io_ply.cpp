@@ -53,14 +53,14 @@ class PlyParser {
         scan_(name, bytes, TextScanner::Comments::none),
         attribute_(std::move(attribute)) {}
 
-  PolygonMesh parse() {
+  ParsedSurface parse() {
     read_header();
     for (const Element& element : elements_) read_element(element);
     for (const Index v : mesh_.face_vertices)
       if (static_cast<std::size_t>(v) >= mesh_.positions.size())
         throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
                          std::to_string(mesh_.positions.size()));
-    return std::move(mesh_);
+    return {std::move(mesh_), {}};
   }
 
   /// Whether the header, which is all that is read, announces faces.
@@ -231,13 +231,13 @@ class PlyParser {
 
 }  // namespace
 
-PolygonMesh parse_ply(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).parse(); }
+ParsedSurface parse_ply(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).parse(); }
 
 bool ply_has_faces(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).has_faces(); }
 
 std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute) {
   PlyParser parser(name, bytes, attribute);
-  const std::size_t num_vertices = parser.parse().positions.size();
+  const std::size_t num_vertices = parser.parse().mesh.positions.size();
   std::vector<double> values = parser.take_attribute();
   if (values.size() != num_vertices) throw InputError(name + ": the vertices have no property " + in_quotes(attribute));
   return values;

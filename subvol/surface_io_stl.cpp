@@ -4,16 +4,19 @@
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 namespace subvol {
 
 namespace {
 
 constexpr std::size_t kHeaderBytes = 84;    // 80 bytes of anything, then the number of facets
-constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, two bytes of attributes
+constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, two bytes that say how many of attributes follow
 constexpr std::size_t kFirstVertexByte = 12;
+constexpr std::size_t kAttributeCountByte = 48;
 
 /// STL repeats a vertex in every facet: equal positions become one vertex.
 class Welder {
@@ -26,6 +29,7 @@ class Welder {
     mesh_.face_vertices.push_back(it->second);
     if (mesh_.face_vertices.size() % 3 == 0) mesh_.face_offsets.push_back(mesh_.face_vertices.size());
   }
+  bool is_empty() const { return mesh_.face_vertices.empty(); }
   PolygonMesh take() { return std::move(mesh_); }
 
  private:
@@ -37,25 +41,65 @@ std::size_t num_binary_facets(std::string_view bytes) {
   return static_cast<std::size_t>(decode(bytes.data() + kHeaderBytes - 4, kUInt32, std::endian::little));
 }
 
-/// Text may have blanks and a byte order mark first, and capitals.
-bool begins_as_text(std::string_view bytes) {
-  const auto word = TextScanner("", bytes.substr(0, kHeaderBytes), TextScanner::Comments::none).next();
-  return bytes.starts_with("solid") || (word && lower_case(*word) == "solid");
+bool has_room_for_facets(std::string_view bytes) {
+  return num_binary_facets(bytes) <= (bytes.size() - kHeaderBytes) / kFacetBytes;
 }
 
-/// Binary files too may begin with "solid": what tells is whether the size is that of the facets announced.
+/// Whatever the header says: four bytes of text announce more than 150 million facets, and no text has control
+/// characters where a number of facets or a facet is.
 bool is_binary(std::string_view bytes) {
+  const auto is_no_text = [](unsigned char c) { return c < '\t'; };
   if (bytes.size() < kHeaderBytes) return false;
-  return !begins_as_text(bytes) || bytes.size() == kHeaderBytes + kFacetBytes * num_binary_facets(bytes);
+  const std::string_view first = bytes.substr(0, kHeaderBytes + kFacetBytes);
+  return has_room_for_facets(bytes) || std::any_of(first.begin(), first.end(), is_no_text);
 }
 
-PolygonMesh parse_binary(const std::string& name, std::string_view bytes) {
-  const std::size_t n = num_binary_facets(bytes);
-  if (n > (bytes.size() - kHeaderBytes) / kFacetBytes)
+/// Where the facets are, and where the last ends.
+struct BinaryFacets {
+  std::vector<std::size_t> begins;
+  std::size_t end;
+};
+
+/// Walks the facets, each with as many bytes of attributes as it says. Nothing: one is not within the file.
+std::optional<BinaryFacets> facets_with_attributes(std::string_view bytes) {
+  BinaryFacets facets{{}, kHeaderBytes};
+  for (std::size_t f = 0, n = num_binary_facets(bytes); f < n; ++f) {
+    if (facets.end > bytes.size() || bytes.size() - facets.end < kFacetBytes) return std::nullopt;
+    facets.begins.push_back(facets.end);
+    const double more =
+        decode(bytes.data() + facets.end + kAttributeCountByte, kUInt16, std::endian::little);
+    facets.end += kFacetBytes + static_cast<std::size_t>(more);
+  }
+  if (facets.end > bytes.size()) return std::nullopt;
+  return facets;
+}
+
+/// Many programs keep a colour where the count of attribute bytes should be: then the facets alone fill the file.
+BinaryFacets binary_facets(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
+  const std::size_t n = num_binary_facets(bytes), plain_end = kHeaderBytes + kFacetBytes * n;
+  if (!has_room_for_facets(bytes))
     throw InputError(name + ": byte 80: " + std::to_string(n) + " facets, more than the file can hold");
+  if (bytes.size() == plain_end) {
+    BinaryFacets facets{std::vector<std::size_t>(n), plain_end};
+    for (std::size_t f = 0; f < n; ++f) facets.begins[f] = kHeaderBytes + f * kFacetBytes;
+    return facets;
+  }
+  auto facets = facets_with_attributes(bytes);
+  if (!facets || (facets->end != bytes.size() && facets->end != plain_end))
+    throw InputError(name + ": byte " + std::to_string(plain_end) + ": the " + std::to_string(n) +
+                     " facets end here without their attributes" +
+                     (facets ? ", and at byte " + std::to_string(facets->end) + " with them" : "") +
+                     ", but the file has " + std::to_string(bytes.size()) + " bytes");
+  if (facets->end != bytes.size())  // no facet has attributes: there is no doubt where they are
+    warnings.push_back(std::to_string(bytes.size() - plain_end) + " bytes after the last facet are passed over");
+  return std::move(*facets);
+}
+
+PolygonMesh parse_binary(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
+  const BinaryFacets facets = binary_facets(name, bytes, warnings);
   Welder welder;
-  for (std::size_t f = 0; f < n; ++f) {
-    const std::size_t facet = kHeaderBytes + f * kFacetBytes;
+  for (std::size_t f = 0; f < facets.begins.size(); ++f) {
+    const std::size_t facet = facets.begins[f];
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t vertex = facet + kFirstVertexByte * (i + 1);
       Vec3 position;
@@ -100,18 +144,26 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
     } else if (keyword == (in_solid ? "endsolid" : "solid")) {
       in_solid = !in_solid;
       scan.line();  // the solid's name
+    } else if (word->data() == bytes.data() && !in_solid) {
+      scan.fail("expected solid, as STL in text begins, or the 84 bytes and the facets of a binary file, found " +
+                in_quotes(*word));
     } else {
       scan.fail(std::string("expected ") + (in_solid ? "facet or endsolid" : "solid") + ", found " + in_quotes(*word));
     }
   }
+  if (in_solid && welder.is_empty())
+    scan.fail("the file ends after " + std::to_string(bytes.size()) + " bytes without a facet, in text or in binary");
   if (in_solid) scan.fail("the file ends where facet or endsolid is expected");
   return welder.take();
 }
 
 }  // namespace
 
-PolygonMesh parse_stl(const std::string& name, std::string_view bytes) {
-  return is_binary(bytes) ? parse_binary(name, bytes) : parse_text(name, bytes);
+ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
+  ParsedSurface parsed;
+  if (is_binary(bytes) && !has_room_for_facets(bytes)) require_no_utf16(name, bytes);
+  parsed.mesh = is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes);
+  return parsed;
 }
 
 }  // namespace subvol

@@ -39,7 +39,7 @@ class ObjParser {
  public:
   ObjParser(const std::string& name, std::string_view bytes) : name_(name), scan_(name, bytes) {}
 
-  PolygonMesh parse() {
+  ParsedSurface parse() {
     while (auto line = scan_.line()) {
       line_ = scan_.word_line();
       std::string joined;
@@ -53,7 +53,7 @@ class ObjParser {
       if (!line) break;
     }
     check_indices();
-    return std::move(mesh_);
+    return {std::move(mesh_), {}};
   }
 
  private:
@@ -111,7 +111,7 @@ class ObjParser {
 
 }  // namespace
 
-PolygonMesh parse_off(const std::string& name, std::string_view bytes) {
+ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
   TextScanner scan(name, bytes);
   const auto keyword = scan.next();
   if (!keyword) scan.fail("the file is empty, expected OFF");
@@ -140,10 +140,10 @@ PolygonMesh parse_off(const std::string& name, std::string_view bytes) {
     skip_rest_of_line(scan);  // a colour
   }
   if (const auto more = scan.next()) scan.fail("more than the counts say: " + in_quotes(*more));
-  return mesh;
+  return {std::move(mesh), {}};
 }
 
-PolygonMesh parse_obj(const std::string& name, std::string_view bytes) { return ObjParser(name, bytes).parse(); }
+ParsedSurface parse_obj(const std::string& name, std::string_view bytes) { return ObjParser(name, bytes).parse(); }
 
 std::vector<Vec3> parse_xyz(const std::string& name, std::string_view bytes, std::size_t& longer_lines) {
   TextScanner scan(name, bytes);

@@ -26,6 +26,20 @@ std::optional<Number> parse(std::string_view word) {
   return value;
 }
 
+constexpr std::size_t kNotFound = std::string_view::npos;
+
+/// Whether so many of the first units of two bytes (or all there are, but one at least) are printable or blank ASCII, in
+/// the byte order that puts the zero at `zero`: 0 or 1.
+bool has_wide_ascii(std::string_view bytes, std::size_t zero) {
+  constexpr std::size_t kUnits = 4;
+  if (bytes.size() < 2) return false;
+  for (std::size_t i = 0; i < std::min(bytes.size() / 2, kUnits); ++i) {
+    const char c = bytes[2 * i + 1 - zero];
+    if (bytes[2 * i + zero] != 0 || !(is_blank(c) || (c > ' ' && c <= '~'))) return false;
+  }
+  return true;
+}
+
 const char* kind_name(std::filesystem::file_status status) {
   if (std::filesystem::is_fifo(status)) return "pipe";
   return std::filesystem::is_socket(status) ? "socket" : "device";
@@ -55,21 +69,37 @@ std::string read_file(const std::filesystem::path& path) {
 
 TextScanner::TextScanner(std::string name, std::string_view bytes, Comments comments)
     : name_(std::move(name)), bytes_(bytes), comments_(comments) {
+  require_no_utf16(name_, bytes_);
   if (bytes_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // a byte order mark some editors leave
+  const std::size_t first_end = line_end();
+  cr_alone_ = first_end < bytes_.size() && bytes_[first_end] == '\r' && behind(first_end) == first_end + 1;
+}
+
+// What was found is kept: the LF may be far off, or missing, where lines end with CR.
+std::size_t TextScanner::line_end() {
+  if (next_lf_ < at_ || (next_lf_ == 0 && at_ == 0)) next_lf_ = std::min(bytes_.find('\n', at_), bytes_.size());
+  const std::size_t length = bytes_.substr(at_, next_lf_ - at_).find('\r');
+  return length == kNotFound ? next_lf_ : at_ + length;
+}
+
+std::size_t TextScanner::behind(std::size_t end) const {
+  if (end == bytes_.size()) return end;
+  const bool is_pair = bytes_[end] == '\r' && !cr_alone_ && end + 1 < bytes_.size() && bytes_[end + 1] == '\n';
+  return end + (is_pair ? 2 : 1);
 }
 
 void TextScanner::skip_blanks() {
   while (at_ < bytes_.size()) {
     const char c = bytes_[at_];
     if (c == '#' && comments_ == Comments::hash) {
-      const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
-      std::string_view text = bytes_.substr(at_ + 1, end - at_ - 1);
-      if (text.ends_with('\r')) text.remove_suffix(1);
+      const std::size_t end = line_end();
       word_line_ = line_;
-      if (on_comment) on_comment(text);
+      if (on_comment) on_comment(bytes_.substr(at_ + 1, end - at_ - 1));
       at_ = end;
+    } else if (c == '\n' || c == '\r') {
+      at_ = behind(at_);
+      ++line_;
     } else if (is_blank(c)) {
-      line_ += c == '\n';
       ++at_;
     } else {
       return;
@@ -126,10 +156,9 @@ std::size_t TextScanner::count(const char* expected, std::size_t words_per_entry
 std::optional<std::string_view> TextScanner::line() {
   word_line_ = line_;
   if (at_ == bytes_.size()) return std::nullopt;
-  const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
-  std::string_view text = bytes_.substr(at_, end - at_);
-  if (text.ends_with('\r')) text.remove_suffix(1);
-  at_ = std::min(end + 1, bytes_.size());
+  const std::size_t end = line_end();
+  const std::string_view text = bytes_.substr(at_, end - at_);
+  at_ = behind(end);
   ++line_;
   return text;
 }
@@ -143,6 +172,13 @@ std::string_view TextScanner::bytes(std::size_t n, const char* expected) {
 
 void TextScanner::fail(const std::string& message, std::size_t line) const {
   throw InputError(name_ + ":" + std::to_string(line) + ": " + message);
+}
+
+void require_no_utf16(const std::string& name, std::string_view bytes) {
+  const bool little_mark = bytes.starts_with("\xFF\xFE"), big_mark = bytes.starts_with("\xFE\xFF");
+  const std::string_view text = bytes.substr(little_mark || big_mark ? 2 : 0);
+  if ((!big_mark && has_wide_ascii(text, 1)) || (!little_mark && has_wide_ascii(text, 0)))
+    throw InputError(name + ": the text is UTF-16, two bytes to a character; save it as UTF-8");
 }
 
 std::optional<double> parse_number(std::string_view word) {

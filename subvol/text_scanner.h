@@ -16,12 +16,13 @@ std::string read_file(const std::filesystem::path& path);
 
 /// Words and numbers of a text file held in memory, one after the other, with the line for complaints.
 ///
-/// Words are separated by blanks, tabs and line ends. A word that starts with '#' opens a comment up to the end of the
+/// Words are separated by blanks, tabs and line ends. Lines end with LF, CR LF or CR; where the first line of a file ends
+/// with CR alone, a LF behind a CR ends a line of its own, because it may be the first byte of binary data. A word that starts with '#' opens a comment up to the end of the
 /// line, unless comments are off. Nothing is allocated by what a file claims: check counts with `count`.
 class TextScanner {
  public:
   enum class Comments { hash, none };
-  /// name: how the file is called in messages; bytes must outlive the scanner.
+  /// name: how the file is called in messages; bytes must outlive the scanner. InputError: the text is UTF-16.
   TextScanner(std::string name, std::string_view bytes, Comments comments = Comments::hash);
 
   /// Called with the text of every comment that is passed, without '#' and line end.
@@ -55,12 +56,22 @@ class TextScanner {
 
  private:
   void skip_blanks();
+  /// Where the current line ends: before its LF, CR LF or CR, or at the end of the file.
+  std::size_t line_end();
+  /// Behind the line end at `end`.
+  std::size_t behind(std::size_t end) const;
 
   std::string name_;
   std::string_view bytes_;
   Comments comments_;
   std::size_t at_ = 0, line_ = 1, word_line_ = 1;
+  std::size_t next_lf_ = 0;  ///< the first LF from here on, if it is not before here
+  bool cr_alone_ = false;    ///< the first line ends so
 };
+
+/// InputError, naming the file, where its bytes are text in UTF-16 (of either byte order, with or without a byte order
+/// mark), in which no format here is written.
+void require_no_utf16(const std::string& name, std::string_view bytes);
 
 /// A word as a finite number or whole number, or nothing if it is not entirely one ("nan" and "inf" are none).
 std::optional<double> parse_number(std::string_view word);

@@ -55,7 +55,8 @@ void append(std::string& out, Number value, bool big_endian = false) {
   out.append(bytes.data(), bytes.size());
 }
 
-std::string binary_stl(const std::string& header) {
+/// attributes: what follows each facet; count: what the facets say of it.
+std::string binary_stl(const std::string& header, std::uint16_t count = 7, const std::string& attributes = "") {
   std::string out = header;
   out.resize(80, ' ');
   append(out, std::uint32_t{4});
@@ -63,7 +64,8 @@ std::string binary_stl(const std::string& header) {
     for (int i = 0; i < 3; ++i) append(out, std::numeric_limits<float>::quiet_NaN());
     for (const Index v : t)
       for (int i = 0; i < 3; ++i) append(out, static_cast<float>(kTetPoints[static_cast<std::size_t>(v)][i]));
-    append(out, std::uint16_t{7});
+    append(out, count);
+    out += attributes;
   }
   return out;
 }
@@ -134,12 +136,85 @@ TEST_CASE("STL is read as text and binary, also when a binary file begins with s
   const std::string capitals = replaced(replaced(text_stl(), "solid", "SOLID"), "endsolid", "EndSolid");
   for (const std::string& bytes :
        {text_stl(), capitals, "\r\n " + text_stl(), "\xEF\xBB\xBF" + text_stl(), binary_stl("a header"),
-        binary_stl("solid but binary"), binary_stl("SOLID but binary"), binary_stl("Solid_made_elsewhere") + "more"}) {
+        binary_stl("solid but binary"), binary_stl("SOLID but binary"), binary_stl("solid b", 0) + "more",
+        binary_stl("b", 0) + "more", binary_stl("solid b", 4, "more"), binary_stl("b", 4, "more")}) {
     const TriangleMesh mesh = read_triangles("a.stl", bytes);
     REQUIRE(mesh.positions.size() == 4);
     CHECK(mesh.positions[1] == kTetPoints[2]);
     CHECK(mesh.triangles == std::vector<std::array<Index, 3>>{{0, 1, 2}, {0, 2, 3}, {2, 1, 3}, {1, 0, 3}});
   }
+}
+
+TEST_CASE("bytes after the last facet of a binary STL are told, and refused where they could be attributes") {
+  std::vector<std::string> warnings;
+  read_triangles("a.stl", binary_stl("solid b", 0) + "more", &warnings);
+  REQUIRE(warnings.size() == 1);
+  CHECK_THAT(warnings[0], Contains("4 bytes after the last facet"));
+  for (const std::string header : {"b", "solid b"}) {
+    const std::string attributes = binary_stl(header, 4, "more");
+    CHECK_THAT(refusal("a.stl", binary_stl(header) + "more"), Contains("byte 284") && Contains("288 bytes"));
+    CHECK_THAT(refusal("a.stl", attributes + "x"), Contains("byte 284") && Contains("byte 300"));
+    CHECK_THAT(refusal("a.stl", attributes.substr(0, 299)), Contains("byte 284"));
+    for (std::size_t n = 85; n < 284; n += 7) {
+      CAPTURE(header, n);
+      CHECK_THAT(refusal("a.stl", binary_stl(header, 0).substr(0, n)), Contains("byte 80: 4 facets"));
+    }
+  }
+  CHECK_THAT(refusal("a.stl", "solid cube" + std::string(70, ' ')), Contains("80 bytes without a facet"));
+}
+
+TEST_CASE("text whose lines end with CR, or CR and LF, is read, and its lines are counted") {
+  const auto with_ends = [](std::string text, const std::string& end) {
+    for (std::size_t at = 0; (at = text.find('\n', at)) != text.npos; at += end.size()) text.replace(at, 1, end);
+    return text;
+  };
+  const std::string obj = "# c\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\ng a\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  for (const std::string end : {"\r", "\r\n", "\n"}) {
+    CAPTURE(end.size(), end[0]);
+    check_tet(read_triangles("a.off", with_ends("# c\n" + kTetOff, end)));
+    check_tet(read_triangles("a.obj", with_ends(obj, end)));
+    check_tet(read_triangles("a.ply", with_ends(kTextPly, end)));
+    CHECK(read_triangles("a.stl", with_ends(text_stl(), end)).triangles.size() == 4);
+    CHECK_THAT(refusal("a.obj", with_ends(replaced(obj, "f 2 3 4", "f 2 3 x"), end)), Contains(":9:"));
+    CHECK_THAT(refusal("a.off", with_ends(replaced(kTetOff, "3 0 2 1", "3 0 2 9"), end)), Contains(":7:"));
+    // The first of the binary numbers may look like the end of a line.
+    std::string header = replaced(replaced(kPlyHeader, "uchar red", "uchar r"), "uchar int", "uchar uchar");
+    header = with_ends("ply\nformat binary_little_endian 1.0\n" + header.substr(0, header.find("property list uchar f")) +
+                           "end_header\n", end);
+    std::string numbers;
+    for (const Vec3& x : kTetPoints) {
+      append(numbers, std::uint8_t{'\n'});
+      append(numbers, static_cast<float>(x.x()));
+      append(numbers, static_cast<float>(x.y()));
+      append(numbers, x.z());
+    }
+    for (const auto& t : kTet) {
+      append(numbers, std::uint8_t{3});
+      for (const Index v : t) append(numbers, static_cast<std::uint8_t>(v));
+    }
+    check_tet(read_triangles("a.ply", header + numbers));
+  }
+  // One that strays among others ends a line as well: what stands behind it is not lost.
+  check_tet(read_triangles("a.obj", replaced(obj, "0 0 0\nv", "0 0 0\rv")));
+}
+
+TEST_CASE("text in UTF-16 is named as such by every reader") {
+  const auto wide = [](const std::string& text, bool big_endian, bool mark) {
+    std::string bytes = mark ? (big_endian ? "\xFE\xFF" : "\xFF\xFE") : "";
+    for (const char c : text) bytes += big_endian ? std::string{'\0', c} : std::string{c, '\0'};
+    return bytes;
+  };
+  const std::string long_stl = text_stl() + text_stl() + text_stl();
+  for (const bool big_endian : {false, true})
+    for (const bool mark : {false, true})
+      for (const auto& [name, text] : {std::pair("a.off", kTetOff), {"a.obj", "v 0 0 0\n"}, {"a.stl", text_stl()},
+                                       {"a.stl", long_stl}, {"a.stl", "solid"}, {"a.ply", kTextPly}}) {
+        CAPTURE(name, big_endian, mark);
+        CHECK_THAT(refusal(name, wide(text, big_endian, mark)), Contains(name) && Contains("UTF-16"));
+      }
+  // A binary file may have any header.
+  std::string bytes = binary_stl(wide("solid", false, true), 0);
+  CHECK(read_triangles("a.stl", bytes).triangles.size() == 4);
 }
 
 TEST_CASE("PLY is read as text and binary of both byte orders, whatever else it carries") {
