@@ -11,7 +11,7 @@ namespace subvol::cli {
 
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings) {
-  if (!source.path.empty()) return {load_volume(source.path, warnings), std::nullopt};
+  if (!source.path.empty()) return {load_volume(source.path, warnings, true, run.references), std::nullopt};
   if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   if (options.time_limit_seconds > 0 && !run.checkpoint.empty())
     warnings.push_back("which template is made depends on how far its trials come within --time-limit: a run that "

@@ -44,7 +44,7 @@ MeshCheck against(const std::optional<Target>& target, const Check& check) {
 
 Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, const WorkProgress& progress,
                      std::vector<std::string>& warnings) {
-  const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false);
+  const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false, arguments.run.references);
   Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
@@ -87,6 +87,7 @@ std::string text_of(const Checked& checked) {
 int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   checked_outputs(arguments.run, {});
   apply_resources(arguments.run);
+  require_choice_of_references(arguments.mesh, arguments.run.references);
   std::vector<std::string> warnings;
   std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
@@ -122,6 +123,7 @@ void add_check_command(CLI::App& app, Action& action) {
       ->check(number_in(1e-4, 100.0))
       ->type_name("PERCENT")
       ->capture_default_str();
+  add_references_option(*verb, arguments->run);
   verb->add_flag("--json", arguments->json, "Print JSON instead of text");
   verb->add_option("--report", arguments->run.report, "Write the JSON to a file as well")->type_name("FILE.json");
   verb->add_flag("--force", arguments->run.force, "Replace a report that exists");

@@ -23,7 +23,7 @@ struct ConvertArguments {
 
 void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outputs,
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
-  const VolumeMesh mesh = load_volume(arguments.input, warnings);
+  const VolumeMesh mesh = load_volume(arguments.input, warnings, true, arguments.run.references);
   require_all_written(write_each(outputs, [&](const Output& output) {
     if (arguments.limit && output.extension == ".obj") {
       write_polygons(output, tessellated_limit(mesh, writing), writing);
@@ -75,6 +75,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   writing.options = options_of_result(verb);
   std::vector<std::string> warnings;
   int status = kDone;
+  require_choice_of_references(arguments.input, arguments.run.references);
   if (is_high_order_file(arguments.input)) {
     status = convert_high_order(arguments, outputs, writing, warnings);
   } else if (is_volume_file(arguments.input)) {
@@ -104,6 +105,7 @@ void add_convert_command(CLI::App& app, Action& action) {
       ->type_name("N")
       ->capture_default_str();
   add_map_tolerance(*verb, arguments->writing);
+  add_references_option(*verb, arguments->run);
   add_output_options(*verb, arguments->run,
                      "Where to, the extension choosing the format: " + output_formats() +
                          "; cutaway:FILE.glb for the cells inside; may be given several times");

@@ -355,6 +355,7 @@ void add_fit_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(kLeastTemplateCells, kMostTemplateCells))
       ->type_name("N")
       ->excludes(file);
+  add_references_option(*verb, arguments->run)->needs(file);
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
   add_high_order_options(*verb, *arguments);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/loading.h"
 
+#include "cli/exit_status.h"
 #include "fit/mesh_check.h"
 #include "fit/surface_distance.h"
 #include "subvol/boundary.h"
@@ -60,8 +61,14 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
   return boundary;
 }
 
-VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check) {
-  return read_volume_mesh(path, {.check = check, .warnings = &warnings});
+VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+                       const std::string& references) {
+  return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
+}
+
+void require_choice_of_references(const std::filesystem::path& path, const std::string& references) {
+  if (references.empty() || is_volume_file(path)) return;
+  throw UsageError("--references: " + path.string() + " has no cell data to choose from");
 }
 
 std::vector<double> load_thicknesses(const std::filesystem::path& path) {

@@ -41,7 +41,12 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
 /// A volume mesh that is sound but for inverted cells and unused vertices (or, unchecked, just readable).
-VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true);
+/// references: name of the cell data that become them; empty: those that are meant.
+VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
+                       const std::string& references = {});
+
+/// UsageError: --references was given for a file whose cell data cannot be chosen from.
+void require_choice_of_references(const std::filesystem::path& path, const std::string& references);
 
 /// Positive numbers, one a line; blank lines are passed over. InputError, with the line: anything else.
 std::vector<double> load_thicknesses(const std::filesystem::path& path);

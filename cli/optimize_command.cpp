@@ -59,7 +59,7 @@ class OptimizeRun : public LongRun {
 };
 
 void OptimizeRun::load() {
-  mesh_ = load_volume(arguments_.mesh, warnings_);
+  mesh_ = load_volume(arguments_.mesh, warnings_, true, arguments_.run.references);
   if (!arguments_.target.empty()) target_ = load_surface(arguments_.target, warnings_);
   surface_ = target_ ? *target_ : fan_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   before_ = measure_quality(mesh_);
@@ -220,6 +220,7 @@ void add_optimize_command(CLI::App& app, Action& action) {
   verb->add_option("MESH", arguments->mesh, "Hexes, prisms and tets: " + volume_mesh_formats())
       ->required()
       ->type_name("FILE");
+  add_references_option(*verb, arguments->run);
   add_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "The mesh, or its surface, by extension: " + output_formats() +

@@ -49,6 +49,14 @@ void add_output_options(CLI::App& verb, RunOptions& options, const std::string& 
   add_resource_options(verb, options);
 }
 
+CLI::Option* add_references_option(CLI::App& verb, RunOptions& options) {
+  return verb
+      .add_option("--references", options.references,
+                  "Cell data of a .vtk that become the cells' references (default: those with a name of materials or\n"
+                  "regions, or else the first of whole numbers that are no ghosts or cell numbers)")
+      ->type_name("NAME");
+}
+
 void add_long_run_options(CLI::App& verb, RunOptions& options) {
   verb.add_option("--report", options.report, "Write what was done and what is true of the result")
       ->type_name("FILE.json");

@@ -23,6 +23,7 @@ struct RunOptions {
   unsigned seed = 0;
   std::string progress;              ///< bar, plain, json, none; empty: by what stderr is
   std::string checkpoint, resume;    ///< empty: none
+  std::string references;            ///< cell data that become the cells' references; empty: those that are meant
   double every_seconds = 60;         ///< between two writes of the checkpoint, at least
 };
 
@@ -30,6 +31,8 @@ struct RunOptions {
 void add_resource_options(CLI::App& verb, RunOptions& options);
 /// -o, --force, --quiet, and the above.
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help);
+/// --references: for what reads volume meshes.
+CLI::Option* add_references_option(CLI::App& verb, RunOptions& options);
 /// --report, --progress, --seed: for what runs long.
 void add_long_run_options(CLI::App& verb, RunOptions& options);
 /// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own

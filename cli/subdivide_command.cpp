@@ -30,7 +30,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
-  VolumeMesh cage = load_volume(arguments.mesh, warnings);
+  VolumeMesh cage = load_volume(arguments.mesh, warnings, true, arguments.run.references);
   const Json input{{"mesh", describe(arguments.mesh, cage)}};
   if (arguments.crease_angle_degrees) {
     cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
@@ -78,6 +78,7 @@ void add_subdivide_command(CLI::App& app, Action& action) {
                    "Boundary edges sharper than this become creases (default: only those the file tags)")
       ->check(number_in(0.0, 180.0))
       ->type_name("DEGREES");
+  add_references_option(*verb, arguments->run);
   add_output_options(*verb, arguments->run,
                      "Refined mesh, or its surface, by extension: " + output_formats() +
                          "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given\n"

@@ -43,6 +43,10 @@ struct EditArguments : TemplateRun {
 Vec3 low_corner(const std::vector<double>& box) { return {box[0], box[1], box[2]}; }
 Vec3 high_corner(const std::vector<double>& box) { return {box[3], box[4], box[5]}; }
 
+VolumeMesh load_edited(EditArguments& arguments, const std::string& path) {
+  return load_volume(path, arguments.warnings, true, arguments.run.references);
+}
+
 VolumeMesh make_grid(EditArguments& arguments) {
   if (arguments.box.empty() == arguments.mesh.empty())
     throw UsageError("template grid: give a SURFACE or --box, one of them");
@@ -74,13 +78,13 @@ std::vector<char> chosen_cells(EditArguments& arguments, const VolumeMesh& mesh,
 }
 
 VolumeMesh make_carved(EditArguments& arguments) {
-  const VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
   const std::vector<char> chosen = chosen_cells(arguments, mesh, "carve: give one of --inside, --box and --list");
   return carve(mesh, [&](std::size_t c) { return (chosen[c] != 0) != arguments.invert; });
 }
 
 VolumeMesh make_refined(EditArguments& arguments) {
-  const VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
   const std::vector<char> chosen =
       chosen_cells(arguments, mesh, "refine: give one of --inside, --box, --list and --thin");
   if (std::find(chosen.begin(), chosen.end(), 1) == chosen.end())
@@ -98,7 +102,7 @@ VolumeMesh make_extruded(EditArguments& arguments) {
 }
 
 VolumeMesh make_collapsed(EditArguments& arguments) {
-  const VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
   const Index a = arguments.vertices[0], b = arguments.vertices[1];
   return arguments.what == "edge"   ? collapse_edge(mesh, a, b)
          : arguments.what == "face" ? collapse_face(mesh, a, b)
@@ -106,15 +110,15 @@ VolumeMesh make_collapsed(EditArguments& arguments) {
 }
 
 VolumeMesh make_merged(EditArguments& arguments) {
-  VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
-  if (!arguments.other.empty()) mesh = joined(mesh, load_volume(arguments.other, arguments.warnings));
+  VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  if (!arguments.other.empty()) mesh = joined(mesh, load_edited(arguments, arguments.other));
   Eigen::AlignedBox3d box;
   for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
   return glue(mesh, arguments.tolerance / 100 * box.diagonal().norm());
 }
 
 VolumeMesh make_split(EditArguments& arguments) {
-  const VolumeMesh mesh = load_volume(arguments.mesh, arguments.warnings);
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
   if (arguments.what == "tets") return split_into_tets(mesh);
   if (arguments.vertices.empty()) throw UsageError("template split: --into " + arguments.what + " needs --edge A B");
   const Index a = arguments.vertices[0], b = arguments.vertices[1];
@@ -122,7 +126,7 @@ VolumeMesh make_split(EditArguments& arguments) {
 }
 
 VolumeMesh make_pillowed(EditArguments& arguments) {
-  return pillow(load_volume(arguments.mesh, arguments.warnings), arguments.cells);
+  return pillow(load_edited(arguments, arguments.mesh), arguments.cells);
 }
 
 using Maker = VolumeMesh (*)(EditArguments&);
@@ -146,6 +150,7 @@ CLI::App* add_edit(CLI::App& group, Action& action, const std::shared_ptr<EditAr
 }
 
 CLI::Option* add_mesh(CLI::App& verb, EditArguments& arguments) {
+  add_references_option(verb, arguments.run);
   return verb.add_option("MESH", arguments.mesh, "Mesh to edit: " + volume_mesh_formats())
       ->required()
       ->type_name("FILE");

@@ -19,8 +19,9 @@ struct ParsedMesh {
 
 /// `name` is the file's name for messages. Errors as `read_volume_mesh`, which also does the checks that are not the
 /// format's business. Indices are in range, positions finite.
-ParsedMesh parse_medit(const std::string& name, std::string_view bytes);
-ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes);
+/// references: `ReadOptions::references`.
+ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const std::string& references);
+ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes, const std::string& references);
 
 /// The file's bytes. The mesh is consistent: `write_volume_mesh` has looked.
 std::string format_medit(const VolumeMesh& mesh);

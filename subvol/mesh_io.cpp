@@ -18,7 +18,7 @@ namespace {
 struct Format {
   const char* extension;
   const char* description;
-  ParsedMesh (*parse)(const std::string& name, std::string_view bytes);
+  ParsedMesh (*parse)(const std::string& name, std::string_view bytes, const std::string& references);
   std::string (*format)(const VolumeMesh& mesh);
 };
 
@@ -89,7 +89,7 @@ void check_mesh(const std::string& name, ParsedMesh& parsed) {
 
 VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
   const Format& format = format_of(path);
-  ParsedMesh parsed = format.parse(path.string(), read_file(path));
+  ParsedMesh parsed = format.parse(path.string(), read_file(path), options.references);
   if (parsed.mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
   if (options.check) check_mesh(path.string(), parsed);
   if (options.warnings)

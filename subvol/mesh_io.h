@@ -16,6 +16,9 @@ struct ReadOptions {
   bool check = true;
   /// Where warnings go, one line each with the file's name; may be null.
   std::vector<std::string>* warnings = nullptr;
+  /// Name of the cell data that become the references; empty: those that are meant (docs/file-formats.md). InputError
+  /// where there is none of that name.
+  std::string references{};
 };
 
 /// Reads a volume mesh of hexes, prisms and tets; the extension chooses the format (docs/file-formats.md).

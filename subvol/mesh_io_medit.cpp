@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/error.h"
 #include "subvol/features.h"
 #include "subvol/mesh_formats.h"
 #include "subvol/text_scanner.h"
@@ -278,7 +279,12 @@ void append_tags(std::string& text, const FeatureTags& tags) {
 
 }  // namespace
 
-ParsedMesh parse_medit(const std::string& name, std::string_view bytes) { return MeditParser(name, bytes).parse(); }
+ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const std::string& references) {
+  if (!references.empty())
+    throw InputError(name + ": no cell data " + in_quotes(references) +
+                     ": a .mesh has one reference for each cell, without a name");
+  return MeditParser(name, bytes).parse();
+}
 
 std::string format_medit(const VolumeMesh& mesh) {
   std::string text = "MeshVersionFormatted 2\nDimension 3\nVertices\n" + std::to_string(mesh.num_vertices()) + "\n";

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/binary_value.h"
+#include "subvol/error.h"
 #include "subvol/mesh_formats.h"
+#include "subvol/reference_arrays.h"
 #include "subvol/text_scanner.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -59,7 +62,8 @@ constexpr VtkAttribute kSkippedAttributes[] = {
 
 class VtkParser {
  public:
-  VtkParser(const std::string& name, std::string_view bytes) : scan_(name, bytes, TextScanner::Comments::none) {}
+  VtkParser(const std::string& name, std::string_view bytes, const std::string& references)
+      : scan_(name, bytes, TextScanner::Comments::none), name_(name), asked_(references) {}
 
   ParsedMesh parse() {
     read_header();
@@ -70,7 +74,7 @@ class VtkParser {
       else if (keyword == "cell_types") read_cell_types();
       else if (keyword == "cell_data") read_attributes(num_cells_, true);
       else if (keyword == "point_data") read_attributes(parsed_.mesh.num_vertices(), false);
-      else if (keyword == "field") read_field(nullptr);
+      else if (keyword == "field") read_field(false);
       else if (keyword == "metadata") skip_metadata();
       else scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
       if (stray_attribute_) break;  // the mesh itself stands before its attributes
@@ -224,7 +228,7 @@ class VtkParser {
     types_ = read_whole_numbers(n, kInt32, "cell types");
   }
 
-  // Attributes may be of many kinds; read are whole-number scalars of cells (the first become references).
+  // Attributes may be of many kinds; read are the scalars of cells, of which one may become the references.
   void read_attributes(std::size_t expected, bool of_cells) {
     const std::int64_t n = scan_.integer("the number of attribute entries");
     if (n < 0 || static_cast<std::uint64_t>(n) != expected)
@@ -235,37 +239,38 @@ class VtkParser {
       const std::string keyword = lower_case(*word);
       if (keyword == "cell_data" || keyword == "point_data") return;
       scan_.next();
-      if (keyword == "scalars") read_scalars(expected, of_cells ? &references_ : nullptr);
-      else if (keyword == "field") read_field(of_cells ? &references_ : nullptr);
+      if (keyword == "scalars") read_scalars(expected, of_cells);
+      else if (keyword == "field") read_field(of_cells);
       else if (keyword == "metadata") skip_metadata();
-      else if (!references_.empty()) stray_attribute_ = true;  // nothing more is wanted
-      else if (!skip_attribute(keyword, expected)) end_attributes(*word);
+      else if (!skip_attribute(keyword, expected, of_cells)) end_attributes(*word);
     }
   }
 
   /// False: its kind or type is not known.
-  bool skip_attribute(const std::string& keyword, std::size_t n) {
+  bool skip_attribute(const std::string& keyword, std::size_t n, bool of_cells) {
     const auto* attribute = std::find_if(std::begin(kSkippedAttributes), std::end(kSkippedAttributes),
                                          [&](const VtkAttribute& a) { return keyword == a.keyword; });
     if (attribute == std::end(kSkippedAttributes)) return false;
-    scan_.word("the name of an attribute");
+    const std::string_view name = scan_.word("the name of an attribute");
     std::size_t components = attribute->components;
     if (components == 0) components = read_count("the number of components");
     if (keyword == "lookup_table") n = read_count("the size of a lookup table");
     const auto type = attribute->is_colors ? std::optional(binary_ ? kUInt8 : kFloat32)
                                            : type_of(scan_.word("a data type"));
-    if (type) read_array(n, components, *type, nullptr);
-    return type.has_value();
+    if (!type) return false;
+    if (keyword == "lookup_table") read_array(n, components, *type, "", Array::no_data);
+    else read_array(n, components, *type, name, of_cells && !keyword.ends_with("_ids") ? Array::of_cells : Array::other);
+    return true;
   }
 
   /// At one that cannot be passed over.
   void end_attributes(std::string_view word) {
     stray_attribute_ = true;
-    if (references_.empty())
+    if (std::none_of(arrays_.begin(), arrays_.end(), may_be_references) || !asked_.empty())
       parsed_.warnings.push_back("attributes from " + in_quotes(word) + " on are not read");
   }
 
-  void read_scalars(std::size_t n, std::vector<std::int64_t>* references) {
+  void read_scalars(std::size_t n, bool of_cells) {
     const std::string_view name = scan_.word("the name of the scalars");
     const auto type = type_of(scan_.word("a data type"));
     if (!type) return end_attributes(name);
@@ -276,10 +281,10 @@ class VtkParser {
       scan_.next();
       scan_.word("the name of a lookup table");
     }
-    read_array(n, static_cast<std::size_t>(components), *type, references);
+    read_array(n, static_cast<std::size_t>(components), *type, name, of_cells ? Array::of_cells : Array::other);
   }
 
-  void read_field(std::vector<std::int64_t>* references) {
+  void read_field(bool of_cells) {
     scan_.word("the name of the field");
     const std::size_t num_arrays = read_count("the number of arrays");
     for (std::size_t i = 0; i < num_arrays; ++i) {
@@ -301,7 +306,7 @@ class VtkParser {
         if (!has_types_) scan_.fail("unknown data type " + in_quotes(type_name));
         return end_attributes(name);
       }
-      read_array(n, components, *type, references);
+      read_array(n, components, *type, name, of_cells ? Array::of_cells : Array::other);
     }
   }
 
@@ -319,16 +324,58 @@ class VtkParser {
     scan_.bytes(length, "an array");
   }
 
-  void read_array(std::size_t n, std::size_t components, ValueType type, std::vector<std::int64_t>* references) {
+  enum class Array { of_cells, other, no_data };  ///< a lookup table is no data
+
+  void read_array(std::size_t n, std::size_t components, ValueType type, std::string_view name, Array kind) {
     if (components > 0 && n > scan_.bytes_left() / components) scan_.fail("the file ends within an array");
-    const bool keep = references && references->empty() && components == 1 && n == num_cells_ &&
-                      !type.is_real();
-    if (keep)
-      *references = read_whole_numbers(n, type, "cell references");
-    else if (binary_ || !type.is_real())
-      read_values(n * components, type, "an array", [](std::size_t, double) {});
+    CellNumbers array{decoded(name), type.is_real(), {}};
+    bool keep = kind == Array::of_cells && components == 1 && n == num_cells_;
+    const auto take = [&](std::size_t, double value) {
+      keep = keep && value == std::floor(value);
+      if (keep) array.values.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
+    };
+    if (binary_ || !type.is_real())
+      read_values(n * components, type, "an array", take);
     else  // quality values and the like may well be nan
-      for (std::size_t i = 0; i < n * components; ++i) scan_.word("an array");
+      for (std::size_t i = 0; i < n * components; ++i) {
+        const auto value = parse_number(scan_.word("an array"));
+        take(i, value.value_or(std::numeric_limits<double>::quiet_NaN()));
+      }
+    if (keep)
+      arrays_.push_back(std::move(array));
+    else if (kind == Array::of_cells)
+      others_.push_back(std::move(array.name));
+    num_arrays_ += kind != Array::no_data;
+  }
+
+  /// Names are words: VTK writes a blank in one as %20.
+  static std::string decoded(std::string_view word) {
+    std::string name;
+    for (std::size_t i = 0; i < word.size(); ++i) {
+      int code = 0;
+      const char* digits = word.data() + i + 1;
+      const bool is_code = word[i] == '%' && i + 2 < word.size() &&
+                           std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2;
+      name += is_code ? static_cast<char>(code) : word[i];
+      i += is_code ? 2 : 0;
+    }
+    return name;
+  }
+
+  void choose_references() {
+    std::optional<std::size_t> chosen;
+    try {
+      chosen = subvol::choose_references(arrays_, asked_, others_);
+    } catch (const InputError& error) {
+      throw InputError(name_ + ": " + error.what());
+    }
+    if (!chosen) return;
+    references_ = arrays_[*chosen].values;
+    const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), may_be_references) - 1;
+    if (rivals > 0 && asked_.empty())
+      parsed_.warnings.push_back("references are taken from the cell data " + in_quotes(arrays_[*chosen].name) +
+                                 "; there are " + std::to_string(rivals) +
+                                 " more of whole numbers, of which --references NAME chooses another");
   }
 
   /// METADATA runs to the next empty line.
@@ -339,6 +386,7 @@ class VtkParser {
   }
 
   void build_cells() {
+    choose_references();
     if (types_.size() != num_cells_)
       scan_.fail(std::to_string(types_.size()) + " cell types for " + std::to_string(num_cells_) + " cells",
                  types_line_);
@@ -390,10 +438,13 @@ class VtkParser {
   }
 
   TextScanner scan_;
+  std::string name_, asked_;
   ParsedMesh parsed_;
+  std::vector<CellNumbers> arrays_;   ///< of which the references may be chosen
+  std::vector<std::string> others_;   ///< names of the other cell data
   int major_ = 0;
   bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false;
-  std::size_t num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
+  std::size_t num_arrays_ = 0, num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
   std::vector<std::size_t> offsets_{0};
   std::vector<std::int64_t> corners_, types_, references_;
 };
@@ -404,7 +455,9 @@ const VtkCell& vtk_cell_of(CellKind kind) {
 
 }  // namespace
 
-ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes) { return VtkParser(name, bytes).parse(); }
+ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes, const std::string& references) {
+  return VtkParser(name, bytes, references).parse();
+}
 
 std::string format_legacy_vtk(const VolumeMesh& mesh) {
   std::string text = "# vtk DataFile Version 3.0\nsubvol volume mesh\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS " +

@@ -50,6 +50,35 @@ TEST_CASE("convert writes every format, and what can be read back is the same", 
   CHECK(place.run("convert target.off --limit -o t2.glb").status == 2);
 }
 
+TEST_CASE("--references chooses the cell data that become references, and names those there are", "[cli]") {
+  const Workplace place;
+  subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
+  mesh.references = {7, 9};
+  subvol::write_volume_mesh(place / "plain.vtk", mesh);
+  std::string bytes = content_of(place / "plain.vtk");
+  bytes.replace(bytes.find("CELL_DATA"), bytes.npos,
+                "CELL_DATA 2\nFIELD f 3\nvtkGhostType 1 2 unsigned_char\n0 1\nMaterialIds 1 2 double\n7 9\n"
+                "colour 1 2 int\n3 4\n");
+  place.file("a.vtk", bytes);
+  for (const auto& [options, references] : {std::pair("", std::vector{7, 9}), {" --references colour", {3, 4}},
+                                            {" --references vtkGhostType", {0, 1}}}) {
+    const std::string given = options;
+    CAPTURE(given);
+    const Run run = place.run("convert a.vtk --force -o b.mesh" + given);
+    CHECK(run.status == 0);
+    CHECK((run.err.find("--references NAME") != std::string::npos) == given.empty());
+    CHECK(subvol::read_volume_mesh(place / "b.mesh").references == references);
+  }
+  for (const std::string verb : {"convert a.vtk -o c.mesh", "subdivide a.vtk -o c.mesh", "optimize a.vtk -o c.mesh",
+                                 "template pillow a.vtk -o c.mesh", "check a.vtk"}) {
+    const Run run = place.run(verb + " --references region");
+    CAPTURE(verb, run.err);
+    CHECK(run.status == 3);
+    CHECK(run.err.find("'MaterialIds'") != std::string::npos);
+  }
+  CHECK(place.run("convert target.off --references x -o c.obj").status == 2);
+}
+
 TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
   const Workplace place(subvol::samples::bracket_sample());
   REQUIRE(place.run("subdivide template.mesh --levels 2 -o fine.mesh -o fine.glb --report r.json").status == 0);

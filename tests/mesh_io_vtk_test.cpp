@@ -134,8 +134,55 @@ TEST_CASE("whole-number cell data become references, in whatever form they come"
                     "POINT_DATA 11\nSCALARS q float\nLOOKUP_TABLE default\n" + others +
                         "CELL_DATA 5\nFIELD FieldData 2\nq 1 5 float\n" + floats +
                         "METADATA\nINFORMATION 0\n\npart 1 5 int\n" + values,
-                    "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\nnonsense");
+                    "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\n" + array_of(std::vector<float>(15, 0.5f), binary));
   CHECK(read_bytes(base + after).references == std::vector<int>{5, 6, 7});
+}
+
+TEST_CASE("references come from the cell data that are meant, and from those that are asked for") {
+  const bool binary = GENERATE(false, true);
+  const auto ints = [&](const std::string& name, std::int32_t first) {
+    return name + " 1 5 int\n" + array_of(std::vector<std::int32_t>{first, first + 1, first + 2, 8, 9}, binary);
+  };
+  const auto reals = [&](const std::string& name, double first, double step) {
+    return name + " 1 5 double\n" +
+           array_of(std::vector<double>{first, first + step, first + 2 * step, 8, 9}, binary);
+  };
+  const auto read = [&](const std::vector<std::string>& arrays, const std::string& name = "",
+                        std::vector<std::string>* warnings = nullptr) {
+    std::string bytes = vtk_file({"3.0", binary}, kPoints, kCells, kTypes) + "CELL_DATA 5\nFIELD f " +
+                        std::to_string(arrays.size()) + "\n";
+    for (const std::string& array : arrays) bytes += array;
+    const TemporaryFolder folder;
+    return read_volume_mesh(folder.file("in.vtk", bytes), {.warnings = warnings, .references = name}).references;
+  };
+  const std::vector<int> wanted{5, 6, 7};
+  for (const char* other : {"vtkGhostType", "vtkOriginalCellIds", "GlobalIds", "GlobalElementId", "PedigreeIds",
+                            "cell_id", "ids", "avtGhostZones"}) {
+    CAPTURE(other);
+    CHECK(read({ints(other, 40), ints("colour", 5)}) == wanted);
+    CHECK(read({ints(other, 40)}).empty());
+    CHECK(read({ints("MaterialIds", 40), ints(other, 5)}, other) == wanted);
+  }
+  for (const char* known : {"reference", "MaterialIds", "material", "medit:ref", "gmsh:physical", "CellEntityIds",
+                            "Region%20Id", "attribute"}) {
+    CAPTURE(known);
+    CHECK(read({ints("first", 40), ints("vtkOriginalCellIds", 50), reals(known, 5, 1)}) == wanted);
+    CHECK(read({ints("first", 40), ints(known, 5)}) == wanted);
+  }
+  CHECK(read({ints("gmsh:geometrical", 40), ints("gmsh:physical", 5)}) == wanted);
+  CHECK(read({reals("pressure", 5, 1)}).empty());              // nobody knows that it is none
+  CHECK(read({reals("pressure", 5, 1)}, "pressure") == wanted);
+  CHECK(read({reals("MaterialIds", 5, 0.5)}).empty());         // 5.5 is no reference
+  CHECK(read({ints("Region%20Id", 5)}, "region id") == wanted);
+  std::vector<std::string> warnings;
+  read({ints("colour", 5), ints("shade", 40)}, "", &warnings);
+  REQUIRE(warnings.size() == 2);
+  CHECK_THAT(warnings[0] + warnings[1], Contains("'colour'") && Contains("--references"));
+  CHECK_THROWS_WITH(read({ints("colour", 5), reals("q", 0, 0.5)}, "material"),
+                    Contains("in.vtk") && Contains("'material'") && Contains("'colour'") && Contains("'q'"));
+  const TemporaryFolder folder;
+  write_volume_mesh(folder / "a.mesh", lattice(1, 1, 1));
+  CHECK_THROWS_WITH(read_volume_mesh(folder / "a.mesh", {.references = "material"}), Contains("without a name"));
 }
 
 TEST_CASE("cell data become references whatever attributes stand before them") {
@@ -180,7 +227,7 @@ TEST_CASE("references that do not fit become 0, with a warning") {
   const std::vector<std::int64_t> values{5, 3'000'000'000, -9'000'000'000'000'000'000, 8, 9};
   std::vector<std::string> warnings;
   const VolumeMesh mesh = read_bytes(vtk_file({"3.0", binary}, kPoints, kCells, kTypes) +
-                                         "CELL_DATA 5\nFIELD f 1\nid 1 5 vtktypeint64\n" + array_of(values, binary),
+                                         "CELL_DATA 5\nFIELD f 1\nzone 1 5 vtktypeint64\n" + array_of(values, binary),
                                      &warnings);
   CHECK(mesh.references == std::vector<int>{5, 0, 0});
   REQUIRE(warnings.size() == 2);
