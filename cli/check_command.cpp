@@ -87,6 +87,7 @@ std::string text_of(const Checked& checked) {
 int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   checked_outputs(arguments.run, {});
   apply_resources(arguments.run);
+  require_known_file(arguments.mesh);
   require_choice_of_references(arguments.mesh, arguments.run.references);
   std::vector<std::string> warnings;
   std::optional<Target> target;

@@ -75,6 +75,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   writing.options = options_of_result(verb);
   std::vector<std::string> warnings;
   int status = kDone;
+  require_known_file(arguments.input);
   require_choice_of_references(arguments.input, arguments.run.references);
   if (is_high_order_file(arguments.input)) {
     status = convert_high_order(arguments, outputs, writing, warnings);

@@ -23,12 +23,45 @@ bool is_volume_file(const std::filesystem::path& path) {
 
 bool is_high_order_file(const std::filesystem::path& path) { return lower_case(path.extension().string()) == ".vtu"; }
 
+namespace {
+
+bool is_surface_or_points(const std::filesystem::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return is_surface_extension(extension) || extension == ".xyz";
+}
+
+}  // namespace
+
+void require_known_file(const std::filesystem::path& path) {
+  if (is_volume_file(path) || is_high_order_file(path) || is_surface_or_points(path)) return;
+  throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +
+                   "; of cells there are " + cell_formats() + "; of surfaces " + surface_formats() + "; of points " +
+                   point_cloud_formats());
+}
+
+void require_surface_file(const std::filesystem::path& path) {
+  require_known_file(path);
+  if (is_high_order_file(path))
+    throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but a surface is wanted");
+}
+
+void require_cell_file(const std::filesystem::path& path) {
+  require_known_file(path);
+  if (is_surface_or_points(path))
+    throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
+  if (is_high_order_file(path))
+    throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but linear cells are wanted: " +
+                     volume_mesh_formats());
+}
+
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  require_surface_file(path);
   if (is_point_cloud_file(path)) return read_point_cloud(path, &warnings);
   return load_surface(path, warnings);
 }
 
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  require_surface_file(path);
   if (is_point_cloud_file(path))
     throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; expected a " +
                      "surface");
@@ -40,6 +73,7 @@ PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::st
 }
 
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  require_surface_file(path);
   if (!is_volume_file(path)) return {read_polygon_mesh(path, &warnings), {}};
   return tagged_polygons(load_volume(path, warnings));
 }
@@ -63,6 +97,7 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
 
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
+  require_cell_file(path);
   return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
 }
 

@@ -14,6 +14,12 @@
 
 namespace subvol::cli {
 
+/// InputError: a path's extension is none of a file with geometry; it lists those there are. Where it is one that holds
+/// something else than a surface (a volume mesh has one, its boundary) or linear cells, that is said.
+void require_known_file(const std::filesystem::path& path);
+void require_surface_file(const std::filesystem::path& path);
+void require_cell_file(const std::filesystem::path& path);
+
 /// Whether a path's extension is one of a volume mesh.
 bool is_volume_file(const std::filesystem::path& path);
 

@@ -21,13 +21,17 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
   const std::size_t begin = bytes.find("<VTKFile");
   if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
     fail("expected a whole VTK XML file");
+  // Everything that subvol does not write is told in one way: nobody is to change a header until the file is read.
+  const auto refuse_foreign = [&](const std::string& found) {
+    fail("another program has written this .vtu (" + found +
+         "), and of those subvol reads none, only its own; save it as legacy .vtk");
+  };
   const std::string_view header = tag(bytes, begin);
   for (const auto& [key, expected] : {std::pair{"type", "UnstructuredGrid"}, {"version", "2.2"},
                                       {"byte_order", "LittleEndian"}, {"header_type", "UInt64"}})
     if (attribute(header, key) != expected)
-      fail(std::string("expected ") + key + "=\"" + expected + "\", as subvol writes it, found " +
-           in_quotes(attribute(header, key)));
-  if (header.find("compressor") != std::string_view::npos) fail("expected arrays that are not compressed");
+      refuse_foreign("its " + std::string(key) + " is " + in_quotes(attribute(header, key)) + ", not '" + expected + "'");
+  if (header.find("compressor") != std::string_view::npos) refuse_foreign("its arrays are compressed");
   for (std::size_t at = bytes.find("<DataArray", begin); at != std::string_view::npos;
        at = bytes.find("<DataArray", at + 1))
     add(bytes, at);

@@ -86,7 +86,7 @@ ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double gro
   require_numberable(surface, inside, outside);
   ShellLayers layers;
   layers.topology = build_surface(surface.positions.size(), {surface.face_offsets.begin(), surface.face_offsets.end()},
-                                  surface.face_vertices, {}, SurfaceKind::maybe_open);
+                                  surface.face_vertices, {}, SurfaceKind::maybe_open, surface.positions);
   layers.surface = std::move(surface);
   layers.inside = inside;
   layers.outside = outside;

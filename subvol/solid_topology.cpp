@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/solid_topology.h"
 
+#include "subvol/crowded_edges.h"
 #include "subvol/error.h"
 
 #include <Eigen/Dense>
@@ -16,8 +17,9 @@ namespace subvol {
 
 namespace {
 
-/// Equal positions become one vertex; vertices of no triangle go. Numbers ascend as in the input.
-TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped) {
+/// Equal positions become one vertex; vertices of no triangle go. Numbers ascend as in the input; `names` are the first
+/// of those that became one vertex.
+TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped, std::vector<Index>& names) {
   std::vector<char> used(mesh.positions.size(), 0);
   for (const auto& t : mesh.triangles)
     for (Index v : t) {
@@ -45,6 +47,7 @@ TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped) {
     if (n == kNoIndex) {
       n = static_cast<Index>(result.positions.size());
       result.positions.push_back(mesh.positions[v]);
+      names.push_back(first[v]);
     }
     return n;
   };
@@ -90,14 +93,21 @@ struct Neighbor {
   bool flipped = false;  ///< runs the same way along the common edge
 };
 
-/// Neighbours across the edges of each triangle, in no order of edges.
-std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const HalfEdge> edges) {
+void require_two_triangles(const TriangleMesh& mesh, std::span<const HalfEdge> edges, std::span<const Index> names) {
+  CrowdedEdges crowded;
+  const auto name = [&](Index v) { return vertex_text(names[v], &mesh.positions[v]); };
+  for_each_edge(edges, [&](std::span<const HalfEdge> run) {
+    if (run.size() > 2) crowded.add(name(run[0].low), name(run[0].high), run.size());
+  });
+  if (!crowded.empty()) throw InputError("surface: it bounds no solid: " + crowded.text());
+}
+
+/// Neighbours across the edges of each triangle, in no order of edges. names: numbers of vertices for messages.
+std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const HalfEdge> edges,
+                                                std::span<const Index> names) {
+  require_two_triangles(mesh, edges, names);
   std::vector<std::vector<Neighbor>> neighbors(mesh.triangles.size());
   for_each_edge(edges, [&](std::span<const HalfEdge> run) {
-    if (run.size() > 2)
-      throw InputError("surface: the edge between vertices " + std::to_string(run[0].low) + " and " +
-                       std::to_string(run[0].high) + " (after welding) has " + std::to_string(run.size()) +
-                       " triangles; a solid's boundary has two");
     if (run.size() < 2) return;
     const bool flipped = run[0].forward == run[1].forward;
     neighbors[run[0].triangle].push_back({run[1].triangle, flipped});
@@ -108,8 +118,8 @@ std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::s
 
 /// Turns triangles to agree with their neighbours; the majority of a component stays as it is. Returns the component of
 /// each triangle; one without neighbours has none (-1).
-std::vector<int> orient(TriangleMesh& mesh, SolidBoundary& result) {
-  const auto neighbors = neighbors_of(mesh, sorted_half_edges(mesh));
+std::vector<int> orient(TriangleMesh& mesh, std::span<const Index> names, SolidBoundary& result) {
+  const auto neighbors = neighbors_of(mesh, sorted_half_edges(mesh), names);
   std::vector<int> component(mesh.triangles.size(), -1);
   std::vector<char> turned(mesh.triangles.size(), 0);
   std::vector<Index> queue;
@@ -307,8 +317,9 @@ std::string to_string(const BettiNumbers& numbers) {
 
 SolidBoundary solid_boundary(const TriangleMesh& surface) {
   SolidBoundary result;
-  TriangleMesh mesh = welded(surface, result.dropped_triangles);
-  std::vector<int> component = orient(mesh, result);
+  std::vector<Index> names;
+  TriangleMesh mesh = welded(surface, result.dropped_triangles, names);
+  std::vector<int> component = orient(mesh, names, result);
   drop_loners(mesh, component, result);
   if (mesh.triangles.empty()) throw InputError("surface: it has no triangles that share an edge");
   close_holes(mesh, component, result);

@@ -242,6 +242,11 @@ std::vector<double> read_vertex_attribute(const fs::path& path, const std::strin
   return parse_ply_attribute(path.string(), read_file(path), attribute);
 }
 
+bool is_surface_extension(const std::string& extension) {
+  return std::any_of(std::begin(kFormats), std::end(kFormats),
+                     [&](const Format& format) { return extension == format.extension; });
+}
+
 std::string surface_formats() {
   std::string text;
   for (const Format& format : kFormats)

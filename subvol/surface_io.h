@@ -53,6 +53,9 @@ PointCloud read_point_cloud(const std::filesystem::path& path, std::vector<std::
 /// finite.
 std::vector<double> read_vertex_attribute(const std::filesystem::path& path, const std::string& attribute);
 
+/// Whether `read_polygon_mesh` knows an extension, in small letters and with its point.
+bool is_surface_extension(const std::string& extension);
+
 /// Extensions the readers accept, as text for help and messages.
 std::string surface_formats();
 std::string point_cloud_formats();

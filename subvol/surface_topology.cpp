@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface_topology.h"
 
+#include "subvol/crowded_edges.h"
 #include "subvol/error.h"
 
 #include <string>
@@ -16,7 +17,8 @@ std::string name_of(Index v, std::span<const Index> names) {
 /// What a closed surface is here: the boundary of something.
 std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
 
-void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind) {
+void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind,
+                  std::span<const Vec3> positions) {
   const std::size_t num_corners = surface.corner_vertices.size();
   surface.vertex_corners.assign(num_vertices, kNoIndex);
   std::vector<Index> valence(num_vertices, 0);
@@ -39,6 +41,16 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
   surface.twins.assign(num_corners, kNoIndex);
   surface.corner_edges.assign(num_corners, kNoIndex);
   surface.edge_corners.reserve(num_corners / 2);
+  const auto joins = [&](Index g, Index v, Index w) {
+    const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
+    return (begin == v && end == w) || (begin == w && end == v);
+  };
+  CrowdedEdges crowded;
+  std::string first_fault;
+  const auto vertex = [&](Index v) {
+    return vertex_text(names.empty() ? v : names[static_cast<std::size_t>(v)],
+                       positions.empty() ? nullptr : &positions[static_cast<std::size_t>(v)]);
+  };
   for (std::size_t i = 0; i < num_corners; ++i) {
     const Index h = static_cast<Index>(i);
     const Index from = surface.corner_vertices[h], to = surface.corner_vertices[surface.next(h)];
@@ -50,11 +62,20 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
       if (begin == from && end == to) ++same;
     }
     const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
+    if (same + opposite > 2) {
+      bool is_first = true;  // of the corners at this edge
+      for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g])
+        is_first = is_first && (g >= h || !joins(g, from, to));
+      if (is_first) crowded.add(vertex(from), vertex(to), static_cast<std::size_t>(same + opposite));
+      continue;
+    }
     if (same != 1 || (opposite != 1 && !border)) {
       const std::string edge = prefix(kind) + "edge " + name_of(from, names) + "-" + name_of(to, names);
-      if (same > 1 && same + opposite == 2) throw InputError(edge + ": its two faces run the same way along it");
-      throw InputError(edge + " must lie between two " + prefix(kind) + "faces of opposite direction; it has " +
-                       std::to_string(same + opposite));
+      if (first_fault.empty())
+        first_fault = same > 1 ? edge + ": its two faces run the same way along it"
+                               : edge + " must lie between two " + prefix(kind) + "faces of opposite direction; it has " +
+                                     std::to_string(same + opposite);
+      continue;
     }
     surface.twins[h] = twin;
     if (border || h < twin) {
@@ -64,6 +85,8 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
       surface.corner_edges[h] = surface.corner_edges[twin];
     }
   }
+  if (!crowded.empty()) throw InputError((kind == SurfaceKind::closed ? "boundary: " : "surface: ") + crowded.text());
+  if (!first_fault.empty()) throw InputError(first_fault);
 }
 
 void check_fans(const SurfaceTopology& surface, std::span<const Index> names, SurfaceKind kind) {
@@ -90,7 +113,8 @@ float checked_sharpness(double sharpness, const std::string& what) {
 }  // namespace
 
 SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_offsets,
-                              std::vector<Index> face_vertices, std::span<const Index> names, SurfaceKind kind) {
+                              std::vector<Index> face_vertices, std::span<const Index> names, SurfaceKind kind,
+                              std::span<const Vec3> positions) {
   SurfaceTopology surface;
   surface.face_offsets = std::move(face_offsets);
   surface.corner_vertices = std::move(face_vertices);
@@ -98,7 +122,7 @@ SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_
   for (std::size_t f = 0; f < surface.num_faces(); ++f)
     for (Index h = surface.face_offsets[f]; h < surface.face_offsets[f + 1]; ++h)
       surface.corner_faces[h] = static_cast<Index>(f);
-  pair_corners(surface, num_vertices, names, kind);
+  pair_corners(surface, num_vertices, names, kind, positions);
   check_fans(surface, names, kind);
   surface.edge_sharpness.assign(surface.num_edges(), 0.0f);
   surface.vertex_sharpness.assign(num_vertices, 0.0f);

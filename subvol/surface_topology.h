@@ -56,10 +56,11 @@ enum class SurfaceKind {
 /// face_offsets, face_vertices  polygons on vertices 0 .. num_vertices - 1, each of them used.
 /// InputError: an edge that is not between exactly two faces with opposite directions (or beside one face, where the
 /// surface may be open), or a vertex whose faces form more than one fan. The message has the numbers `names[v]`, or v
-/// where `names` is empty.
+/// where `names` is empty; edges of more than two faces are all counted, and the first ten listed with the positions of
+/// their ends, where these are given.
 SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_offsets,
                               std::vector<Index> face_vertices, std::span<const Index> names = {},
-                              SurfaceKind kind = SurfaceKind::closed);
+                              SurfaceKind kind = SurfaceKind::closed, std::span<const Vec3> positions = {});
 
 /// The boundary of a volume mesh.
 struct BoundarySurface {

@@ -97,6 +97,18 @@ TEST_CASE("A soup with holes and flipped triangles becomes a solid's boundary", 
   fan.positions = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(0, -1, 0)};
   fan.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
   CHECK_THROWS_AS(solid_boundary(fan), InputError);
+  // Numbers are those of the input, though vertices are welded, and come in another order in the triangles.
+  fan.positions = {Vec3(9, 9, 9), Vec3(0, 0, 1), Vec3(0, -1, 0), Vec3(0, 0.5, 0), Vec3(1, 0, 0), Vec3(0, 0, 0), Vec3(1, 0, 0)};
+  fan.triangles = {{5, 4, 3}, {6, 5, 1}, {5, 4, 2}};
+  CHECK_THROWS_WITH(solid_boundary(fan), Catch::Contains("1 edge has more than two") && Catch::Contains("4 (1 0 0)") &&
+                                             Catch::Contains("5 (0 0 0)") && Catch::Contains("has 3"));
+  TriangleMesh fans;  // a dozen of them
+  for (Index i = 0; i < 12; ++i) {
+    for (const Vec3& p : fan.positions) fans.positions.push_back(p + Vec3(0, 0, 5 * i));
+    for (const auto& [a, b, c] : fan.triangles) fans.triangles.push_back({7 * i + a, 7 * i + b, 7 * i + c});
+  }
+  CHECK_THROWS_WITH(solid_boundary(fans), Catch::Contains("12 edges have more than two faces, the first 10:") &&
+                                              Catch::Contains("(1 0 45)") && !Catch::Contains("(1 0 50)"));
   CHECK_THROWS_AS(solid_boundary({{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)}, {{0, 1, 2}}}), InputError);
 }
 
