@@ -85,12 +85,21 @@ void check_mesh(const std::string& name, ParsedMesh& parsed) {
   warn_of(defects, MeshDefect::Kind::unused_vertex, " vertices belong to no cell", parsed.warnings);
 }
 
+/// InputError: all vertices of the cells are in one place.
+void require_extent(const std::string& name, const VolumeMesh& mesh) {
+  const Vec3& first = mesh.positions[mesh.cell_vertices.front()];
+  if (std::all_of(mesh.cell_vertices.begin(), mesh.cell_vertices.end(),
+                  [&](Index v) { return mesh.positions[v] == first; }))
+    throw InputError(name + ": all vertices of the cells are in one place");
+}
+
 }  // namespace
 
 VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
   const Format& format = format_of(path);
   ParsedMesh parsed = format.parse(path.string(), read_file(path), options.references);
   if (parsed.mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  require_extent(path.string(), parsed.mesh);
   if (options.check) check_mesh(path.string(), parsed);
   if (options.warnings)
     for (const std::string& warning : parsed.warnings) options.warnings->push_back(path.string() + ": " + warning);

@@ -31,7 +31,7 @@ struct ReadOptions {
 ///
 /// Throws InputError with file and line (binary VTK: the line is that of the last text) for anything else: unknown
 /// extension, keyword or cell type; pyramids and cells of higher order; indices out of range; numbers that are not
-/// finite; counts beyond what the file can hold; a file cut short; no cells; and, with `check`, a mesh that is not
+/// finite; counts beyond what the file can hold; a file cut short; no cells; all their vertices in one place; and, with `check`, a mesh that is not
 /// sound.
 /// Memory: a few times the size of the file, whatever counts it claims.
 VolumeMesh read_volume_mesh(const std::filesystem::path& path, const ReadOptions& options = {});
