@@ -11,6 +11,7 @@
 #include <compare>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -49,6 +50,22 @@ std::map<Volume, int> volume_numbers(const Blocks& blocks) {
   return numbers;
 }
 
+/// The physical group of each reference, > 0: programs lose cells without a group where others have one, or refuse the
+/// file. A positive reference is its own group, any other has the first number that is free.
+std::map<int, int> physical_groups(const Blocks& blocks) {
+  std::map<int, int> groups;
+  std::set<int> taken;
+  for (const auto& [key, cells] : blocks)
+    if (const int reference = key.first.reference; reference > 0) taken.insert(groups[reference] = reference);
+  int next = 1;
+  for (const auto& [key, cells] : blocks) {
+    if (const int reference = key.first.reference; reference > 0 || groups.contains(reference)) continue;
+    while (taken.contains(next)) ++next;
+    groups[key.first.reference] = next++;
+  }
+  return groups;
+}
+
 void append_line(std::string& text, std::initializer_list<std::size_t> numbers) {
   const char* separator = "";
   for (const std::size_t number : numbers) {
@@ -59,7 +76,15 @@ void append_line(std::string& text, std::initializer_list<std::size_t> numbers) 
   text += '\n';
 }
 
-void append_entities(std::string& text, const CellView& mesh, const std::map<Volume, int>& volumes) {
+void append_physical_names(std::string& text, const std::map<int, int>& groups) {
+  text += "$PhysicalNames\n" + std::to_string(groups.size()) + "\n";
+  for (const auto& [reference, group] : groups)
+    text += "3 " + std::to_string(group) + " \"reference " + std::to_string(reference) + "\"\n";
+  text += "$EndPhysicalNames\n";
+}
+
+void append_entities(std::string& text, const CellView& mesh, const std::map<Volume, int>& volumes,
+                     const std::map<int, int>& groups) {
   Vec3 low = mesh.positions[0], high = low;
   for (const Vec3& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
   text += "$Entities\n";
@@ -70,8 +95,7 @@ void append_entities(std::string& text, const CellView& mesh, const std::map<Vol
     append_vector(text, low, " ");
     text += ' ';
     append_vector(text, high, " ");
-    text += volume.reference > 0 ? " 1 " + std::to_string(volume.reference) : " 0";
-    text += " 0\n";
+    text += " 1 " + std::to_string(groups.at(volume.reference)) + " 0\n";
   }
   text += "$EndEntities\n";
 }
@@ -193,7 +217,9 @@ std::string msh_document(const CellView& mesh, std::span<const double> cell_mini
   const Blocks blocks = blocks_of(mesh);
   const std::map<Volume, int> volumes = volume_numbers(blocks);
   std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
-  append_entities(text, mesh, volumes);
+  const std::map<int, int> groups = physical_groups(blocks);
+  append_physical_names(text, groups);
+  append_entities(text, mesh, volumes, groups);
   append_nodes(text, mesh);
   append_elements(text, mesh, blocks, volumes);
   if (!cell_minima.empty()) append_element_data(text, blocks, cell_minima);

@@ -81,9 +81,10 @@ TEST_CASE("a .msh holds the cells by volume and kind, with physical groups and e
   const auto skip = [&](int n) {
     for (std::string word; n > 0; --n) in >> word;
   };
-  line("$MeshFormat 4.1 0 8 $EndMeshFormat $Entities 0 0 0 3 1");
+  line("$MeshFormat 4.1 0 8 $EndMeshFormat $PhysicalNames 3 3 1 \"reference 0\" 3 2 \"reference 2\" 3 5 \"reference 5\"");
+  line("$EndPhysicalNames $Entities 0 0 0 3 1");
   skip(6);
-  line("0 0 2");
+  line("1 1 0 2");
   skip(6);
   line("1 2 0 3");
   skip(6);
@@ -102,6 +103,35 @@ TEST_CASE("a .msh holds the cells by volume and kind, with physical groups and e
   for (const Index v : mesh.cell(0)) expect(std::to_string(v + 1));
   line("3 3 4 1 4 6 10 7 13 $EndElements $ElementData 1 \"scaled_jacobian\" 1 0 3 0 1 4");
   line("1 0.25 2 0.30000000000000004 3 0.5 4 -0.125 $EndElementData");
+}
+
+TEST_CASE("every cell of a .msh is in a physical group, whatever the references are") {
+  VolumeMesh mesh = marked_cells();
+  const auto entities = [&](std::vector<int> references) {
+    mesh.references = std::move(references);
+    const std::string text = msh_text(mesh);
+    const std::size_t begin = text.find("$Entities\n") + 10;
+    std::istringstream lines(text.substr(begin, text.find("$EndEntities") - begin));
+    std::vector<std::vector<int>> found;  // number of the volume, and its groups
+    std::string line;
+    for (std::getline(lines, line); std::getline(lines, line);) {
+      std::istringstream words(line);
+      int number = 0, num_groups = 0;
+      double coordinate;
+      words >> number;
+      for (int i = 0; i < 6; ++i) words >> coordinate;
+      words >> num_groups;
+      found.push_back({number});
+      for (int group; num_groups > 0 && words >> group; --num_groups) found.back().push_back(group);
+    }
+    return found;
+  };
+  using Volumes = std::vector<std::vector<int>>;
+  CHECK(entities({}) == Volumes{{1, 1}});
+  CHECK(entities({0, 0, 0, 0}) == Volumes{{1, 1}});
+  CHECK(entities({1, 0, 1, 0}) == Volumes{{1, 2}, {2, 1}});
+  CHECK(entities({-3, 0, 1, 3}) == Volumes{{1, 2}, {2, 4}, {3, 1}, {4, 3}});
+  CHECK(entities({-1, -1, 2147483647, 7}) == Volumes{{1, 1}, {2, 7}, {3, 2147483647}});
 }
 
 TEST_CASE("meshes that cannot be written as volumes are refused") {
