@@ -66,6 +66,22 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
     CHECK(glb.find(name) != std::string::npos);
 }
 
+TEST_CASE("No verb takes a mesh that is a point", "[cli]") {
+  const Workplace place;
+  place.file("point.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n1 2 3 0\n1 2 3 0\n1 2 3 0\n1 2 3 0\n"
+                           "Tetrahedra\n1\n1 2 3 4 0\nEnd\n");
+  for (const std::string verb :
+       {"check point.mesh", "convert point.mesh -o a.vtk", "subdivide point.mesh -o a.mesh", "optimize point.mesh -o a.mesh",
+        "fit target.off --template point.mesh -o a.mesh", "fit point.mesh -o a.mesh", "template pillow point.mesh -o a.mesh",
+        "shell point.mesh --thickness 1 -o a.mesh", "check template.mesh --target point.mesh"}) {
+    const Run run = place.run(verb);
+    CAPTURE(verb, run.err);
+    CHECK(run.status == 3);
+    CHECK(run.err.find("in one place") != std::string::npos);
+    CHECK(!place.has("a.mesh"));
+  }
+}
+
 TEST_CASE("A shell of curved cells goes to its files with its thickness, and is what the files say", "[cli]") {
   const Workplace place;
   const Run run = place.run(
