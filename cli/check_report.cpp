@@ -93,9 +93,17 @@ Json orders_json(const OrderSummary& orders) {
           {"full_order_nodes", orders.num_full_order_nodes}};
 }
 
+Json unused_vertices_json(const MeshCheck& check) {
+  Json vertices = Json::array();
+  for (const MeshDefect& defect : check.defects)
+    if (defect.kind == MeshDefect::Kind::unused_vertex) vertices.push_back(defect.entity);
+  return vertices;
+}
+
 Json defects_json(const MeshCheck& check) {
   Json defects = Json::array();
   for (const MeshDefect& defect : check.defects) {
+    if (defect.kind == MeshDefect::Kind::unused_vertex) continue;  // it stands against nothing
     defects.push_back({{"kind", to_string(defect.kind)}, {"entity", defect.entity}, {"message", defect.message}});
   }
   return defects;
@@ -119,6 +127,7 @@ Json check_json(const MeshCheck& check) {
   }
   if (check.has_topology) json["topology"] = topology_json(check);
   json["defects"] = defects_json(check);
+  if (const Json unused = unused_vertices_json(check); !unused.empty()) json["unused_vertices"] = unused;
   return json;
 }
 

@@ -185,12 +185,16 @@ void append(std::string& text, const char* format, Values... values) {
   text += line;
 }
 
-void append_defects(std::string& text, const std::vector<MeshDefect>& defects) {
+/// Unused vertices stand against nothing, and are told beside the defects.
+void append_defects(std::string& text, std::vector<MeshDefect> defects) {
   constexpr std::size_t kMaxLines = 20;
+  const std::size_t num_unused =
+      std::erase_if(defects, [](const MeshDefect& defect) { return defect.kind == Kind::unused_vertex; });
   append(text, "defects             %zu\n", defects.size());
   for (std::size_t i = 0; i < std::min(defects.size(), kMaxLines); ++i)
     append(text, "  %s: %s\n", to_string(defects[i].kind), defects[i].message.c_str());
   if (defects.size() > kMaxLines) append(text, "  ... and %zu more\n", defects.size() - kMaxLines);
+  if (num_unused > 0) append(text, "unused vertices     %zu, which does not matter\n", num_unused);
 }
 
 void append_orders(std::string& text, const OrderSummary& orders) {

@@ -66,6 +66,22 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
     CHECK(glb.find(name) != std::string::npos);
 }
 
+TEST_CASE("check calls a mesh valid or counts its defects, never both", "[cli]") {
+  const Workplace place;
+  subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
+  mesh.positions.insert(mesh.positions.end(), 24, {5, 5, 5});
+  subvol::write_volume_mesh(place / "spare.mesh", mesh);
+  const Run run = place.run("check spare.mesh");
+  CAPTURE(run.out);
+  CHECK(run.status == 0);
+  CHECK(run.out.find("defects             0\n") != std::string::npos);
+  CHECK(run.out.find("unused vertices     24") != std::string::npos);
+  const auto found = found_in(place, "spare.mesh");
+  CHECK(found.at("valid") == true);
+  CHECK(found.at("defects").empty());
+  CHECK(found.at("unused_vertices").size() == 24);
+}
+
 TEST_CASE("No verb takes a mesh that is a point", "[cli]") {
   const Workplace place;
   place.file("point.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n1 2 3 0\n1 2 3 0\n1 2 3 0\n1 2 3 0\n"
