@@ -73,7 +73,7 @@ void ShellRun::load() {
   surface_ = load_tagged_polygons(arguments_.surface, warnings_);
   const TriangleMesh triangles = triangulate(surface_.polygons);
   diagonal_ = bounding_box_diagonal(triangles);
-  if (faces_point_inward(triangles)) warnings_.push_back(arguments_.surface + ": " + kFacesPointInward);
+  if (const auto warning = inward_warning(triangles)) warnings_.push_back(arguments_.surface + ": " + *warning);
   tell_warnings();
 }
 

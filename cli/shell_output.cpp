@@ -5,15 +5,18 @@
 #include "export/cell_text.h"
 #include "export/read_back.h"
 #include "export/volume_writer.h"
-#include "fit/target_surface.h"
+#include "fit/soup_topology.h"
 #include "subvol/boundary.h"
 #include "subvol/cell_topology.h"
+#include "subvol/winding_number.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <functional>
+#include <numeric>
 #include <span>
 
 namespace subvol::cli {
@@ -111,14 +114,36 @@ std::vector<VertexField> thickness_fields(const ShellResult& shell) {
 
 }  // namespace
 
-bool faces_point_inward(const TriangleMesh& surface) {
-  const TargetSurface target(surface);
-  if (target.volume_source() != VolumeSource::signed_sum) return false;
-  double volume = 0;
-  for (const auto& [a, b, c] : surface.triangles)
-    volume += (surface.positions[a] - target.centre())
-                  .dot((surface.positions[b] - target.centre()).cross(surface.positions[c] - target.centre()));
-  return volume < 0;
+std::optional<std::string> inward_warning(const TriangleMesh& surface) {
+  // In front of a face the winding number is 0 outside a surface that faces outward, and -1 inside one that faces
+  // inward; of a surface that encloses nothing it is between. Small holes hardly change it.
+  constexpr double kInside = -0.9;
+  constexpr std::size_t kMostFaces = 2000;
+  constexpr double kOffset = 1e-3;  // of a face's size
+  const std::size_t n = surface.triangles.size(), step = (n + kMostFaces - 1) / kMostFaces;
+  std::vector<Vec3> points;
+  std::vector<double> areas;
+  for (std::size_t t = 0; t < n; t += step) {
+    const auto& [a, b, c] = surface.triangles[t];
+    const Vec3 &x = surface.positions[a], &y = surface.positions[b], &z = surface.positions[c];
+    const Vec3 normal = (y - x).cross(z - x);
+    if (!(normal.norm() > 0)) continue;
+    points.push_back((x + y + z) / 3 + kOffset * normal / std::sqrt(normal.norm()));
+    areas.push_back(normal.norm());
+  }
+  if (points.empty()) return std::nullopt;
+  const std::vector<double> numbers = WindingNumber(surface).at(points);
+  const double area = std::accumulate(areas.begin(), areas.end(), 0.0);
+  if (std::inner_product(areas.begin(), areas.end(), numbers.begin(), 0.0) > kInside * area) return std::nullopt;
+  const SoupTopology edges = soup_topology(surface.positions, surface.triangles);
+  const bool is_closed = edges.open_edges == 0 && edges.crowded_edges == 0;
+  return "the faces of this " +
+         (is_closed ? std::string("closed surface")
+                    : "surface, which has " + std::to_string(edges.open_edges) + " open edges" +
+                          (edges.crowded_edges > 0
+                               ? " and " + std::to_string(edges.crowded_edges) + " of three faces or more,"
+                               : ",")) +
+         " point inward, so outward is its inside";
 }
 
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {

@@ -5,14 +5,13 @@
 #include "cli/writing.h"
 #include "shell/curved_shell.h"
 
+#include <optional>
 #include <string>
 
 namespace subvol::cli {
 
-/// Whether a surface is closed and encloses a negative volume; and what is to be said then.
-bool faces_point_inward(const TriangleMesh& surface);
-inline constexpr const char* kFacesPointInward =
-    "the faces of this closed surface point inward, so outward is its inside";
+/// What is to be said of a surface that encloses something, up to small holes, and whose faces point into it.
+std::optional<std::string> inward_warning(const TriangleMesh& surface);
 
 /// Writes a shell: its cells with thickness at the vertices where the format has fields, its sheets as named nodes of a
 /// scene, or its boundary as polygons.

@@ -28,7 +28,7 @@ class Growing {
     surface_ = surface_from(surface, "surface");
     const TriangleMesh triangles = triangulate(surface_.polygons);
     diagonal_ = bounding_box_diagonal(triangles);
-    points_inward_ = cli::faces_point_inward(triangles);
+    inward_warning_ = cli::inward_warning(triangles);
     read_thickness(thickness);
     options_.tags = surface_.tags;
     if (crease_angle_)
@@ -42,7 +42,7 @@ class Growing {
     result->shell = work_.run("grow", [&] { return make_shell(surface_.polygons, options_); });
     if (curved_options_.order != 1) curve(*result);
     std::vector<std::string> warnings = result->shell.report.warnings;
-    if (points_inward_) warnings.insert(warnings.begin(), cli::kFacesPointInward);
+    if (inward_warning_) warnings.insert(warnings.begin(), *inward_warning_);
     result->report = make_report("shell", report_of(*result), keywords_, work_, warnings);
     return result;
   }
@@ -127,7 +127,7 @@ class Growing {
   std::optional<double> crease_angle_;
   SurfaceMesh surface_;
   double diagonal_ = 0;
-  bool points_inward_ = false;
+  std::optional<std::string> inward_warning_;
 };
 
 /// The straight cells, which keep the result they are part of.

@@ -6,6 +6,7 @@
 #include "subvol/mesh_topology.h"
 #include "tests/glb_reader.h"
 #include "tests/sample_meshes.h"
+#include "tests/surface_fixtures.h"
 #include "tests/workplace.h"
 
 #include <catch2/catch.hpp>
@@ -64,6 +65,35 @@ TEST_CASE("A shell goes from a surface to cells, named sheets and a report that 
   const std::string glb = content_of(place / "shell.glb");
   for (const char* name : {"\"inner\"", "\"base\"", "\"outer\"", "\"wireframe\"", "_THICKNESS"})
     CHECK(glb.find(name) != std::string::npos);
+}
+
+TEST_CASE("A surface that faces inward is told, with holes or without, and called closed only if it is", "[cli]") {
+  const Workplace place;
+  subvol::TriangleMesh ball = subvol::test::cube_surface(8, true);
+  const std::string thin = " --thickness 1% --straight --force -o shell.mesh";
+  const auto write = [&](std::size_t num_missing, bool inward) {
+    std::string text = "OFF\n" + std::to_string(ball.positions.size()) + " " +
+                       std::to_string(ball.triangles.size() - num_missing) + " 0\n";
+    for (const subvol::Vec3& p : ball.positions)
+      text += std::to_string(p.x()) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
+    for (std::size_t t = num_missing; t < ball.triangles.size(); ++t) {
+      const auto& [a, b, c] = ball.triangles[t];
+      text += "3 " + std::to_string(a) + " " + std::to_string(inward ? c : b) + " " + std::to_string(inward ? b : c) + "\n";
+    }
+    place.file("ball.off", text);
+  };
+  for (const std::size_t num_missing : {0, 1, 20}) {
+    write(num_missing, true);
+    const Run run = place.run("shell ball.off" + thin);
+    CAPTURE(num_missing, run.err);
+    CHECK(run.err.find("point inward") != std::string::npos);
+    CHECK((run.err.find("this closed surface") != std::string::npos) == (num_missing == 0));
+    CHECK((run.err.find("3 open edges") != std::string::npos) == (num_missing == 1));
+    write(num_missing, false);
+    CHECK(place.run("shell ball.off" + thin).err.find("inward") == std::string::npos);
+  }
+  write(ball.triangles.size() / 2, true);  // half a ball encloses nothing
+  CHECK(place.run("shell ball.off" + thin).err.find("inward") == std::string::npos);
 }
 
 TEST_CASE("check calls a mesh valid or counts its defects, never both", "[cli]") {
