@@ -93,6 +93,60 @@ void require_extent(const std::string& name, const VolumeMesh& mesh) {
     throw InputError(name + ": all vertices of the cells are in one place");
 }
 
+/// Whether a cell's determinant is negative at every corner.
+bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
+  const CellTopology& topology = cell_topology(mesh.kinds[c]);
+  const auto cell = mesh.cell(c);
+  for (int i = 0; i < topology.num_vertices; ++i) {
+    const auto& n = topology.corner_neighbors[i];
+    const Vec3& x = mesh.positions[cell[i]];
+    const Vec3 e0 = mesh.positions[cell[n[0]]] - x, e1 = mesh.positions[cell[n[1]]] - x,
+               e2 = mesh.positions[cell[n[2]]] - x;
+    if (!(e0.cross(e1).dot(e2) < 0)) return false;
+  }
+  return true;
+}
+
+/// The same cell seen from the other side.
+void turn_over(VolumeMesh& mesh, std::size_t c) {
+  const auto corner = [&](std::size_t i) -> Index& { return mesh.cell_vertices[mesh.cell_offsets[c] + i]; };
+  if (mesh.kinds[c] == CellKind::hex) {
+    std::swap(corner(1), corner(3));
+    std::swap(corner(5), corner(7));
+    return;
+  }
+  std::swap(corner(1), corner(2));
+  if (mesh.kinds[c] == CellKind::prism) std::swap(corner(4), corner(5));
+}
+
+/// Cells that are left-handed at every corner are no tangle but another way to number corners, if all cells are, or all
+/// prisms, which programs number in two ways: these are numbered anew, unless others would then see a common face from
+/// the same side. Without `mend` this is only said.
+void turn_over_mirrored(ParsedMesh& parsed, bool mend) {
+  VolumeMesh& mesh = parsed.mesh;
+  const auto all_mirrored = [&](bool only_prisms) {
+    bool found = false;
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+      if (only_prisms && mesh.kinds[c] != CellKind::prism) continue;
+      if (!is_left_handed(mesh, c)) return false;
+      found = true;
+    }
+    return found;
+  };
+  const bool all = all_mirrored(false);
+  if (!all && !all_mirrored(true)) return;
+  VolumeMesh turned = mesh;
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (all || mesh.kinds[c] == CellKind::prism) turn_over(turned, c), ++count;
+  const auto defects = validate(turned);
+  if (!all && std::any_of(defects.begin(), defects.end(), [](const MeshDefect& d) { return !is_warning(d); })) return;
+  if (mend) mesh = std::move(turned);
+  parsed.warnings.push_back((all ? "all " : "all prisms, ") + std::to_string(count) +
+                            " cells are left-handed at every corner, as of a mirrored mesh or of other numbering: "
+                            "their corners " + (mend ? "are" : "are not") + " numbered anew");
+}
+
 }  // namespace
 
 VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
@@ -100,6 +154,7 @@ VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
   ParsedMesh parsed = format.parse(path.string(), read_file(path), options.references);
   if (parsed.mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
   require_extent(path.string(), parsed.mesh);
+  turn_over_mirrored(parsed, options.check);
   if (options.check) check_mesh(path.string(), parsed);
   if (options.warnings)
     for (const std::string& warning : parsed.warnings) options.warnings->push_back(path.string() + ": " + warning);

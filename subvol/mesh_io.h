@@ -26,13 +26,14 @@ struct ReadOptions {
 ///   .mesh  Medit ASCII, versions 1 to 4, dimension 3; tags from Edges + Ridges and Corners
 ///   .vtk   legacy VTK 2.0 to 5.1, ASCII or binary, UNSTRUCTURED_GRID; a VTK wedge is renumbered to our prism
 ///
-/// Vertices and cells keep the file's order (Medit: section by section). Nothing is flipped or repaired; only tags off
-/// the boundary are dropped, with a warning. Cells of lower dimension are skipped.
+/// Vertices and cells keep the file's order (Medit: section by section). Nothing is flipped or repaired, but with a
+/// warning: tags off the boundary are dropped; and with `check` cells are numbered anew where all of them, or all prisms,
+/// are left-handed at every corner. Cells of lower dimension are skipped.
 ///
 /// Throws InputError with file and line (binary VTK: the line is that of the last text) for anything else: unknown
 /// extension, keyword or cell type; pyramids and cells of higher order; indices out of range; numbers that are not
-/// finite; counts beyond what the file can hold; a file cut short; no cells; all their vertices in one place; and, with `check`, a mesh that is not
-/// sound.
+/// finite; counts beyond what the file can hold; a file cut short; no cells; all their vertices in one place; and, with
+/// `check`, a mesh that is not sound.
 /// Memory: a few times the size of the file, whatever counts it claims.
 VolumeMesh read_volume_mesh(const std::filesystem::path& path, const ReadOptions& options = {});
 

@@ -170,12 +170,45 @@ TEST_CASE("an unsound mesh is refused unless the check is off") {
   CHECK(read_volume_mesh(folder.file("in.mesh", twice), {.check = false}).num_cells() == 2);
 }
 
-TEST_CASE("left-handed cells are kept as they are, with a warning") {
+TEST_CASE("left-handed cells beside others are kept as they are, with a warning") {
   std::vector<std::string> warnings;
-  const VolumeMesh mesh = read_text(cube_file("Hexahedra\n1\n4 3 2 1 8 7 6 5 0\nEnd\n"), &warnings);
-  CHECK(mesh.cell_vertices[0] == 3);
+  VolumeMesh cubes = lattice(1, 1, 2);
+  for (const std::size_t v : {8, 9, 10, 11}) cubes.positions[v].z() = 0.5;  // the upper cell stands on its head
+  const TemporaryFolder folder;
+  write_volume_mesh(folder / "in.mesh", cubes);
+  const VolumeMesh mesh = read_volume_mesh(folder / "in.mesh", {.warnings = &warnings});
+  CHECK(mesh.cell_vertices == cubes.cell_vertices);
   REQUIRE(warnings.size() == 1);
-  CHECK_THAT(warnings[0], Contains("in.mesh") && Contains("left-handed"));
+  CHECK_THAT(warnings[0], Contains("in.mesh") && Contains("1 of 2 cells are flat or left-handed"));
+}
+
+TEST_CASE("a mirrored mesh is numbered anew, with a warning") {
+  const TemporaryFolder folder;
+  for (const VolumeMesh& mesh : {mixed_cells(), lattice(2, 1, 1)}) {
+    VolumeMesh mirrored = mesh;
+    for (Vec3& x : mirrored.positions) x.x() = -x.x();
+    write_volume_mesh(folder / "in.mesh", mirrored);
+    std::vector<std::string> warnings;
+    const VolumeMesh found = read_volume_mesh(folder / "in.mesh", {.warnings = &warnings});
+    REQUIRE(warnings.size() == 1);
+    CHECK_THAT(warnings[0], Contains("all " + std::to_string(mesh.num_cells()) + " cells are left-handed"));
+    CHECK(validate(found).empty());
+    warnings.clear();
+    const VolumeMesh kept = read_volume_mesh(folder / "in.mesh", {.check = false, .warnings = &warnings});
+    REQUIRE(warnings.size() == 1);
+    CHECK_THAT(warnings[0], Contains("are not numbered anew"));
+    CHECK(!validate(kept).empty());
+  }
+}
+
+TEST_CASE("a mesh without extent is refused, checked or not") {
+  const TemporaryFolder folder;
+  for (const bool check : {true, false})
+    CHECK_THROWS_WITH(
+        read_volume_mesh(folder.file("in.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n5\n1 2 3 0\n1 2 3 0\n"
+                                                "1 2 3 0\n1 2 3 0\n0 0 0 0\nTetrahedra\n1\n1 2 3 4 0\nEnd\n"),
+                         {.check = check}),
+        Contains("in one place"));
 }
 
 TEST_CASE("unused vertices stay in the mesh, with a warning") {

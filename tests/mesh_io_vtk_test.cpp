@@ -117,6 +117,19 @@ TEST_CASE("every flavour of legacy VTK gives the same mesh, cells right-handed a
   for (std::size_t i = 0; i < kPoints.size(); ++i) CHECK(mesh.positions[i / 3][static_cast<int>(i % 3)] == kPoints[i]);
 }
 
+TEST_CASE("wedges numbered in the other order are numbered anew, beside hexes and alone") {
+  std::vector<std::vector<std::int32_t>> cells = kCells;
+  std::swap(cells[1][1], cells[1][2]);
+  std::swap(cells[1][4], cells[1][5]);
+  std::vector<std::string> warnings;
+  const VolumeMesh mesh = read_bytes(vtk_file({}, kPoints, cells, kTypes), &warnings);
+  REQUIRE(warnings.size() == 2);
+  CHECK_THAT(warnings[0] + warnings[1], Contains("all prisms, 1 cells are left-handed"));
+  CHECK(validate(mesh).empty());
+  CHECK(mesh.cell_vertices == read_bytes(vtk_file({}, kPoints, kCells, kTypes)).cell_vertices);
+  CHECK(validate(read_bytes(vtk_file({}, kPoints, {cells[1]}, {13}))).size() == 5);  // the points of no cell
+}
+
 TEST_CASE("a voxel becomes a hex of positive volume") {
   const VolumeMesh mesh =
       read_bytes(vtk_file({}, {kPoints.begin(), kPoints.begin() + 24}, {{0, 1, 3, 2, 4, 5, 7, 6}}, {11}));
