@@ -2,12 +2,14 @@
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/loading.h"
+#include "cli/losses.h"
 #include "cli/outputs.h"
 #include "cli/writing.h"
 #include "cli/written_result.h"
 #include "subvol/mesh_io.h"
 #include "subvol/surface_io.h"
 
+#include <algorithm>
 #include <iostream>
 #include <memory>
 
@@ -24,6 +26,7 @@ struct ConvertArguments {
 void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outputs,
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
   const VolumeMesh mesh = load_volume(arguments.input, warnings, true, arguments.run.references);
+  warn_of_losses(marks_of(mesh), marks_of(mesh), outputs, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) {
     if (arguments.limit && output.extension == ".obj") {
       write_polygons(output, tessellated_limit(mesh, writing), writing);
@@ -39,9 +42,15 @@ void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outp
 /// returns  an ExitStatus: that of the polynomial cells that were written.
 int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs, const WritingOptions& writing,
                        std::vector<std::string>& warnings) {
+void convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs,
+                        const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   for (const Output& output : outputs) require_for_curved_cells(output);
   const HighOrderFile file = read_high_order(arguments.input);
+  const auto is_set = [](int reference) { return reference != 0; };
+  const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
+  const Marks marks{.references = static_cast<std::size_t>(num_set)};
+  warn_of_losses(marks, marks, outputs, warnings, true);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
   const std::vector<PolynomialCells> polynomials =
       check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, [&](const HighOrderMesh& mesh) {
@@ -79,6 +88,7 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   require_choice_of_references(arguments.input, arguments.run.references);
   if (is_high_order_file(arguments.input)) {
     status = convert_high_order(arguments, outputs, writing, warnings);
+    convert_high_order(arguments, outputs, writing, warnings);
   } else if (is_volume_file(arguments.input)) {
     convert_volume(arguments, outputs, writing, warnings);
   } else {

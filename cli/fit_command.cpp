@@ -6,6 +6,7 @@
 #include "cli/exit_status.h"
 #include "cli/high_order_fit_run.h"
 #include "cli/loading.h"
+#include "cli/losses.h"
 #include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/untangling.h"
@@ -102,6 +103,7 @@ void FitRun::load_template() {
     untangle_template(arguments_.template_mesh.path, arguments_.run,
                       {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
   choice_ = std::move(loaded.choice);
+  if (!choice_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
   tell_warnings();
   if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
 }

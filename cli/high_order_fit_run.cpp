@@ -6,6 +6,7 @@
 #include "cli/exit_status.h"
 #include "cli/interrupt.h"
 #include "cli/loading.h"
+#include "cli/losses.h"
 #include "cli/outputs.h"
 #include "cli/progress.h"
 #include "cli/report.h"
@@ -129,6 +130,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
                     arguments.run, warnings);
   const double template_seconds = seconds_since(template_start);
   VolumeMesh& template_mesh = loaded.mesh;
+  if (!loaded.choice)
+    warn_of_losses(marks_of(template_mesh), marks_of(template_mesh), outputs, warnings, true);
   tell_warnings();
   if (loaded.choice && !arguments.run.quiet) std::cerr << to_text(*loaded.choice);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet

@@ -5,6 +5,7 @@
 #include "cli/exit_status.h"
 #include "cli/high_order_fit_run.h"
 #include "cli/loading.h"
+#include "cli/losses.h"
 #include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/writing.h"
@@ -60,6 +61,7 @@ class OptimizeRun : public LongRun {
 
 void OptimizeRun::load() {
   mesh_ = load_volume(arguments_.mesh, warnings_, true, arguments_.run.references);
+  warn_of_losses(marks_of(mesh_), marks_of(mesh_), outputs_, warnings_);
   if (!arguments_.target.empty()) target_ = load_surface(arguments_.target, warnings_);
   surface_ = target_ ? *target_ : fan_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   before_ = measure_quality(mesh_);

@@ -2,6 +2,7 @@
 #include "cli/commands.h"
 #include "cli/exit_status.h"
 #include "cli/loading.h"
+#include "cli/losses.h"
 #include "cli/outputs.h"
 #include "cli/writing.h"
 #include "cli/written_result.h"
@@ -31,6 +32,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings, true, arguments.run.references);
+  const Marks read = marks_of(cage);
   const Json input{{"mesh", describe(arguments.mesh, cage)}};
   if (arguments.crease_angle_degrees) {
     cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
@@ -39,6 +41,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
       arguments.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
   const VolumeMesh fine = subdivide_repeatedly(cage, arguments.levels, rule);
 
+  warn_of_losses(read, marks_of(fine), outputs, warnings);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.mesh;
   writing.options = options_of_result(verb);

@@ -4,6 +4,7 @@
 
 #include "cli/exit_status.h"
 #include "cli/loading.h"
+#include "cli/losses.h"
 #include "cli/outputs.h"
 #include "cli/template_command.h"
 #include "fit/surface_distance.h"
@@ -37,6 +38,7 @@ struct EditArguments : TemplateRun {
   double size = 0, margin = 5, share = 0.5, thickness = 0, growth = 1, tolerance = 1e-6;
   int layers = 1, parts = 2;
   bool invert = false, thin = false;
+  Marks read;
   std::string what;
 };
 
@@ -44,7 +46,12 @@ Vec3 low_corner(const std::vector<double>& box) { return {box[0], box[1], box[2]
 Vec3 high_corner(const std::vector<double>& box) { return {box[3], box[4], box[5]}; }
 
 VolumeMesh load_edited(EditArguments& arguments, const std::string& path) {
-  return load_volume(path, arguments.warnings, true, arguments.run.references);
+  VolumeMesh mesh = load_volume(path, arguments.warnings, true, arguments.run.references);
+  const Marks marks = marks_of(mesh);
+  arguments.read.references += marks.references;
+  arguments.read.creases += marks.creases;
+  arguments.read.corners += marks.corners;
+  return mesh;
 }
 
 VolumeMesh make_grid(EditArguments& arguments) {
@@ -135,6 +142,7 @@ int run_edit(EditArguments arguments, const CLI::App& verb, Maker make) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
   arguments.writing.source = arguments.mesh;
   const VolumeMesh mesh = make(arguments);
+  warn_of_losses(arguments.read, marks_of(mesh), outputs, arguments.warnings);
   return write_template(arguments, verb, outputs, mesh, {{"input", arguments.mesh}});
 }
 

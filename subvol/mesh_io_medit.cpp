@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/error.h"
 #include "subvol/features.h"
+#include "subvol/left_out.h"
 #include "subvol/mesh_formats.h"
 #include "subvol/text_scanner.h"
 
@@ -24,10 +25,11 @@ constexpr CellSection kCellSections[] = {
 struct SkippedSection {
   const char* keyword;
   std::size_t numbers_per_entry;
+  bool has_reference = false;  ///< its last number, of which one that is not 0 is missed
 };
 constexpr std::size_t kUntilKeyword = 0;  // files disagree on the length of an entry
 constexpr SkippedSection kSkippedSections[] = {
-    {"Triangles", 4}, {"Quadrilaterals", 5}, {"RequiredVertices", 1}, {"RequiredEdges", 1}, {"RequiredTriangles", 1},
+    {"Triangles", 4, true}, {"Quadrilaterals", 5, true}, {"RequiredVertices", 1}, {"RequiredEdges", 1}, {"RequiredTriangles", 1},
     {"RequiredQuadrilaterals", 1}, {"Normals", 3}, {"NormalAtVertices", 2}, {"NormalAtTriangleVertices", 3},
     {"NormalAtQuadrilateralVertices", 4}, {"Tangents", 3}, {"TangentAtVertices", 2}, {"TangentAtEdges", 3},
     {"TangentAtEdgeVertices", 3}, {"SubDomainFromMesh", kUntilKeyword}, {"SubDomainFromGeom", kUntilKeyword}};
@@ -66,6 +68,7 @@ class MeditParser {
     if (!has_vertices_) scan_.fail("the file has no Vertices");
     check_cells();
     resolve_tags();
+    left_out_.tell(parsed_.warnings);
     return std::move(parsed_);
   }
 
@@ -92,7 +95,7 @@ class MeditParser {
       return read_cells(*s);
     if (const auto* s = std::find_if(std::begin(kSkippedSections), std::end(kSkippedSections), named);
         s != std::end(kSkippedSections))
-      return skip_section(s->numbers_per_entry);
+      return skip_section(*s);
     if (const auto* s = std::find_if(std::begin(kSkippedValues), std::end(kSkippedValues), named);
         s != std::end(kSkippedValues))
       return skip_numbers(s->numbers_per_entry);
@@ -110,9 +113,20 @@ class MeditParser {
       scan_.fail(std::to_string(n) + " pyramids: " + kNoPyramids);
   }
 
-  void skip_section(std::size_t numbers_per_entry) {
-    const std::size_t n = scan_.count("the number of entries", numbers_per_entry);
-    if (numbers_per_entry != kUntilKeyword) return skip_numbers(n * numbers_per_entry);
+  void skip_section(const SkippedSection& section) {
+    const std::string keyword = section.keyword;
+    const std::size_t n = scan_.count("the number of entries", section.numbers_per_entry);
+    if (section.has_reference) {
+      std::size_t num_marked = 0;
+      for (std::size_t i = 0; i < n; ++i) {
+        skip_numbers(section.numbers_per_entry - 1);
+        num_marked += scan_.number("a number") != 0;
+      }
+      left_out_.add("references of " + keyword, num_marked);
+      return;
+    }
+    if (keyword.starts_with("Required")) left_out_.add(keyword, n);
+    if (section.numbers_per_entry != kUntilKeyword) return skip_numbers(n * section.numbers_per_entry);
     for (auto word = scan_.peek(); word && parse_number(*word); word = scan_.peek()) scan_.next();
   }
 
@@ -125,10 +139,12 @@ class MeditParser {
     has_vertices_ = true;
     const std::size_t n = scan_.count("the number of Vertices", 4);
     parsed_.mesh.positions.resize(n);
+    std::size_t num_marked = 0;
     for (Vec3& position : parsed_.mesh.positions) {
       for (int i = 0; i < 3; ++i) position[i] = scan_.number("a coordinate");
-      scan_.integer("a vertex reference");
+      num_marked += scan_.integer("a vertex reference") != 0;
     }
+    left_out_.add("references of Vertices", num_marked);
   }
 
   void read_cells(const CellSection& section) {
@@ -169,7 +185,7 @@ class MeditParser {
     for (std::size_t i = 0; i < n; ++i) {
       const Index v0 = read_vertex_number(), v1 = read_vertex_number();
       edges_.push_back({std::min(v0, v1), std::max(v0, v1)});
-      scan_.integer("an edge reference");
+      left_out_.add("references of Edges", scan_.integer("an edge reference") != 0);
     }
   }
 
@@ -234,6 +250,7 @@ class MeditParser {
 
   TextScanner scan_;
   ParsedMesh parsed_;
+  LeftOut left_out_;
   bool has_vertices_ = false, ended_ = false;
   std::vector<std::size_t> cell_lines_;
   std::vector<std::array<Index, 2>> edges_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/binary_value.h"
 #include "subvol/error.h"
+#include "subvol/left_out.h"
 #include "subvol/mesh_formats.h"
 #include "subvol/reference_arrays.h"
 #include "subvol/text_scanner.h"
@@ -299,6 +300,7 @@ class VtkParser {
       if (lower_case(type_name) == "string") {
         scan_.line();
         for (std::size_t j = 0; j < components * n; ++j) skip_string();
+        ++num_arrays_;
         continue;
       }
       const auto type = type_of(type_name);
@@ -369,6 +371,9 @@ class VtkParser {
     } catch (const InputError& error) {
       throw InputError(name_ + ": " + error.what());
     }
+    LeftOut left_out;
+    left_out.add("data arrays", num_arrays_ - (chosen ? 1 : 0));
+    left_out.tell(parsed_.warnings);
     if (!chosen) return;
     references_ = arrays_[*chosen].values;
     const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), may_be_references) - 1;

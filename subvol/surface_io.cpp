@@ -216,7 +216,9 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
     cloud.points = parse_xyz(path.string(), read_file(path), longer_lines);
     remarks.count(longer_lines, "lines have more than three columns: the rest is skipped");
   } else if (extension == ".ply") {
-    PolygonMesh mesh = parse_ply(path.string(), read_file(path)).mesh;
+    ParsedSurface parsed = parse_ply(path.string(), read_file(path));
+    remarks.tell(parsed.warnings);
+    PolygonMesh& mesh = parsed.mesh;
     remarks.count(mesh.num_faces(), "faces are skipped: only the points are read");
     cloud.points = std::move(mesh.positions);
   } else {

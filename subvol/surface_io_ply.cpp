@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/binary_value.h"
 #include "subvol/error.h"
+#include "subvol/left_out.h"
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
 
@@ -60,7 +61,9 @@ class PlyParser {
       if (static_cast<std::size_t>(v) >= mesh_.positions.size())
         throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
                          std::to_string(mesh_.positions.size()));
-    return {std::move(mesh_), {}};
+    ParsedSurface parsed{std::move(mesh_), {}};
+    left_out_.tell(parsed.warnings);
+    return parsed;
   }
 
   /// Whether the header, which is all that is read, announces faces.
@@ -130,8 +133,18 @@ class PlyParser {
       word = words.next().value_or("");
     }
     property.type = type_of(word);
-    property.use = use_of(elements_.back().name, words.next().value_or(""), property.is_list);
+    const std::string_view name = words.next().value_or("");
+    property.use = use_of(elements_.back().name, name, property.is_list);
     elements_.back().properties.push_back(property);
+    note(elements_.back(), property, name);
+  }
+
+  /// Normals are not missed: faces have them.
+  void note(const Element& element, const Property& property, std::string_view name) {
+    const bool is_normal = name == "nx" || name == "ny" || name == "nz";
+    if (element.count == 0 || property.use != Property::Use::none || is_normal) return;
+    const bool is_known = element.name == "vertex" || element.name == "face";
+    left_out_.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
   }
 
   ValueType type_of(std::string_view word) const {
@@ -224,6 +237,7 @@ class PlyParser {
   bool text_ = true;
   std::endian order_ = std::endian::little;
   std::vector<Element> elements_;
+  LeftOut left_out_;
   PolygonMesh mesh_;
   std::string attribute_;
   std::vector<double> values_;

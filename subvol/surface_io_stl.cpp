@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/binary_value.h"
 #include "subvol/error.h"
+#include "subvol/left_out.h"
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
 
@@ -98,8 +99,11 @@ BinaryFacets binary_facets(const std::string& name, std::string_view bytes, std:
 PolygonMesh parse_binary(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
   const BinaryFacets facets = binary_facets(name, bytes, warnings);
   Welder welder;
+  LeftOut left_out;
   for (std::size_t f = 0; f < facets.begins.size(); ++f) {
     const std::size_t facet = facets.begins[f];
+    if (decode(bytes.data() + facet + kAttributeCountByte, kUInt16, std::endian::little) != 0)
+      left_out.add("facets' attributes");
     for (std::size_t i = 0; i < 3; ++i) {
       const std::size_t vertex = facet + kFirstVertexByte * (i + 1);
       Vec3 position;
@@ -110,6 +114,7 @@ PolygonMesh parse_binary(const std::string& name, std::string_view bytes, std::v
       welder.add(position);
     }
   }
+  left_out.tell(warnings);
   return welder.take();
 }
 
@@ -133,9 +138,11 @@ void parse_facet(TextScanner& scan, Welder& welder) {
   expect(scan, "endfacet");
 }
 
-PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
+PolygonMesh parse_text(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
   TextScanner scan(name, bytes, TextScanner::Comments::none);
   Welder welder;
+  LeftOut left_out;
+  std::size_t num_solids = 0;
   bool in_solid = false;
   while (const auto word = scan.next()) {
     const std::string keyword = lower_case(*word);
@@ -143,6 +150,7 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
       parse_facet(scan, welder);
     } else if (keyword == (in_solid ? "endsolid" : "solid")) {
       in_solid = !in_solid;
+      num_solids += in_solid;
       scan.line();  // the solid's name
     } else if (word->data() == bytes.data() && !in_solid) {
       scan.fail("expected solid, as STL in text begins, or the 84 bytes and the facets of a binary file, found " +
@@ -154,6 +162,8 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
   if (in_solid && welder.is_empty())
     scan.fail("the file ends after " + std::to_string(bytes.size()) + " bytes without a facet, in text or in binary");
   if (in_solid) scan.fail("the file ends where facet or endsolid is expected");
+  if (num_solids > 1) left_out.add("solids, which become one", num_solids);
+  left_out.tell(warnings);
   return welder.take();
 }
 
@@ -162,7 +172,7 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
 ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
   ParsedSurface parsed;
   if (is_binary(bytes) && !has_room_for_facets(bytes)) require_no_utf16(name, bytes);
-  parsed.mesh = is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes);
+  parsed.mesh = is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes, parsed.warnings);
   return parsed;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // OFF, OBJ and XYZ.
+#include "subvol/left_out.h"
 #include "subvol/surface_formats.h"
 #include "subvol/text_scanner.h"
 
@@ -28,12 +29,21 @@ OffCounts read_off_counts(TextScanner& scan) {
   return {vertices, faces};
 }
 
-void skip_rest_of_line(TextScanner& scan) { scan.line(); }
+/// Whether there was anything in it.
+bool skip_rest_of_line(TextScanner& scan) {
+  const auto rest = scan.line();
+  return rest && TextScanner("", *rest).next().has_value();
+}
 
-/// Words of OBJ that say nothing about polygons.
-constexpr std::string_view kSkippedObj[] = {
-    "vt", "vn", "vp", "g", "o", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "l", "p", "bevel", "c_interp",
-    "d_interp", "lod", "shadow_obj", "trace_obj"};
+/// Words of OBJ that say nothing about polygons, and what of them is missed.
+struct SkippedObj {
+  std::string_view keyword;
+  const char* missed = nullptr;
+};
+constexpr SkippedObj kSkippedObj[] = {
+    {"vt", "texture coordinates"}, {"vn"}, {"vp"}, {"g", "names of groups"}, {"o", "names of objects"}, {"s"}, {"mg"},
+    {"usemtl", "uses of materials"}, {"mtllib"}, {"usemap", "uses of maps"}, {"maplib"}, {"l", "lines"}, {"p", "points"},
+    {"bevel"}, {"c_interp"}, {"d_interp"}, {"lod"}, {"shadow_obj"}, {"trace_obj"}};
 
 class ObjParser {
  public:
@@ -53,7 +63,9 @@ class ObjParser {
       if (!line) break;
     }
     check_indices();
-    return {std::move(mesh_), {}};
+    ParsedSurface parsed{std::move(mesh_), {}};
+    left_out_.tell(parsed.warnings);
+    return parsed;
   }
 
  private:
@@ -63,8 +75,10 @@ class ObjParser {
     if (!keyword) return;
     if (*keyword == "v") return parse_vertex(words);
     if (*keyword == "f" || *keyword == "fo") return parse_face(words);
-    if (std::find(std::begin(kSkippedObj), std::end(kSkippedObj), *keyword) == std::end(kSkippedObj))
-      scan_.fail("unknown OBJ keyword " + in_quotes(*keyword), line_);
+    const auto* skipped = std::find_if(std::begin(kSkippedObj), std::end(kSkippedObj),
+                                       [&](const SkippedObj& s) { return s.keyword == *keyword; });
+    if (skipped == std::end(kSkippedObj)) scan_.fail("unknown OBJ keyword " + in_quotes(*keyword), line_);
+    if (skipped->missed) left_out_.add(skipped->missed);
   }
 
   void parse_vertex(TextScanner& words) {
@@ -76,6 +90,9 @@ class ObjParser {
       position[i] = *value;
     }
     mesh_.positions.push_back(position);
+    std::size_t more = 0;  // one is a weight
+    while (words.next()) ++more;
+    if (more >= 3) left_out_.add("colours of vertices");
   }
 
   void parse_face(TextScanner& words) {
@@ -105,6 +122,7 @@ class ObjParser {
   std::string name_;
   TextScanner scan_;
   PolygonMesh mesh_;
+  LeftOut left_out_;
   std::size_t line_ = 1;
   std::vector<std::size_t> face_lines_;
 };
@@ -122,6 +140,9 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
   const auto [num_vertices, num_faces] = read_off_counts(scan);
 
   PolygonMesh mesh;
+  LeftOut left_out;
+  if (keyword->find('C') != std::string_view::npos) left_out.add("colours of vertices", num_vertices);
+  if (keyword->find("ST") != std::string_view::npos) left_out.add("texture coordinates", num_vertices);
   mesh.positions.resize(num_vertices);
   for (Vec3& position : mesh.positions) {
     for (int i = 0; i < 3; ++i) position[i] = scan.number("a coordinate");
@@ -137,10 +158,12 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
       mesh.face_vertices.push_back(static_cast<Index>(v));
     }
     mesh.face_offsets.push_back(mesh.face_vertices.size());
-    skip_rest_of_line(scan);  // a colour
+    if (skip_rest_of_line(scan)) left_out.add("colours of faces");
   }
   if (const auto more = scan.next()) scan.fail("more than the counts say: " + in_quotes(*more));
-  return {std::move(mesh), {}};
+  ParsedSurface parsed{std::move(mesh), {}};
+  left_out.tell(parsed.warnings);
+  return parsed;
 }
 
 ParsedSurface parse_obj(const std::string& name, std::string_view bytes) { return ObjParser(name, bytes).parse(); }

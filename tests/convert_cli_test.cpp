@@ -114,6 +114,25 @@ TEST_CASE("an input that cannot be read is told as what it is, by every verb", "
   }
 }
 
+TEST_CASE("what was read and is in none of the outputs is told once, by every verb", "[cli]") {
+  const Workplace place(subvol::samples::bracket_sample());
+  subvol::VolumeMesh mesh = subvol::read_volume_mesh(place / "template.mesh");
+  REQUIRE(!mesh.tags.creases.empty());
+  mesh.references.assign(mesh.num_cells(), 3);
+  subvol::write_volume_mesh(place / "a.mesh", mesh);
+  const std::string told = "in none of the outputs: ", references = std::to_string(mesh.num_cells()) + " references of cells",
+                    creases = std::to_string(mesh.tags.creases.size()) + " creases";
+  for (const std::string verb : {"convert a.mesh", "subdivide a.mesh", "template split a.mesh --into tets"}) {
+    const auto run = [&](const std::string& outputs) { return place.run(verb + " --force" + outputs).err; };
+    CAPTURE(verb);
+    const std::string obj = run(" -o b.obj"), vtk = run(" -o b.vtk -o b.obj"), all = run(" -o b.mesh -o b.obj");
+    CHECK(obj.find(told + references + ", " + creases) != std::string::npos);
+    CHECK(vtk.find(told + creases) != std::string::npos);
+    CHECK((all.find(told) == std::string::npos || verb.starts_with("template")));
+    CHECK(run(" --quiet -o b.obj").empty());
+  }
+}
+
 TEST_CASE("subdivide multiplies the cells by eight a level", "[cli]") {
   const Workplace place(subvol::samples::bracket_sample());
   REQUIRE(place.run("subdivide template.mesh --levels 2 -o fine.mesh -o fine.glb --report r.json").status == 0);

@@ -213,7 +213,8 @@ TEST_CASE("cell data become references whatever attributes stand before them") {
       array_of(std::vector<std::int32_t>{5, 6, 7, 8, 9}, binary);
   std::vector<std::string> warnings;
   CHECK(read_bytes(bytes, &warnings).references == std::vector<int>{5, 6, 7});
-  CHECK(warnings.size() == 1);  // of the quad and the vertex
+  REQUIRE(warnings.size() == 2);  // of the quad and the vertex, and of the arrays
+  CHECK_THAT(warnings[0] + warnings[1], Contains("8 data arrays"));
 }
 
 TEST_CASE("attributes that cannot be passed over end the reading of a VTK file, and that is said") {
