@@ -7,6 +7,8 @@
 #include "subvol/mesh_topology.h"
 #include "subvol/text_scanner.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 
 namespace subvol {
