@@ -42,8 +42,6 @@ void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outp
 /// returns  an ExitStatus: that of the polynomial cells that were written.
 int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs, const WritingOptions& writing,
                        std::vector<std::string>& warnings) {
-void convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs,
-                        const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   for (const Output& output : outputs) require_for_curved_cells(output);
   const HighOrderFile file = read_high_order(arguments.input);
@@ -88,7 +86,6 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   require_choice_of_references(arguments.input, arguments.run.references);
   if (is_high_order_file(arguments.input)) {
     status = convert_high_order(arguments, outputs, writing, warnings);
-    convert_high_order(arguments, outputs, writing, warnings);
   } else if (is_volume_file(arguments.input)) {
     convert_volume(arguments, outputs, writing, warnings);
   } else {
