@@ -53,7 +53,7 @@ Checked check_linear(const CheckArguments& arguments, const std::optional<Target
 
 Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target,
                          const WorkProgress& progress) {
-  const HighOrderMesh mesh = read_high_order(arguments.mesh).mesh;
+  const HighOrderMesh mesh = load_high_order(arguments.mesh).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
   return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
           describe(arguments.mesh, mesh), std::nullopt, check_lagrange_cells(arguments.mesh, mesh)};

@@ -101,6 +101,16 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
   return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
 }
 
+HighOrderFile load_high_order(const std::filesystem::path& path) {
+  HighOrderFile file = read_high_order(path);
+  const auto& x = file.mesh.coefficients;  // vertices, then displacements
+  const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
+  if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
+      std::all_of(vertices_end, x.end(), [](const Vec3& d) { return d.isZero(0); }))
+    throw InputError(path.string() + ": all of the mesh is in one place");
+  return file;
+}
+
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references) {
   if (references.empty() || is_volume_file(path)) return;
   throw UsageError("--references: " + path.string() + " has no cell data to choose from");

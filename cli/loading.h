@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/run_options.h"
+#include "export/high_order_file.h"
 #include "fit/high_order_mesh.h"
 #include "subvol/point_cloud.h"
 #include "subvol/triangle_mesh.h"
@@ -50,6 +51,9 @@ TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vect
 /// references: name of the cell data that become them; empty: those that are meant.
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
+
+/// `read_high_order`; InputError also where all of the mesh is in one place.
+HighOrderFile load_high_order(const std::filesystem::path& path);
 
 /// UsageError: --references was given for a file whose cell data cannot be chosen from.
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references);

@@ -5,6 +5,7 @@
 #include "subvol/surface_io.h"
 #include "tests/workplace.h"
 
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
 #include <optional>

@@ -116,10 +116,15 @@ TEST_CASE("No verb takes a mesh that is a point", "[cli]") {
   const Workplace place;
   place.file("point.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n1 2 3 0\n1 2 3 0\n1 2 3 0\n1 2 3 0\n"
                            "Tetrahedra\n1\n1 2 3 4 0\nEnd\n");
+  subvol::VolumeMesh straight = subvol::test::lattice(1, 1, 1);
+  for (subvol::Vec3& x : straight.positions) x = {1, 2, 3};
+  const subvol::HighOrderMesh mesh(subvol::ElementSpace(straight, subvol::Basis::fourier, 2), straight);
+  subvol::write_volume(place / "point.vtu", mesh, {});
   for (const std::string verb :
        {"check point.mesh", "convert point.mesh -o a.vtk", "subdivide point.mesh -o a.mesh", "optimize point.mesh -o a.mesh",
         "fit target.off --template point.mesh -o a.mesh", "fit point.mesh -o a.mesh", "template pillow point.mesh -o a.mesh",
-        "shell point.mesh --thickness 1 -o a.mesh", "check template.mesh --target point.mesh"}) {
+        "shell point.mesh --thickness 1 -o a.mesh", "check template.mesh --target point.mesh", "check point.vtu",
+        "convert point.vtu -o a.mesh"}) {
     const Run run = place.run(verb);
     CAPTURE(verb, run.err);
     CHECK(run.status == 3);
