@@ -3,8 +3,9 @@
 
 #include "export/high_order_file.h"
 #include "fit/high_order_quality.h"
-#include "fit/option_checks.h"
 #include "fit/polynomial_map.h"
+#include "subvol/format.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 #include <sstream>

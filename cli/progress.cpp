@@ -3,7 +3,7 @@
 
 #include "cli/run_options.h"
 #include "cli/standard_output.h"
-#include "fit/option_checks.h"
+#include "subvol/format.h"
 
 #include <algorithm>
 #include <cstdio>

@@ -4,8 +4,9 @@
 #include "cli/exit_status.h"
 #include "cli/interrupt.h"
 #include "cli/progress.h"
-#include "fit/curve_mesh.h"
+#include "fit/untangle_before_fit.h"
 #include "subvol/error.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 

@@ -5,7 +5,7 @@
 #include "cli/exit_status.h"
 #include "cli/report.h"
 #include "export/high_order_file.h"
-#include "fit/option_checks.h"
+#include "subvol/format.h"
 #include "subvol/mesh_io.h"
 #include "subvol/version.h"
 

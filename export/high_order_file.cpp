@@ -10,6 +10,7 @@
 #include "subvol/atomic_file.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 #include <cmath>

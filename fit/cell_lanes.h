@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/lanes.h"
 #include "subvol/volume_mesh.h"
 
 #include <algorithm>
@@ -10,8 +11,7 @@
 
 namespace subvol {
 
-/// Eight hexes side by side: kernels templated on their number type run on all of them at once.
-inline constexpr int kLanes = 8;
+/// One number of each of kLanes hexes: kernels templated on their number type run on all of them at once.
 using Lanes = Eigen::Array<double, kLanes, 1>;
 
 inline double larger(double a, double b) { return a > b ? a : b; }

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/lanes.h"
 #include "subvol/types.h"
 
 namespace subvol {
-
-/// Number of Jacobians that the kernels below work on at once (one SIMD register of doubles, or several narrow ones).
-inline constexpr int kLanes = 8;
 
 /// How distorted a cell is at a point: functions of the singular values s of the Jacobian J, 0 where it is ideal.
 ///

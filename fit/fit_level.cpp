@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/fit_level.h"
 
-#include "fit/element_rule.h"
-#include "fit/shape_functions.h"
 #include "subvol/limit_surface.h"
 #include "subvol/mesh_topology.h"
+#include "subvol/subdivision.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 
@@ -91,26 +88,6 @@ SparseMap bilinear_refinement(const BoundaryRefinement& once, std::size_t num_no
   return map;
 }
 
-/// Mean lengths of a cell's edges: along the three directions of a hex, around the triangles of a prism (twice) and
-/// across, of all edges of a tet (three times).
-Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes) {
-  const CellTopology& topology = cell_topology(kind);
-  Vec3 sums = Vec3::Zero(), counts = Vec3::Zero();
-  for (int e = 0; e < topology.num_edges; ++e) {
-    const int a = topology.edges[e][0], b = topology.edges[e][1];
-    const double length = (nodes[cell[b]] - nodes[cell[a]]).norm();
-    const Vec3 along = (canonical_vertices(kind)[b] - canonical_vertices(kind)[a]).cwiseAbs();
-    for (int i = 0; i < 3; ++i) {
-      const bool counts_here =
-          kind == CellKind::tet || (kind == CellKind::prism && i < 2 ? along[2] == 0 : along[i] > 0);
-      if (!counts_here) continue;
-      sums[i] += length;
-      counts[i] += 1;
-    }
-  }
-  return sums.cwiseQuotient(counts);
-}
-
 }  // namespace
 
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
@@ -157,25 +134,6 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     level.sample_triangles.push_back({q[0], q[2], q[3]});
   }
   return level;
-}
-
-std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
-                              double own_share) {
-  constexpr double kLeastShare = 1e-3;
-  double ideal_volumes = 0;
-  for (CellKind kind : mesh.kinds) ideal_volumes += ideal_volume(kind);
-  const double common = std::cbrt(volume / std::max(ideal_volumes, std::numeric_limits<double>::min()));
-  std::vector<Vec3> boxes(mesh.num_cells());
-  double total = 0;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    const Vec3 lengths = box_lengths(mesh.kinds[c], mesh.cell(c), nodes);
-    for (int i = 0; i < 3; ++i)
-      boxes[c][i] = common * std::pow(std::max(lengths[i] / common, kLeastShare), own_share);
-    total += ideal_volume(mesh.kinds[c]) * boxes[c].prod();
-  }
-  const double scale = std::cbrt(volume / total);
-  for (Vec3& h : boxes) h *= scale;
-  return boxes;
 }
 
 }  // namespace subvol

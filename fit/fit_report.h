@@ -2,6 +2,7 @@
 #pragma once
 
 #include "fit/crease_distance.h"
+#include "fit/minimizer.h"
 #include "fit/target_report.h"
 #include "subvol/types.h"
 
@@ -33,19 +34,8 @@ enum class StopReason {
 };
 const char* to_string(StopReason reason);
 
-/// Why one minimisation ended; infeasible_start: at once, for E is infinite there.
-enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
-
 /// Why work ended that is done with one minimisation, the last. Without a step, and from no start: stalled.
 StopReason stop_reason(MinimizerStop stop);
-
-/// One Newton (or L-BFGS) step.
-struct IterationRecord {
-  double surface_energy = 0, volume_energy = 0;  ///< E_S and E_W (dimensionless), E = E_S + lambda E_W   Paper: Eq. 1
-  double step_length = 0;                        ///< accepted fraction of the search direction
-  int linear_iterations = 0;                     ///< CG iterations of this step
-  int evaluations = 0;                           ///< energy evaluations of its line search
-};
 
 /// One minimisation with fixed level, lambda and tangential weight.
 struct StageRecord {
@@ -73,6 +63,9 @@ struct FitReport {
   std::optional<CreaseDistance> creases;   ///< of the limit surface; where there are sharp edges to follow
   std::vector<std::string> warnings;       ///< audit: what the template's geometry cannot do, topology mismatch, ...
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "subdivision", "voronoi", "volume", "solve", ...
+
+  /// Notes how far the template is from the target, the state of the target, and what no fit can change about it.
+  void note_start(const StartComparison& start);
 
   /// The last stage whose result was kept; null: none was.
   StageRecord* last_kept_stage() {

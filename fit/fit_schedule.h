@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/subdivision_fit.h"
+#include "fit/fit_options.h"
+#include "fit/stage.h"
 
 #include <vector>
 
 namespace subvol {
-
-/// One minimisation: weights, and when it ends.
-struct Stage {
-  double lambda, tangential_weight;
-  int max_iterations = 20;
-  double relative_decrease = 1e-3;
-};
 
 /// Mean distance, in per cent of the diagonal, down to which a fit without a tolerance lowers lambda further.
 inline constexpr double kDefaultAccuracyPercent = 0.015;
@@ -26,12 +20,6 @@ inline constexpr double kLeastGain = 0.01;
 inline constexpr double kMostShapeLoss = 0.0075;
 /// The same where only the template's vertices move: few unknowns have to reach the whole surface.
 inline constexpr double kMostCageShapeLoss = 0.015;
-/// A crease counts as much as a strip of surface so wide, by the target's length V/A.
-inline constexpr double kCreaseWidth = 1;
-/// The target is sampled at least about so many times.
-inline constexpr std::size_t kLeastTargetSamples = 20000;
-/// L-BFGS steps allowed for each Newton step of a stage.
-inline constexpr int kLbfgsSteps = 30;
 
 /// Which minimisations a recursive fit runs, decided from the template's initial distance.
 ///

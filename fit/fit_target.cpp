@@ -2,9 +2,8 @@
 #include "fit/fit_target.h"
 
 #include "fit/enclosed_volume.h"
-#include "fit/option_checks.h"
-#include "fit/target_report.h"
 #include "subvol/error.h"
+#include "subvol/format.h"
 
 #include <Eigen/Geometry>
 
@@ -83,20 +82,16 @@ SurfaceDistance FitTarget::measure(const TriangleMesh& fitted, bool extremes) co
               : surface_distance(fitted_tree, surface.samples());
 }
 
-double FitTarget::compare_start(const TriangleMesh& boundary, FitReport& report) {
+StartComparison FitTarget::compare_start(const TriangleMesh& boundary) {
   const SurfaceDistance start = distance(boundary);
-  report.initial_distance_mean_percent = 100 * start.mean();
-  report.initial_distance_max_percent = 100 * start.max();
   if (surface.volume_source() == VolumeSource::isoperimetric)
     if (const double volume = signed_volume(boundary.positions, boundary.triangles); volume > 0)
       surface.set_volume(volume);
-  report.target = describe_target(surface, boundary);
+  StartComparison result{start.mean(), start.max(), describe_target(surface, boundary)};
   const double unit = std::pow(normalisation.diagonal, 2);
-  report.target.area *= unit;
-  report.target.volume *= unit * normalisation.diagonal;
-  const std::vector<std::string> found = warnings_of(report.target);
-  report.warnings.insert(report.warnings.end(), found.begin(), found.end());
-  return start.mean();
+  result.target.area *= unit;
+  result.target.volume *= unit * normalisation.diagonal;
+  return result;
 }
 
 }  // namespace subvol

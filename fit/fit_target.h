@@ -2,13 +2,14 @@
 #pragma once
 
 #include "fit/closest_point.h"
-#include "fit/fit_report.h"
-#include "fit/fit_schedule.h"
 #include "fit/surface_distance.h"
+#include "fit/target_report.h"
 #include "fit/target_surface.h"
 #include "subvol/volume_mesh.h"
 
+#include <cstddef>
 #include <optional>
+#include <vector>
 
 namespace subvol {
 
@@ -26,6 +27,9 @@ struct Normalisation {
   void take_in(VolumeMesh& mesh) const;
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };
+
+/// The target is sampled at least about so many times.
+inline constexpr std::size_t kLeastTargetSamples = 20000;
 
 /// What a fit is to reproduce, in normalised coordinates: lengths are shares of the target's diagonal.
 struct FitTarget {
@@ -47,9 +51,9 @@ struct FitTarget {
   SurfaceDistance distance(const TriangleMesh& fitted) const { return measure(fitted, true); }
   double mean_distance(const TriangleMesh& fitted) const { return measure(fitted, false).mean(); }
 
-  /// Notes how far a template's boundary is, the state of the target (`TargetReport`), and what no fit can change.
-  /// Where the target encloses nothing the boundary's volume is taken for the one wanted. Returns the mean distance.
-  double compare_start(const TriangleMesh& boundary, FitReport& report);
+  /// Measures how far a template's boundary is, and describes the state of the target. If the target encloses nothing,
+  /// the boundary's volume is taken for the one wanted.
+  StartComparison compare_start(const TriangleMesh& boundary);
 
  private:
   SurfaceDistance measure(const TriangleMesh& fitted, bool extremes) const;

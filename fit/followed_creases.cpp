@@ -66,10 +66,10 @@ void FollowedCreases::release(std::span<const std::uint8_t> vertices, VolumeMesh
   std::erase_if(mesh.tags.corners, [&](const CornerVertex& corner) { return vertices[corner.vertex]; });
 }
 
-void FollowedCreases::refine(const FitLevel& level) {
+void FollowedCreases::refine(std::span<const Index> parents) {
   if (curve_of_crease_.empty()) return;
   std::vector<Index> children;
-  for (Index parent : level.parent_creases) children.push_back(curve_of_crease_[parent]);
+  for (Index parent : parents) children.push_back(curve_of_crease_[parent]);
   curve_of_crease_ = std::move(children);
 }
 
@@ -78,10 +78,6 @@ std::vector<CreaseSegment> FollowedCreases::segments(std::span<const std::array<
   for (std::size_t k = 0; k < edges.size() && !curve_of_crease_.empty(); ++k)
     result.push_back({edges[k], curve_of_crease_[k * curve_of_crease_.size() / edges.size()]});
   return result;
-}
-
-CreaseEnergy FollowedCreases::energy(const FitLevel& level, double width, double tangential_weight) const {
-  return energy(level.crease_edges, level.samples.num_rows(), width, tangential_weight);
 }
 
 CreaseEnergy FollowedCreases::energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,

@@ -4,7 +4,6 @@
 #include "fit/crease_distance.h"
 #include "fit/crease_energy.h"
 #include "fit/crease_paths.h"
-#include "fit/fit_level.h"
 #include "subvol/limit_surface.h"
 #include "subvol/triangle_mesh.h"
 #include "subvol/volume_mesh.h"
@@ -19,6 +18,8 @@ namespace subvol {
 
 /// Edges sharper than this, in degrees, are features where nobody says otherwise.
 inline constexpr double kUsualCreaseAngle = 40;
+/// A crease counts as much as a strip of surface so wide, by the target's length V/A.
+inline constexpr double kCreaseWidth = 1;
 
 /// The creases of a fit from level to level, and which feature curve of the target each of them follows.
 class FollowedCreases {
@@ -40,12 +41,11 @@ class FollowedCreases {
   /// Gives up the curves that have a crease at one of the vertices marked, with their tags and the corners marked.
   void release(std::span<const std::uint8_t> vertices, VolumeMesh& mesh);
 
-  /// Goes over to the creases of the mesh of a level made from the present ones.
-  void refine(const FitLevel& level);
+  /// Goes over to the creases of a mesh refined from the present one; parents: for each, the crease that it came from.
+  void refine(std::span<const Index> parents);
 
-  /// Draws the samples on a level's creases to their curves.
-  CreaseEnergy energy(const FitLevel& level, double width, double tangential_weight) const;
-  /// The same for any samples: `edges` between them run along the mesh's creases in their order, equally many for each.
+  /// Draws the samples on the creases to their curves: `edges` between samples run along the mesh's creases in their
+  /// order, equally many for each.
   CreaseEnergy energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,
                       double tangential_weight) const;
   /// limit  refinement of the present level's mesh, at `points`.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/distortion.h"
 #include "fit/wide_matrix.h"
 
 namespace subvol {

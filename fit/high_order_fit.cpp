@@ -3,19 +3,22 @@
 
 #include "fit/boundary_samples.h"
 #include "fit/boundary_triangles.h"
-#include "fit/fit_level.h"
 #include "fit/fit_target.h"
 #include "fit/high_order_energy.h"
 #include "fit/high_order_quality.h"
 #include "fit/high_order_schedule.h"
+#include "fit/ideal_boxes.h"
+#include "fit/make_surface_term.h"
 #include "fit/memory_budget.h"
-#include "fit/option_checks.h"
 #include "fit/order_indicator.h"
 #include "fit/quadrature.h"
 #include "fit/stage_runner.h"
 #include "fit/staged_fit.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/format.h"
+#include "subvol/option_checks.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -148,9 +151,10 @@ HighOrderFit::HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, co
 }
 
 void HighOrderFit::look_over_template() {
-  const double distance =
-      target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))), report_);
-  schedule_ = make_high_order_schedule(options_.lambda_close, distance / target_.surface.length());
+  const StartComparison start =
+      target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
+  report_.note_start(start);
+  schedule_ = make_high_order_schedule(options_.lambda_close, start.mean_distance / target_.surface.length());
 }
 
 /// Intervals along an edge: about as fine as the target, and as the curves need so that their chords do not matter;

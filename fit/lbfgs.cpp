@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fit_problem.h"
+#include "fit/lbfgs.h"
+
 #include "fit/vector_math.h"
 
 #include <cmath>

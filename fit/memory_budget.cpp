@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/memory_budget.h"
 
-#include "fit/option_checks.h"
+#include "subvol/format.h"
 #include "subvol/process_memory.h"
 
 #include <algorithm>

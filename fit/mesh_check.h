@@ -7,6 +7,7 @@
 #include "fit/surface_distance.h"
 #include "subvol/audit.h"
 #include "subvol/triangle_mesh.h"
+#include "subvol/validate.h"
 #include "subvol/volume_mesh.h"
 #include "subvol/work_progress.h"
 

@@ -1,44 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fit_problem.h"
-#include "fit/option_checks.h"
+#include "fit/newton.h"
+
 #include "fit/vector_math.h"
-#include "subvol/error.h"
+#include "subvol/format.h"
 
 #include <Eigen/LU>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
+#include <string>
+#include <utility>
 
 namespace subvol {
-
-FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, std::unique_ptr<VolumeTerm> volume_energy,
-                       std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight)
-    : nodes(std::move(node_map)),
-      nodes_transposed(transposed(nodes)),
-      samples(std::move(sample_map)),
-      samples_transposed(transposed(samples)),
-      volume(std::move(volume_energy)),
-      surface(std::move(surface_energy)),
-      lambda(volume_weight) {}
-
-void FitProblem::apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const {
-  nodes.apply(x, out);
-  if (!fixed_nodes.empty()) add_scaled(1, fixed_nodes, out);
-}
-
-void FitProblem::apply_samples(std::span<const Vec3> x, std::span<Vec3> out) const {
-  multiply_samples(x, out);
-  if (!fixed_samples.empty()) add_scaled(1, fixed_samples, out);
-}
-
-void FitProblem::multiply_samples(std::span<const Vec3> d, std::span<Vec3> out) const {
-  tables ? tables->apply(d, out) : samples.apply(d, out);
-}
-
-void FitProblem::pull_back_samples(std::span<const Vec3> g, std::span<Vec3> out) const {
-  tables ? tables->apply_transposed(g, out) : samples_transposed.apply(g, out);
-}
 
 namespace {
 
@@ -123,11 +97,6 @@ std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vec
   std::vector<Index> result;
   std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(result));
   return result;
-}
-
-void cancel(MinimizerResult& result) {
-  result.stop = MinimizerStop::cancelled;
-  result.explanation = "stopped by the caller";
 }
 
 /// One minimisation by Newton's method.
@@ -323,29 +292,6 @@ MinimizerResult NewtonRun::run() {
 }
 
 }  // namespace
-
-bool has_ended(const MinimizerOptions& options, MinimizerResult& result) {
-  if (!options.ended || !options.ended()) return false;
-  cancel(result);
-  return true;
-}
-
-bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result) {
-  result.iterations.push_back(record);
-  if (!options.progress || options.progress(record)) return true;
-  cancel(result);
-  return false;
-}
-
-void densify_again(FitProblem& problem, const MinimizerResult& result) {
-  if (result.densified.empty()) return;
-  if (result.densified_at.size() != problem.nodes.num_cols)
-    throw InputError("cells were densified at a state of " + std::to_string(result.densified_at.size()) +
-                     " unknowns, expected " + std::to_string(problem.nodes.num_cols));
-  std::vector<Vec3> nodes(problem.nodes.num_rows());
-  problem.apply_nodes(result.densified_at, nodes);
-  for (const std::vector<Index>& cells : result.densified) problem.volume->densify(cells, nodes);
-}
 
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
   return NewtonRun(problem, x, options).run();

@@ -3,18 +3,19 @@
 
 #include "fit/boundary_samples.h"
 #include "fit/boundary_triangles.h"
-#include "fit/cell_sizes.h"
 #include "fit/closest_point_energy.h"
-#include "fit/fit_level.h"
 #include "fit/fit_target.h"
 #include "fit/free_nodes.h"
-#include "fit/option_checks.h"
+#include "fit/ideal_boxes.h"
 #include "fit/quality.h"
 #include "fit/stage_runner.h"
 #include "fit/surface_distance.h"
 #include "fit/untangle.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/format.h"
+#include "subvol/option_checks.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/fit_problem.h"
+#include "fit/minimizer.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,37 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/closest_point_energy.h"
+#include "fit/fit_options.h"
 #include "fit/fit_problem.h"
-#include "fit/fit_schedule.h"
+#include "fit/fit_report.h"
+#include "fit/minimizer.h"
+#include "fit/stage.h"
 #include "fit/stage_log.h"
-#include "fit/target_surface.h"
+#include "subvol/triangle_mesh.h"
 
 #include <chrono>
-#include <cstdint>
-#include <memory>
+#include <cstddef>
+#include <functional>
 #include <optional>
-#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace subvol {
-
-/// E_S between samples of the fitted surface and a target, which must outlive it.
-///
-/// Voronoi cells have neither of these:
-/// far_length  of `ClosestPointEnergy::emphasize_far`; 0: none
-/// refined     of `ClosestPointEnergy::refine`; empty: none
-std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
-                                               const std::vector<std::array<Index, 3>>& sample_triangles,
-                                               std::size_t num_samples, double tangential_weight,
-                                               Correspondence correspondence,
-                                               SurfacePull pull = SurfacePull::along_normals,
-                                               double far_length = 0,
-                                               std::span<const std::uint8_t> refined = {});
-
-/// InputError unless closest points are what pulls: Voronoi cells of points have no area.
-void require_closest(Correspondence correspondence);
 
 /// Runs the minimisations of a fit one after the other, with one clock and one report.
 class StageRunner {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fit/fit_report.h"
-#include "fit/subdivision_fit.h"
+#include "subvol/fit_state.h"
 #include "subvol/types.h"
 
 #include <cstddef>

@@ -7,8 +7,9 @@
 #include "fit/fit_schedule.h"
 #include "fit/fit_target.h"
 #include "fit/followed_creases.h"
+#include "fit/ideal_boxes.h"
+#include "fit/make_surface_term.h"
 #include "fit/memory_budget.h"
-#include "fit/option_checks.h"
 #include "fit/quality.h"
 #include "fit/stage_runner.h"
 #include "fit/staged_fit.h"
@@ -16,8 +17,11 @@
 #include "subvol/audit.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/format.h"
 #include "subvol/limit_surface.h"
 #include "subvol/mesh_topology.h"
+#include "subvol/option_checks.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -129,9 +133,10 @@ SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh
 void SubdivisionFit::look_over_template() {
   FitReport& report = result_.report;
   report.warnings = audit(template_).warnings;
-  const double distance = target_.compare_start(
-      refined_triangles(boundary_surface(template_, MeshTopology(template_))), report);
-  schedule_ = make_schedule(options_, distance / target_.surface.length(), template_creases_.hold_the_surface());
+  const StartComparison start =
+      target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
+  report.note_start(start);
+  schedule_ = make_schedule(options_, start.mean_distance / target_.surface.length(), template_creases_.hold_the_surface());
 }
 
 void SubdivisionFit::prepare_level() {
@@ -139,7 +144,7 @@ void SubdivisionFit::prepare_level() {
   level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.num_details(),
                           finest());
   limit_check_.reset();
-  creases_.refine(level_);
+  creases_.refine(level_.parent_creases);
   target_.sample(level_.samples.num_rows());
   ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.surface.volume(),
                              number_ == 1 ? own_box_share_ : 1);
@@ -155,7 +160,8 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
       make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
                         options_.correspondence);
   if (!creases_.curves().empty())
-    term->add_creases(creases_.energy(level_, kCreaseWidth * target_.surface.length(), stage.tangential_weight));
+    term->add_creases(creases_.energy(level_.crease_edges, level_.samples.num_rows(),
+                                      kCreaseWidth * target_.surface.length(), stage.tangential_weight));
   return term;
 }
 
@@ -425,30 +431,6 @@ FitResult SubdivisionFit::run() {
 }
 
 }  // namespace
-
-StopReason stop_reason(MinimizerStop stop) {
-  switch (stop) {
-    case MinimizerStop::converged: return StopReason::converged;
-    case MinimizerStop::iteration_limit: return StopReason::iteration_limit;
-    case MinimizerStop::cancelled: return StopReason::cancelled;
-    case MinimizerStop::no_step:
-    case MinimizerStop::infeasible_start: break;
-  }
-  return StopReason::stalled;
-}
-
-const char* to_string(StopReason reason) {
-  switch (reason) {
-    case StopReason::converged: return "converged";
-    case StopReason::tolerance_missed: return "tolerance_missed";
-    case StopReason::iteration_limit: return "iteration_limit";
-    case StopReason::time_limit: return "time_limit";
-    case StopReason::memory_limit: return "memory_limit";
-    case StopReason::cancelled: return "cancelled";
-    case StopReason::stalled: return "stalled";
-  }
-  return "unknown";
-}
 
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options) {

@@ -24,6 +24,12 @@ struct TargetReport {
   bool same_topology() const { return topology == template_topology; }
 };
 
+/// How a fit begins: how far the template's boundary is from the target.
+struct StartComparison {
+  double mean_distance = 0, max_distance = 0;  ///< symmetric, in shares of the target's diagonal
+  TargetReport target;
+};
+
 /// boundary  closed and oriented: the template's. Cost: sorts of the edges.
 TargetReport describe_target(const TargetSurface& target, const TriangleMesh& boundary);
 

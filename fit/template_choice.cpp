@@ -5,7 +5,6 @@
 #include "fit/boundary_triangles.h"
 #include "fit/high_order_fit.h"
 #include "fit/high_order_quality.h"
-#include "fit/option_checks.h"
 #include "fit/quality.h"
 #include "fit/self_intersection.h"
 #include "fit/subdivision_fit.h"
@@ -14,6 +13,7 @@
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/mesh_topology.h"
+#include "subvol/option_checks.h"
 
 #include <algorithm>
 #include <chrono>

@@ -2,8 +2,8 @@
 #include "fit/untangle.h"
 
 #include "fit/certificate.h"
-#include "fit/option_checks.h"
 #include "fit/regularised_barrier.h"
+#include "subvol/format.h"
 
 #include <algorithm>
 #include <cmath>

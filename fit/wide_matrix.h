@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/distortion.h"
+#include "fit/lanes.h"
 #include "fit/wide.h"
 
 namespace subvol {

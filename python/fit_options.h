@@ -3,8 +3,8 @@
 
 #include "cli/writing.h"
 #include "fit/basis.h"
-#include "fit/curve_mesh.h"
 #include "fit/high_order_fit.h"
+#include "fit/untangle_before_fit.h"
 #include "python/keywords.h"
 #include "subvol/subdivision.h"
 

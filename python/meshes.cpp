@@ -9,6 +9,7 @@
 #include "subvol/features.h"
 #include "subvol/sound_points.h"
 #include "subvol/surface_io.h"
+#include "subvol/validate.h"
 
 #include <algorithm>
 #include <array>

@@ -4,9 +4,8 @@
 #include "cli/check_report.h"
 #include "cli/report.h"
 #include "fit/boundary_triangles.h"
-#include "fit/curve_mesh.h"
 #include "fit/mesh_check.h"
-#include "fit/option_checks.h"
+#include "fit/untangle_before_fit.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
 #include "python/fit_options.h"
@@ -14,6 +13,7 @@
 #include "python/results.h"
 #include "subvol/boundary.h"
 #include "subvol/error.h"
+#include "subvol/option_checks.h"
 
 namespace subvol::python {
 namespace {

@@ -3,7 +3,6 @@
 #include "cli/report.h"
 #include "cli/shell_output.h"
 #include "fit/mesh_check.h"
-#include "fit/option_checks.h"
 #include "fit/surface_distance.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
@@ -13,6 +12,7 @@
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/features.h"
+#include "subvol/option_checks.h"
 
 #include <algorithm>
 

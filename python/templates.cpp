@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/loading.h"
-#include "fit/option_checks.h"
 #include "python/arrays.h"
 #include "python/keywords.h"
 #include "python/meshes.h"
@@ -11,6 +10,7 @@
 #include "subvol/carve.h"
 #include "subvol/cell_split.h"
 #include "subvol/error.h"
+#include "subvol/option_checks.h"
 #include "subvol/pillow.h"
 #include "subvol/refine.h"
 #include "subvol/sheet.h"

@@ -2,7 +2,7 @@
 #include "python/work.h"
 
 #include "cli/run_options.h"
-#include "fit/option_checks.h"
+#include "subvol/option_checks.h"
 
 #include <omp.h>
 

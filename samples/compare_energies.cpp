@@ -4,9 +4,9 @@
 // every cell; a conformal one shrinks or swells cells by the singularity to keep their shapes.
 
 #include "export/high_order_file.h"
-#include "fit/fit_problem.h"
 #include "fit/high_order_energy.h"
 #include "fit/high_order_quality.h"
+#include "fit/newton.h"
 #include "subvol/atomic_file.h"
 
 #include <Eigen/LU>

@@ -3,8 +3,8 @@
 
 #include "fit/boundary_triangles.h"
 #include "fit/closest_point_energy.h"
-#include "fit/fit_problem.h"
 #include "fit/free_nodes.h"
+#include "fit/newton.h"
 #include "fit/self_intersection.h"
 #include "fit/volume_energy.h"
 #include "shell/thickness.h"

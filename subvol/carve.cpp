@@ -3,6 +3,7 @@
 
 #include "subvol/error.h"
 #include "subvol/template_edit.h"
+#include "subvol/validate.h"
 #include "subvol/winding_number.h"
 
 #include <algorithm>

@@ -6,6 +6,7 @@
 #include "subvol/mesh_formats.h"
 #include "subvol/mesh_topology.h"
 #include "subvol/text_scanner.h"
+#include "subvol/validate.h"
 
 #include <Eigen/Geometry>
 

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/boundary_rules.h"
 #include "subvol/sparse_map.h"
 #include "subvol/volume_mesh.h"
 
 namespace subvol {
-
-/// How boundary vertices move when a mesh is refined.
-enum class BoundaryRule {
-  catmull_clark,  ///< rows equal OpenSubdiv's: the boundary is an artist's subdivision surface (default)
-  averaging       ///< the paper's plain multi-linear averaging of the boundary quads
-};
 
 /// One refinement: V_fine = S V_control (paper: Eq. 10).
 ///

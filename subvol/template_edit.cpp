@@ -4,6 +4,7 @@
 #include "subvol/error.h"
 #include "subvol/features.h"
 #include "subvol/mesh_topology.h"
+#include "subvol/validate.h"
 
 #include <Eigen/Geometry>
 

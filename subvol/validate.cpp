@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/validate.h"
+
 #include "subvol/mesh_topology.h"
-#include "subvol/volume_mesh.h"
 
 #include <Eigen/Geometry>
 

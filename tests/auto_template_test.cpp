@@ -9,6 +9,7 @@
 #include "subvol/solid_topology.h"
 #include "subvol/surface_io.h"
 #include "subvol/template_frames.h"
+#include "subvol/validate.h"
 #include "tests/data.h"
 #include "tests/sample_meshes.h"
 #include "tests/surface_fixtures.h"

@@ -2,6 +2,7 @@
 #include "subvol/features.h"
 
 #include "subvol/error.h"
+#include "subvol/validate.h"
 #include "tests/sample_meshes.h"
 
 #include <catch2/catch.hpp>

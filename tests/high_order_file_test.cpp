@@ -7,6 +7,7 @@
 #include "fit/quality.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
+#include "subvol/validate.h"
 #include "tests/data.h"
 #include "tests/element_fixtures.h"
 #include "tests/skipping.h"

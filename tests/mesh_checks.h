@@ -3,6 +3,7 @@
 
 #include "subvol/boundary.h"
 #include "subvol/mesh_topology.h"
+#include "subvol/validate.h"
 #include "subvol/volume_mesh.h"
 
 #include <catch2/catch.hpp>

@@ -3,6 +3,7 @@
 
 #include "subvol/error.h"
 #include "subvol/features.h"
+#include "subvol/validate.h"
 #include "tests/data.h"
 #include "tests/sample_meshes.h"
 #include "tests/temporary_folder.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
+#include "subvol/validate.h"
 #include "tests/sample_meshes.h"
 #include "tests/temporary_folder.h"
 

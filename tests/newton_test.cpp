@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fit_problem.h"
+#include "fit/newton.h"
 #include "subvol/error.h"
 
 #include <catch2/catch.hpp>

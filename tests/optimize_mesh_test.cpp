@@ -6,6 +6,7 @@
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/mesh_io.h"
+#include "subvol/validate.h"
 #include "tests/data.h"
 #include "tests/sample_meshes.h"
 

@@ -10,6 +10,7 @@
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/surface_io.h"
+#include "subvol/validate.h"
 #include "tests/data.h"
 #include "tests/shell_fixtures.h"
 #include "tests/surface_fixtures.h"

@@ -3,6 +3,7 @@
 #include "fit/certificate.h"
 #include "fit/fit_level.h"
 #include "fit/high_order_fit.h"
+#include "fit/ideal_boxes.h"
 #include "fit/mesh_check.h"
 #include "fit/optimize_mesh.h"
 #include "fit/subdivision_fit.h"
@@ -11,6 +12,7 @@
 #include "subvol/boundary.h"
 #include "subvol/error.h"
 #include "subvol/limit_surface.h"
+#include "subvol/subdivision.h"
 #include "tests/data.h"
 #include "tests/sample_meshes.h"
 

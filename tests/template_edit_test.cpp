@@ -8,6 +8,7 @@
 #include "subvol/mesh_topology.h"
 #include "subvol/pillow.h"
 #include "subvol/sheet.h"
+#include "subvol/validate.h"
 #include "subvol/vertex_merge.h"
 #include "subvol/voxel_grid.h"
 #include "subvol/winding_number.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh_topology.h"
+#include "subvol/validate.h"
 #include "subvol/volume_mesh.h"
 
 #include "tests/sample_meshes.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/validate.h"
 #include "subvol/voxel_evolution.h"
 #include "subvol/voxel_grid.h"
 #include "subvol/voxel_topology.h"

@@ -9,6 +9,7 @@
 #include "fit/optimize_mesh.h"
 #include "samples/shapes.h"
 #include "subvol/error.h"
+#include "subvol/validate.h"
 #include "tests/fuzz/bytes_as_file.h"
 
 #include <cstring>

@@ -8,6 +8,7 @@
 #include "subvol/fingerprint.h"
 #include "subvol/mesh_io.h"
 #include "subvol/surface_io.h"
+#include "subvol/validate.h"
 #include "tests/fuzz/bytes_as_file.h"
 
 using subvol::fuzz::kExtension;

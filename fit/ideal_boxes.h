@@ -9,6 +9,19 @@
 
 namespace subvol {
 
+/// Lengths that stretch the ideal cell (`element_rule.h`) of each cell along its coordinates, between one size for all
+/// (own_share 0) and the cell's own (1):
+///
+///   h_ci = common^(1 - own_share) own_ci^own_share,  all rescaled so that the stretched ideal cells have the volume
+///
+/// own_ci is the mean length of a hex's four edges along its direction i; of the edges around a prism's triangles for
+/// both directions there, and of those across; of all edges of a tet. A box of the cell's own proportions has the cell
+/// pay for shear and for change, not for being long or flat.
+///
+/// nodes   the vertices' positions; lengths below a thousandth of the common size are raised to it.
+/// volume  > 0, in the cube of the nodes' unit.
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume, double own_share);
+
 /// Boxes (`ideal_boxes`) for a mesh some of whose cells say nothing about the size that is wanted there.
 ///
 /// A trusted cell keeps its own box. The others get cubes whose size runs smoothly between them and the boundary:

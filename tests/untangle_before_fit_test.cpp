@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/certificate.h"
-#include "fit/curve_mesh.h"
+#include "fit/untangle_before_fit.h"
 #include "sample_meshes.h"
 
 #include <catch2/catch.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/curve_mesh.h"
+#include "fit/untangle_before_fit.h"
 
 #include "fit/certificate.h"
 #include "subvol/error.h"

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/cell_sizes.h"
+#include "fit/ideal_boxes.h"
 
 #include "fit/element_rule.h"
-#include "fit/fit_level.h"
+#include "fit/shape_functions.h"
 #include "subvol/mesh_topology.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace subvol {
 
@@ -13,6 +15,26 @@ namespace {
 
 constexpr int kMaxSweeps = 200;
 constexpr double kSmallChange = 1e-3;
+
+/// Mean lengths of a cell's edges: along the three directions of a hex, around the triangles of a prism (twice) and
+/// across, of all edges of a tet (three times).
+Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes) {
+  const CellTopology& topology = cell_topology(kind);
+  Vec3 sums = Vec3::Zero(), counts = Vec3::Zero();
+  for (int e = 0; e < topology.num_edges; ++e) {
+    const int a = topology.edges[e][0], b = topology.edges[e][1];
+    const double length = (nodes[cell[b]] - nodes[cell[a]]).norm();
+    const Vec3 along = (canonical_vertices(kind)[b] - canonical_vertices(kind)[a]).cwiseAbs();
+    for (int i = 0; i < 3; ++i) {
+      const bool counts_here =
+          kind == CellKind::tet || (kind == CellKind::prism && i < 2 ? along[2] == 0 : along[i] > 0);
+      if (!counts_here) continue;
+      sums[i] += length;
+      counts[i] += 1;
+    }
+  }
+  return sums.cwiseQuotient(counts);
+}
 
 /// ln of the mean length of a face's edges.
 double log_size(std::span<const Index> face, std::span<const Vec3> nodes) {
@@ -22,6 +44,25 @@ double log_size(std::span<const Index> face, std::span<const Vec3> nodes) {
 }
 
 }  // namespace
+
+std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
+                              double own_share) {
+  constexpr double kLeastShare = 1e-3;
+  double ideal_volumes = 0;
+  for (CellKind kind : mesh.kinds) ideal_volumes += ideal_volume(kind);
+  const double common = std::cbrt(volume / std::max(ideal_volumes, std::numeric_limits<double>::min()));
+  std::vector<Vec3> boxes(mesh.num_cells());
+  double total = 0;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const Vec3 lengths = box_lengths(mesh.kinds[c], mesh.cell(c), nodes);
+    for (int i = 0; i < 3; ++i)
+      boxes[c][i] = common * std::pow(std::max(lengths[i] / common, kLeastShare), own_share);
+    total += ideal_volume(mesh.kinds[c]) * boxes[c].prod();
+  }
+  const double scale = std::cbrt(volume / total);
+  for (Vec3& h : boxes) h *= scale;
+  return boxes;
+}
 
 std::vector<Vec3> interpolated_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
                                      std::span<const std::uint8_t> trusted) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/option_checks.h"
+#include "subvol/format.h"
 
 #include <locale.h>
 

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+namespace subvol {
+
+/// What pulls at what in the surface energy.
+enum class Correspondence {
+  closest,  ///< exact closest points, both ways (`ClosestPointEnergy`): better cells at the same distance (default)
+  voronoi   ///< the paper's restricted Voronoi cells (`SurfaceEnergy`)
+};
+
+}  // namespace subvol

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+namespace subvol {
+
+/// printf into a string, with a decimal point whatever the program's locale; what is beyond 159 characters is cut off.
+[[gnu::format(printf, 1, 2)]] std::string formatted(const char* form, ...);
+
+}  // namespace subvol
