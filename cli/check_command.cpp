@@ -7,6 +7,7 @@
 #include "cli/progress.h"
 #include "cli/report.h"
 #include "cli/standard_output.h"
+#include "cli/verb_options.h"
 #include "cli/writing.h"
 #include "subvol/surface_io.h"
 #include "subvol/version.h"

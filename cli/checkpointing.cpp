@@ -31,24 +31,6 @@ StageLog earlier_log(const std::string& file, const RunIdentity& identity) {
 
 }  // namespace
 
-void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
-  const auto group = "Long runs";
-  CLI::Option* checkpoint =
-      verb.add_option("--checkpoint", options.checkpoint, "Keep in FILE what --resume needs, as the run goes on")
-          ->type_name("FILE")
-          ->group(group);
-  verb.add_option("--every", options.every_seconds, "Write the checkpoint at most so often")
-      ->check(number_in(0, 1e9))
-      ->type_name("SECONDS")
-      ->capture_default_str()
-      ->needs(checkpoint)
-      ->group(group);
-  verb.add_option("--resume", options.resume,
-                  "Go on from the checkpoint of a run of the same inputs and options, to the same result")
-      ->type_name("FILE")
-      ->group(group);
-}
-
 std::string fingerprint(const TriangleMesh& mesh) {
   Fingerprint print;
   print.add(numbers(mesh.positions)).add(mesh.triangles.size());
@@ -69,10 +51,6 @@ std::string fingerprint(const VolumeMesh& mesh) {
   for (const CreaseEdge& crease : mesh.tags.creases) print.add(crease.v0).add(crease.v1).add(crease.sharpness);
   for (const CornerVertex& corner : mesh.tags.corners) print.add(corner.vertex).add(corner.sharpness);
   return print.text();
-}
-
-RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs) {
-  return run_identity(verb.get_name(), options_of_result(verb), inputs);
 }
 
 RunIdentity run_identity(const std::string& verb, const Json& options,

@@ -14,9 +14,6 @@
 
 namespace subvol::cli {
 
-/// --checkpoint, --every, --resume.
-void add_checkpoint_options(CLI::App& verb, RunOptions& options);
-
 /// What tells one input from another: all that a fit reads of it.
 std::string fingerprint(const TriangleMesh& mesh);
 std::string fingerprint(const PointCloud& cloud);
@@ -24,8 +21,6 @@ std::string fingerprint(const Target& target);
 std::string fingerprint(const VolumeMesh& mesh);
 
 /// A run by its version, verb, inputs (name and fingerprint), and those options that bear on the result of the fit.
-RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs);
-/// The same from the verb's name and its options.
 RunIdentity run_identity(const std::string& verb, const Json& options,
                          const std::vector<std::pair<std::string, std::string>>& inputs);
 

@@ -10,6 +10,7 @@
 #include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/untangling.h"
+#include "cli/verb_options.h"
 #include "cli/writing.h"
 #include "cli/written_result.h"
 #include "fit/subdivision_fit.h"

@@ -11,6 +11,7 @@
 #include "cli/progress.h"
 #include "cli/report.h"
 #include "cli/untangling.h"
+#include "cli/verb_options.h"
 #include "cli/written_result.h"
 #include "fit/mesh_check.h"
 #include "fit/quality.h"

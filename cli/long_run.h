@@ -7,6 +7,8 @@
 #include "cli/run_options.h"
 #include "fit/fit_report.h"
 
+#include <CLI/CLI.hpp>
+
 #include <chrono>
 #include <functional>
 #include <string>

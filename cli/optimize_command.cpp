@@ -8,6 +8,7 @@
 #include "cli/losses.h"
 #include "cli/long_run.h"
 #include "cli/report.h"
+#include "cli/verb_options.h"
 #include "cli/writing.h"
 #include "cli/written_result.h"
 #include "fit/boundary_triangles.h"

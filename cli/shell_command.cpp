@@ -6,6 +6,7 @@
 #include "cli/long_run.h"
 #include "cli/report.h"
 #include "cli/shell_output.h"
+#include "cli/verb_options.h"
 #include "cli/writing.h"
 #include "cli/written_result.h"
 #include "fit/mesh_check.h"

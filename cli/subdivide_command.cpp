@@ -4,6 +4,7 @@
 #include "cli/loading.h"
 #include "cli/losses.h"
 #include "cli/outputs.h"
+#include "cli/verb_options.h"
 #include "cli/writing.h"
 #include "cli/written_result.h"
 #include "subvol/features.h"

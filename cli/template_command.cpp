@@ -3,6 +3,7 @@
 
 #include "cli/exit_status.h"
 #include "cli/outputs.h"
+#include "cli/verb_options.h"
 #include "cli/written_result.h"
 
 #include <utility>

@@ -7,6 +7,7 @@
 #include "cli/losses.h"
 #include "cli/outputs.h"
 #include "cli/template_command.h"
+#include "cli/verb_options.h"
 #include "fit/surface_distance.h"
 #include "shell/extrude.h"
 #include "subvol/carve.h"

@@ -83,7 +83,7 @@ std::string parse_cut(const std::string& text, CutPlane& cut) {
   if (text.empty() || text[0] < 'x' || text[0] > 'z' || (text.size() > 1 && text[1] != ':')) return error;
   cut.axis = text[0] - 'x';
   if (text.size() == 1) return {};
-  if (!number_in(1e-9, 1 - 1e-9)(text.substr(2)).empty()) return error;
+  if (!is_number_in(text.substr(2), 1e-9, 1 - 1e-9)) return error;
   cut.share = *parse_number(text.substr(2));
   return {};
 }
@@ -98,51 +98,6 @@ SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& op
                             .source = as_utf8(options.source.filename().string())};
   for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
   return scene;
-}
-
-void add_writing_options(CLI::App& verb, WritingOptions& options) {
-  const auto group = "Surfaces for DCC tools";
-  verb.add_option("--chord", options.chord_percent,
-                  "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
-      ->check(number_in(1e-4, 100.0))
-      ->type_name("PERCENT")
-      ->capture_default_str()
-      ->group(group);
-  verb.add_option("--unit", options.metres_per_unit, "Length of the mesh's unit")
-      ->check(number_in(1e-12, 1e12))
-      ->type_name("METRES")
-      ->capture_default_str()
-      ->group(group);
-  verb.add_option("--up", options.up_axis, "Axis of the mesh that points up")
-      ->check(CLI::IsMember({"y", "z"}))
-      ->type_name("y|z")
-      ->capture_default_str()
-      ->group(group);
-  verb.add_option_function<std::string>(
-          "--cut",
-          [&options](const std::string& text) {
-            if (const std::string error = parse_cut(text, options.cut); !error.empty())
-              throw CLI::ValidationError("--cut", error);
-          },
-          "Where cutaway:FILE cuts: the axis the plane stands across, and where along it (default: the axis along\n"
-          "which the mesh is shortest, halfway)")
-      ->type_name("x|y|z[:SHARE]")
-      ->group(group);
-  verb.add_flag("--no-wireframe", options.no_wireframe, "Leave the edges of the cells out of .glb and .gltf")
-      ->group(group);
-  verb.add_flag("--quantize", options.quantize,
-                "Small .glb and .gltf: positions in 16 bits, normals in 8 (KHR_mesh_quantization)")
-      ->group(group);
-}
-
-CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options) {
-  return verb
-      .add_option("--map-tolerance", options.map_tolerance_percent,
-                  "Largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, in\n"
-                  "per cent of the diagonal; if it is larger, the program says so and ends with status 4")
-      ->check(number_in(0.0, 100.0))
-      ->type_name("PERCENT")
-      ->capture_default_str();
 }
 
 void write_scene(const std::filesystem::path& path, const Scene& scene) {

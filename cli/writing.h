@@ -34,12 +34,6 @@ struct WritingOptions {
 /// Largest chord error of surfaces that are measured, per cent as above: coarse scenes do not make a coarse check.
 double measured_chord_percent(const WritingOptions& options);
 
-/// --chord, --unit, --up, --cut, --no-wireframe, --quantize.
-void add_writing_options(CLI::App& verb, WritingOptions& options);
-
-/// --map-tolerance.
-CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);
-
 /// Reads where a cutaway is cut: x, y or z, also with a place as "z:0.3". Returns what is wrong, or nothing.
 std::string parse_cut(const std::string& text, CutPlane& cut);
 
