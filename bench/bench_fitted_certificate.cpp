@@ -4,9 +4,9 @@
 // cell is inverted: of the first pass, which makes the models that it needs, and of later ones.
 #include "bench/freed_memory.h"
 #include "export/high_order_file.h"
-#include "fit/high_order_certificate.h"
-#include "fit/high_order_energy.h"
-#include "subvol/error.h"
+#include "fit/certificate/high_order_certificate.h"
+#include "fit/energies/high_order_energy.h"
+#include "subvol/base/error.h"
 
 #include <omp.h>
 

@@ -5,8 +5,8 @@
 // amplitudes before), and of later ones. Times for the proof and what stands beside it are those of the processor.
 #include "bench/freed_memory.h"
 #include "bench/hex_grid.h"
-#include "fit/high_order_certificate.h"
-#include "fit/high_order_energy.h"
+#include "fit/certificate/high_order_certificate.h"
+#include "fit/energies/high_order_energy.h"
 
 #include <omp.h>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bench/hex_grid.h"
 #include "fit/optimize_mesh.h"
-#include "fit/quality.h"
-#include "subvol/mesh_topology.h"
+#include "fit/quality/quality.h"
+#include "subvol/mesh/mesh_topology.h"
 
 #include <omp.h>
 

@@ -3,19 +3,19 @@
 // with the same ideal cells. JSON to stdout: processor time until the energy is within 1 % of the least that either
 // finds. Usage: bench_solvers [TARGET TEMPLATE [ORDER]]; without arguments the torus sample, order 4. One thread.
 #include "bench/freed_memory.h"
-#include "fit/boundary_samples.h"
-#include "fit/fit_target.h"
-#include "fit/high_order_energy.h"
+#include "fit/elements/boundary_samples.h"
+#include "fit/elements/ideal_boxes.h"
+#include "fit/energies/high_order_energy.h"
+#include "fit/energies/make_surface_term.h"
+#include "fit/fits/high_order_schedule.h"
 #include "fit/high_order_fit.h"
-#include "fit/high_order_schedule.h"
-#include "fit/ideal_boxes.h"
-#include "fit/lbfgs.h"
-#include "fit/make_surface_term.h"
-#include "fit/newton.h"
-#include "fit/stage_runner.h"
+#include "fit/solver/lbfgs.h"
+#include "fit/solver/newton.h"
+#include "fit/stages/stage_runner.h"
+#include "fit/target/fit_target.h"
 #include "samples/shapes.h"
-#include "subvol/mesh_io.h"
-#include "subvol/surface_io.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
 
 #include <omp.h>
 

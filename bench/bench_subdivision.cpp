@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Times of building and applying the subdivision matrix, level by level, and of refining a boundary.
 #include "bench/hex_grid.h"
-#include "subvol/limit_surface.h"
-#include "subvol/mesh_topology.h"
-#include "subvol/subdivision.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/subdivision/limit_surface.h"
+#include "subvol/subdivision/subdivision.h"
 
 #include <omp.h>
 

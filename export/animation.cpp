@@ -2,11 +2,11 @@
 #include "export/animation.h"
 
 #include "export/polygon_shading.h"
-#include "fit/boundary_samples.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/limit_surface.h"
-#include "subvol/mesh_topology.h"
+#include "fit/elements/boundary_samples.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/subdivision/limit_surface.h"
+#include "subvol/surface/boundary.h"
 
 #include <string>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "export/export.h"
-#include "subvol/fit_state.h"
+#include "subvol/mesh/fit_state.h"
 
 #include <span>
 

@@ -3,7 +3,7 @@
 
 #include "export/text_format.h"
 #include "export/vtu_arrays.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <algorithm>
 #include <cassert>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/types.h"
+#include "subvol/base/types.h"
 
 #include <array>
 

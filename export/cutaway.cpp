@@ -2,9 +2,9 @@
 #include "export/cutaway.h"
 
 #include "export/color_map.h"
-#include "fit/boundary_samples.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
+#include "fit/elements/boundary_samples.h"
+#include "subvol/base/error.h"
+#include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
 

@@ -3,11 +3,11 @@
 
 #include "export/color_map.h"
 #include "export/polygon_shading.h"
-#include "fit/quality.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/limit_surface.h"
-#include "subvol/mesh_topology.h"
+#include "fit/quality/quality.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/subdivision/limit_surface.h"
+#include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
 

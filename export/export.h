@@ -4,9 +4,9 @@
 #include "export/high_order_patches.h"
 #include "export/scene.h"
 #include "export/tessellate.h"
-#include "fit/curved_boundary.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "fit/geometry/curved_boundary.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <span>

@@ -6,11 +6,11 @@
 #include "export/lagrange_mesh.h"
 #include "export/text_format.h"
 #include "export/vtu_reader.h"
-#include "fit/high_order_quality.h"
-#include "subvol/atomic_file.h"
-#include "subvol/error.h"
-#include "subvol/mesh_io.h"
-#include "subvol/validate.h"
+#include "fit/quality/high_order_quality.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/error.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/mesh/validate.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "export/volume_writer.h"
-#include "fit/cell_reference.h"
-#include "fit/high_order_mesh.h"
-#include "fit/polynomial_map.h"
+#include "fit/elements/cell_reference.h"
+#include "fit/elements/high_order_mesh.h"
+#include "fit/elements/polynomial_map.h"
 
 #include <filesystem>
 #include <span>

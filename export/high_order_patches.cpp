@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/high_order_patches.h"
 
-#include "subvol/error.h"
-#include "subvol/feature_tags.h"
-#include "subvol/surface_refinement.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/feature_tags.h"
+#include "subvol/subdivision/surface_refinement.h"
 
 #include <Eigen/Geometry>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/high_order_mesh.h"
-#include "subvol/patch_surface.h"
+#include "fit/elements/high_order_mesh.h"
+#include "subvol/subdivision/patch_surface.h"
 
 #include <vector>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/lagrange_cells.h"
 
-#include "fit/pattern_table.h"
-#include "subvol/error.h"
+#include "fit/elements/pattern_table.h"
+#include "subvol/base/error.h"
 
 #include <Eigen/LU>
 

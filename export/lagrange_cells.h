@@ -3,7 +3,7 @@
 
 #include "export/cell_text.h"
 #include "export/lagrange_lattice.h"
-#include "fit/high_order_mesh.h"
+#include "fit/elements/high_order_mesh.h"
 
 namespace subvol {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/cell_topology.h"
-#include "subvol/types.h"
+#include "subvol/base/types.h"
+#include "subvol/mesh/cell_topology.h"
 
 #include <vector>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/lagrange_mesh.h"
 
-#include "fit/pattern_table.h"
-#include "subvol/error.h"
-#include "subvol/parallel_errors.h"
+#include "fit/elements/pattern_table.h"
+#include "subvol/base/error.h"
+#include "subvol/base/parallel_errors.h"
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "export/lagrange_lattice.h"
-#include "fit/high_order_mesh.h"
+#include "fit/elements/high_order_mesh.h"
 
 #include <span>
 #include <vector>

@@ -2,8 +2,8 @@
 #include "export/obj_writer.h"
 
 #include "export/text_format.h"
-#include "subvol/atomic_file.h"
-#include "subvol/version.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/version.h"
 
 namespace subvol {
 

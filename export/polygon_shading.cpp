@@ -2,7 +2,7 @@
 #include "export/polygon_shading.h"
 
 #include "export/text_format.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <Eigen/Geometry>
 

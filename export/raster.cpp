@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/raster.h"
 
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <Eigen/Geometry>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "export/color_map.h"
-#include "subvol/triangle_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <cstdint>

@@ -5,9 +5,9 @@
 #include "export/lagrange_mesh.h"
 #include "export/text_format.h"
 #include "export/vtu_reader.h"
-#include "subvol/error.h"
-#include "subvol/mesh_io.h"
-#include "subvol/text_scanner.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/mesh_io.h"
 
 #include <tiny_gltf.h>
 

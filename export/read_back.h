@@ -9,8 +9,8 @@
 
 #include "export/high_order_file.h"
 #include "export/scene.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <filesystem>
 

@@ -2,7 +2,7 @@
 #include "export/strip_cuts.h"
 
 #include "export/chord_distance.h"
-#include "subvol/parallel_errors.h"
+#include "subvol/base/parallel_errors.h"
 
 #include <algorithm>
 #include <bit>

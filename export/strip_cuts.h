@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/patch_surface.h"
-#include "subvol/work_progress.h"
+#include "subvol/base/work_progress.h"
+#include "subvol/subdivision/patch_surface.h"
 
 #include <array>
 #include <span>

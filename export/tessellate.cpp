@@ -2,9 +2,9 @@
 #include "export/tessellate.h"
 
 #include "export/strip_cuts.h"
-#include "subvol/error.h"
-#include "subvol/feature_tags.h"
-#include "subvol/limit_patches.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/feature_tags.h"
+#include "subvol/subdivision/limit_patches.h"
 
 #include <Eigen/Geometry>
 

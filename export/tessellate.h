@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/patch_surface.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
-#include "subvol/work_progress.h"
+#include "subvol/base/work_progress.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/subdivision/patch_surface.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "export/text_format.h"
 
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 namespace subvol {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/text_scanner.h"
-#include "subvol/triangle_mesh.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <concepts>
 #include <filesystem>

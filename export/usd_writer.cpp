@@ -2,9 +2,9 @@
 #include "export/usd_writer.h"
 
 #include "export/text_format.h"
-#include "subvol/atomic_file.h"
-#include "subvol/error.h"
-#include "subvol/version.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/error.h"
+#include "subvol/base/version.h"
 
 #include <algorithm>
 #include <cmath>

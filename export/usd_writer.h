@@ -2,8 +2,8 @@
 #pragma once
 
 #include "export/scene.h"
-#include "subvol/feature_tags.h"
-#include "subvol/triangle_mesh.h"
+#include "subvol/mesh/feature_tags.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <filesystem>
 #include <string>

@@ -3,8 +3,8 @@
 
 #include "export/cell_text.h"
 #include "export/text_format.h"
-#include "subvol/atomic_file.h"
-#include "subvol/error.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/error.h"
 
 #include <algorithm>
 #include <cmath>

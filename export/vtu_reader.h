@@ -2,8 +2,8 @@
 #pragma once
 
 #include "export/vtu_arrays.h"
-#include "subvol/error.h"
-#include "subvol/text_scanner.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
 
 #include <cstring>
 #include <map>

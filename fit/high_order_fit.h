@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/fit_report.h"
-#include "fit/high_order_mesh.h"
+#include "fit/elements/high_order_mesh.h"
+#include "fit/stages/fit_report.h"
 #include "fit/subdivision_fit.h"
 
 #include <functional>

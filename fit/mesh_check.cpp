@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/mesh_check.h"
 
-#include "fit/boundary_triangles.h"
-#include "fit/high_order_certificate.h"
-#include "fit/high_order_quality.h"
-#include "fit/self_intersection.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/length_range.h"
-#include "subvol/mesh_topology.h"
+#include "fit/certificate/high_order_certificate.h"
+#include "fit/geometry/boundary_triangles.h"
+#include "fit/geometry/self_intersection.h"
+#include "fit/quality/high_order_quality.h"
+#include "subvol/base/error.h"
+#include "subvol/base/length_range.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/curved_boundary.h"
-#include "fit/high_order_mesh.h"
-#include "fit/quality.h"
-#include "fit/surface_distance.h"
-#include "subvol/audit.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/validate.h"
-#include "subvol/volume_mesh.h"
-#include "subvol/work_progress.h"
+#include "fit/elements/high_order_mesh.h"
+#include "fit/geometry/curved_boundary.h"
+#include "fit/geometry/surface_distance.h"
+#include "fit/quality/quality.h"
+#include "subvol/base/work_progress.h"
+#include "subvol/mesh/validate.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/subdivision/audit.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <cstddef>

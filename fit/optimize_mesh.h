@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/fit_report.h"
-#include "fit/followed_creases.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "fit/features/followed_creases.h"
+#include "fit/stages/fit_report.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <functional>
 #include <vector>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/fit_options.h"
-#include "fit/fit_report.h"
-#include "subvol/fit_state.h"
-#include "subvol/point_cloud.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "fit/stages/fit_options.h"
+#include "fit/stages/fit_report.h"
+#include "subvol/mesh/fit_state.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/point_cloud.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <vector>
 

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/template_choice.h"
 
-#include "fit/boundary_samples.h"
-#include "fit/boundary_triangles.h"
+#include "fit/elements/boundary_samples.h"
+#include "fit/geometry/boundary_triangles.h"
+#include "fit/geometry/self_intersection.h"
+#include "fit/geometry/surface_distance.h"
 #include "fit/high_order_fit.h"
-#include "fit/high_order_quality.h"
-#include "fit/quality.h"
-#include "fit/self_intersection.h"
+#include "fit/quality/high_order_quality.h"
+#include "fit/quality/quality.h"
 #include "fit/subdivision_fit.h"
-#include "fit/surface_distance.h"
-#include "subvol/auto_template.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/mesh_topology.h"
-#include "subvol/option_checks.h"
+#include "subvol/base/error.h"
+#include "subvol/base/option_checks.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+#include "subvol/templates/auto_template.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/basis.h"
-#include "fit/fit_report.h"
-#include "subvol/solid_topology.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "fit/elements/basis.h"
+#include "fit/stages/fit_report.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/solid_topology.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <cstddef>
 #include <functional>

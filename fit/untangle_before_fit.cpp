@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/untangle_before_fit.h"
 
-#include "fit/certificate.h"
-#include "subvol/error.h"
+#include "fit/certificate/certificate.h"
+#include "subvol/base/error.h"
 
 #include <string>
 #include <utility>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fit/optimize_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "subvol/mesh/volume_mesh.h"
 
 #include <cstddef>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/arrays.h"
 
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cli/checkpointing.h"
+#include "cli/runs/checkpointing.h"
 #include "python/keywords.h"
 #include "python/work.h"
 

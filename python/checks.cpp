@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/check_report.h"
+#include "cli/runs/check_report.h"
+#include "fit/geometry/self_intersection.h"
 #include "fit/mesh_check.h"
-#include "fit/self_intersection.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/module.h"

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/outputs.h"
-#include "cli/shell_output.h"
-#include "cli/writing.h"
-#include "cli/written_result.h"
+#include "cli/runs/outputs.h"
+#include "cli/runs/shell_output.h"
+#include "cli/runs/writing.h"
+#include "cli/runs/written_result.h"
 #include "fit/mesh_check.h"
-#include "fit/quality.h"
+#include "fit/quality/quality.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
-#include "subvol/error.h"
-#include "subvol/mesh_io.h"
-#include "subvol/surface_io.h"
+#include "subvol/base/error.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
 
 namespace subvol::python {
 namespace {

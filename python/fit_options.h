@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cli/writing.h"
-#include "fit/basis.h"
+#include "cli/runs/writing.h"
+#include "fit/elements/basis.h"
 #include "fit/high_order_fit.h"
 #include "fit/untangle_before_fit.h"
 #include "python/keywords.h"
-#include "subvol/subdivision.h"
+#include "subvol/subdivision/subdivision.h"
 
 namespace subvol::python {
 

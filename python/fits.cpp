@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/automatic_template.h"
-#include "cli/check_report.h"
-#include "cli/report.h"
-#include "cli/untangling.h"
-#include "cli/writing.h"
+#include "cli/runs/automatic_template.h"
+#include "cli/runs/check_report.h"
+#include "cli/runs/report.h"
+#include "cli/runs/untangling.h"
+#include "cli/runs/writing.h"
 #include "fit/high_order_fit.h"
 #include "fit/mesh_check.h"
 #include "fit/template_choice.h"
@@ -13,7 +13,7 @@
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <algorithm>
 

@@ -5,8 +5,8 @@
 #include "python/fit_options.h"
 #include "python/meshes.h"
 #include "python/module.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
+#include "subvol/surface/boundary.h"
 
 namespace subvol::python {
 namespace {

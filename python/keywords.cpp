@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/keywords.h"
 
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <algorithm>
 #include <limits>

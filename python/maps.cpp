@@ -5,10 +5,10 @@
 #include "python/meshes.h"
 #include "python/module.h"
 #include "python/work.h"
-#include "subvol/error.h"
-#include "subvol/features.h"
-#include "subvol/limit_surface.h"
-#include "subvol/repeated_subdivision.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/features.h"
+#include "subvol/subdivision/limit_surface.h"
+#include "subvol/subdivision/repeated_subdivision.h"
 
 namespace subvol::python {
 namespace {

@@ -4,12 +4,12 @@
 #include "python/arrays.h"
 #include "python/module.h"
 #include "python/work.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/features.h"
-#include "subvol/sound_points.h"
-#include "subvol/surface_io.h"
-#include "subvol/validate.h"
+#include "subvol/base/error.h"
+#include "subvol/io/sound_points.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/mesh/features.h"
+#include "subvol/mesh/validate.h"
+#include "subvol/surface/boundary.h"
 
 #include <algorithm>
 #include <array>

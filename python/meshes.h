@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cli/loading.h"
+#include "cli/runs/loading.h"
 #include "export/high_order_file.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <pybind11/pybind11.h>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/module.h"
 
-#include "cli/exit_status.h"
-#include "cli/run_options.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/run_options.h"
 #include "python/work.h"
-#include "subvol/error.h"
-#include "subvol/version.h"
+#include "subvol/base/error.h"
+#include "subvol/base/version.h"
 
 namespace subvol::python {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/optimize_mesh.h"
 
-#include "cli/check_report.h"
-#include "cli/report.h"
-#include "fit/boundary_triangles.h"
+#include "cli/runs/check_report.h"
+#include "cli/runs/report.h"
+#include "fit/geometry/boundary_triangles.h"
 #include "fit/mesh_check.h"
 #include "fit/untangle_before_fit.h"
 #include "python/arrays.h"
@@ -11,9 +11,9 @@
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/option_checks.h"
+#include "subvol/base/error.h"
+#include "subvol/base/option_checks.h"
+#include "subvol/surface/boundary.h"
 
 namespace subvol::python {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/report.h"
 
-#include "cli/report.h"
-#include "subvol/process_memory.h"
-#include "subvol/version.h"
+#include "cli/runs/report.h"
+#include "subvol/base/process_memory.h"
+#include "subvol/base/version.h"
 
 namespace subvol::python {
 

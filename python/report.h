@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "cli/run_options.h"
+#include "cli/runs/run_options.h"
 #include "python/keywords.h"
 #include "python/work.h"
 

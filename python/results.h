@@ -4,7 +4,7 @@
 #include "python/meshes.h"
 #include "python/report.h"
 #include "shell/curved_shell.h"
-#include "subvol/fit_state.h"
+#include "subvol/mesh/fit_state.h"
 
 #include <memory>
 #include <optional>

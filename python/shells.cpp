@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/check_report.h"
-#include "cli/report.h"
-#include "cli/shell_output.h"
+#include "cli/runs/check_report.h"
+#include "cli/runs/report.h"
+#include "cli/runs/shell_output.h"
+#include "fit/geometry/surface_distance.h"
 #include "fit/mesh_check.h"
-#include "fit/surface_distance.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
 #include "shell/shell.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
-#include "subvol/features.h"
-#include "subvol/option_checks.h"
+#include "subvol/base/error.h"
+#include "subvol/base/option_checks.h"
+#include "subvol/mesh/features.h"
+#include "subvol/surface/boundary.h"
 
 #include <algorithm>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/work.h"
 
-#include "cli/run_options.h"
-#include "subvol/option_checks.h"
+#include "cli/runs/run_options.h"
+#include "subvol/base/option_checks.h"
 
 #include <omp.h>
 

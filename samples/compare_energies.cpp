@@ -4,10 +4,10 @@
 // every cell; a conformal one shrinks or swells cells by the singularity to keep their shapes.
 
 #include "export/high_order_file.h"
-#include "fit/high_order_energy.h"
-#include "fit/high_order_quality.h"
-#include "fit/newton.h"
-#include "subvol/atomic_file.h"
+#include "fit/energies/high_order_energy.h"
+#include "fit/quality/high_order_quality.h"
+#include "fit/solver/newton.h"
+#include "subvol/base/atomic_file.h"
 
 #include <Eigen/LU>
 

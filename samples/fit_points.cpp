@@ -4,11 +4,11 @@
 
 #include "export/export.h"
 #include "export/gltf_writer.h"
-#include "fit/boundary_samples.h"
+#include "fit/elements/boundary_samples.h"
 #include "fit/high_order_fit.h"
 #include "fit/mesh_check.h"
 #include "samples/shapes.h"
-#include "subvol/atomic_file.h"
+#include "subvol/base/atomic_file.h"
 
 #include <cstdio>
 #include <exception>

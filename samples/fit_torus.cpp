@@ -3,10 +3,10 @@
 
 #include "export/export.h"
 #include "export/gltf_writer.h"
-#include "fit/quality.h"
+#include "fit/quality/quality.h"
 #include "fit/subdivision_fit.h"
 #include "samples/shapes.h"
-#include "subvol/mesh_io.h"
+#include "subvol/io/mesh_io.h"
 
 #include <cstdio>
 #include <exception>

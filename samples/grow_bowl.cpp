@@ -5,7 +5,7 @@
 #include "export/gltf_writer.h"
 #include "samples/shapes.h"
 #include "shell/shell.h"
-#include "subvol/mesh_io.h"
+#include "subvol/io/mesh_io.h"
 
 #include <algorithm>
 #include <cstdio>

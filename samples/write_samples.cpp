@@ -4,8 +4,8 @@
 
 #include "export/obj_writer.h"
 #include "samples/shapes.h"
-#include "subvol/atomic_file.h"
-#include "subvol/mesh_io.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/io/mesh_io.h"
 
 #include <cstdio>
 #include <exception>

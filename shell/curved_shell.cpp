@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/curved_shell.h"
 
-#include "fit/high_order_certificate.h"
-#include "fit/high_order_energy.h"
-#include "fit/high_order_quality.h"
-#include "fit/self_intersection.h"
-#include "fit/stage_runner.h"
+#include "fit/certificate/high_order_certificate.h"
+#include "fit/energies/high_order_energy.h"
+#include "fit/geometry/self_intersection.h"
+#include "fit/quality/high_order_quality.h"
+#include "fit/stages/stage_runner.h"
 #include "shell/shell_check.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <algorithm>
 #include <memory>

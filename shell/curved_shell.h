@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/boundary_samples.h"
-#include "fit/curved_boundary.h"
-#include "fit/high_order_mesh.h"
+#include "fit/elements/boundary_samples.h"
+#include "fit/elements/high_order_mesh.h"
+#include "fit/geometry/curved_boundary.h"
 #include "shell/shell.h"
 #include "shell/thickness.h"
 

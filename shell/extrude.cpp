@@ -3,8 +3,8 @@
 
 #include "shell/shell_layers.h"
 #include "shell/visible_normals.h"
-#include "subvol/error.h"
-#include "subvol/template_edit.h"
+#include "subvol/base/error.h"
+#include "subvol/templates/template_edit.h"
 
 #include <cmath>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/ray_gap.h"
 
-#include "subvol/error.h"
+#include "subvol/base/error.h"
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>

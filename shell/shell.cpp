@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/shell.h"
 
-#include "fit/boundary_triangles.h"
-#include "fit/closest_point_energy.h"
-#include "fit/free_nodes.h"
-#include "fit/newton.h"
-#include "fit/self_intersection.h"
-#include "fit/volume_energy.h"
+#include "fit/energies/closest_point_energy.h"
+#include "fit/energies/volume_energy.h"
+#include "fit/geometry/boundary_triangles.h"
+#include "fit/geometry/self_intersection.h"
+#include "fit/solver/free_nodes.h"
+#include "fit/solver/newton.h"
 #include "shell/thickness.h"
 #include "shell/visible_normals.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
+#include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
 

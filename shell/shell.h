@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/fit_report.h"
-#include "fit/quality.h"
+#include "fit/quality/quality.h"
+#include "fit/stages/fit_report.h"
 #include "shell/shell_check.h"
 #include "shell/shell_layers.h"
 

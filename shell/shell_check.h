@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate.h"
+#include "fit/certificate/certificate.h"
 #include "shell/shell_layers.h"
 
 #include <array>

@@ -2,8 +2,8 @@
 #include "shell/shell_layers.h"
 
 #include "shell/visible_normals.h"
-#include "subvol/error.h"
-#include "subvol/features.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/features.h"
 
 #include <Eigen/Geometry>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/cell_reference.h"
-#include "subvol/surface_topology.h"
-#include "subvol/triangle_mesh.h"
-#include "subvol/volume_mesh.h"
+#include "fit/elements/cell_reference.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/surface_topology.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <span>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "shell/thickness.h"
 
-#include "fit/closest_point.h"
-#include "fit/surface_distance.h"
+#include "fit/geometry/closest_point.h"
+#include "fit/geometry/surface_distance.h"
 #include "shell/ray_gap.h"
-#include "subvol/boundary.h"
-#include "subvol/error.h"
+#include "subvol/base/error.h"
+#include "subvol/surface/boundary.h"
 
 #include <algorithm>
 #include <functional>

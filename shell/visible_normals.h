@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/triangle_mesh.h"
-#include "subvol/types.h"
+#include "subvol/base/types.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <optional>
 #include <span>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The layers only point down: docs/architecture.md, "Who may include whom".
 
-#include "tests/data.h"
+#include "tests/support/data.h"
 
 #include <catch2/catch.hpp>
 
@@ -34,10 +34,10 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
     {"tests", {"subvol", "fit", "shell", "export", "cli", "samples", "tests"}},
 };
 // Results of a fit may be shown, its energies and solver not.
-const std::set<std::string> kFitForExport{"fit/quality.h", "fit/certificate.h", "fit/element_space.h",
-                                          "fit/high_order_mesh.h", "fit/pattern_table.h",
-                                          "fit/high_order_quality.h", "fit/curved_boundary.h",
-                                          "fit/boundary_samples.h"};
+const std::set<std::string> kFitForExport{"fit/quality/quality.h", "fit/certificate/certificate.h", "fit/elements/element_space.h",
+                                          "fit/elements/high_order_mesh.h", "fit/elements/pattern_table.h",
+                                          "fit/quality/high_order_quality.h", "fit/geometry/curved_boundary.h",
+                                          "fit/elements/boundary_samples.h"};
 
 struct Source {
   std::string path, layer;

@@ -2,7 +2,7 @@
 // The tests' main: a run in which nothing failed and something was left out ends with a status of its own, so that
 // ctest tells skipped tests from those that passed, and never takes a failure for either.
 #define CATCH_CONFIG_RUNNER
-#include "tests/skipping.h"
+#include "tests/support/skipping.h"
 
 #include <catch2/catch.hpp>
 

@@ -9,7 +9,7 @@ import { join } from "node:path";
 const SECONDS_TO_START = 60, SECONDS_IN_ALL = 180;
 const TYPES = { html: "text/html; charset=utf-8", js: "text/javascript", png: "image/png", glb: "model/gltf-binary" };
 
-/// Ends as a test that cannot run here, with the status of tests/skipping.h.
+/// Ends as a test that cannot run here, with the status of tests/support/skipping.h.
 export function skip(why) {
   console.log(`SKIPPED: ${why}`);
   process.exit(77);

@@ -2,11 +2,11 @@
 // libFuzzer target of what only the program reads: kExtension says of which files. Reports (.json) become pages
 // or are refused, options from a file (.toml) are understood or a usage error, thicknesses (.txt) are positive numbers.
 
-#include "cli/commands.h"
-#include "cli/exit_status.h"
-#include "cli/loading.h"
-#include "cli/report_page.h"
-#include "subvol/error.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/report_page.h"
+#include "cli/verbs/commands.h"
+#include "subvol/base/error.h"
 #include "tests/fuzz/bytes_as_file.h"
 
 #include <algorithm>

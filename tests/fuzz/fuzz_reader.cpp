@@ -3,12 +3,12 @@
 // returns something sound or throws InputError.
 
 #include "export/high_order_file.h"
-#include "fit/checkpoint.h"
-#include "subvol/error.h"
-#include "subvol/fingerprint.h"
-#include "subvol/mesh_io.h"
-#include "subvol/surface_io.h"
-#include "subvol/validate.h"
+#include "fit/stages/checkpoint.h"
+#include "subvol/base/error.h"
+#include "subvol/base/fingerprint.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/mesh/validate.h"
 #include "tests/fuzz/bytes_as_file.h"
 
 using subvol::fuzz::kExtension;

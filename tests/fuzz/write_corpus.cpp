@@ -3,10 +3,10 @@
 
 #include "export/high_order_file.h"
 #include "export/obj_writer.h"
-#include "fit/checkpoint.h"
+#include "fit/stages/checkpoint.h"
 #include "samples/shapes.h"
-#include "subvol/atomic_file.h"
-#include "subvol/mesh_io.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/io/mesh_io.h"
 
 #include <cstdio>
 #include <cstring>

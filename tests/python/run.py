@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """run.py MODULE: runs the tests of one module of this folder. Exit status: 0 all passed, 1 some failed, 77 none failed
-but some were skipped (each is named), as in tests/skipping.h."""
+but some were skipped (each is named), as in tests/support/skipping.h."""
 
 import sys
 import unittest

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/interrupt.h"
+
+#include "cli/runs/exit_status.h"
+#include "subvol/base/atomic_file.h"
+
+#include <atomic>
+#include <csignal>
+
+#include <time.h>
+#include <unistd.h>
+
+namespace subvol::cli {
+namespace {
+
+constexpr long long kOneSignalNanoseconds = 200'000'000;
+
+/// When the first one came; 0: not yet.
+std::atomic<long long> first{0};
+static_assert(std::atomic<long long>::is_always_lock_free);
+
+// Only what a signal handler may call.
+void note(int) {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  const long long now = time.tv_sec * 1'000'000'000LL + time.tv_nsec + 1;
+  long long before = 0;
+  const bool is_first = first.compare_exchange_strong(before, now);
+  // Who waits for the reader of a pipe does not look at the flag.
+  if (!waits_for_reader() && (is_first || now - before <= kOneSignalNanoseconds)) return;
+  delete_temporaries();
+  _exit(kInterrupted);
+}
+
+}  // namespace
+
+void catch_interrupt() {
+  struct sigaction action {};
+  action.sa_handler = note;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+bool interrupted() { return first != 0; }
+
+}  // namespace subvol::cli

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/loading.h"
+
+#include "cli/runs/exit_status.h"
+#include "fit/geometry/surface_distance.h"
+#include "fit/mesh_check.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+
+#include <algorithm>
+#include <array>
+
+namespace subvol::cli {
+
+bool is_volume_file(const std::filesystem::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".mesh" || extension == ".vtk";
+}
+
+bool is_high_order_file(const std::filesystem::path& path) { return lower_case(path.extension().string()) == ".vtu"; }
+
+namespace {
+
+bool is_surface_or_points(const std::filesystem::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return is_surface_extension(extension) || extension == ".xyz";
+}
+
+}  // namespace
+
+void require_known_file(const std::filesystem::path& path) {
+  if (is_volume_file(path) || is_high_order_file(path) || is_surface_or_points(path)) return;
+  throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +
+                   "; of cells there are " + cell_formats() + "; of surfaces " + surface_formats() + "; of points " +
+                   point_cloud_formats());
+}
+
+void require_surface_file(const std::filesystem::path& path) {
+  require_known_file(path);
+  if (is_high_order_file(path))
+    throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but a surface is wanted");
+}
+
+void require_cell_file(const std::filesystem::path& path) {
+  require_known_file(path);
+  if (is_surface_or_points(path))
+    throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
+  if (is_high_order_file(path))
+    throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but linear cells are wanted: " +
+                     volume_mesh_formats());
+}
+
+Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  require_surface_file(path);
+  if (is_point_cloud_file(path)) return read_point_cloud(path, &warnings);
+  return load_surface(path, warnings);
+}
+
+TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  require_surface_file(path);
+  if (is_point_cloud_file(path))
+    throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; expected a " +
+                     "surface");
+  return is_volume_file(path) ? triangulate(load_polygons(path, warnings)) : read_triangle_mesh(path, &warnings);
+}
+
+PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  return load_tagged_polygons(path, warnings).polygons;
+}
+
+TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  require_surface_file(path);
+  if (!is_volume_file(path)) return {read_polygon_mesh(path, &warnings), {}};
+  return tagged_polygons(load_volume(path, warnings));
+}
+
+TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  std::vector<Index> volume_vertex;
+  TaggedPolygons boundary{boundary_surface(mesh, topology, &volume_vertex), {}};
+  // volume_vertex ascends, so the order of tags is kept.
+  const auto number = [&](Index v) {
+    return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
+  };
+  for (const CreaseEdge& crease : mesh.tags.creases)
+    if (const Index e = topology.find_edge(crease.v0, crease.v1); e != kNoIndex && topology.is_boundary_edge(e))
+      boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
+  for (const CornerVertex& corner : mesh.tags.corners)
+    if (topology.is_boundary_vertex(corner.vertex))
+      boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
+  return boundary;
+}
+
+VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+                       const std::string& references) {
+  require_cell_file(path);
+  return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
+}
+
+HighOrderFile load_high_order(const std::filesystem::path& path) {
+  HighOrderFile file = read_high_order(path);
+  const auto& x = file.mesh.coefficients;  // vertices, then displacements
+  const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
+  if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
+      std::all_of(vertices_end, x.end(), [](const Vec3& d) { return d.isZero(0); }))
+    throw InputError(path.string() + ": all of the mesh is in one place");
+  return file;
+}
+
+void require_choice_of_references(const std::filesystem::path& path, const std::string& references) {
+  if (references.empty() || is_volume_file(path)) return;
+  throw UsageError("--references: " + path.string() + " has no cell data to choose from");
+}
+
+std::vector<double> load_thicknesses(const std::filesystem::path& path) {
+  constexpr std::string_view kBlanks = " \t";
+  const std::string bytes = read_file(path);
+  TextScanner lines(path.string(), bytes, TextScanner::Comments::none);
+  std::vector<double> thicknesses;
+  while (const auto line = lines.line()) {
+    const std::size_t begin = line->find_first_not_of(kBlanks);
+    if (begin == line->npos) continue;
+    const std::string_view word = line->substr(begin, line->find_last_not_of(kBlanks) + 1 - begin);
+    const auto value = parse_number(word);
+    if (!value || !(*value > 0)) lines.fail("expected a positive thickness, found " + in_quotes(word));
+    thicknesses.push_back(*value);
+  }
+  return thicknesses;
+}
+
+Json describe(const std::string& path, const TriangleMesh& mesh) {
+  return {{"path", path},
+          {"vertices", mesh.positions.size()},
+          {"triangles", mesh.triangles.size()},
+          {"bounding_box_diagonal", bounding_box_diagonal(mesh)}};
+}
+
+Json describe(const std::string& path, const PointCloud& cloud) {
+  return {{"path", path}, {"points", cloud.points.size()}, {"bounding_box_diagonal", bounding_box_diagonal(cloud)}};
+}
+
+Json describe(const std::string& path, const Target& target) {
+  return std::visit([&](const auto& geometry) { return describe(path, geometry); }, target);
+}
+
+Json describe(const std::string& path, const PolygonMesh& mesh) {
+  return {{"path", path},
+          {"vertices", mesh.positions.size()},
+          {"faces", mesh.num_faces()},
+          {"bounding_box_diagonal", bounding_box_diagonal(triangulate(mesh))}};
+}
+
+Json describe(const std::string& path, const VolumeMesh& mesh) {
+  std::array<std::size_t, kNumCellKinds> counts{};
+  for (CellKind kind : mesh.kinds) ++counts[static_cast<std::size_t>(kind)];
+  return {{"path", path},
+          {"vertices", mesh.num_vertices()},
+          {"cells", mesh.num_cells()},
+          {"hexes", counts[static_cast<std::size_t>(CellKind::hex)]},
+          {"prisms", counts[static_cast<std::size_t>(CellKind::prism)]},
+          {"tets", counts[static_cast<std::size_t>(CellKind::tet)]},
+          {"creases", mesh.tags.creases.size()},
+          {"corners", mesh.tags.corners.size()}};
+}
+
+Json describe(const std::string& path, const HighOrderMesh& mesh) {
+  Json json = describe(path, mesh.straight_sided());
+  const OrderSummary orders = order_summary(mesh.space);
+  json["basis"] = to_string(orders.basis);
+  json["min_order"] = orders.min_order;
+  json["max_order"] = orders.max_order;
+  json["nodes"] = orders.num_nodes;
+  json["full_order_nodes"] = orders.num_full_order_nodes;
+  return json;
+}
+
+std::string target_formats() { return surface_formats() + "; points: " + point_cloud_formats(); }
+
+std::string cell_formats() { return volume_mesh_formats() + ", .vtu (high-order, as subvol writes it)"; }
+
+}  // namespace subvol::cli

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/losses.h"
+
+#include "subvol/io/left_out.h"
+
+#include <algorithm>
+
+namespace subvol::cli {
+
+namespace {
+
+bool holds_references(const Output& output) { return output.is_volume(); }
+bool holds_tags(const Output& output) { return output.extension == ".mesh" || output.extension == ".usda"; }
+
+}  // namespace
+
+Marks marks_of(const VolumeMesh& mesh) {
+  const auto is_set = [](int reference) { return reference != 0; };
+  return {static_cast<std::size_t>(std::count_if(mesh.references.begin(), mesh.references.end(), is_set)),
+          mesh.tags.creases.size(), mesh.tags.corners.size()};
+}
+
+void warn_of_losses(const Marks& read, const Marks& result, std::span<const Output> outputs,
+                    std::vector<std::string>& warnings, bool curved) {
+  if (outputs.empty()) return;
+  const bool keeps_references = std::any_of(outputs.begin(), outputs.end(), holds_references);
+  const bool keeps_tags = !curved && std::any_of(outputs.begin(), outputs.end(), holds_tags);
+  LeftOut lost;
+  if (!keeps_references || result.references == 0) lost.add("references of cells", read.references);
+  if (!keeps_tags || result.creases == 0) lost.add("creases", read.creases);
+  if (!keeps_tags || result.corners == 0) lost.add("corners", read.corners);
+  if (!lost.empty()) warnings.push_back("read, but in none of the outputs: " + lost.text());
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/runs/run_options.h"
+
+#include <string>
+#include <string_view>
+
+namespace subvol::cli {
+
+/// Text for HTML and its attributes.
+std::string escaped(std::string_view text);
+
+/// Surface, volume and total energy of every iteration of all stages, logarithmic, as SVG; empty without iterations.
+/// Energies that are not positive are drawn at the plot's lower end.
+std::string energy_plot(const Json& stages);
+
+/// Counts in equal bins as bars, as SVG; empty without any.
+std::string histogram_plot(const Json& counts);
+
+}  // namespace subvol::cli

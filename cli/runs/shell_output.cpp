@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/shell_output.h"
+
+#include "cli/runs/exit_status.h"
+#include "export/cell_text.h"
+#include "export/read_back.h"
+#include "export/volume_writer.h"
+#include "fit/target/soup_topology.h"
+#include "subvol/mesh/cell_topology.h"
+#include "subvol/surface/boundary.h"
+#include "subvol/surface/winding_number.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <numeric>
+#include <span>
+
+namespace subvol::cli {
+namespace {
+
+/// What the thicknesses of one side are, in the mesh's unit.
+struct ThicknessFigures {
+  double mean = 0, least = 0, most = 0;
+
+  explicit ThicknessFigures(std::span<const double> thickness) {
+    for (const double t : thickness) mean += t / static_cast<double>(thickness.size());
+    least = *std::min_element(thickness.begin(), thickness.end());
+    most = *std::max_element(thickness.begin(), thickness.end());
+  }
+};
+
+/// Calls visit(name, first strand) for every side that has layers.
+template <class Visit>
+void for_each_side(const ShellLayers& layers, const Visit& visit) {
+  if (layers.inside > 0) visit("inside", std::size_t{0});
+  if (layers.outside > 0) visit("outside", layers.num_columns());
+}
+
+/// Values per strand as values per vertex; those of the surface itself are the larger of both sides.
+std::vector<double> by_vertex(const ShellLayers& layers, const std::vector<double>& by_strand) {
+  const std::size_t n = layers.num_columns();
+  std::vector<double> values;
+  for (std::size_t i = 0; i < layers.num_sheets() * n; ++i) {
+    const Index strand = layers.strand(static_cast<Index>(i));
+    values.push_back(strand == kNoIndex ? std::max(by_strand[i % n], by_strand[n + i % n]) : by_strand[strand]);
+  }
+  return values;
+}
+
+/// Fills mesh and wires of a sheet; returns its thickness as (achieved, asked, 0) at each of the mesh's vertices.
+using MakeSheet = std::function<std::vector<Vec3>(int sheet, SceneSheet& made)>;
+
+Scene scene_of(const ShellLayers& layers, const MakeSheet& make, const SurfaceSceneOptions& options) {
+  std::vector<SceneSheet> sheets;
+  const auto add = [&](const char* name, int sheet) {
+    SceneSheet& added = sheets.emplace_back();
+    added.name = name;
+    added.attribute.name = "_THICKNESS";
+    for (const Vec3& thickness : make(sheet, added)) {
+      added.attribute.values.push_back(thickness[0]);
+      added.shades.push_back(thickness[0] / thickness[1]);
+    }
+  };
+  if (layers.inside > 0) add("inner", 0);
+  add("base", layers.inside);
+  if (layers.outside > 0) add("outer", layers.num_sheets() - 1);
+  return sheet_scene(sheets, "viridis over achieved / asked thickness 0..1, above 1 as 1", options);
+}
+
+/// (achieved, asked, 0) at every vertex.
+std::vector<Vec3> thickness_at_vertices(const ShellResult& shell) {
+  const std::vector<double> achieved = by_vertex(shell.layers, shell.achieved),
+                            asked = by_vertex(shell.layers, shell.asked);
+  std::vector<Vec3> thickness;
+  for (std::size_t v = 0; v < achieved.size(); ++v) thickness.emplace_back(achieved[v], asked[v], 0);
+  return thickness;
+}
+
+Scene scene_of(const ShellResult& shell, const SurfaceSceneOptions& options) {
+  const std::vector<Vec3> thickness = thickness_at_vertices(shell);
+  const auto make = [&](int sheet, SceneSheet& made) {
+    made.mesh = sheet_surface(shell.layers, shell.mesh, sheet);
+    const auto first = thickness.begin() + shell.layers.vertex(sheet, 0);
+    return std::vector<Vec3>(first, first + static_cast<std::ptrdiff_t>(shell.layers.num_columns()));
+  };
+  return scene_of(shell.layers, make, options);
+}
+
+/// Sheets of curved cells, sampled; thickness is linear between the vertices.
+Scene scene_of(const ShellResult& shell, const CurvedShell& curved, const SurfaceSceneOptions& options) {
+  const ElementSpace& space = curved.mesh.space;
+  const ElementSpace linear = space.with_orders(EntityOrders::uniform(space.topology(), 1));
+  const std::vector<Vec3> thickness = thickness_at_vertices(shell);
+  const int intervals = std::max(4, 2 * space.max_order());
+  const auto make = [&](int sheet, SceneSheet& made) {
+    const BoundarySamples samples = sheet_samples(shell.layers, space, sheet, intervals);
+    made.mesh = as_polygons({samples.positions.apply(curved.mesh.coefficients), samples.triangles});
+    made.wires = samples.crease_edges;
+    return point_map(linear, samples.points).apply(thickness);
+  };
+  return scene_of(shell.layers, make, options);
+}
+
+std::vector<VertexField> thickness_fields(const ShellResult& shell) {
+  return {{"thickness", by_vertex(shell.layers, shell.achieved)},
+          {"thickness_asked", by_vertex(shell.layers, shell.asked)},
+          {"thickness_limited", by_vertex(shell.layers, shell.limited)},
+          {"clearance", by_vertex(shell.layers, shell.clearance)}};
+}
+
+}  // namespace
+
+std::optional<std::string> inward_warning(const TriangleMesh& surface) {
+  // In front of a face the winding number is 0 outside a surface that faces outward, and -1 inside one that faces
+  // inward; of a surface that encloses nothing it is between. Small holes hardly change it.
+  constexpr double kInside = -0.9;
+  constexpr std::size_t kMostFaces = 2000;
+  constexpr double kOffset = 1e-3;  // of a face's size
+  const std::size_t n = surface.triangles.size(), step = (n + kMostFaces - 1) / kMostFaces;
+  std::vector<Vec3> points;
+  std::vector<double> areas;
+  for (std::size_t t = 0; t < n; t += step) {
+    const auto& [a, b, c] = surface.triangles[t];
+    const Vec3 &x = surface.positions[a], &y = surface.positions[b], &z = surface.positions[c];
+    const Vec3 normal = (y - x).cross(z - x);
+    if (!(normal.norm() > 0)) continue;
+    points.push_back((x + y + z) / 3 + kOffset * normal / std::sqrt(normal.norm()));
+    areas.push_back(normal.norm());
+  }
+  if (points.empty()) return std::nullopt;
+  const std::vector<double> numbers = WindingNumber(surface).at(points);
+  const double area = std::accumulate(areas.begin(), areas.end(), 0.0);
+  if (std::inner_product(areas.begin(), areas.end(), numbers.begin(), 0.0) > kInside * area) return std::nullopt;
+  const SoupTopology edges = soup_topology(surface.positions, surface.triangles);
+  const bool is_closed = edges.open_edges == 0 && edges.crowded_edges == 0;
+  return "the faces of this " +
+         (is_closed ? std::string("closed surface")
+                    : "surface, which has " + std::to_string(edges.open_edges) + " open edges" +
+                          (edges.crowded_edges > 0
+                               ? " and " + std::to_string(edges.crowded_edges) + " of three faces or more,"
+                               : ",")) +
+         " point inward, so outward is its inside";
+}
+
+void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {
+  if (shows_surface(output)) {
+    write_scene(output.path, scene_of(shell, scene_options(output, options)));
+  } else if (output.extension == ".vtu" || output.extension == ".msh") {
+    write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell));
+    require_written(output.path, shell.mesh);
+  } else {
+    write_output(output, shell.mesh, options);
+  }
+}
+
+void write_shell(const Output& output, const ShellResult& shell, const CurvedShell& curved,
+                 const WritingOptions& options) {
+  if (output.part == Part::cage) return write_output(output, shell.mesh, options);
+  if (shows_surface(output)) return write_scene(output.path, scene_of(shell, curved, scene_options(output, options)));
+  if (output.extension == ".vtu" || output.extension == ".msh") {
+    const std::vector<VertexField> fields = thickness_fields(shell);
+    return write_curved_cells(output, curved.mesh,
+                              {.cell_minima = curved.quality.cell_minima,
+                               .reference = shell_reference(shell.layers, shell.limited),
+                               .references = shell.mesh.references,
+                               .fields = fields,
+                               .map_tolerance_percent = options.map_tolerance_percent});
+  }
+  write_output(output, HighOrderFile{curved.mesh, shell.mesh.references}, options);
+}
+
+void take_figures(const CurvedShell& curved, ShellResult& shell) {
+  shell.achieved = curved.thickness.achieved;
+  shell.clearance = curved.thickness.clearance;
+  shell.quality = curved.quality;
+  shell.failures = {curved.quality.certificate, curved.intersecting_faces};
+  FitReport& report = shell.report;
+  const FitReport& added = curved.report;
+  report.stages.insert(report.stages.end(), added.stages.begin(), added.stages.end());
+  report.warnings.insert(report.warnings.end(), added.warnings.begin(), added.warnings.end());
+  if (report.stop_reason != StopReason::converged) return;
+  report.stop_reason = added.stop_reason;
+  report.explanation = added.explanation;
+}
+
+void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surface, int order) {
+  for (const Output& output : outputs) {
+    if (output.part == Part::cage) continue;
+    if (output.extension == ".usda")
+      throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or cage:" +
+                       output.path.string());
+    if (output.extension != ".msh") continue;
+    for (std::size_t f = 0; f < surface.num_faces(); ++f) {
+      const CellKind kind =
+          surface.face_offsets[f + 1] - surface.face_offsets[f] == 3 ? CellKind::prism : CellKind::hex;
+      if (order > max_gmsh_order(kind))
+        throw UsageError(output.path.string() + ": Gmsh evaluates a " + cell_topology(kind).name + " up to order " +
+                         std::to_string(max_gmsh_order(kind)) + " only; take .vtu");
+    }
+  }
+}
+
+Json thickness_json(const ShellResult& shell, double diagonal) {
+  Json json = Json::object();
+  const std::size_t n = shell.layers.num_columns();
+  for_each_side(shell.layers, [&](const char* side, std::size_t first) {
+    const auto figures = [&](const std::vector<double>& thickness) {
+      const ThicknessFigures f({thickness.data() + first, n});
+      return Json{{"mean", f.mean},
+                  {"min", f.least},
+                  {"max", f.most},
+                  {"mean_percent", 100 * f.mean / diagonal},
+                  {"min_percent", 100 * f.least / diagonal},
+                  {"max_percent", 100 * f.most / diagonal}};
+    };
+    std::size_t num_limited = 0;
+    for (std::size_t v = first; v < first + n; ++v) num_limited += shell.limited[v] < shell.asked[v];
+    json[side] = {{"asked", figures(shell.asked)},
+                  {"limited", figures(shell.limited)},
+                  {"achieved", figures(shell.achieved)},
+                  {"clearance", figures(shell.clearance)},
+                  {"limited_vertices", num_limited}};
+  });
+  return json;
+}
+
+std::string thickness_text(const ShellResult& shell) {
+  std::string text;
+  const std::size_t n = shell.layers.num_columns();
+  for_each_side(shell.layers, [&](const char* side, std::size_t first) {
+    const ThicknessFigures asked({shell.asked.data() + first, n}), found({shell.achieved.data() + first, n});
+    char line[200];
+    std::snprintf(line, sizeof line, "thickness %-9s asked %.6g, achieved mean %.6g (%.1f %%), min %.6g, max %.6g\n",
+                  side, asked.mean, found.mean, 100 * found.mean / asked.mean, found.least, found.most);
+    text += line;
+  });
+  return text;
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/writing.h"
+
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "export/animation.h"
+#include "export/export.h"
+#include "export/gltf_writer.h"
+#include "export/obj_writer.h"
+#include "export/read_back.h"
+#include "export/usd_writer.h"
+#include "export/volume_writer.h"
+#include "fit/quality/high_order_quality.h"
+#include "fit/quality/quality.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/mesh_io.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+namespace subvol::cli {
+namespace {
+
+SceneValue scene_value(const Json& value) {
+  if (value.is_boolean()) return value.get<bool>();
+  if (value.is_number()) return value.get<double>();
+  return as_utf8(value.is_string() ? value.get<std::string>() : value.dump());
+}
+
+void write_cells(const Output& output, const VolumeMesh& mesh) {
+  if (output.extension == ".vtu" || output.extension == ".msh") {
+    write_volume(output.path, mesh, measure_quality(mesh).cell_minima);
+  } else {
+    write_volume_mesh(output.path, mesh);
+  }
+  require_written(output.path, mesh);
+}
+
+void write_polygons(const Output& output, const PolygonMesh& surface, const FeatureTags& tags,
+                    const WritingOptions& options) {
+  if (output.extension == ".obj") {
+    write_obj(output.path, surface);
+  } else {
+    const SurfaceSceneOptions scene = scene_options(output, options);
+    write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
+  }
+  require_written(output.path, surface);
+}
+
+/// Two triangles that follow one another are a quad again.
+PolygonMesh polygons_of(const CurvedBoundary& boundary) {
+  PolygonMesh mesh{boundary.triangles.positions, {0}, {}};
+  const auto& triangles = boundary.triangles.triangles;
+  for (std::size_t t = 0; t < triangles.size(); t += 2) {
+    mesh.face_vertices.insert(mesh.face_vertices.end(), triangles[t].begin(), triangles[t].end());
+    mesh.face_vertices.push_back(triangles[t + 1][2]);
+    mesh.face_offsets.push_back(mesh.face_vertices.size());
+  }
+  return mesh;
+}
+
+/// Points that a crease doubled, for the sake of their normals, are one again.
+PolygonMesh polygons_of(const TessellatedSurface& surface) {
+  PolygonMesh mesh{{}, {0}, {}};
+  std::map<std::array<double, 3>, Index> places;
+  for (const auto& quad : surface.quads) {
+    for (const Index corner : quad) {
+      const Vec3& p = surface.positions[corner];
+      const auto [place, added] = places.try_emplace({p[0], p[1], p[2]}, static_cast<Index>(mesh.positions.size()));
+      if (added) mesh.positions.push_back(p);
+      mesh.face_vertices.push_back(place->second);
+    }
+    mesh.face_offsets.push_back(mesh.face_vertices.size());
+  }
+  return mesh;
+}
+
+}  // namespace
+
+std::string parse_cut(const std::string& text, CutPlane& cut) {
+  const std::string error = "must be x, y or z, or with a share between 0 and 1 as x:0.3, not " + text;
+  if (text.empty() || text[0] < 'x' || text[0] > 'z' || (text.size() > 1 && text[1] != ':')) return error;
+  cut.axis = text[0] - 'x';
+  if (text.size() == 1) return {};
+  if (!is_number_in(text.substr(2), 1e-9, 1 - 1e-9)) return error;
+  cut.share = *parse_number(text.substr(2));
+  return {};
+}
+
+SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options) {
+  SurfaceSceneOptions scene{.name = as_utf8(output.path.stem().string()),
+                            .max_chord_percent = options.chord_percent,
+                            .wireframe = !options.no_wireframe,
+                            .quantize = options.quantize,
+                            .metres_per_unit = options.metres_per_unit,
+                            .up_axis = options.up_axis == "z" ? UpAxis::z : UpAxis::y,
+                            .source = as_utf8(options.source.filename().string())};
+  for (const auto& [key, value] : options.options.items()) scene.options.emplace_back(key, scene_value(value));
+  return scene;
+}
+
+void write_scene(const std::filesystem::path& path, const Scene& scene) {
+  write_gltf(path, scene);
+  require_written(path, scene);
+}
+
+void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
+  write_volume(output.path, mesh, options);
+  require_written(output.path, mesh, options);
+}
+
+void require_for_curved_cells(const Output& output) {
+  if (output.extension == ".usda")
+    throw UsageError(output.path.string() + ": .usda holds subdivision cages, not curved cells; take .glb or .obj");
+}
+
+bool shows_surface(const Output& output) { return output.part == Part::result && output.is_scene(); }
+
+void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
+                  const WritingOptions& options) {
+  if (output.part == Part::cage) return write_output(output, cage, options);
+  if (!shows_surface(output)) return write_output(output, mesh, options);
+  const std::vector<double> quality = patch_quality(cage, *limit, measure_quality(mesh).cell_minima);
+  write_scene(output.path, surface_scene(*limit, quality, scene_options(output, options)));
+}
+
+void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
+  if (output.is_volume()) return write_cells(output, mesh);
+  if (output.part == Part::cutaway)
+    return write_scene(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
+                                                 scene_options(output, options)));
+  if (output.is_scene()) return write_scene(output.path, boundary_scene(mesh, scene_options(output, options)));
+  const TaggedPolygons boundary = tagged_polygons(mesh);
+  write_polygons(output, boundary.polygons, boundary.tags, options);
+}
+
+void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
+  const HighOrderMesh& mesh = file.mesh;
+  require_for_curved_cells(output);
+  if (output.extension == ".obj")
+    return write_polygons(output, polygons_of(curved_boundary(mesh, options.chord_percent)), {}, options);
+  const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
+  const std::vector<double> minima = is_linear ? std::vector<double>{} : measure_quality(mesh).cell_minima;
+  if (output.part == Part::cutaway)
+    return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
+  if (output.is_scene()) return write_scene(output.path, surface_scene(mesh, minima, scene_options(output, options)));
+  write_curved_cells(output, mesh,
+                     {.cell_minima = minima,
+                      .references = file.references,
+                      .linear_intervals = options.linear_intervals,
+                      .map_tolerance_percent = options.map_tolerance_percent});
+}
+
+void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
+  if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
+  if (output.is_scene()) return write_scene(output.path, polygon_scene(surface, {}, scene_options(output, options)));
+  write_polygons(output, surface, {}, options);
+}
+
+void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options) {
+  write_polygons(output, polygons_of(limit), {}, options);
+}
+
+void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
+                     const WritingOptions& options) {
+  write_scene(output.path, animation_scene(cage, states, scene_options(output, options)));
+}
+
+void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
+                     const WritingOptions& options) {
+  write_scene(output.path, animation_scene(mesh, states, scene_options(output, options)));
+}
+
+bool has_animation(std::span<const Output> outputs) {
+  return std::any_of(outputs.begin(), outputs.end(), [](const Output& o) { return o.part == Part::animation; });
+}
+
+double measured_chord_percent(const WritingOptions& options) {
+  return std::min(options.chord_percent, WritingOptions{}.chord_percent);
+}
+
+TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options,
+                                     const WorkProgress& progress) {
+  return tessellate(cage, chord_length(cage, {.max_chord_percent = options.chord_percent}), kMostQuads, progress);
+}
+
+}  // namespace subvol::cli

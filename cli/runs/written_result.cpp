@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/written_result.h"
+
+#include "cli/runs/check_report.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/report.h"
+#include "export/high_order_file.h"
+#include "subvol/base/format.h"
+#include "subvol/base/version.h"
+#include "subvol/io/mesh_io.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <string_view>
+
+namespace subvol::cli {
+namespace {
+
+/// The first that is a file of this kind, and no pipe; null: none.
+const Output* first_file(std::span<const Output> outputs, Part part, std::string_view extension) {
+  const auto found = std::find_if(outputs.begin(), outputs.end(), [&](const Output& output) {
+    return output.part == part && output.extension == extension && std::filesystem::is_regular_file(output.path);
+  });
+  return found == outputs.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+std::optional<VolumeMesh> written_cells(std::span<const Output> outputs, Part part) {
+  for (const char* extension : {".mesh", ".vtk"})
+    if (const Output* file = first_file(outputs, part, extension))
+      return read_volume_mesh(file->path, {.check = false});
+  return {};
+}
+
+std::optional<HighOrderMesh> written_curved_cells(std::span<const Output> outputs) {
+  if (const Output* file = first_file(outputs, Part::result, ".vtu")) return read_high_order(file->path).mesh;
+  return {};
+}
+
+std::vector<std::string> linear_cells_warnings(const MeshCheck& check) {
+  if (check.valid()) return {};
+  std::string found;
+  if (check.quality)
+    found = formatted(": %zu of %zu are inverted, %zu pairs of triangles of their boundary intersect",
+                      check.quality->inverted_cells, check.quality->num_cells, check.num_intersecting_triangle_pairs);
+  return {"the linear cells that were written for the curved ones are not valid" + found + "; --intervals of " +
+          "`convert` makes smaller ones of a .vtu"};
+}
+
+std::vector<PolynomialCells> check_polynomial_cells(std::span<const Output> outputs, const HighOrderMesh& mesh,
+                                                    double map_tolerance_percent,
+                                                    const std::function<MeshCheck(const HighOrderMesh&)>& check) {
+  std::vector<PolynomialCells> all;
+  for (const Output& output : outputs) {
+    if (output.part != Part::result || !holds_polynomial_cells(output)) continue;
+    const PolynomialMap written = file_cells(mesh, output.extension, map_tolerance_percent);
+    if (written.distance_bound == 0) continue;
+    const double percent = 100 * written.distance_bound / vertex_diagonal(mesh);
+    all.push_back({output.path.string(), percent, percent <= map_tolerance_percent, check(written.mesh)});
+  }
+  return all;
+}
+
+std::vector<std::string> polynomial_cells_warnings(const PolynomialCells& cells) {
+  std::vector<std::string> warnings;
+  if (!cells.is_close)
+    warnings.push_back(cells.file + formatted(": its polynomial cells are up to %.3g %% of the diagonal away from the "
+                                              "curved cells, which is more than --map-tolerance; the basis legendre "
+                                              "needs no such approximation up to order %d",
+                                              cells.distance_percent, kMaxVtkOrder));
+  if (!cells.check.valid())
+    warnings.push_back(cells.file + ": its polynomial cells, which other programs compute with, are not valid" +
+                       (cells.check.quality ? formatted(": %zu of %zu are not certified",
+                                                        cells.check.quality->certificate.not_certified.size(),
+                                                        cells.check.quality->num_cells)
+                                            : std::string()));
+  return warnings;
+}
+
+Json polynomial_cells_json(std::span<const PolynomialCells> all) {
+  Json json = Json::array();
+  for (const PolynomialCells& cells : all) {
+    Json one{{"file", as_utf8(cells.file)},
+             {"distance_from_map_percent", cells.distance_percent},
+             {"within_map_tolerance", cells.is_close}};
+    one.update(check_json(cells.check));
+    json.push_back(std::move(one));
+  }
+  return json;
+}
+
+int polynomial_cells_status(std::span<const PolynomialCells> all) {
+  const auto count = [&](auto is_wrong) { return std::count_if(all.begin(), all.end(), is_wrong); };
+  if (count([](const PolynomialCells& cells) { return !cells.check.valid(); }) > 0) return kFailed;
+  return count([](const PolynomialCells& cells) { return !cells.is_close; }) > 0 ? kNotConverged : kDone;
+}
+
+int write_checked(const RunOptions& run, std::vector<Output> outputs, const VolumeMesh& mesh,
+                  const std::function<void(const Output&)>& write, const std::vector<std::string>& warnings,
+                  const Json& details) {
+  require_extent(mesh.positions, "mesh to be written");
+  const std::vector<std::string> failures = write_each(outputs, write);
+  const std::optional<VolumeMesh> written = written_cells(outputs);
+  const MeshCheck check = check_mesh(written ? *written : mesh);
+  if (!run.report.empty()) {
+    Json json{{"subvol", version()}};
+    json.update(details);
+    json.update(check_json(check));
+    json["warnings"] = warnings_json(warnings, failures);
+    json["peak_memory_bytes"] = peak_memory_bytes();
+    json["outputs"] = output_names(outputs);
+    write_report(run.report, json);
+  }
+  if (!run.quiet) {
+    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
+    std::cerr << to_text(check);
+    for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
+  }
+  require_all_written(failures);
+  return check.valid() ? kDone : kFailed;
+}
+
+void hold_to(const DistancesAsked& asked, const MeshCheck& found, FitReport& report) {
+  if (!found.distance) return;
+  hold_to(asked.mean_percent, "as written, the mean", found.mean_distance_percent(), report);
+  hold_to(asked.max_percent, "as written, the largest", found.max_distance_percent(), report);
+}
+
+void hold_to(std::optional<double> most_percent, const char* which, double percent, FitReport& report) {
+  if (report.stop_reason != StopReason::converged || !most_percent || percent <= *most_percent) return;
+  report.stop_reason = StopReason::tolerance_missed;
+  report.explanation =
+      formatted("%s distance of %.6g %% is above the tolerance of %.6g %%", which, percent, *most_percent);
+}
+
+}  // namespace subvol::cli

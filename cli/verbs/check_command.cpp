@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/check_report.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/outputs.h"
+#include "cli/runs/progress.h"
+#include "cli/runs/report.h"
+#include "cli/runs/standard_output.h"
+#include "cli/runs/writing.h"
+#include "cli/verbs/commands.h"
+#include "cli/verbs/verb_options.h"
+#include "subvol/base/version.h"
+#include "subvol/io/surface_io.h"
+
+#include <iostream>
+#include <memory>
+#include <optional>
+
+namespace subvol::cli {
+namespace {
+
+struct CheckArguments {
+  RunOptions run;
+  std::string mesh, target;
+  double chord_percent = WritingOptions{}.chord_percent;
+  bool json = false;
+};
+
+/// What is known of the mesh in a file.
+struct Checked {
+  MeshCheck check;
+  Json input;                             ///< what the mesh is
+  std::optional<SubdivisionAudit> audit;  ///< of a mesh that may be subdivided
+  std::optional<LagrangeCheck> lagrange;  ///< of curved cells
+
+  bool valid() const { return check.valid() && (!lagrange || lagrange->valid()); }
+};
+
+/// check(geometry) with a pointer to the target's, whatever it is; null where there is none.
+template <class Check>
+MeshCheck against(const std::optional<Target>& target, const Check& check) {
+  if (!target) return check(static_cast<const TriangleMesh*>(nullptr));
+  return std::visit([&](const auto& geometry) { return check(&geometry); }, *target);
+}
+
+Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, const WorkProgress& progress,
+                     std::vector<std::string>& warnings) {
+  const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false, arguments.run.references);
+  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
+                  describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
+  checked.audit = checked.check.subdivision_audit;
+  return checked;
+}
+
+Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target,
+                         const WorkProgress& progress) {
+  const HighOrderMesh mesh = load_high_order(arguments.mesh).mesh;
+  const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
+  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
+          describe(arguments.mesh, mesh), std::nullopt, check_lagrange_cells(arguments.mesh, mesh)};
+}
+
+Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Checked& checked,
+                 const std::vector<std::string>& warnings) {
+  Json json{{"subvol", version()},
+            {"command", "check"},
+            {"options", options_in_force(verb)},
+            {"input", {{"mesh", checked.input}}},
+            {"valid", checked.valid()}};
+  if (!arguments.target.empty()) json["input"]["target"] = arguments.target;
+  json.update(check_json(checked.check));
+  json["valid"] = checked.valid();
+  if (checked.lagrange) json["lagrange_cells"] = lagrange_json(*checked.lagrange);
+  if (checked.audit) json["audit"] = audit_json(*checked.audit);
+  json["warnings"] = warnings;
+  json["peak_memory_bytes"] = peak_memory_bytes();
+  return json;
+}
+
+/// The verdict last, as in the text of the check itself.
+std::string text_of(const Checked& checked) {
+  std::string text = to_text(checked.check);
+  if (!checked.lagrange) return text;
+  const std::size_t verdict = text.rfind('\n', text.size() - 2) + 1;
+  return text.substr(0, verdict) + to_text(*checked.lagrange) + (checked.valid() ? "valid\n" : "NOT VALID\n");
+}
+
+int run_check(const CheckArguments& arguments, const CLI::App& verb) {
+  checked_outputs(arguments.run, {});
+  apply_resources(arguments.run);
+  require_known_file(arguments.mesh);
+  require_choice_of_references(arguments.mesh, arguments.run.references);
+  std::vector<std::string> warnings;
+  std::optional<Target> target;
+  if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
+  ProgressTeller teller(arguments.run.progress, arguments.run.quiet || arguments.json);
+  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target, teller.work())
+                                                             : check_linear(arguments, target, teller.work(), warnings);
+  teller.finish();
+  if (!arguments.run.quiet) {
+    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
+  }
+  const Json json = report_json(arguments, verb, checked, warnings);
+  if (!arguments.run.report.empty()) write_report(arguments.run.report, json);
+  if (arguments.json) {
+    print(json_text(json));
+  } else if (!arguments.run.quiet) {
+    print(text_of(checked));
+  }
+  return checked.valid() ? kDone : kFailed;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, Action& action) {
+  CLI::App* verb =
+      app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
+  const auto arguments = std::make_shared<CheckArguments>();
+  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats())->required()->type_name("FILE");
+  verb->add_option("--target", arguments->target,
+                   "Measure the distance to this surface, or of these points: " + target_formats())
+      ->type_name("SURFACE");
+  verb->add_option("--chord", arguments->chord_percent,
+                   "A curved boundary is looked at as triangles this close to it, in per cent of its box's diagonal")
+      ->check(number_in(1e-4, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
+  add_references_option(*verb, arguments->run);
+  verb->add_flag("--json", arguments->json, "Print JSON instead of text");
+  verb->add_option("--report", arguments->run.report, "Write the JSON to a file as well")->type_name("FILE.json");
+  verb->add_flag("--force", arguments->run.force, "Replace a report that exists");
+  verb->add_flag("--quiet", arguments->run.quiet, "Say nothing but errors; the exit status tells");
+  add_resource_options(*verb, arguments->run);
+  verb->footer(R"(Exit status 0 if the mesh is valid (every cell proved positive, no defects), 1 if it is not.
+
+Example:
+  subvol check bone_fine.mesh --target bone.off --json)");
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_check(*arguments, *verb); }; });
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/losses.h"
+#include "cli/runs/outputs.h"
+#include "cli/runs/writing.h"
+#include "cli/runs/written_result.h"
+#include "cli/verbs/commands.h"
+#include "cli/verbs/verb_options.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+
+namespace subvol::cli {
+namespace {
+
+struct ConvertArguments {
+  RunOptions run;
+  WritingOptions writing;
+  std::string input;
+  bool limit = false;
+};
+
+void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outputs,
+                    const WritingOptions& writing, std::vector<std::string>& warnings) {
+  const VolumeMesh mesh = load_volume(arguments.input, warnings, true, arguments.run.references);
+  warn_of_losses(marks_of(mesh), marks_of(mesh), outputs, warnings);
+  require_all_written(write_each(outputs, [&](const Output& output) {
+    if (arguments.limit && output.extension == ".obj") {
+      write_polygons(output, tessellated_limit(mesh, writing), writing);
+    } else if (arguments.limit && shows_surface(output)) {
+      const TessellatedSurface limit = tessellated_limit(mesh, writing);
+      write_output(output, mesh, mesh, &limit, writing);
+    } else {
+      write_output(output, mesh, writing);
+    }
+  }));
+}
+
+/// returns  an ExitStatus: that of the polynomial cells that were written.
+int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs, const WritingOptions& writing,
+                       std::vector<std::string>& warnings) {
+  if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
+  for (const Output& output : outputs) require_for_curved_cells(output);
+  const HighOrderFile file = load_high_order(arguments.input);
+  const auto is_set = [](int reference) { return reference != 0; };
+  const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
+  const Marks marks{.references = static_cast<std::size_t>(num_set)};
+  warn_of_losses(marks, marks, outputs, warnings, true);
+  require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
+  const std::vector<PolynomialCells> polynomials =
+      check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, [&](const HighOrderMesh& mesh) {
+        return check_mesh(mesh, curved_boundary(mesh, measured_chord_percent(writing)));
+      });
+  for (const PolynomialCells& cells : polynomials)
+    for (const std::string& warning : polynomial_cells_warnings(cells)) warnings.push_back(warning);
+  return polynomial_cells_status(polynomials);
+}
+
+void convert_surface(const ConvertArguments& arguments, std::vector<Output>& outputs,
+                     const WritingOptions& writing, std::vector<std::string>& warnings) {
+  if (arguments.limit)
+    throw UsageError("--limit: " + arguments.input + " is a surface, and the limit surface is that of cells");
+  for (const Output& output : outputs) {
+    if (output.part == Part::cutaway)
+      throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");
+    if (output.is_volume()) {
+      throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
+    }
+  }
+  const PolygonMesh surface = load_polygons(arguments.input, warnings);
+  require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, surface, writing); }));
+}
+
+int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway});
+  apply_resources(arguments.run);
+  WritingOptions writing = arguments.writing;
+  writing.source = arguments.input;
+  writing.options = options_of_result(verb);
+  std::vector<std::string> warnings;
+  int status = kDone;
+  require_known_file(arguments.input);
+  require_choice_of_references(arguments.input, arguments.run.references);
+  if (is_high_order_file(arguments.input)) {
+    status = convert_high_order(arguments, outputs, writing, warnings);
+  } else if (is_volume_file(arguments.input)) {
+    convert_volume(arguments, outputs, writing, warnings);
+  } else {
+    convert_surface(arguments, outputs, writing, warnings);
+  }
+  if (!arguments.run.quiet) {
+    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
+  }
+  return status;
+}
+
+}  // namespace
+
+void add_convert_command(CLI::App& app, Action& action) {
+  CLI::App* verb = app.add_subcommand("convert", "Write a mesh in another format");
+  const auto arguments = std::make_shared<ConvertArguments>();
+  verb->add_option("IN", arguments->input, "Volume mesh: " + cell_formats() + "; or surface: " + surface_formats())
+      ->required()
+      ->type_name("FILE");
+  verb->add_flag("--limit", arguments->limit,
+                 "Surface formats show the limit surface of the mesh as a control cage, not its flat faces");
+  verb->add_option("--intervals", arguments->writing.linear_intervals,
+                   "Of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order")
+      ->check(CLI::Range(0, 64))
+      ->type_name("N")
+      ->capture_default_str();
+  add_map_tolerance(*verb, arguments->writing);
+  add_references_option(*verb, arguments->run);
+  add_output_options(*verb, arguments->run,
+                     "Where to, the extension choosing the format: " + output_formats() +
+                         "; cutaway:FILE.glb for the cells inside; may be given several times");
+  verb->get_option("--output")->required();
+  add_writing_options(*verb, arguments->writing);
+  verb->footer(
+      R"(Surface formats take the boundary of a volume mesh; .usda keeps it a subdivision cage with its creases.
+The curved boundary of a high-order .vtu is cut into triangles within --chord of it.
+
+Examples:
+  subvol convert cage.vtk -o cage.mesh
+  subvol convert cage.mesh --limit -o smooth.glb
+  subvol convert curved.vtu -o curved.msh -o curved.glb)");
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_convert(*arguments, *verb); }; });
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,388 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/automatic_template.h"
+#include "cli/runs/check_report.h"
+#include "cli/runs/checkpointing.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/losses.h"
+#include "cli/runs/report.h"
+#include "cli/runs/untangling.h"
+#include "cli/runs/writing.h"
+#include "cli/runs/written_result.h"
+#include "cli/verbs/commands.h"
+#include "cli/verbs/high_order_fit_run.h"
+#include "cli/verbs/long_run.h"
+#include "cli/verbs/verb_options.h"
+#include "fit/subdivision_fit.h"
+#include "subvol/base/version.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/templates/auto_template.h"
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+namespace subvol::cli {
+namespace {
+
+struct FitArguments {
+  RunOptions run;
+  WritingOptions writing;
+  FitOptions fit;
+  std::string target;
+  TemplateSource template_mesh;
+  std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
+  std::string point_weights = "equal", energy = "hencky";
+  int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
+  std::string basis = to_string(HighOrderFitOptions{}.basis);
+  bool adaptive = false;
+};
+
+SolverKind solver_kind(const FitArguments& arguments) {
+  return arguments.solver == "lbfgs" ? SolverKind::lbfgs : SolverKind::newton;
+}
+
+Correspondence correspondence(const FitArguments& arguments) {
+  return arguments.correspondence == "voronoi" ? Correspondence::voronoi : Correspondence::closest;
+}
+
+PointWeights point_weights(const FitArguments& arguments) {
+  return arguments.point_weights == "area" ? PointWeights::by_area : PointWeights::equal;
+}
+
+Distortion distortion(const FitArguments& arguments) {
+  for (Distortion d : {Distortion::inverse_mean_ratio, Distortion::condition_number})
+    if (arguments.energy == to_string(d)) return d;
+  return Distortion::hencky;
+}
+
+/// One fit from its files to its files.
+class FitRun : public LongRun {
+ public:
+  FitRun(const FitArguments& arguments, const CLI::App& verb)
+      : LongRun(arguments.run, verb), arguments_(arguments) {}
+  int run();
+
+ private:
+  void load();
+  void load_template();
+  void fit();
+  void write();
+  void check();
+  Json report() const;
+  void summarise() const;
+
+  const FitArguments& arguments_;
+  Target target_;
+  VolumeMesh template_mesh_;
+  std::optional<TemplateChoice> choice_;  ///< where the template was made
+  std::optional<Checkpointing> checkpointing_;
+  FitResult result_;
+  MeshCheck mesh_check_;
+  TessellatedSurface limit_;
+  SurfaceDistance limit_distance_;
+};
+
+void FitRun::load() {
+  target_ = load_target(arguments_.target, warnings_);
+  require_fitting_options(verb_, is_cloud(target_));
+  if (arguments_.template_mesh.path.empty())  // before minutes go into one
+    require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
+  tell_warnings();
+}
+
+void FitRun::load_template() {
+  LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_,
+                                             {.crease_angle_degrees = arguments_.fit.crease_angle_degrees,
+                                              .time_limit_seconds =
+                                                  kTrialsShareOfTime * arguments_.fit.time_limit_seconds},
+                                             arguments_.run, warnings_);
+  template_mesh_ = std::move(loaded.mesh);
+  if (has_few_inverted_cells(template_mesh_))
+    untangle_template(arguments_.template_mesh.path, arguments_.run,
+                      {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
+  choice_ = std::move(loaded.choice);
+  if (!choice_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
+  tell_warnings();
+  if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
+}
+
+void FitRun::fit() {
+  FitOptions options = arguments_.fit;
+  options.surface = arguments_.surface == "limit" ? FittedSurface::limit : FittedSurface::mesh;
+  options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
+  options.correspondence = correspondence(arguments_);
+  options.solver = solver_kind(arguments_);
+  checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)},
+                                                    {"template", fingerprint(template_mesh_)}}));
+  options.log = checkpointing_->log();
+  options.keep_states = has_animation(outputs_);
+  options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
+  // What is left of it: a template may have been made.
+  if (options.time_limit_seconds > 0)
+    options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
+  options.point_weights = point_weights(arguments_);
+  options.distortion = distortion(arguments_);
+  result_ = followed([&](auto progress) {
+    options.progress = progress;
+    options.cancelled = interrupted;
+    return std::visit(
+        [&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); }, target_);
+  });
+  checkpointing_->finish(result_.report.warnings);
+  add_warnings(result_.report.warnings);
+}
+
+void FitRun::write() {
+  WritingOptions writing = arguments_.writing;
+  writing.source = arguments_.target;
+  writing.options = options_of_result(verb_);
+  const auto write = [&](bool with_limit) {
+    write_each(
+        [&](const Output& output) {
+          if (output.part == Part::animation)
+            write_animation(output, result_.cage, result_.states, writing);
+          else
+            write_output(output, result_.cage, result_.mesh, &limit_, writing);
+        },
+        [&](const Output& output) { return shows_surface(output) == with_limit; });
+  };
+  write(false);  // where little memory is left the limit surface may be what does not fit
+  limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, writing, progress); });
+  write(true);
+}
+
+void FitRun::check() {
+  WritingOptions fine;
+  fine.chord_percent = measured_chord_percent(arguments_.writing);
+  if (fine.chord_percent < arguments_.writing.chord_percent)
+    limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, fine, progress); });
+  const std::optional<VolumeMesh> written = written_cells(outputs_);
+  const VolumeMesh& mesh = written ? *written : result_.mesh;
+  std::visit(
+      [&](const auto& target) {
+        mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target, {.progress = progress}); });
+        limit_distance_ = surface_distance(triangles_of(limit_), target);
+      },
+      target_);
+  hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
+  if (arguments_.surface == "limit")
+    hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
+            100 * limit_distance_.mean() / mesh_check_.target_diagonal, result_.report);
+}
+
+Json FitRun::report() const {
+  const FitReport& report = result_.report;
+  const double diagonal = mesh_check_.target_diagonal;
+  Json json{{"subvol", version()},
+            {"command", "fit"},
+            {"options", options_in_force(verb_)},
+            {"input",
+             {{"target", describe(arguments_.target, target_)},
+              {"template", describe(arguments_.template_mesh.path, template_mesh_)}}}};
+  if (choice_) json["template"] = choice_json(*choice_);
+  json.update(fit_json(report));
+  json.update(check_json(mesh_check_));
+  json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
+  json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
+  if (report.creases) json["creases"] = creases_json(*report.creases);
+  json["cage"] = describe("", result_.cage);
+  checkpointing_->describe(json);
+  json["audit"] = audit_json(audit(template_mesh_));
+  return json;
+}
+
+void FitRun::summarise() const {
+  const FitReport& report = result_.report;
+  const double percent = 100 / mesh_check_.target_diagonal;
+  std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
+            << to_text(mesh_check_)
+            << (limit_distance_.one_sided ? "points to limit surface: mean " : "limit surface to target: mean ")
+            << limit_distance_.mean() * percent << " %, max "
+            << limit_distance_.max() * percent << " % of the diagonal\n";
+  if (report.creases) std::cerr << to_text(*report.creases);
+  tell_outputs();
+}
+
+int FitRun::run() {
+  prepare({Part::cage, Part::cutaway, Part::animation});
+  timed("read", &FitRun::load);
+  timed("template", &FitRun::load_template);
+  if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
+  timed("fit", &FitRun::fit);
+  timed("write", &FitRun::write);
+  timed("check", &FitRun::check);
+  write_report(report(), seconds_json(result_.report));
+  if (!arguments_.run.quiet) summarise();
+  require_outputs();
+  return status(result_.report, mesh_check_.valid());
+}
+
+void add_method_options(CLI::App& verb, FitArguments& arguments) {
+  FitOptions& fit = arguments.fit;
+  verb.add_option("--levels", fit.levels, "Times the template is subdivided")
+      ->check(CLI::Range(1, 6))
+      ->type_name("L")
+      ->capture_default_str();
+  verb.add_option(
+          "--tolerance", fit.tolerance_percent,
+          "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
+      ->check(number_in(1e-9, 100.0))
+      ->type_name("PERCENT");
+  verb.add_option("--surface", arguments.surface,
+                  "What is to agree with the target: the cage's limit surface, or the finest mesh itself")
+      ->check(CLI::IsMember({"limit", "mesh"}))
+      ->type_name("limit|mesh")
+      ->capture_default_str();
+  verb.add_option("--boundary", arguments.boundary, "How boundary vertices are subdivided")
+      ->check(CLI::IsMember({"catmull-clark", "averaging"}))
+      ->type_name("catmull-clark|averaging")
+      ->capture_default_str();
+  verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
+  verb.add_option("--crease-angle", fit.crease_angle_degrees,
+                  "Keep edges of the target sharper than this sharp: edges of the template that follow them become\n"
+                  "creases and are drawn to them (default: creases only where the template's file tags them)")
+      ->check(number_in(0.0, 180.0))
+      ->type_name("DEGREES");
+}
+
+void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
+  const auto group = "Curved elements";
+  CLI::Option* order = verb.add_option("--order", arguments.order,
+                                       "Fit curved elements, orders raised up to P, in place of a subdivision volume")
+                           ->check(CLI::Range(1, kMaxOrder))
+                           ->type_name("P")
+                           ->group(group);
+  verb.add_option("--basis", arguments.basis, "Modes of the curved elements")
+      ->check(CLI::IsMember({"fourier", "legendre"}))
+      ->type_name("fourier|legendre")
+      ->capture_default_str()
+      ->needs(order)
+      ->group(group);
+  add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
+  verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
+      ->needs(order)
+      ->group(group);
+  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far"})
+    order->excludes(verb.get_option(other));
+}
+
+/// The same run with curved elements: lambda has another default there.
+HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
+  HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
+  HighOrderFitOptions& fit = result.fit;
+  fit.order = arguments.order;
+  fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
+  fit.adaptive = arguments.adaptive;
+  fit.tolerance_percent = arguments.fit.tolerance_percent;
+  if (verb.count("--lambda-close") > 0) fit.lambda_close = arguments.fit.lambda_close;
+  fit.solver = solver_kind(arguments);
+  fit.correspondence = correspondence(arguments);
+  fit.point_weights = point_weights(arguments);
+  fit.distortion = distortion(arguments);
+  fit.max_iterations = arguments.fit.max_iterations;
+  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
+  return result;
+}
+
+void add_solver_options(CLI::App& verb, FitArguments& arguments) {
+  FitOptions& fit = arguments.fit;
+  const auto group = "Solver";
+  verb.add_option("--lambda-far", fit.lambda_far, "Weight of the cells' shape while the template is far away")
+      ->check(number_in(1e-9, 1e9))
+      ->type_name("W")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option(
+          "--lambda-close", fit.lambda_close,
+          "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
+          "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05,\n"
+          "lowered for a --tolerance alone")
+      ->check(number_in(1e-9, 1e9))
+      ->type_name("W")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--solver", arguments.solver, "How energies are minimised")
+      ->check(CLI::IsMember({"newton", "lbfgs"}))
+      ->type_name("newton|lbfgs")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--correspondence", arguments.correspondence,
+                  "What pulls at what: exact closest points both ways, or the restricted Voronoi cells of the paper")
+      ->check(CLI::IsMember({"closest", "voronoi"}))
+      ->type_name("closest|voronoi")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--energy", arguments.energy,
+                  "How cells' distortion is measured: hencky keeps shapes and sizes, the others shapes alone")
+      ->check(CLI::IsMember({"hencky", "inverse_mean_ratio", "condition_number"}))
+      ->type_name("hencky|inverse_mean_ratio|condition_number")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option(
+          "--point-weights", arguments.point_weights,
+          "How much each point of a cloud counts: all alike, or by the area it stands for, where scans are uneven")
+      ->check(CLI::IsMember({"equal", "area"}))
+      ->type_name("equal|area")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--max-iterations", fit.max_iterations, "Steps per stage (default: as many as the schedule asks for)")
+      ->check(CLI::Range(1, 1'000'000))
+      ->type_name("N")
+      ->group(group);
+  verb.add_option("--time-limit", fit.time_limit_seconds, "Stop after this time with the best result so far")
+      ->check(number_in(1e-3, 1e9))
+      ->type_name("SECONDS")
+      ->group(group);
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app, Action& action) {
+  CLI::App* verb = app.add_subcommand("fit", "Deform a template until its boundary reproduces a surface");
+  const auto arguments = std::make_shared<FitArguments>();
+  verb->add_option("TARGET", arguments->target,
+                   "Surface to reproduce: " + surface_formats() + "; a volume mesh, for its boundary; or points: " +
+                       point_cloud_formats())
+      ->required()
+      ->type_name("FILE");
+  CLI::Option* file = verb->add_option("--template", arguments->template_mesh.path,
+                                       "Coarse mesh to start from: " + volume_mesh_formats() +
+                                           " (default: made from the target)")
+                          ->type_name("MESH");
+  verb->add_option("--cells", arguments->template_mesh.cells,
+                   "About how many cells a template made from the target has (default: as many as it needs)")
+      ->check(CLI::Range(kLeastTemplateCells, kMostTemplateCells))
+      ->type_name("N")
+      ->excludes(file);
+  add_references_option(*verb, arguments->run)->needs(file);
+  add_method_options(*verb, *arguments);
+  add_solver_options(*verb, *arguments);
+  add_high_order_options(*verb, *arguments);
+  add_output_options(*verb, arguments->run,
+                     "Finest mesh, or its surface, by extension: " + output_formats() +
+                         "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb\n"
+                         "for the fit as it went; may be given several times");
+  add_writing_options(*verb, arguments->writing);
+  add_long_run_options(*verb, arguments->run);
+  add_checkpoint_options(*verb, arguments->run);
+  verb->footer(R"(Example:
+  subvol fit bone.off --template bone.mesh --levels 3 -o bone.glb -o cage:bone_cage.usda -o bone_fine.mesh
+
+  subvol fit bone.off -o bone.glb                  (with a template made from the surface)
+  subvol fit bone.off --template bone.mesh --order 4 -o bone.vtu -o bone.glb
+
+Ctrl-C once ends the fit with the best result so far (exit status 130), twice ends the program.
+--config FILE.toml reads options from a file: key = value, keys being the long names above.)");
+  verb->callback([arguments, verb, &action] {
+    action = [arguments, verb] {
+      return arguments->order > 0 ? run_high_order_fit(high_order_arguments(*arguments, *verb), *verb)
+                                  : FitRun(*arguments, *verb).run();
+    };
+  });
+}
+
+}  // namespace subvol::cli

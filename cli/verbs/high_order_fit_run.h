@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/runs/automatic_template.h"
+#include "cli/runs/run_options.h"
+#include "cli/runs/writing.h"
+#include "fit/high_order_fit.h"
+
+#include <CLI/CLI.hpp>
+
+#include <string>
+
+namespace subvol::cli {
+
+/// What `fit --order`, or `optimize --order`, was asked to do.
+struct HighOrderFitArguments {
+  RunOptions run;
+  WritingOptions writing;
+  HighOrderFitOptions fit;
+  std::string target;
+  TemplateSource template_mesh;
+  const char* command = "fit";  ///< the verb, for messages and the report
+  /// All cells of the template that are not proved valid are untangled before, not only where a few are inverted.
+  bool untangles = false;
+  bool takes_points = true;     ///< the target may be points
+};
+
+/// Fits curved elements from files to files; returns an ExitStatus.
+int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& verb);
+
+}  // namespace subvol::cli

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/exit_status.h"
+#include "cli/runs/report.h"
+#include "cli/runs/standard_output.h"
+#include "cli/verbs/commands.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/error.h"
+
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <iostream>
+#include <new>
+#include <string_view>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+#include <unistd.h>
+
+namespace subvol::cli {
+namespace {
+
+constexpr const char* kOutOfMemory = "out of memory";
+
+int complain(const char* what, int status) {
+  std::cerr << "subvol: " << what << '\n';
+  return status;
+}
+
+// The parser would only say that a verb is missing.
+void require_known_verb(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  std::string verbs;
+  for (const CLI::App* verb : app.get_subcommands({})) {
+    if (verb->get_name() == argv[1]) return;
+    verbs += ' ' + verb->get_name();
+  }
+  throw UsageError(std::string("there is no verb '") + argv[1] + "'; there are:" + verbs);
+}
+
+/// Whether an allocation has failed.
+std::atomic<bool> has_run_out{false};
+
+[[noreturn]] void run_out() {
+  has_run_out = true;
+  throw std::bad_alloc();
+}
+
+/// An exception that leaves a parallel loop ends the program here: in order, and with nothing half-written. In the
+/// program's first thread the language does not say which one it was.
+[[noreturn]] void end_in_order() {
+  const char* what = has_run_out ? kOutOfMemory : "an error in a parallel loop";
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {  // of Eigen's, which asks elsewhere
+    what = kOutOfMemory;
+  } catch (...) {
+  }
+  // Nothing is allocated any more, nothing unwound: other threads still run.
+  delete_temporaries();
+  (void)!write(STDERR_FILENO, "subvol: ", 8);
+  (void)!write(STDERR_FILENO, what, std::strlen(what));
+  (void)!write(STDERR_FILENO, "\n", 1);
+  std::_Exit(kFailed);
+}
+
+/// Arrays of one step are asked for again in the next: they are not handed back to the system each time, which would
+/// have to clear their pages anew (a tenth of the time of `optimize`).
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  constexpr int kMegabyte = 1 << 20;
+  mallopt(M_MMAP_THRESHOLD, 32 * kMegabyte);
+  mallopt(M_TRIM_THRESHOLD, 128 * kMegabyte);
+#endif
+}
+
+/// `--report=` would take the next word for its value.
+void require_value_behind_sign(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word.starts_with("--") && word.find('=') == word.size() - 1)
+      throw UsageError(std::string(word.substr(0, word.size() - 1)) + ": expected a value, got nothing");
+  }
+}
+
+/// An unset variable of a script is no file name: without this, its option would count as not given.
+void require_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& value : option->results())
+      if (value.empty()) throw UsageError(option->get_name() + ": expected a value, got nothing");
+  for (const CLI::App* verb : app.get_subcommands()) require_values(*verb);
+}
+
+int run(int argc, char** argv) {
+  remember_command_line(argc, argv);
+  CLI::App app{"Fits volume meshes to surfaces: subdivision volumes and shells.", "subvol"};
+  Action action;
+  describe_program(app, action);
+  require_known_verb(app, argc, argv);
+  require_value_behind_sign(argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  require_values(app);
+  return action();
+}
+
+/// What `run` returns, or the status of the error that it ends with.
+int run_to_status(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const UsageError& error) {
+    return complain(error.what(), kUsage);
+  } catch (const EndedEarly& error) {
+    return complain(error.what(), error.status);
+  } catch (const InputError& error) {
+    return complain(error.what(), kRejected);
+  } catch (const std::bad_alloc&) {
+    return complain(kOutOfMemory, kFailed);
+  } catch (const std::exception& error) {
+    return complain(error.what(), kFailed);
+  }
+}
+
+}  // namespace
+}  // namespace subvol::cli
+
+int main(int argc, char** argv) {
+  using namespace subvol::cli;
+  keep_freed_memory();
+  std::set_new_handler(run_out);
+  std::set_terminate(end_in_order);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+  prepare_standard_output();
+  return finished_standard_output(run_to_status(argc, argv));
+}

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/losses.h"
+#include "cli/runs/outputs.h"
+#include "cli/runs/writing.h"
+#include "cli/runs/written_result.h"
+#include "cli/verbs/commands.h"
+#include "cli/verbs/verb_options.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/mesh/features.h"
+#include "subvol/subdivision/repeated_subdivision.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+
+namespace subvol::cli {
+namespace {
+
+struct SubdivideArguments {
+  RunOptions run;
+  WritingOptions writing;
+  std::string mesh, boundary = "catmull-clark";
+  int levels = 1;
+  std::optional<double> crease_angle_degrees;
+};
+
+int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
+  if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway});
+  apply_resources(arguments.run);
+  std::vector<std::string> warnings;
+  VolumeMesh cage = load_volume(arguments.mesh, warnings, true, arguments.run.references);
+  const Marks read = marks_of(cage);
+  const Json input{{"mesh", describe(arguments.mesh, cage)}};
+  if (arguments.crease_angle_degrees) {
+    cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
+  }
+  const BoundaryRule rule =
+      arguments.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
+  const VolumeMesh fine = subdivide_repeatedly(cage, arguments.levels, rule);
+
+  warn_of_losses(read, marks_of(fine), outputs, warnings);
+  WritingOptions writing = arguments.writing;
+  writing.source = arguments.mesh;
+  writing.options = options_of_result(verb);
+  TessellatedSurface limit;
+  const bool has_limit = rule == BoundaryRule::catmull_clark;  // averaging ends in another surface
+  if (has_limit && std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
+  return write_checked(
+      arguments.run, std::move(outputs), fine,
+      [&](const Output& output) {
+        if (has_limit || output.part == Part::cage)
+          write_output(output, cage, fine, &limit, writing);
+        else
+          write_output(output, fine, writing);
+      },
+      warnings,
+      {{"command", "subdivide"},
+       {"options", options_in_force(verb)},
+       {"input", input},
+       {"result", describe("", fine)}});
+}
+
+}  // namespace
+
+void add_subdivide_command(CLI::App& app, Action& action) {
+  CLI::App* verb = app.add_subcommand("subdivide", "Refine a control mesh");
+  const auto arguments = std::make_shared<SubdivideArguments>();
+  verb->add_option("MESH", arguments->mesh, "Control mesh: " + volume_mesh_formats())->required()->type_name("FILE");
+  verb->add_option("--levels", arguments->levels, "Times it is subdivided")
+      ->check(CLI::Range(1, 8))
+      ->type_name("L")
+      ->capture_default_str();
+  verb->add_option("--boundary", arguments->boundary, "How boundary vertices are subdivided")
+      ->check(CLI::IsMember({"catmull-clark", "averaging"}))
+      ->type_name("catmull-clark|averaging")
+      ->capture_default_str();
+  verb->add_option("--crease-angle", arguments->crease_angle_degrees,
+                   "Boundary edges sharper than this become creases (default: only those the file tags)")
+      ->check(number_in(0.0, 180.0))
+      ->type_name("DEGREES");
+  add_references_option(*verb, arguments->run);
+  add_output_options(*verb, arguments->run,
+                     "Refined mesh, or its surface, by extension: " + output_formats() +
+                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given\n"
+                         "several times");
+  add_writing_options(*verb, arguments->writing);
+  verb->add_option("--report", arguments->run.report, "Write what was done and what is true of the result")
+      ->type_name("FILE.json");
+  verb->footer(R"(Example:
+  subvol subdivide cage.mesh --levels 2 --crease-angle 40 -o fine.mesh -o fine.glb)");
+  verb->callback(
+      [arguments, verb, &action] { action = [arguments, verb] { return run_subdivide(*arguments, *verb); }; });
+}
+
+}  // namespace subvol::cli

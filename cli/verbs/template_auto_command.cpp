@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/exit_status.h"
+#include "cli/runs/interrupt.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/outputs.h"
+#include "cli/runs/progress.h"
+#include "cli/verbs/template_command.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/templates/auto_template.h"
+
+#include <iostream>
+#include <memory>
+
+namespace subvol::cli {
+namespace {
+
+struct AutoArguments : TemplateRun {
+  std::string target;
+  AutoTemplateOptions options;
+};
+
+AutoTemplateResult make(const AutoArguments& arguments, const TriangleMesh& target) {
+  ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
+  AutoTemplateOptions options = arguments.options;
+  options.progress = [&](double fraction) {
+    teller.tell({.stage = "template", .level = 0, .iteration = 0, .energy = 0, .fraction = fraction});
+    return !interrupted();
+  };
+  catch_interrupt();
+  AutoTemplateResult result = auto_templates(target, options);
+  teller.finish();
+  return result;
+}
+
+Json topology_json(const BettiNumbers& topology) {
+  return {{"components", topology.components},
+          {"handles", topology.handles},
+          {"cavities", topology.cavities},
+          {"euler_number", topology.euler_number()}};
+}
+
+int run_auto(AutoArguments arguments, const CLI::App& verb) {
+  const std::vector<Output> outputs = template_outputs(arguments, verb);
+  const TriangleMesh target = load_surface(arguments.target, arguments.warnings);
+  arguments.writing.source = arguments.target;
+  const AutoTemplateResult result = make(arguments, target);
+  if (result.cancelled) return kInterrupted;
+  if (result.templates.empty()) {
+    std::cerr << "subvol: no grid that was tried, of up to 20 times " << arguments.options.cells
+              << " cells has the target's " << to_string(result.wanted) << "\n";
+    return kFailed;
+  }
+  const AutoTemplate& made = result.templates.front();
+  const bool as_asked = made.cells_asked == arguments.options.cells;
+  if (!as_asked)
+    arguments.warnings.push_back(std::to_string(arguments.options.cells) + " cells cannot carry the target's " +
+                                 to_string(result.wanted) + "; --cells " + std::to_string(made.cells_asked) + " does");
+  Json axes = Json::array();
+  for (int a = 0; a < 3; ++a) axes.push_back({made.axes(0, a), made.axes(1, a), made.axes(2, a)});
+  const int status = write_template(arguments, verb, outputs, made.mesh,
+                                    {{"input", {{"target", describe(arguments.target, target)}}},
+                                     {"template",
+                                      {{"cells", made.mesh.num_cells()},
+                                       {"cells_that_work", made.cells_asked},
+                                       {"pillowed", made.pillowed},
+                                       {"wanted", topology_json(result.wanted)},
+                                       {"topology", topology_json(made.topology)},
+                                       {"score", made.score},
+                                       {"axes", axes},
+                                       {"grids", result.grids},
+                                       {"candidates", result.candidates}}}});
+  return status == kDone && !as_asked ? kNotConverged : status;
+}
+
+}  // namespace
+
+void add_template_auto(CLI::App& group, Action& action) {
+  CLI::App* verb = group.add_subcommand("auto", "Make a template from a surface: a carved grid with its topology");
+  const auto arguments = std::make_shared<AutoArguments>();
+  verb->add_option("TARGET", arguments->target,
+                   "Surface that bounds a solid: " + surface_formats() + "; or a volume mesh, for its boundary")
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--cells", arguments->options.cells, "About how many cells; more where the topology needs them")
+      ->check(CLI::Range(kLeastTemplateCells, kMostTemplateCells))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");
+  add_template_options(*verb, *arguments);
+  verb->add_option("--progress", arguments->run.progress,
+                   "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
+      ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
+      ->type_name("KIND");
+  verb->footer(R"(Exit status 4: so many cells cannot carry the topology; the template has more.
+
+Example:
+  subvol template auto bone.off --cells 300 -o bone_template.mesh)");
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_auto(*arguments, *verb); }; });
+}
+
+}  // namespace subvol::cli

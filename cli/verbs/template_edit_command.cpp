@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The verbs under `template` that make a mesh by hand: grid, carve, extrude, pillow, refine, collapse, merge,
+// split.
+
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/losses.h"
+#include "cli/runs/outputs.h"
+#include "cli/verbs/template_command.h"
+#include "cli/verbs/verb_options.h"
+#include "fit/geometry/surface_distance.h"
+#include "shell/extrude.h"
+#include "subvol/base/error.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/templates/carve.h"
+#include "subvol/templates/cell_split.h"
+#include "subvol/templates/pillow.h"
+#include "subvol/templates/refine.h"
+#include "subvol/templates/sheet.h"
+#include "subvol/templates/vertex_merge.h"
+#include "subvol/templates/voxel_grid.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+
+namespace subvol::cli {
+namespace {
+
+/// Options of all edits; each verb offers those it reads.
+struct EditArguments : TemplateRun {
+  std::string mesh, other, inside;
+  std::vector<double> box, direction;
+  std::vector<int> counts;
+  std::vector<Index> cells, vertices;
+  double size = 0, margin = 5, share = 0.5, thickness = 0, growth = 1, tolerance = 1e-6;
+  int layers = 1, parts = 2;
+  bool invert = false, thin = false;
+  Marks read;
+  std::string what;
+};
+
+Vec3 low_corner(const std::vector<double>& box) { return {box[0], box[1], box[2]}; }
+Vec3 high_corner(const std::vector<double>& box) { return {box[3], box[4], box[5]}; }
+
+VolumeMesh load_edited(EditArguments& arguments, const std::string& path) {
+  VolumeMesh mesh = load_volume(path, arguments.warnings, true, arguments.run.references);
+  const Marks marks = marks_of(mesh);
+  arguments.read.references += marks.references;
+  arguments.read.creases += marks.creases;
+  arguments.read.corners += marks.corners;
+  return mesh;
+}
+
+VolumeMesh make_grid(EditArguments& arguments) {
+  if (arguments.box.empty() == arguments.mesh.empty())
+    throw UsageError("template grid: give a SURFACE or --box, one of them");
+  if (arguments.counts.empty() == (arguments.size == 0))
+    throw UsageError("template grid: give --counts or --size, one of them");
+  Vec3 low, high;
+  if (arguments.mesh.empty()) {
+    low = low_corner(arguments.box);
+    high = high_corner(arguments.box);
+  } else {
+    const auto box = box_around(load_surface(arguments.mesh, arguments.warnings), arguments.margin);
+    low = box[0];
+    high = box[1];
+  }
+  return voxel_mesh(arguments.counts.empty()
+                        ? box_grid(low, high, arguments.size)
+                        : box_grid(low, high, {arguments.counts[0], arguments.counts[1], arguments.counts[2]}));
+}
+
+/// The cells that --inside, --box, --list or --thin name: one of them.
+std::vector<char> chosen_cells(EditArguments& arguments, const VolumeMesh& mesh, const std::string& choices) {
+  const int given = !arguments.inside.empty() + !arguments.box.empty() + !arguments.cells.empty() + arguments.thin;
+  if (given != 1) throw UsageError("template " + choices);
+  if (arguments.thin) return thin_cells(mesh);
+  if (!arguments.inside.empty())
+    return cells_inside(mesh, load_surface(arguments.inside, arguments.warnings), arguments.share);
+  return arguments.box.empty() ? cells_listed(mesh, arguments.cells)
+                               : cells_in_box(mesh, low_corner(arguments.box), high_corner(arguments.box));
+}
+
+VolumeMesh make_carved(EditArguments& arguments) {
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  const std::vector<char> chosen = chosen_cells(arguments, mesh, "carve: give one of --inside, --box and --list");
+  return carve(mesh, [&](std::size_t c) { return (chosen[c] != 0) != arguments.invert; });
+}
+
+VolumeMesh make_refined(EditArguments& arguments) {
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  const std::vector<char> chosen =
+      chosen_cells(arguments, mesh, "refine: give one of --inside, --box, --list and --thin");
+  if (std::find(chosen.begin(), chosen.end(), 1) == chosen.end())
+    arguments.warnings.push_back("no cell is chosen: the mesh stays as it is");
+  return refine_at(mesh, vertices_of(mesh, chosen));
+}
+
+VolumeMesh make_extruded(EditArguments& arguments) {
+  TaggedPolygons surface = load_tagged_polygons(arguments.mesh, arguments.warnings);
+  ExtrudeOptions options{.thickness = arguments.thickness, .layers = arguments.layers, .growth = arguments.growth};
+  if (!arguments.direction.empty())
+    options.direction = Vec3(arguments.direction[0], arguments.direction[1], arguments.direction[2]);
+  options.tags = std::move(surface.tags);
+  return extrude(surface.polygons, options);
+}
+
+VolumeMesh make_collapsed(EditArguments& arguments) {
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  const Index a = arguments.vertices[0], b = arguments.vertices[1];
+  return arguments.what == "edge"   ? collapse_edge(mesh, a, b)
+         : arguments.what == "face" ? collapse_face(mesh, a, b)
+                                    : collapse_sheet(mesh, a, b);
+}
+
+VolumeMesh make_merged(EditArguments& arguments) {
+  VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  if (!arguments.other.empty()) mesh = joined(mesh, load_edited(arguments, arguments.other));
+  Eigen::AlignedBox3d box;
+  for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
+  return glue(mesh, arguments.tolerance / 100 * box.diagonal().norm());
+}
+
+VolumeMesh make_split(EditArguments& arguments) {
+  const VolumeMesh mesh = load_edited(arguments, arguments.mesh);
+  if (arguments.what == "tets") return split_into_tets(mesh);
+  if (arguments.vertices.empty()) throw UsageError("template split: --into " + arguments.what + " needs --edge A B");
+  const Index a = arguments.vertices[0], b = arguments.vertices[1];
+  return arguments.what == "prisms" ? split_into_prisms(mesh, a, b) : split_sheet(mesh, a, b, arguments.parts);
+}
+
+VolumeMesh make_pillowed(EditArguments& arguments) {
+  return pillow(load_edited(arguments, arguments.mesh), arguments.cells);
+}
+
+using Maker = VolumeMesh (*)(EditArguments&);
+
+int run_edit(EditArguments arguments, const CLI::App& verb, Maker make) {
+  const std::vector<Output> outputs = template_outputs(arguments, verb);
+  arguments.writing.source = arguments.mesh;
+  const VolumeMesh mesh = make(arguments);
+  warn_of_losses(arguments.read, marks_of(mesh), outputs, arguments.warnings);
+  return write_template(arguments, verb, outputs, mesh, {{"input", arguments.mesh}});
+}
+
+/// A verb with what all of them have; its own options follow.
+CLI::App* add_edit(CLI::App& group, Action& action, const std::shared_ptr<EditArguments>& arguments, const char* name,
+                   const char* help, Maker make) {
+  CLI::App* verb = group.add_subcommand(name, help);
+  add_template_options(*verb, *arguments);
+  verb->callback([arguments, verb, make, &action] {
+    action = [arguments, verb, make] { return run_edit(*arguments, *verb, make); };
+  });
+  return verb;
+}
+
+CLI::Option* add_mesh(CLI::App& verb, EditArguments& arguments) {
+  add_references_option(verb, arguments.run);
+  return verb.add_option("MESH", arguments.mesh, "Mesh to edit: " + volume_mesh_formats())
+      ->required()
+      ->type_name("FILE");
+}
+
+CLI::Option* add_box(CLI::App& verb, EditArguments& arguments, const char* help) {
+  return verb.add_option("--box", arguments.box, help)->expected(6)->type_name("X0 Y0 Z0 X1 Y1 Z1");
+}
+
+CLI::Option* add_cell_list(CLI::App& verb, EditArguments& arguments, const char* help) {
+  return verb.add_option("--list", arguments.cells, help)
+      ->delimiter(',')
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("CELL,...");
+}
+
+CLI::Option* add_vertices(CLI::App& verb, EditArguments& arguments, const char* name, const char* help) {
+  return verb.add_option(name, arguments.vertices, help)->expected(2)->check(CLI::NonNegativeNumber)->type_name("A B");
+}
+
+void add_grid(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb = add_edit(group, action, a, "grid", "Fill a box with equal hexes", make_grid);
+  verb->add_option("SURFACE", a->mesh, "Take the box around this surface")->type_name("FILE");
+  add_box(*verb, *a, "Or take this box");
+  verb->add_option("--counts", a->counts, "Cells along each axis")
+      ->expected(3)
+      ->check(CLI::Range(1, 100'000))
+      ->type_name("NX NY NZ");
+  verb->add_option("--size", a->size, "Or: about how long a cell is")
+      ->check(number_in(1e-300, 1e300))
+      ->type_name("LENGTH");
+  verb->add_option("--margin", a->margin, "How far the box stands off the surface, in per cent of its diagonal")
+      ->check(number_in(0.0, 1000.0))->type_name("PERCENT")->capture_default_str();
+}
+
+/// --inside with --share, --box and --list.
+void add_choice(CLI::App& verb, EditArguments& arguments) {
+  verb.add_option("--inside", arguments.inside, "Cells that lie in this surface, by winding number")
+      ->type_name("SURFACE");
+  verb.add_option("--share", arguments.share, "By at least this share of their volume")
+      ->check(number_in(1e-6, 1.0))->type_name("SHARE")->capture_default_str();
+  add_box(verb, arguments, "Cells whose centre lies in a box");
+  add_cell_list(verb, arguments, "These cells, numbered from 0");
+}
+
+void add_carve(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb = add_edit(group, action, a, "carve", "Keep some cells", make_carved);
+  add_mesh(*verb, *a);
+  add_choice(*verb, *a);
+  verb->add_flag("--invert", a->invert, "Keep the others instead");
+}
+
+void add_refine(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb = add_edit(group, action, a, "refine", "Cut some hexes in 27, and those around so that they fit",
+                            make_refined);
+  add_mesh(*verb, *a);
+  add_choice(*verb, *a);
+  verb->add_flag("--thin", a->thin, "Cells that are all there is between two sides of the mesh");
+}
+
+void add_extrude(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb =
+      add_edit(group, action, a, "extrude", "Stack hexes and prisms on the faces of a surface", make_extruded);
+  verb->add_option("SURFACE", a->mesh, "Surface of triangles and quads: " + surface_formats())
+      ->required()
+      ->type_name("FILE");
+  verb->add_option("--thickness", a->thickness, "Of all layers together")
+      ->required()
+      ->check(number_in(1e-300, 1e300))
+      ->type_name("LENGTH");
+  verb->add_option("--layers", a->layers, "How many")
+      ->check(CLI::Range(1, 10'000))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--growth", a->growth, "Thickness of a layer against the one below")
+      ->check(number_in(0.01, 100.0))->type_name("FACTOR")->capture_default_str();
+  verb->add_option("--direction", a->direction, "Where to (default: along the surface's normals)")
+      ->expected(3)
+      ->type_name("X Y Z");
+}
+
+void add_pillow(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb = add_edit(group, action, a, "pillow",
+                            "Put a layer of cells inside the boundary, or around some cells", make_pillowed);
+  add_mesh(*verb, *a);
+  add_cell_list(*verb, *a, "Around these cells, numbered from 0 (default: all)");
+}
+
+void add_collapse(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb =
+      add_edit(group, action, a, "collapse", "Take cells out by shrinking a sheet, a face or an edge", make_collapsed);
+  add_mesh(*verb, *a);
+  verb->add_option("--what", a->what,
+                   "The sheet of edge A B; the quad with opposite corners A B, and its column; the edge A B")
+      ->check(CLI::IsMember({"sheet", "face", "edge"}))
+      ->default_str("sheet")
+      ->type_name("sheet|face|edge");
+  add_vertices(*verb, *a, "--vertices", "Two vertices, numbered from 0")->required();
+}
+
+void add_merge(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  CLI::App* verb =
+      add_edit(group, action, a, "merge", "Glue faces that lie on each other, of one mesh or two", make_merged);
+  add_mesh(*verb, *a);
+  verb->add_option("OTHER", a->other, "Mesh to put beside it first")->type_name("FILE");
+  verb->add_option("--tolerance", a->tolerance,
+                   "Distance up to which vertices are one, in per cent of the box's diagonal")
+      ->check(number_in(0.0, 10.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
+}
+
+void add_split(CLI::App& group, Action& action) {
+  const auto a = std::make_shared<EditArguments>();
+  a->what = "parts";
+  CLI::App* verb =
+      add_edit(group, action, a, "split", "Cut a sheet into layers, or all cells into prisms or tets", make_split);
+  add_mesh(*verb, *a);
+  verb->add_option("--into", a->what, "Layers of the sheet of an edge; prisms along an edge; tets")
+      ->check(CLI::IsMember({"parts", "prisms", "tets"}))->type_name("parts|prisms|tets")->capture_default_str();
+  add_vertices(*verb, *a, "--edge", "Ends of the edge, numbered from 0");
+  verb->add_option("--parts", a->parts, "Into how many layers")
+      ->check(CLI::Range(2, 1000))
+      ->type_name("N")
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_template_edits(CLI::App& group, Action& action) {
+  add_grid(group, action);
+  add_carve(group, action);
+  add_extrude(group, action);
+  add_pillow(group, action);
+  add_refine(group, action);
+  add_collapse(group, action);
+  add_merge(group, action);
+  add_split(group, action);
+}
+
+}  // namespace subvol::cli

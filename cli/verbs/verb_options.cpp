@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/verbs/verb_options.h"
+
+#include "cli/runs/exit_status.h"
+
+#include <algorithm>
+#include <sstream>
+
+namespace subvol::cli {
+namespace {
+
+// Numbers and booleans as such, all else as text.
+Json typed(const std::string& text) {
+  const Json value = Json::parse(text, nullptr, false);
+  return value.is_number() || value.is_boolean() ? value : Json(text);
+}
+
+Json typed(const std::vector<std::string>& texts) {
+  Json all = Json::array();
+  for (const std::string& text : texts) all.push_back(typed(text));
+  return all;
+}
+
+constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimit = std::size_t{1} << 50;
+
+/// Whether one was given that this one does not go with.
+bool is_excluded(const CLI::Option& option) {
+  const auto& others = option.get_excludes();
+  return std::any_of(others.begin(), others.end(), [](const CLI::Option* other) { return other->count() > 0; });
+}
+
+}  // namespace
+
+void add_resource_options(CLI::App& verb, RunOptions& options) {
+  verb.add_option("--threads", options.threads, "Number of threads (default: all cores)")
+      ->check(CLI::Range(1, 1024))
+      ->type_name("N");
+  verb.add_option("--memory-limit", options.memory_limit,
+                  "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best\n"
+                  "result so far")
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(kLeastMemoryLimit, kMostMemoryLimit))
+      ->type_name("SIZE");
+}
+
+void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help) {
+  verb.add_option("-o,--output", options.outputs, output_help)->type_name("FILE")->allow_extra_args(false);
+  verb.add_flag("--force", options.force, "Replace outputs that exist");
+  verb.add_flag("--quiet", options.quiet, "Say nothing but errors");
+  add_resource_options(verb, options);
+}
+
+CLI::Option* add_references_option(CLI::App& verb, RunOptions& options) {
+  return verb
+      .add_option("--references", options.references,
+                  "Cell data of a .vtk that become the cells' references (default: those with a name of materials or\n"
+                  "regions, or else the first of whole numbers that are no ghosts or cell numbers)")
+      ->type_name("NAME");
+}
+
+CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options) {
+  return verb
+      .add_option("--map-tolerance", options.map_tolerance_percent,
+                  "Largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, in\n"
+                  "per cent of the diagonal; if it is larger, the program says so and ends with status 4")
+      ->check(number_in(0.0, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
+}
+
+void add_long_run_options(CLI::App& verb, RunOptions& options) {
+  verb.add_option("--report", options.report, "Write what was done and what is true of the result")
+      ->type_name("FILE.json");
+  verb.add_option("--progress", options.progress,
+                  "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")
+      ->check(CLI::IsMember({"bar", "plain", "json", "none"}))
+      ->type_name("KIND");
+  verb.add_option("--seed", options.seed, "Kept in the report; nothing here draws random numbers")->type_name("N");
+}
+
+void require_fitting_options(const CLI::App& verb, bool points) {
+  const auto given = [&](const char* name) {
+    const CLI::Option* option = verb.get_option_no_throw(name);
+    return option ? option->results() : std::vector<std::string>{};
+  };
+  if (!points) {
+    if (!given("--point-weights").empty())
+      throw UsageError("--point-weights: the target is a surface; its triangles count by their areas");
+    return;
+  }
+  if (!given("--crease-angle").empty())
+    throw UsageError("--crease-angle: the target holds points, between which no edges can be seen");
+  if (const auto kind = given("--correspondence"); !kind.empty() && kind.back() == "voronoi")
+    throw UsageError("--correspondence voronoi: the target holds points, which have no area to be cut into cells");
+}
+
+void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
+  const auto group = "Long runs";
+  CLI::Option* checkpoint =
+      verb.add_option("--checkpoint", options.checkpoint, "Keep in FILE what --resume needs, as the run goes on")
+          ->type_name("FILE")
+          ->group(group);
+  verb.add_option("--every", options.every_seconds, "Write the checkpoint at most so often")
+      ->check(number_in(0, 1e9))
+      ->type_name("SECONDS")
+      ->capture_default_str()
+      ->needs(checkpoint)
+      ->group(group);
+  verb.add_option("--resume", options.resume,
+                  "Go on from the checkpoint of a run of the same inputs and options, to the same result")
+      ->type_name("FILE")
+      ->group(group);
+}
+
+void add_writing_options(CLI::App& verb, WritingOptions& options) {
+  const auto group = "Surfaces for DCC tools";
+  verb.add_option("--chord", options.chord_percent,
+                  "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
+      ->check(number_in(1e-4, 100.0))
+      ->type_name("PERCENT")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--unit", options.metres_per_unit, "Length of the mesh's unit")
+      ->check(number_in(1e-12, 1e12))
+      ->type_name("METRES")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--up", options.up_axis, "Axis of the mesh that points up")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->type_name("y|z")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option_function<std::string>(
+          "--cut",
+          [&options](const std::string& text) {
+            if (const std::string error = parse_cut(text, options.cut); !error.empty())
+              throw CLI::ValidationError("--cut", error);
+          },
+          "Where cutaway:FILE cuts: the axis the plane stands across, and where along it (default: the axis along\n"
+          "which the mesh is shortest, halfway)")
+      ->type_name("x|y|z[:SHARE]")
+      ->group(group);
+  verb.add_flag("--no-wireframe", options.no_wireframe, "Leave the edges of the cells out of .glb and .gltf")
+      ->group(group);
+  verb.add_flag("--quantize", options.quantize,
+                "Small .glb and .gltf: positions in 16 bits, normals in 8 (KHR_mesh_quantization)")
+      ->group(group);
+}
+
+CLI::Validator number_in(double low, double high) {
+  std::ostringstream range;
+  range << low << " .. " << high;
+  const auto check = [low, high, text = range.str()](const std::string& word) -> std::string {
+    if (is_number_in(word, low, high)) return {};
+    return "must be a number in " + text + ", not " + word;
+  };
+  return CLI::Validator(check, "");
+}
+
+Json options_in_force(const CLI::App& verb) {
+  Json all = Json::object();
+  for (const CLI::Option* option : verb.get_options()) {
+    const std::string name = option->get_single_name();
+    if (name == "help" || name == "output" || option->get_positional()) continue;
+    const auto& given = option->results();
+    if (!given.empty()) {
+      all[name] = option->get_items_expected_max() > 1 ? typed(given) : typed(given.back());
+    } else if (is_excluded(*option)) {
+      continue;
+    } else if (option->get_expected_min() == 0) {
+      all[name] = false;
+    } else if (!option->get_default_str().empty()) {
+      all[name] = typed(option->get_default_str());
+    }
+  }
+  return all;
+}
+
+Json options_of_result(const CLI::App& verb) {
+  Json options = options_in_force(verb);
+  for (const char* name : {"force", "quiet", "threads", "memory-limit", "time-limit", "report", "progress", "config",
+                           "checkpoint", "every", "resume"})
+    options.erase(name);
+  return options;
+}
+
+RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs) {
+  return run_identity(verb.get_name(), options_of_result(verb), inputs);
+}
+
+}  // namespace subvol::cli

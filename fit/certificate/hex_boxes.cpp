@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/certificate/hex_boxes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace subvol {
+
+namespace {
+
+/// Share of the mean edges up to which errors of models are small as long as nothing is known of det J.
+constexpr double kSmallError = 0.15;
+/// Beyond this sum it does not pay to look: the shifts of `determinant_bound` sum up to about that much, if the mean
+/// edges tell the mean matrix, and what they leave must be more than the variation of J (measured).
+constexpr double kHopelessError = 0.55;
+
+/// Boxes of each precision that keep their coefficients (15 KB, 8 KB) until they are halved.
+constexpr int kMostKept = 64;
+
+// Of the lowest det J, by the mean edges, up to `kGood` of it: what errors may come to.
+constexpr double kShare = 0.1, kGood = 0.5;
+
+/// Which of the first kWide entries of a matrix, by columns, are of that column.
+constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
+
+}  // namespace
+
+template <class Vector>
+typename CoefficientsPool<Vector>::Pooled CoefficientsPool<Vector>::take() {
+  if (spare_.empty()) {
+    spare_.reserve(++num_made_);  // so that returning them never allocates
+    spare_.push_back(std::make_unique<Coefficients>());
+  }
+  Pooled result(spare_.back().release(), Return{this});
+  spare_.pop_back();
+  return result;
+}
+
+HexBoxes::HexBoxes(Basis basis, int order)
+    : n_(order + 1), lanes_((n_ + kWide - 1) / kWide * kWide), contraction_(basis, order) {
+  for (AlignedDoubles& used : is_used_) used.assign(lanes_, 0);
+  bounds_ = contraction_.models(1, 0).bounds();
+  slope_bounds_ = contraction_.models(1, 0).slope_bounds();
+  mode_bounds_.assign(lanes_, 0);
+  inverse_bounds_ = inverse_slope_bounds_ = mode_slope_bounds_ = mode_bounds_;
+  weights_.assign(3 * n_ * kWeights, 0);
+  std::copy_n(bounds_.begin() + 2, n_ - 2, mode_bounds_.begin() + 2);
+  std::copy_n(slope_bounds_.begin() + 2, n_ - 2, mode_slope_bounds_.begin() + 2);
+  for (int i = 2; i < n_; ++i) {
+    inverse_bounds_[i] = 1 / bounds_[i];
+    inverse_slope_bounds_[i] = 1 / slope_bounds_[i];
+  }
+  sums_.assign((5 * n_ + 1) * lanes_, 0);
+}
+
+void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients) {
+  contraction_.set_cell(modes, coefficients);
+  ++cell_;
+
+  Mat3 edges = Mat3::Zero();
+  for (int corner = 0; corner < 8; ++corner)
+    for (int row = 0; row < 3; ++row)
+      for (int d = 0; d < 3; ++d) {
+        const int k = corner >> 2, j = corner >> 1 & 1, i = corner & 1;
+        const double x = contraction_.modes(row)[k * contraction_.row() + j * n_ + i];
+        edges(row, d) += corner >> d & 1 ? x : -x;
+      }
+  mean_edges_ = 0.25 * edges.colwise().norm().transpose();
+  inverse_mean_edges_ = mean_edges_.cwiseInverse();
+  make_weights();
+  contraction_.take_steps();
+  constexpr double kMost = 1e10;
+  const double total = contraction_.total().maxCoeff();
+  fits_single_ = total < kMost && total > 1 / kMost;
+}
+
+/// |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i|, |sum_i x_i N_i'| <= |x_1 - x_0| + ...: that for
+/// two directions, one after the other. Numbers i are in lanes.
+void HexBoxes::make_weights() {
+  const auto larger = [](Wide x, const Wide& y) {
+    take_higher(x, y);
+    return x;
+  };
+  // Of the numbers in lanes.
+  const auto modes_along = [&](const double* x, const AlignedDoubles& bounds) {
+    Wide sum{};
+    for (int i = 0; i < lanes_; i += kWide) sum += load_wide(x + i) * load_wide(bounds.data() + i);
+    return sum_of_lanes(sum);
+  };
+  const auto along = [&](const double* x) { return std::max(x[0], x[1]) + modes_along(x, mode_bounds_); };
+  const int line = n_ * lanes_, layer = contraction_.row();
+  double *by_j = sums_.data(), *by_j_slope = by_j + line, *by_k = by_j_slope + line, *by_k_slope = by_k + line,
+         *steps = by_k_slope + line, *steps_by_j = steps + line;
+  const double *value = bounds_.data(), *slope = slope_bounds_.data();
+  for (int row = 0; row < 3; ++row) {
+    const double* modes = contraction_.modes(row);
+    for (int first = 0; first < lanes_; first += kWide) {
+      const auto at = [&](int j, int k) { return load_wide(modes + k * layer + j * n_ + first); };
+      for (int j = 0; j < n_; ++j) {
+        const Wide x0 = at(j, 0), x1 = at(j, 1);
+        Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
+        for (int k = 2; k < n_; ++k) {
+          const Wide x = size_of(at(j, k));
+          sum += value[k] * x, slopes += slope[k] * x;
+        }
+        store_wide(sum, by_j + j * lanes_ + first);
+        store_wide(slopes, by_j_slope + j * lanes_ + first);
+      }
+      for (int k = 0; k < n_; ++k) {
+        const Wide x0 = at(0, k), x1 = at(1, k);
+        Wide sum = larger(size_of(x0), size_of(x1)), slopes = size_of(x1 - x0);
+        for (int j = 2; j < n_; ++j) {
+          const Wide x = size_of(at(j, k));
+          sum += value[j] * x, slopes += slope[j] * x;
+        }
+        store_wide(sum, by_k + k * lanes_ + first);
+        store_wide(slopes, by_k_slope + k * lanes_ + first);
+      }
+      const double* const sums[3] = {by_k, by_k_slope, by_j_slope};
+      for (int column = 0; column < 3; ++column) {
+        const auto of = [&](int m) { return load_wide(sums[column] + m * lanes_ + first); };
+        Wide sum = larger(of(0), of(1));
+        for (int m = 2; m < n_; ++m) sum += value[m] * of(m);
+        for (int i = std::max(first, 2); i < std::min(first + kWide, n_); ++i)
+          weight(0, i, row, column) = sum[i - first];
+      }
+    }
+
+    // |a_1jk - a_0jk|, by k and j, and these numbers' sum over k.
+    for (int k = 0; k < n_; ++k)
+      for (int j = 0; j < n_; ++j) {
+        const double* x = modes + k * layer + j * n_;
+        steps[k * lanes_ + j] = std::abs(x[1] - x[0]);
+      }
+    for (int first = 0; first < lanes_; first += kWide) {
+      const auto of = [&](int k) { return load_wide(steps + k * lanes_ + first); };
+      Wide sum = larger(of(0), of(1));
+      for (int k = 2; k < n_; ++k) sum += value[k] * of(k);
+      store_wide(sum, steps_by_j + first);
+    }
+    weight(0, 1, row, 0) = along(steps_by_j);
+    for (int m = 2; m < n_; ++m) {
+      weight(1, m, row, 0) = modes_along(by_j + m * lanes_, mode_slope_bounds_) + steps_by_j[m];
+      weight(1, m, row, 1) = along(by_j + m * lanes_);
+      weight(1, m, row, 2) = along(by_j_slope + m * lanes_);
+      weight(2, m, row, 0) = modes_along(by_k + m * lanes_, mode_slope_bounds_) + along(steps + m * lanes_);
+      weight(2, m, row, 1) = along(by_k_slope + m * lanes_);
+      weight(2, m, row, 2) = along(by_k + m * lanes_);
+    }
+  }
+  for (int d = 0; d < 3; ++d)
+    for (int i = 2; i < n_; ++i)
+      is_used_[d][i] = weight(d, i, 0, d) > 0 || weight(d, i, 1, d) > 0 || weight(d, i, 2, d) > 0;
+}
+
+void HexBoxes::find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result) {
+  result.cell = cell_;
+  const LineModels::Errors& errors = line.errors[zone];
+  // Entries, by columns: of the column along the direction, and of the others.
+  const Wide is_along = kIsColumn[direction], is_across = 1 - is_along;
+  Wide entries{};
+  double last = 0;
+  for (int i = 2; i < n_; ++i) {
+    const double* weights = &weight(direction, i, 0, 0);
+    entries += (errors.slope[i] * is_along + errors.value[i] * is_across) * load_wide(weights);
+    last += (direction == 2 ? errors.slope[i] : errors.value[i]) * weights[kWide];
+  }
+  store_wide(entries, result.entries.data());
+  result.entries(2, 2) = last;
+  Wide growth{}, inflation{};
+  for (int i = 0; i < lanes_; i += kWide) {
+    const Wide value = load_wide(errors.value.data() + i), slope = load_wide(errors.slope.data() + i);
+    const Wide is_used = load_wide(is_used_[direction].data() + i);
+    const Wide inverse_bound = is_used * load_wide(inverse_bounds_.data() + i);
+    take_higher(growth, value * inverse_bound);
+    take_higher(growth, is_used * slope * load_wide(inverse_slope_bounds_.data() + i));
+    take_higher(inflation, load_wide(line.largest_coefficient.data() + i) * inverse_bound);
+  }
+  result.growth = 1 + highest_lane(growth);
+  result.inflation = std::max(1.0, highest_lane(inflation));
+  result.size = line.exact ? 0 : result.entries.colwise().sum().dot(inverse_mean_edges_);
+}
+
+bool HexBoxes::is_hopeless(Box& box) { return !has_coefficients(box) && choose_models(box) > kHopelessError; }
+
+double HexBoxes::choose_models(Box& box) {
+  const double wanted = box.wanted < 0 ? kSmallError : box.wanted;
+  box.modelled_levels = box.levels, box.modelled_index = box.index;
+  box.halved = 0;
+  double sum = 0;
+  for (int d = 0; d < 3; ++d) {
+    const int last = contraction_.num_tiers(d) - 1;
+    int& tier = box.tiers[d];
+    for (tier = 0; tier < last && !(error_size(box, d) <= wanted);) ++tier;
+    sum += error_size(box, d);
+  }
+  return sum;
+}
+
+void HexBoxes::choose_split(Box& box) {
+  // Contractions along u cost least, and boxes next to one another share those along w, and v: what must be halved
+  // anyway along w comes first.
+  constexpr double kNeeded = 0.3;
+  constexpr double kCost[3] = {0.9, 1, 1.1};
+  const bool is_looked_at = has_coefficients(box);
+  box.split = -1;
+  Vec3 variation = Vec3::Zero();
+  for (int d = 2; d >= 0; --d) {
+    variation[d] = error_size(box, d);
+    if (!is_looked_at && box.split < 0 && variation[d] > kNeeded && box.levels[d] < LineModels::kMaxLevel)
+      box.split = d;
+  }
+  if (box.split >= 0) return;
+  if (is_looked_at) {
+    Mat3 varies;
+    with_matrices(box, [&](const auto& matrices) { varies = matrices.variation(); });
+    for (int d = 0; d < 3; ++d)
+      for (int column = 0; column < 3; ++column)
+        variation[d] += varies(d, column) * parts(box.levels[column]) * inverse_mean_edges_[column];
+  }
+  for (int d = 0; d < 3; ++d)
+    if (box.levels[d] < LineModels::kMaxLevel &&
+        (box.split < 0 || variation[d] * kCost[box.split] > variation[box.split] * kCost[d]))
+      box.split = d;
+  if (box.split < 0) box.split = 0;  // the deepest box there is
+  if (pool_.num_taken() > kMostKept) box.coefficients.reset();
+  if (narrow_pool_.num_taken() > kMostKept) box.narrow.reset();
+}
+
+bool HexBoxes::improve(Box& box, double lowest, bool is_last) {
+  if (box.is_precise) return false;
+  const Mat3 mean = narrow_matrices_.mean();
+  const Vec3 lengths = mean.colwise().norm().transpose();
+  const bool is_looked_at = lengths.maxCoeff() < kMostScale * lengths.minCoeff();
+  const double allowed = kShare * std::min(lowest / mean_edges_.prod(), kGood);
+  if (is_looked_at && !is_last && narrow_error_size(box) <= allowed) return false;
+  box.is_precise = true;
+  box.narrow.reset();
+  choose_models(box);  // what comes next is contracted, with models of the box itself
+  return true;
+}
+
+double HexBoxes::narrow_error_size(const Box& box) const {
+  double by_edge = 0;
+  for (int d = 0; d < 3; ++d) by_edge = std::max(by_edge, parts(box.levels[d]) * inverse_mean_edges_[d]);
+  return NarrowHexMatrices::entry_errors(box.narrow->precision).sum() * by_edge;
+}
+
+std::array<HexBoxes::Box, 2> HexBoxes::children(Box box, double lowest) {
+  constexpr double kLeast = 1e-9, kNarrowShare = 0.25;
+  if (lowest != -std::numeric_limits<double>::infinity())
+    box.wanted = std::max(kShare * std::min(lowest / mean_edges_.prod(), kGood), kLeast);
+  const bool was_whole = box.level == 0;
+  bool keeps = has_coefficients(box) && !was_whole;
+  for (int d = 0; d < 3; ++d) keeps = keeps && error_size(box, d) <= box.wanted;
+  if (box.narrow) keeps = keeps && narrow_error_size(box) <= kNarrowShare * box.wanted;
+  std::array<Box, 2> result;
+  for (int half = 0; half < 2; ++half) {
+    Box& child = result[half];
+    child.levels = box.levels, child.index = box.index, child.tiers = box.tiers;
+    child.modelled_levels = box.modelled_levels, child.modelled_index = box.modelled_index;
+    child.wanted = box.wanted;
+    child.near_l = box.near_l;
+    child.halved = box.halved + 1;
+    child.level = box.level + 1;
+    child.is_precise = !fits_single_ || (box.is_precise && !was_whole);
+    ++child.levels[box.split];
+    child.index[box.split] = 2 * box.index[box.split] + half;
+  }
+  const auto halve = [&](auto& pool, auto coefficients) {
+    result[1].*coefficients = pool.take();
+    (box.*coefficients)->halve(box.split, *(result[1].*coefficients));
+    result[0].*coefficients = std::move(box.*coefficients);
+  };
+  if (keeps && box.coefficients) halve(pool_, &Box::coefficients);
+  if (keeps && box.narrow) halve(narrow_pool_, &Box::narrow);
+  return result;
+}
+
+Vec3 HexBoxes::corner_point(const Box& box, int corner) {
+  Vec3 point;
+  for (int d = 0; d < 3; ++d) point[d] = std::ldexp(box.index[d] + (corner >> d & 1), -box.levels[d]);
+  return point;
+}
+
+std::size_t HexBoxes::corner_matrix(const Box& box, int corner) const {
+  const int num_w = q1(box, 2);
+  const int u = (corner & 1) * (q1(box, 0) - 1), v = (corner >> 1 & 1) * (kWide - 1), w = (corner >> 2) * (num_w - 1);
+  return static_cast<std::size_t>((u * num_w + w) * kWide + v);
+}
+
+void HexBoxes::find_coefficients(Box& box) {
+  if (box.is_precise) {
+    box.coefficients = pool_.take();
+    contraction_.contract(box, *box.coefficients);
+  } else {
+    box.narrow = narrow_pool_.take();
+    contraction_.contract(box, *box.narrow);
+  }
+}
+
+/// With P the models: N_i N_j N_k - P_i P_j P_k = (N_i - P_i) N_j N_k + P_i (N_j - P_j) N_k + P_i P_j (N_k - P_k), and
+/// so with one of each three differentiated; |P| is at most `growth` times what bounds |N|.
+Mat3 HexBoxes::remainder(const Box& box) {
+  Mat3 result = Mat3::Zero();
+  double growth = 1, inflation = 1;
+  for (int d = 0; d < 3; ++d) {
+    const LineError& error = line_error(box, d);
+    result += growth * error.entries;
+    growth *= error.growth;
+    inflation *= error.inflation;
+  }
+  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, halvings, L, differences, and
+  // the 16 asked for. Steps of steps have the roundings of those that they are made of: all in all kSteps of the total.
+  constexpr int kSteps = 13;
+  const double roundings = 3 * (n_ + 4) + 1 + kSteps + kWide * box.halved + 3 + 8 + 16;
+  const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;
+  for (int d = 0; d < 3; ++d) {
+    result.col(d) *= 1 / parts(box.levels[d]);
+    result.col(d) += 2 * (q1(box, d) - 1) * rounding * contraction_.total();
+  }
+  return (1 + 1e-10) * result;
+}
+
+}  // namespace subvol

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/certificate/line_models.h"
+
+#include "fit/certificate/chebyshev.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+
+namespace subvol {
+
+namespace {
+
+constexpr long double kPi = std::numbers::pi_v<long double>, kSqrt2 = std::numbers::sqrt2_v<long double>;
+
+/// P_0 .. P_count at t.
+std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
+  std::array<long double, kMaxOrder + 2> p{1, t};
+  for (int i = 1; i < count; ++i) p[i + 1] = ((2 * i + 1) * t * p[i] - i * p[i - 1]) / (i + 1);
+  return p;
+}
+
+long double mode_value(Basis basis, int i, long double x) {
+  if (basis == Basis::fourier) return kSqrt2 * std::sin(i * kPi * x) / (i * kPi);
+  const auto p = legendre(i + 1, 1 - 2 * x);
+  return (p[i - 1] - p[i + 1]) / (2 * std::sqrt(2 * i + 1.0L));
+}
+
+long double mode_slope(Basis basis, int i, long double x) {
+  if (basis == Basis::fourier) return kSqrt2 * std::cos(i * kPi * x);
+  return std::sqrt(2 * i + 1.0L) * legendre(i, 1 - 2 * x)[i];
+}
+
+/// Logarithm of a bound of the k-th derivative of phi_i'; for legendre only k > i is asked for.
+double log_slope_derivative(Basis basis, int i, int k) {
+  if (basis == Basis::legendre) return -std::numeric_limits<double>::infinity();
+  return 0.5 * std::numbers::ln2 + k * std::log(i * std::numbers::pi);
+}
+
+/// About the largest |phi_i|, and not less: between samples next to one another a function is above the larger one by
+/// at most (distance^2 / 8) max |phi_i''|, and |P_i'| <= i (i + 1) / 2.
+double largest_integrated_legendre(int i) {
+  constexpr int kSamples = 2000;
+  long double largest = 0;
+  for (int k = 1; k < kSamples; ++k)
+    largest = std::max(largest, std::abs(mode_value(Basis::legendre, i, static_cast<long double>(k) / kSamples)));
+  return static_cast<double>(largest) + std::sqrt(2 * i + 1.0) * i * (i + 1) / (8.0 * kSamples * kSamples);
+}
+
+}  // namespace
+
+const LineModels& LineModels::get(Basis basis, int order, int degree) {
+  assert(order >= 1 && order <= kMaxOrder && degree >= 1 && degree <= kMaxDegree);
+  struct Made {
+    std::unique_ptr<const LineModels> models;
+    std::once_flag once;
+  };
+  static std::array<std::array<std::array<Made, kMaxDegree + 1>, kMaxOrder + 1>, 2> all;
+  Made& made = all[static_cast<std::size_t>(basis)][order][degree];
+  std::call_once(made.once, [&] { made.models.reset(new LineModels(basis, order, degree)); });
+  return *made.models;
+}
+
+LineModels::LineModels(Basis basis, int order, int degree) : basis_(basis), order_(order), degree_(degree) {
+  bounds_[0] = bounds_[1] = slope_bounds_[0] = slope_bounds_[1] = 1;
+  constexpr double kUp = 1 + 1e-14;
+  for (int i = 1; i < order; ++i) {
+    const bool fourier = basis == Basis::fourier;
+    bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 / (i * std::numbers::pi) : largest_integrated_legendre(i));
+    slope_bounds_[i + 1] = kUp * (fourier ? std::numbers::sqrt2 : std::sqrt(2 * i + 1.0));
+  }
+}
+
+const LineModels::Level& LineModels::level(int l) const {
+  assert(l >= 0 && l <= kMaxLevel);
+  std::call_once(made_[l], [&] { levels_[l] = make_level(l); });
+  return levels_[l];
+}
+
+LineModels::Level LineModels::make_level(int l) const {
+  const int q = degree_, parts = 1 << l;
+  const long double size = std::ldexp(1.0L, -l);
+  Level level;
+  level.coefficients.assign(static_cast<std::size_t>(parts) * (order_ + 1) * kStride, 0);
+  const auto row = [&](int part, int i) {
+    return level.coefficients.data() + (static_cast<std::size_t>(part) * (order_ + 1) + i) * kStride;
+  };
+  for (int part = 0; part < parts; ++part)
+    for (int o = 0; o <= q; ++o) {
+      const long double x = (part + static_cast<long double>(o) / q) * size;
+      row(part, 0)[o] = static_cast<double>(1 - x);
+      row(part, 1)[o] = static_cast<double>(x);
+    }
+
+  // Radius times frequency decides how many nodes there must be until the interpolant is exact for all purposes.
+  const double widest = order_ * std::numbers::pi * static_cast<double>(size) / 2;
+  const int num_nodes = basis_ == Basis::legendre ? std::max(order_, q) : q + 10 + static_cast<int>(2.2 * widest);
+  const ChebyshevExpansion expansion(num_nodes);
+  const auto to_bernstein = chebyshev_to_bernstein(q - 1);
+  std::vector<long double> expanded(q), slope(q), value(q + 1);
+  for (int i = 1; i < order_; ++i) {
+    for (int part = 0; part < parts; ++part) {
+      Errors& errors = level.errors[zone(l, part)];
+      double& error = errors.value[i + 1];
+      double& slope_error = errors.slope[i + 1];
+      const long double mid = (part + 0.5L) * size;
+      double remainder = expansion.expand([&](long double x) { return mode_slope(basis_, i, x); }, mid, size / 2,
+                                          log_slope_derivative(basis_, i, num_nodes), q, expanded.data());
+      if (basis_ == Basis::legendre && i < q) remainder = 0;
+      const bool constant = remainder >= slope_bounds_[i + 1];  // better none than that one
+      if (constant) remainder = slope_bounds_[i + 1];
+      slope_error = std::max(slope_error, remainder);
+      level.exact = level.exact && remainder == 0;
+      error = std::max(error, constant ? std::min(remainder * static_cast<double>(size) / 2, 2 * bounds_[i + 1])
+                                       : remainder * static_cast<double>(size) / 2);
+
+      std::fill(slope.begin(), slope.end(), 0.0L);
+      for (int k = 0; !constant && k < q; ++k)
+        for (int o = 0; o < q; ++o) slope[o] += expanded[k] * to_bernstein[k][o];
+      value[0] = 0;
+      for (int o = 0; o < q; ++o) value[o + 1] = value[o] + slope[o] * size / q;
+      long double middle = 0, binomial = 1;
+      for (int o = 0; o <= q; ++o) {
+        middle += std::ldexp(binomial * value[o], -q);
+        binomial = binomial * (q - o) / (o + 1);
+      }
+      const long double shift = mode_value(basis_, i, mid) - middle;
+      for (int o = 0; o <= q; ++o) row(part, i + 1)[o] = static_cast<double>(value[o] + shift);
+    }
+  }
+  level.narrow_coefficients.resize(level.coefficients.size());
+  std::transform(level.coefficients.begin(), level.coefficients.end(), level.narrow_coefficients.begin(),
+                 [](double b) { return static_cast<float>(b); });
+  level.deviations.assign(level.coefficients.size(), 0);
+  for (int part = 0; part < parts; ++part)
+    for (int i = 0; i <= order_; ++i) {
+      const double* b = row(part, i);
+      float* deviations = level.deviations.data() + (b - level.coefficients.data());
+      const auto [least, largest] = std::minmax_element(b, b + q + 1);
+      const double middle = 0.5 * (*least + *largest), size = std::max(-*least, *largest);
+      level.largest_coefficient[i] = std::max(level.largest_coefficient[i], size);
+      for (int o = 0; o <= q; ++o) deviations[o] = static_cast<float>(b[o] - middle);
+      float* then = deviations + q + 1;
+      then[kMiddle] = static_cast<float>(middle);
+      then[kLargestDeviation] = static_cast<float>(*largest - middle);
+      then[kMiddleSize] = std::abs(then[kMiddle]);
+      then[kLargest] = static_cast<float>(size);
+    }
+  return level;
+}
+
+}  // namespace subvol

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/certificate/simplex_polynomials.h"
+
+#include <mutex>
+
+namespace subvol {
+
+/// Neighbours among the Bernstein coefficients of one degree over a triangle or tetrahedron.
+class SimplexTables {
+ public:
+  static constexpr int kMaxDegree = 24;
+  static constexpr std::size_t kLanes = 4;  ///< control points are worked on so many numbers at a time
+
+  /// dimension: 2 or 3; degree: 1 .. kMaxDegree. Shared by all threads, made when first asked for.
+  static const SimplexTables& get(int dimension, int degree);
+
+  SimplexIndex index, lower;                      ///< of the degree, and of the one below
+  std::size_t stride;                             ///< a multiple of kWide, at least index.size()
+  std::array<std::vector<int>, 4> raised;         ///< per index of lower: with one exponent more; filled up to kLanes
+
+  /// Of the side from vertex a to b > a. Made when first asked for.
+  const SimplexHalving& halving(int a, int b) const;
+
+ private:
+  SimplexTables(int dimension, int degree);
+
+  mutable std::array<std::array<SimplexHalving, 4>, 4> halvings_;
+  mutable std::array<std::array<std::once_flag, 4>, 4> halved_;
+};
+
+}  // namespace subvol

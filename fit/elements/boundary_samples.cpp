@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/elements/boundary_samples.h"
+
+#include "subvol/base/error.h"
+
+#include <algorithm>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+/// Numbers samples as faces ask for them.
+class BoundarySampler {
+ public:
+  BoundarySampler(const ElementSpace& space, int intervals)
+      : space_(space), n_(intervals), vertex_samples_(space.num_vertices(), kNoIndex),
+        edge_samples_(space.topology().num_edges(), kNoIndex) {}
+
+  void add_faces(std::span<const Index> faces) {
+    for (const Index f : faces) {
+      begin_face(f);
+      if (corners_.size() == 4)
+        sample_quad(f);
+      else
+        sample_triangle(f);
+    }
+  }
+
+  /// False: the edge belongs to no face added.
+  bool add_edge(Index e, bool forward = true) {
+    const auto& [low, high] = space_.topology().edge(e);
+    if (vertex_samples_[low] == kNoIndex || vertex_samples_[high] == kNoIndex ||
+        (n_ > 1 && edge_samples_[e] == kNoIndex))
+      return false;
+    for (int i = 0; i < n_; ++i)
+      samples_.crease_edges.push_back(
+          {edge_sample(e, forward ? i : n_ - i), edge_sample(e, forward ? i + 1 : n_ - i - 1)});
+    return true;
+  }
+
+  BoundarySamples take() {
+    samples_.positions = point_map(space_, samples_.points);
+    return std::move(samples_);
+  }
+
+ private:
+  void begin_face(Index f) {
+    cell_ = space_.topology().face_cells(f)[0];
+    corners_ = space_.topology().face(f);
+    const auto vertices = space_.vertices(cell_);
+    for (std::size_t i = 0; i < corners_.size(); ++i)
+      corner_points_[i] = canonical_vertices(
+          space_.kind(cell_))[std::find(vertices.begin(), vertices.end(), corners_[i]) - vertices.begin()];
+  }
+
+  Index add(const Vec3& point) {
+    samples_.points.push_back({cell_, point});
+    return static_cast<Index>(samples_.points.size() - 1);
+  }
+
+  /// A point of the face, s steps from corner 0 towards corner 1 and t towards the last one.
+  Vec3 point(int s, int t) const {
+    const Vec3& origin = corner_points_[0];
+    return origin + (static_cast<double>(s) / n_) * (corner_points_[1] - origin) +
+           (static_cast<double>(t) / n_) * (corner_points_[corners_.size() - 1] - origin);
+  }
+
+  /// The sample `step` intervals from corner a to corner b of the face.
+  Index border(std::size_t a, std::size_t b, int step) {
+    if (step == 0 || step == n_) {
+      const std::size_t corner = step == 0 ? a : b;
+      Index& sample = vertex_samples_[corners_[corner]];
+      if (sample == kNoIndex) sample = add(corner_points_[corner]);
+      return sample;
+    }
+    const Index e = space_.topology().find_edge(corners_[a], corners_[b]);
+    if (edge_samples_[e] == kNoIndex) {
+      edge_samples_[e] = static_cast<Index>(samples_.points.size());
+      const auto [low, high] = corners_[a] < corners_[b] ? std::pair(a, b) : std::pair(b, a);
+      for (int i = 1; i < n_; ++i)
+        add(corner_points_[low] + (static_cast<double>(i) / n_) * (corner_points_[high] - corner_points_[low]));
+    }
+    return edge_sample(e, corners_[a] < corners_[b] ? step : n_ - step);
+  }
+
+  /// The sample 0 .. n along an edge from its smaller vertex; all of them exist.
+  Index edge_sample(Index e, int step) const {
+    const auto& [low, high] = space_.topology().edge(e);
+    if (step == 0) return vertex_samples_[low];
+    return step == n_ ? vertex_samples_[high] : edge_samples_[e] + step - 1;
+  }
+
+  void add_triangle(Index f, Index a, Index b, Index c, bool at_edge) {
+    samples_.triangles.push_back({a, b, c});
+    samples_.triangle_faces.push_back(f);
+    samples_.at_edges.push_back(at_edge);
+  }
+
+  Index& grid(int s, int t) { return grid_[t * (n_ + 1) + s]; }
+
+  void sample_quad(Index f) {
+    grid_.assign((n_ + 1) * (n_ + 1), kNoIndex);
+    for (int i = 0; i <= n_; ++i) {
+      grid(i, 0) = border(0, 1, i);
+      grid(n_, i) = border(1, 2, i);
+      grid(i, n_) = border(3, 2, i);
+      grid(0, i) = border(0, 3, i);
+    }
+    for (int t = 1; t < n_; ++t)
+      for (int s = 1; s < n_; ++s) grid(s, t) = add(point(s, t));
+    for (int t = 0; t < n_; ++t)
+      for (int s = 0; s < n_; ++s) {
+        const bool at_edge = s == 0 || t == 0 || s == n_ - 1 || t == n_ - 1;
+        add_triangle(f, grid(s, t), grid(s + 1, t), grid(s + 1, t + 1), at_edge);
+        add_triangle(f, grid(s, t), grid(s + 1, t + 1), grid(s, t + 1), at_edge);
+      }
+  }
+
+  void sample_triangle(Index f) {
+    grid_.assign((n_ + 1) * (n_ + 1), kNoIndex);
+    for (int i = 0; i <= n_; ++i) {
+      grid(i, 0) = border(0, 1, i);
+      grid(n_ - i, i) = border(1, 2, i);
+      grid(0, i) = border(0, 2, i);
+    }
+    for (int t = 1; t < n_; ++t)
+      for (int s = 1; s + t < n_; ++s) grid(s, t) = add(point(s, t));
+    for (int t = 0; t < n_; ++t)
+      for (int s = 0; s + t < n_; ++s) {
+        const bool at_edge = s == 0 || t == 0;
+        add_triangle(f, grid(s, t), grid(s + 1, t), grid(s, t + 1), at_edge || s + t == n_ - 1);
+        if (s + t + 1 < n_)
+          add_triangle(f, grid(s + 1, t), grid(s + 1, t + 1), grid(s, t + 1), at_edge || s + t == n_ - 2);
+      }
+  }
+
+  const ElementSpace& space_;
+  int n_;
+  std::vector<Index> vertex_samples_, edge_samples_;  // of an edge, the first inside
+  BoundarySamples samples_;
+  Index cell_ = kNoIndex;
+  std::span<const Index> corners_;
+  std::array<Vec3, 4> corner_points_;
+  std::vector<Index> grid_;
+};
+
+void require_intervals(const char* function, int intervals) {
+  if (intervals < 1)
+    throw InputError(std::string(function) + ": intervals must be at least 1, got " + std::to_string(intervals));
+}
+
+void require_numbers(const char* what, std::span<const Index> numbers, std::size_t limit) {
+  for (const Index i : numbers)
+    if (i < 0 || static_cast<std::size_t>(i) >= limit)
+      throw InputError(std::string("make_face_samples: ") + what + ' ' + std::to_string(i) + " of " +
+                       std::to_string(limit));
+}
+
+}  // namespace
+
+BoundarySamples make_boundary_samples(const ElementSpace& space, int intervals, std::span<const CreaseEdge> creases) {
+  require_intervals("make_boundary_samples", intervals);
+  const MeshTopology& topology = space.topology();
+  BoundarySampler sampler(space, intervals);
+  sampler.add_faces(topology.boundary_faces());
+  for (const CreaseEdge& crease : creases) {
+    const auto num_vertices = static_cast<Index>(space.num_vertices());
+    const bool known = crease.v0 >= 0 && crease.v1 >= 0 && crease.v0 < num_vertices && crease.v1 < num_vertices;
+    const Index e = known ? topology.find_edge(crease.v0, crease.v1) : kNoIndex;
+    if (e == kNoIndex || !topology.is_boundary_edge(e))
+      throw InputError("make_boundary_samples: crease " + std::to_string(crease.v0) + ' ' + std::to_string(crease.v1) +
+                       " is no edge of the boundary");
+    sampler.add_edge(e, crease.v0 < crease.v1);
+  }
+  return sampler.take();
+}
+
+BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Index> faces, int intervals,
+                                  std::span<const Index> edges) {
+  require_intervals("make_face_samples", intervals);
+  require_numbers("face", faces, space.topology().num_faces());
+  require_numbers("edge", edges, space.topology().num_edges());
+  BoundarySampler sampler(space, intervals);
+  sampler.add_faces(faces);
+  for (const Index e : edges)
+    if (!sampler.add_edge(e))
+      throw InputError("make_face_samples: edge " + std::to_string(e) + " belongs to none of the faces");
+  return sampler.take();
+}
+
+}  // namespace subvol

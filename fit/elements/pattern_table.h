@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/elements/high_order_mesh.h"
+
+#include <Eigen/Core>
+
+#include <span>
+
+namespace subvol {
+
+/// The shape functions of one pattern at fixed points: cells of that pattern are evaluated there by one small product.
+class PatternTable {
+ public:
+  enum class Derivatives { none, first };
+
+  /// points: canonical coordinates inside the cell. InputError: no such pattern.
+  PatternTable(const ElementSpace& space, std::size_t pattern, std::span<const Vec3> points,
+               Derivatives derivatives = Derivatives::none);
+
+  std::size_t num_points() const { return static_cast<std::size_t>(values_.rows()); }
+
+  /// Positions of a cell of this pattern at the points, num_points() entries; and dx/du (columns are derivatives by
+  /// u, v, w), which need Derivatives::first. The cell's pattern and the sizes are asserted. Safe from several threads.
+  void positions(const HighOrderMesh& mesh, std::size_t c, std::span<Vec3> out) const;
+  void jacobians(const HighOrderMesh& mesh, std::size_t c, std::span<Mat3> out) const;
+
+ private:
+  using Table = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::MatrixX3d gathered(const HighOrderMesh& mesh, std::size_t c) const;
+
+  std::size_t pattern_;
+  Table values_;                      // points x modes
+  std::array<Table, 3> derivatives_;  // by u, v, w; or empty
+};
+
+/// The cells of every pattern, ascending.
+std::vector<std::vector<Index>> cells_by_pattern(const ElementSpace& space);
+
+}  // namespace subvol

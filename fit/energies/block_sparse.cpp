@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/energies/block_sparse.h"
+
+#include "subvol/base/error.h"
+
+#include <omp.h>
+
+#include <algorithm>
+
+namespace subvol {
+
+std::size_t BlockSparse::find(Index row, Index column) const {
+  const auto first = columns.begin() + static_cast<std::ptrdiff_t>(offsets[row]);
+  const auto last = columns.begin() + static_cast<std::ptrdiff_t>(offsets[row + 1]);
+  const auto it = std::lower_bound(first, last, column);
+  return it != last && *it == column ? static_cast<std::size_t>(it - columns.begin()) : num_entries();
+}
+
+void BlockSparse::multiply(std::span<const Vec3> in, std::span<Vec3> out) const {
+  if (in.size() != num_rows() || out.size() != num_rows())
+    throw InputError("BlockSparse::multiply: in and out must have one point per row");
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < num_rows(); ++i) {
+    double x = 0, y = 0, z = 0;
+    for (std::size_t k = offsets[i]; k < offsets[i + 1]; ++k) {
+      const float* b = block(k);
+      const Vec3& p = in[columns[k]];
+      x += b[0] * p[0] + b[1] * p[1] + b[2] * p[2];
+      y += b[3] * p[0] + b[4] * p[1] + b[5] * p[2];
+      z += b[6] * p[0] + b[7] * p[1] + b[8] * p[2];
+    }
+    out[i] = Vec3(x, y, z);
+  }
+}
+
+std::vector<Mat3> BlockSparse::diagonal() const {
+  std::vector<Mat3> result(num_rows(), Mat3::Zero());
+  for (std::size_t i = 0; i < num_rows(); ++i) {
+    const std::size_t k = find(static_cast<Index>(i), static_cast<Index>(i));
+    if (k == num_entries()) continue;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) result[i](r, c) = block(k)[3 * r + c];
+  }
+  return result;
+}
+
+void BlockSparse::set_zero() { std::fill(blocks.begin(), blocks.end(), 0.0f); }
+
+BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes) {
+  for (Index node : nodes)
+    if (node < 0 || static_cast<std::size_t>(node) >= num_rows)
+      throw InputError("clique_pattern: nodes must be in [0, num_rows)");
+  const std::size_t num_elements = offsets.empty() ? 0 : offsets.size() - 1;
+  std::vector<std::size_t> first(num_rows + 1, 0);
+  for (Index node : nodes) ++first[node + 1];
+  for (std::size_t i = 0; i < num_rows; ++i) first[i + 1] += first[i];
+  std::vector<Index> elements(nodes.size());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  for (std::size_t e = 0; e < num_elements; ++e)
+    for (std::size_t k = offsets[e]; k < offsets[e + 1]; ++k) elements[next[nodes[k]]++] = static_cast<Index>(e);
+
+  BlockSparse result;
+  result.offsets.reserve(num_rows + 1);
+  std::vector<Index> row;
+  for (std::size_t i = 0; i < num_rows; ++i) {
+    row.assign(1, static_cast<Index>(i));
+    for (std::size_t k = first[i]; k < first[i + 1]; ++k)
+      row.insert(row.end(), nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k]]),
+                 nodes.begin() + static_cast<std::ptrdiff_t>(offsets[elements[k] + 1]));
+    std::sort(row.begin(), row.end());
+    row.erase(std::unique(row.begin(), row.end()), row.end());
+    result.columns.insert(result.columns.end(), row.begin(), row.end());
+    result.offsets.push_back(result.columns.size());
+  }
+  result.blocks.assign(9 * result.columns.size(), 0.0f);
+  return result;
+}
+
+void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
+                         std::span<Mat3> diagonal) {
+  // Of each thread, column j of M, scattered. Made here, where a lack of memory can be told.
+  std::vector<std::vector<double>> weights(omp_get_max_threads(), std::vector<double>(map.num_rows(), 0.0));
+#pragma omp parallel
+  {
+    std::vector<double>& weight = weights[omp_get_thread_num()];
+#pragma omp for schedule(dynamic, 64)
+    for (std::size_t j = 0; j < map.num_cols; ++j) {
+      const auto rows = map_transposed.row_columns(j);
+      const auto values = map_transposed.row_values(j);
+      for (std::size_t a = 0; a < rows.size(); ++a) weight[rows[a]] = values[a];
+      double sum[9] = {};
+      for (std::size_t a = 0; a < rows.size(); ++a)
+        for (std::size_t k = hessian.offsets[rows[a]]; k < hessian.offsets[rows[a] + 1]; ++k) {
+          const double w = values[a] * weight[hessian.columns[k]];
+          if (w == 0) continue;
+          for (int e = 0; e < 9; ++e) sum[e] += w * hessian.blocks[9 * k + e];
+        }
+      for (int e = 0; e < 9; ++e) diagonal[j](e / 3, e % 3) += sum[e];
+      for (Index i : rows) weight[i] = 0;
+    }
+  }
+}
+
+}  // namespace subvol

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/energies/cell_sweep.h"
+
+#include <algorithm>
+
+namespace subvol {
+
+namespace {
+
+/// One by one, so that sums need not be in memory before.
+template <int kCount>
+[[gnu::always_inline]] inline void put(const Wide (&sums)[kCount], Wide* to) {
+  for (int i = 0; i < kCount; ++i) to[i] = sums[i];
+}
+
+}  // namespace
+
+void CellSweep::load(std::size_t batch, std::span<const Vec3> nodes) {
+  const std::size_t first = batch * group_.num_modes * kLanes;
+  for (std::size_t a = 0; a < group_.num_modes; ++a)
+    for (int l = 0; l < kLanes; ++l) {
+      const Index node = group_.nodes[first + a * kLanes + l];
+      const double sign = group_.signs[first + a * kLanes + l];
+      for (int r = 0; r < 3; ++r) lanes(coefficients_[3 * a + r])[l] = node == kNoIndex ? 0.0 : sign * nodes[node][r];
+    }
+}
+
+template <int kCount>
+void CellSweep::to_dense(std::size_t first, Wide (*j)[9]) const {
+  const Vec3* gradients = group_.gradients.data() + first * group_.num_modes;
+  Wide sums[kCount][9] = {};
+  for (std::size_t a = 0; a < group_.num_modes; ++a)
+    for (int n = 0; n < kCount; ++n)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          sums[n][3 * r + c] += gradients[n * group_.num_modes + a][c] * coefficients_[3 * a + r];
+  for (int n = 0; n < kCount; ++n) put(sums[n], j[n]);
+}
+
+template <int kCount>
+void CellSweep::from_dense(std::size_t first, const Wide (*j)[9]) {
+  const Vec3* gradients = group_.gradients.data() + first * group_.num_modes;
+  Wide own[kCount][9];  // in registers: j might be among the sums, for all that is known
+  for (int n = 0; n < kCount; ++n)
+    for (int e = 0; e < 9; ++e) own[n][e] = j[n][e];
+  for (std::size_t a = 0; a < group_.num_modes; ++a) {
+    Wide sums[3];
+    for (int r = 0; r < 3; ++r) sums[r] = dense_sums_[3 * a + r];
+    for (int n = 0; n < kCount; ++n) {
+      const Vec3& g = gradients[n * group_.num_modes + a];
+      for (int r = 0; r < 3; ++r) sums[r] += g[0] * own[n][3 * r] + g[1] * own[n][3 * r + 1] + g[2] * own[n][3 * r + 2];
+    }
+    put(sums, &dense_sums_[3 * a]);
+  }
+}
+
+template void CellSweep::to_dense<1>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::to_dense<CellSweep::kPoints>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::from_dense<1>(std::size_t, const Wide (*)[9]);
+template void CellSweep::from_dense<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
+
+void CellSweep::to_lines() {
+  for (int kj = 0; kj < m_ * m_; ++kj)
+    for (int q = 0; q < n_; ++q) {
+      Wide sum[6] = {};
+      for (int i = 0; i < m_; ++i) {
+        const Wide* c = &coefficients_[3 * (kj * m_ + i)];
+        const double v = group_.values[q * m_ + i], d = group_.derivatives[q * m_ + i];
+        for (int r = 0; r < 3; ++r) {
+          sum[r] += v * c[r];
+          sum[3 + r] += d * c[r];
+        }
+      }
+      put(sum, &lines_[6 * (static_cast<std::size_t>(kj) * n_ + q)]);
+    }
+}
+
+void CellSweep::to_planes() {
+  for (int k = 0; k < m_; ++k)
+    for (int q2 = 0; q2 < n_; ++q2)
+      for (int q1 = 0; q1 < n_; ++q1) {
+        Wide sum[9] = {};
+        for (int j = 0; j < m_; ++j) {
+          const Wide* a = &lines_[6 * (static_cast<std::size_t>(k * m_ + j) * n_ + q1)];
+          const double v = group_.values[q2 * m_ + j], d = group_.derivatives[q2 * m_ + j];
+          for (int r = 0; r < 3; ++r) {
+            sum[r] += v * a[3 + r];
+            sum[3 + r] += d * a[r];
+            sum[6 + r] += v * a[r];
+          }
+        }
+        put(sum, &planes_[9 * ((static_cast<std::size_t>(k) * n_ + q2) * n_ + q1)]);
+      }
+}
+
+void CellSweep::to_points(std::size_t column, Wide (*j)[9]) const {
+  for (int q = 0; q < n_; ++q) {
+    const double *v = &group_.values[q * m_], *d = &group_.derivatives[q * m_];
+    Wide sum[9] = {};
+    for (int k = 0; k < m_; ++k) {
+      const Wide* b = &planes_[plane_place(k, column)];
+      for (int r = 0; r < 3; ++r) {
+        sum[3 * r] += v[k] * b[r];
+        sum[3 * r + 1] += v[k] * b[3 + r];
+        sum[3 * r + 2] += d[k] * b[6 + r];
+      }
+    }
+    put(sum, j[q]);
+  }
+}
+
+void CellSweep::from_points(std::size_t column, const Wide (*j)[9]) {
+  for (int k = 0; k < m_; ++k) {
+    Wide sum[9] = {};
+    for (int q = 0; q < n_; ++q) {
+      const double v = group_.values[q * m_ + k], d = group_.derivatives[q * m_ + k];
+      for (int r = 0; r < 3; ++r) {
+        sum[r] += v * j[q][3 * r];
+        sum[3 + r] += v * j[q][3 * r + 1];
+        sum[6 + r] += d * j[q][3 * r + 2];
+      }
+    }
+    put(sum, &plane_sums_[plane_place(k, column)]);
+  }
+}
+
+void CellSweep::from_planes() {
+  for (int k = 0; k < m_; ++k)
+    for (int j = 0; j < m_; ++j)
+      for (int q1 = 0; q1 < n_; ++q1) {
+        Wide sum[6] = {};
+        for (int q2 = 0; q2 < n_; ++q2) {
+          const Wide* b = &plane_sums_[9 * ((static_cast<std::size_t>(k) * n_ + q2) * n_ + q1)];
+          const double v = group_.values[q2 * m_ + j], d = group_.derivatives[q2 * m_ + j];
+          for (int r = 0; r < 3; ++r) {
+            sum[r] += d * b[3 + r] + v * b[6 + r];
+            sum[3 + r] += v * b[r];
+          }
+        }
+        put(sum, &lines_[6 * (static_cast<std::size_t>(k * m_ + j) * n_ + q1)]);
+      }
+}
+
+void CellSweep::from_lines() {
+  for (int kj = 0; kj < m_ * m_; ++kj)
+    for (int i = 0; i < m_; ++i) {
+      Wide sum[3] = {};
+      for (int q = 0; q < n_; ++q) {
+        const Wide* a = &lines_[6 * (static_cast<std::size_t>(kj) * n_ + q)];
+        const double v = group_.values[q * m_ + i], d = group_.derivatives[q * m_ + i];
+        for (int r = 0; r < 3; ++r) sum[r] += v * a[r] + d * a[3 + r];
+      }
+      put(sum, &coefficients_[3 * (kj * m_ + i)]);
+    }
+}
+
+}  // namespace subvol

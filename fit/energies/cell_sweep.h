@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/energies/cell_group.h"
+
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Takes the coefficients of one batch to the Jacobians at its points, and back: the work space of one thread.
+class CellSweep {
+ public:
+  explicit CellSweep(const CellGroup& group)
+      : group_(group), m_(group.order + 1), n_(group.points_per_direction), coefficients_(3 * group.num_modes) {
+    if (group.kind != CellKind::hex) {
+      dense_sums_.resize(coefficients_.size());
+      return;
+    }
+    const std::size_t lines = static_cast<std::size_t>(m_) * m_ * n_ * 6, planes = 9 * m_ * num_columns();
+    lines_ = std::make_unique_for_overwrite<Wide[]>(lines);
+    planes_ = std::make_unique_for_overwrite<Wide[]>(planes);
+    plane_sums_ = std::make_unique_for_overwrite<Wide[]>(planes);
+    points_ = std::make_unique_for_overwrite<Wide[][9]>(kColumns * n_);
+  }
+
+  void load(std::size_t batch, std::span<const Vec3> nodes);
+
+  /// Calls op(first, count, J) for all points, some at a time: first, first + 1, ... with the 9 entries of J = dx/du
+  /// for each. With kBack, op leaves there what is summed into the coefficients: out_a = sum_q J_q grad N_a(q).
+  template <bool kBack, class Op>
+  void run(Op&& op) {
+    if (group_.kind == CellKind::hex)
+      run_tensor<kBack>(op);
+    else
+      run_dense<kBack>(op);
+  }
+
+  const std::vector<Wide>& coefficients() const { return coefficients_; }
+
+ private:
+  /// Columns of a hex, and points of other cells, at once: two, so that kernels find pairs.
+  static constexpr int kColumns = 2, kPoints = 2;
+
+  std::size_t num_columns() const { return static_cast<std::size_t>(n_) * n_; }
+  std::size_t plane_place(int k, std::size_t column) const { return 9 * (k * num_columns() + column); }
+
+  template <bool kBack, class Op>
+  void run_dense(Op&& op) {
+    if constexpr (kBack) std::fill(dense_sums_.begin(), dense_sums_.end(), Wide{});
+    const std::size_t num_points = group_.num_points();
+    for (std::size_t first = 0; first < num_points; first += kPoints) {
+      const bool all = first + kPoints <= num_points;
+      Wide j[kPoints][9];
+      all ? to_dense<kPoints>(first, j) : to_dense<1>(first, j);
+      op(first, all ? kPoints : 1, j);
+      if constexpr (kBack) all ? from_dense<kPoints>(first, j) : from_dense<1>(first, j);
+    }
+    if constexpr (kBack) coefficients_.swap(dense_sums_);
+  }
+
+  /// One direction at a time: coefficients (k, j, i) -> lines (k, j, q1) -> planes (k, q2, q1) -> points, column by
+  /// column: what a column needs stays in the fastest cache.
+  template <bool kBack, class Op>
+  void run_tensor(Op&& op) {
+    to_lines();
+    to_planes();
+    for (std::size_t column = 0; column < num_columns(); column += kColumns) {
+      const int count = static_cast<int>(std::min<std::size_t>(kColumns, num_columns() - column));
+      for (int c = 0; c < count; ++c) to_points(column + c, points_.get() + c * n_);
+      op(column * n_, count * n_, points_.get());
+      if constexpr (kBack)
+        for (int c = 0; c < count; ++c) from_points(column + c, points_.get() + c * n_);
+    }
+    if constexpr (kBack) {
+      from_planes();
+      from_lines();
+    }
+  }
+
+  /// J at some points of a cell that is no hex; and back into the sums of its modes.
+  template <int kCount>
+  void to_dense(std::size_t first, Wide (*j)[9]) const;
+  template <int kCount>
+  void from_dense(std::size_t first, const Wide (*j)[9]);
+
+  /// lines: values along u, then derivatives.
+  void to_lines();
+
+  /// planes: derivatives along u, along v, values.
+  void to_planes();
+
+  /// J at the points of a column; and back into the sums of its planes.
+  void to_points(std::size_t column, Wide (*j)[9]) const;
+  void from_points(std::size_t column, const Wide (*j)[9]);
+
+  void from_planes();
+
+  void from_lines();
+
+  const CellGroup& group_;
+  int m_, n_;
+  std::vector<Wide> coefficients_, dense_sums_;
+  std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not filled with zeros first
+  std::unique_ptr<Wide[][9]> points_;
+};
+
+}  // namespace subvol

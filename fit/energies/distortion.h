@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/simd/lanes.h"
+#include "subvol/base/types.h"
+
+namespace subvol {
+
+/// How distorted a cell is at a point: functions of the singular values s of the Jacobian J, 0 where it is ideal.
+///
+///   hencky               1/2 sum (ln s_i)^2        rigid: 0 for rotations; keeps sizes      Paper: section 3.1
+///   inverse_mean_ratio   |J|^2 / (3 det^(2/3)) - 1   conformal: 0 for similarities            Paper: figure 2
+///   condition_number     |J| |J^-1| / 3 - 1          conformal; grows faster towards inversion
+///
+/// Norms are Frobenius'. With x_i = ln s_i the two latter agree to second order: 2/3 sum (x_i - mean x)^2.
+enum class Distortion { hencky, inverse_mean_ratio, condition_number };
+const char* to_string(Distortion distortion);
+
+/// Smallest eigenvalue that the clamped second derivative of a distortion is given (dimensionless).
+inline constexpr double kHessianFloor = 0.01;
+
+/// Distortion energy of kLanes Jacobians, lane by lane, with its derivatives.
+///
+///   e(J) = 1/2 |H|^2,  H = 1/2 ln(J^T J),  de/dJ = J^-T H                      Paper: section 3.1, appendix A
+///
+/// With J = U diag(s) V^T: e = 1/2 sum (ln s_i)^2, de/dJ = U diag(ln s_i / s_i) V^T, and the second derivative has the
+/// eigenvectors u_i v_i^T (stretch) and (u_i v_j^T -+ u_j v_i^T)/sqrt 2 (twist, flip) with the eigenvalues
+///
+///   stretch_i = (1 - ln s_i)/s_i^2,  twist_ij = (g_i + g_j)/(s_i + s_j),  flip_ij = (g_i - g_j)/(s_i - s_j),
+///   g_i = ln s_i / s_i;
+///
+/// each is raised to at least the floor, so that the Hessian is positive definite. Of the other distortions e_i =
+/// de/ds_i stands for g_i, and the stretches are coupled: the matrix of d2e/ds_i ds_j has its eigenvalues raised as a
+/// whole.
+///
+/// Infeasible: det J <= 0 gives energy +infinity and zero derivatives. Never NaN for finite J.
+struct DistortionBatch {
+  alignas(64) double jacobian[9][kLanes];    ///< in: J row by row; rows are world x, y, z, columns reference directions
+  alignas(64) double energy[kLanes];         ///< e(J), dimensionless, >= 0
+  alignas(64) double stress[9][kLanes];      ///< de/dJ, laid out like J
+  alignas(64) double u[9][kLanes];           ///< left singular vectors (columns)
+  alignas(64) double v[9][kLanes];           ///< right singular vectors (columns)
+  alignas(64) double stretch[3][kLanes];     ///< clamped stretch_i
+  alignas(64) double pair_same[3][kLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
+  alignas(64) double pair_cross[3][kLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
+  /// Of u_i v_i^T with u_j v_j^T, clamped; Hencky's has none and leaves it as it is.
+  alignas(64) double coupling[3][kLanes];
+  double floor = kHessianFloor;              ///< in: least eigenvalue of the second derivative; -infinity: as it is
+};
+
+/// What is done at points for one distortion. Each fills what comes before it, too. Of several batches two are worked
+/// on side by side, which takes less time than one after the other; what comes out is the same but for rounding.
+struct DistortionKernels {
+  void (*energy)(DistortionBatch* batches, int count);    ///< `energy`
+  void (*gradient)(DistortionBatch* batches, int count);  ///< and `stress`
+  void (*hessian)(DistortionBatch* batches, int count);   ///< everything
+  bool coupled;                    ///< whether stretches are coupled
+};
+const DistortionKernels& kernels_of(Distortion distortion);
+
+/// Hencky's. Fills `energy`. Cost: the singular values of one 3x3 matrix per lane.
+void hencky_energy(DistortionBatch& batch);
+/// Fills `energy` and `stress`.
+void hencky_gradient(DistortionBatch& batch);
+/// Fills everything.
+void hencky_hessian(DistortionBatch& batch);
+
+/// The same for one Jacobian: e(J), +infinity where det J <= 0; `stress` (may be null) receives de/dJ.
+double hencky(const Mat3& jacobian, Mat3* stress = nullptr);
+
+}  // namespace subvol

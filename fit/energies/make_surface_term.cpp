@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/energies/make_surface_term.h"
+
+#include "fit/energies/surface_energy.h"
+#include "subvol/base/error.h"
+
+namespace subvol {
+
+std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
+                                               const std::vector<std::array<Index, 3>>& sample_triangles,
+                                               std::size_t num_samples, double tangential_weight,
+                                               Correspondence correspondence, SurfacePull pull, double far_length,
+                                               std::span<const std::uint8_t> refined) {
+  if (correspondence == Correspondence::voronoi)
+    return std::make_unique<SurfaceEnergy>(target, sample_triangles, num_samples, tangential_weight);
+  const int points = sample_triangles.size() > 2 * target.triangles().size() ? 1 : 3;
+  auto energy =
+      std::make_unique<ClosestPointEnergy>(target, sample_triangles, num_samples, tangential_weight, points, pull);
+  if (far_length > 0) energy->emphasize_far(far_length);
+  if (!refined.empty()) energy->refine(refined);
+  return energy;
+}
+
+void require_closest(Correspondence correspondence) {
+  if (correspondence != Correspondence::closest)
+    throw InputError(
+        "Correspondence::voronoi: a cloud has no surface to cut into cells; points pull at the closest places");
+}
+
+}  // namespace subvol

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/energies/distortion.h"
+#include "subvol/base/types.h"
+
+namespace subvol {
+
+/// Distortion energy that is finite for every Jacobian, also inverted ones, and tends to a barrier; kLanes at once.
+///
+///   e_eps(J) = 1/4 |J|^2 / chi^(2/3) + 1/6 (D^2 + 1) / chi,  D = det J
+///   chi(D, eps) = (D + sqrt(eps^2 + D^2)) / 2
+///
+/// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of code (2021), with
+/// other weights: without regularisation (chi = D) it is 13/12 at rotations and agrees there with Hencky's energy
+/// (`distortion.h`) up to second order, so that one turns into the other as cells become positive and well shaped.
+///
+/// The second derivative is that of a function of J and D that is convex once chi is replaced by its tangent; what is
+/// left out is the curvature of D and chi:
+///
+///   H = alpha I + beta (J (x) C + C (x) J) + gamma C (x) C >= 0,  C = dD/dJ (cofactors)
+///
+/// Finite for finite J and eps > 0; no value is NaN.
+struct RegularisedBatch {
+  alignas(64) double jacobian[9][kLanes];                     ///< in: laid out as in `DistortionBatch`
+  alignas(64) double energy[kLanes];                          ///< > 0
+  alignas(64) double stress[9][kLanes];                       ///< de/dJ
+  alignas(64) double cofactor[9][kLanes];                     ///< C
+  alignas(64) double alpha[kLanes], beta[kLanes], gamma[kLanes];
+};
+
+/// Fills everything. epsilon > 0, dimensionless.
+void regularised_barrier(RegularisedBatch& batch, double epsilon);
+
+}  // namespace subvol

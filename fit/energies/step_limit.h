@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/base/types.h"
+
+#include <Eigen/Geometry>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+
+namespace subvol {
+
+/// The largest t of a geometric sequence that starts at `limit` so that every det(J + s D), 0 <= s <= t, keeps at least
+/// a tenth of det J, over all pairs (J, D) that were admitted. Pairs may come from many threads at once; same t for
+/// any.
+class StepLimit {
+ public:
+  explicit StepLimit(double limit) {
+    for (int n = 0; n <= kMaxSteps; ++n) step_[n] = limit * std::pow(kShrink, n);
+  }
+
+  void admit(const Mat3& j, const Mat3& d) {
+    const Path path(j, d);
+    int n = steps_.load(std::memory_order_relaxed);
+    while (n < kMaxSteps && !path.safe(step_[n])) ++n;
+    int seen = steps_.load(std::memory_order_relaxed);
+    while (seen < n && !steps_.compare_exchange_weak(seen, n)) {
+    }
+  }
+
+  double step() const { return step_[steps_.load()]; }
+
+  /// Whether det(J + s D) keeps that much for all s up to t.
+  static bool safe(const Mat3& j, const Mat3& d, double t) { return Path(j, d).safe(t); }
+
+ private:
+  /// det(J + t D) - kKept det J = c0 + c1 t + c2 t^2 + c3 t^3; positive on [0, t] if its four Bernstein coefficients
+  /// there are.
+  struct Path {
+    double c0, c1, c2, c3;
+    Path(const Mat3& j, const Mat3& d) {
+      const Vec3 j12 = j.col(1).cross(j.col(2)), d12 = d.col(1).cross(d.col(2));
+      const Vec3 mixed = j.col(1).cross(d.col(2)) + d.col(1).cross(j.col(2));
+      c0 = (1 - kKept) * j.col(0).dot(j12);
+      c1 = d.col(0).dot(j12) + j.col(0).dot(mixed);
+      c2 = d.col(0).dot(mixed) + j.col(0).dot(d12);
+      c3 = d.col(0).dot(d12);
+    }
+    bool safe(double t) const {
+      const double a1 = c1 * t, a2 = c2 * t * t, a3 = c3 * t * t * t;
+      return c0 + a1 / 3 > 0 && c0 + 2 * a1 / 3 + a2 / 3 > 0 && c0 + a1 + a2 + a3 > 0;
+    }
+  };
+  static constexpr double kShrink = 0.8, kKept = 0.1;
+  static constexpr int kMaxSteps = 200;
+  std::array<double, kMaxSteps + 1> step_;  // a table, so that a step has the same bits for every thread
+  std::atomic<int> steps_{0};               // step_[steps_] is safe for every pair seen so far
+};
+
+}  // namespace subvol

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/elements/cell_reference.h"
+#include "fit/elements/element_rule.h"
+#include "fit/energies/block_sparse.h"
+#include "fit/energies/distortion.h"
+#include "fit/energies/volume_term.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Mean distortion of a mesh of linear cells against ideal or given reference cells.
+///
+///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
+///
+/// e is a distortion (`distortion.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point
+/// q against its ideal cell: that of edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a
+/// hex's is the box of edges h_c), or a reference of its own. Dimensionless, >= 0, +infinity where a determinant is not
+/// positive at a point.
+///
+/// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for
+/// any number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
+///
+/// With a regularisation epsilon > 0 the density is that of `regularised_barrier.h`: finite also where cells are
+/// inverted, so that minimising it untangles them. No step is limited then, and no cell counts as uncertified.
+class VolumeEnergy final : public VolumeTerm {
+ public:
+  /// mesh  must outlive the energy; its positions are not read. InputError: more pairs of vertices of one cell than an
+  ///       Index numbers (some 8e7 vertices of hexes).
+  /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError. Cells weigh equally.
+  /// points_per_direction  >= 2; 2: corners only.
+  VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction);
+  /// reference  kept and asked again by `densify`. Cells weigh equally, so that small ones keep their shape too.
+  /// InputError: a reference whose determinant is not positive.
+  VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction);
+
+  double value(std::span<const Vec3> nodes) const override;
+  double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
+  double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override;
+  void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
+                           std::span<Mat3> diagonal) const override;
+  double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
+  std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
+  void densify(std::span<const Index> cells, std::span<const Vec3> nodes = {}) override;
+
+  /// e, Hencky's to begin with.
+  /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
+  void set_distortion(Distortion distortion, double floor = kHessianFloor);
+  /// epsilon  0 (the start): the distortion's own barrier; > 0: the regularised one. InputError: negative, not finite.
+  void set_regularisation(double epsilon);
+  /// w_c by one positive weight per cell, of any common scale. InputError: another number, or not positive and finite.
+  void set_weights(std::span<const double> weights);
+  /// The least det J_cq of each cell, into one place per cell (else InputError).
+  void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const;
+
+  /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `distortion.h`) to
+  /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both
+  /// arguments are spoilt).
+  double add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;
+
+  /// Zero matrix with one block per pair of nodes that share a cell.
+  BlockSparse pattern() const;
+
+ private:
+  /// Cells of one kind and rule; `batches` hold kLanes of them, the last one padded with repeats.
+  struct Group {
+    ElementRule rule;
+    std::vector<std::array<Index, kLanes>> batches;
+    std::vector<int> active;                 ///< real cells of each batch
+    std::vector<std::size_t> color_offsets;  ///< batches of each colour
+    /// Ideal to reference shape, A_ideal A^-1, per batch and point, row by row and lane by lane; empty: ideal cells.
+    std::vector<double> to_reference;
+    const double (*reference(std::size_t batch, std::size_t q) const)[kLanes] {
+      return reinterpret_cast<const double(*)[kLanes]>(to_reference.data() +
+                                                       9 * kLanes * (batch * rule.num_points() + q));
+    }
+  };
+
+  struct BatchState;
+
+  template <class Kernel, class PerPoint>
+  void for_points(const Group& group, std::size_t b, const BatchState& state, Kernel& kernel,
+                  void (Kernel::*evaluate)(int), const PerPoint& per_point) const;
+  template <class Kernel>
+  double value_of(std::span<const Vec3> nodes) const;
+  template <class Kernel>
+  double gradient_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const;
+  template <class Kernel>
+  double hessian_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                    BlockSparse& hessian) const;
+  void find_pattern();
+  void rebuild_groups();
+  void fill_references(Group& group) const;
+  void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
+  template <class PerBatch>
+  double sum_batches(PerBatch&& per_batch) const;
+
+  const VolumeMesh* mesh_;
+  std::size_t num_nodes_;
+  std::vector<Vec3> inverse_lengths_;
+  std::vector<double> weights_;
+  const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
+  double epsilon_ = 0, floor_ = kHessianFloor;
+  CellReference reference_;        ///< empty: ideal cells
+  std::vector<int> points_;        ///< points per direction of each cell
+  std::vector<int> colors_;
+  std::vector<Group> groups_;
+  BlockSparse pattern_, hessian_;
+  std::vector<std::size_t> block_offsets_;  ///< of each cell in block_slots_
+  std::vector<Index> block_slots_;          ///< block number of (a, b), a-major, in the pattern
+};
+
+}  // namespace subvol

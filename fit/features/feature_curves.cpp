@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/feature_curves.h"
+
+#include "subvol/base/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <tuple>
+
+namespace subvol {
+
+namespace {
+
+double angle_degrees_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+}
+
+struct Side {
+  Index low, high, triangle;
+  bool rising;  ///< the triangle runs from low to high
+};
+
+std::vector<std::array<Index, 2>> sharp_edges(const TriangleMesh& mesh, double angle_degrees) {
+  std::vector<Side> sides;
+  std::vector<Vec3> normals;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& q = mesh.triangles[t];
+    for (Index v : q)
+      if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
+        throw InputError("feature_curves: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
+                         " of " + std::to_string(mesh.positions.size()));
+    const Vec3& a = mesh.positions[q[0]];
+    normals.push_back((mesh.positions[q[1]] - a).cross(mesh.positions[q[2]] - a).normalized());
+    for (int i = 0; i < 3; ++i) {
+      const Index v = q[i], w = q[(i + 1) % 3];
+      if (v != w) sides.push_back({std::min(v, w), std::max(v, w), static_cast<Index>(t), v < w});
+    }
+  }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
+  std::vector<std::array<Index, 2>> sharp;
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
+    if (end - i != 2) continue;
+    const Vec3 left = normals[sides[i].triangle];
+    const Vec3 right = (sides[i].rising == sides[i + 1].rising ? -1.0 : 1.0) * normals[sides[i + 1].triangle];
+    if (angle_degrees_between(left, right) > angle_degrees) sharp.push_back({sides[i].low, sides[i].high});
+  }
+  return sharp;
+}
+
+/// Walks along sharp edges from vertex to vertex, each edge once.
+class EdgeWalk {
+ public:
+  EdgeWalk(const TriangleMesh& mesh, std::vector<std::array<Index, 2>> edges, double angle_degrees)
+      : mesh_(mesh), edges_(std::move(edges)), used_(edges_.size(), 0), corner_(mesh.positions.size(), 0) {
+    offsets_.assign(mesh.positions.size() + 1, 0);
+    for (const auto& edge : edges_)
+      for (Index v : edge) ++offsets_[v + 1];
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) offsets_[v + 1] += offsets_[v];
+    around_.resize(2 * edges_.size());
+    std::vector<std::size_t> next(offsets_.begin(), offsets_.end() - 1);
+    for (std::size_t e = 0; e < edges_.size(); ++e)
+      for (Index v : edges_[e]) around_[next[v]++] = static_cast<Index>(e);
+    for (std::size_t v = 0; v < corner_.size(); ++v) corner_[v] = is_corner(static_cast<Index>(v), angle_degrees);
+  }
+
+  FeatureCurves curves() {
+    FeatureCurves result;
+    for (std::size_t v = 0; v < corner_.size(); ++v) {
+      if (!corner_[v]) continue;
+      result.corners.push_back(static_cast<Index>(v));
+      result.corner_edges.push_back(static_cast<int>(edges_at(static_cast<Index>(v)).size()));
+      for (Index e : edges_at(static_cast<Index>(v)))
+        if (!used_[e]) result.curves.push_back(walk(static_cast<Index>(v), e));
+    }
+    for (std::size_t e = 0; e < edges_.size(); ++e)
+      if (!used_[e]) result.curves.push_back(walk(edges_[e][0], static_cast<Index>(e)));
+    return result;
+  }
+
+ private:
+  std::span<const Index> edges_at(Index v) const {
+    return {around_.data() + offsets_[v], offsets_[v + 1] - offsets_[v]};
+  }
+  Index other_end(Index e, Index v) const { return edges_[e][0] == v ? edges_[e][1] : edges_[e][0]; }
+
+  bool is_corner(Index v, double angle_degrees) const {
+    const auto edges = edges_at(v);
+    if (edges.size() != 2) return !edges.empty();
+    const auto& x = mesh_.positions;
+    return angle_degrees_between(x[v] - x[other_end(edges[0], v)], x[other_end(edges[1], v)] - x[v]) > angle_degrees;
+  }
+
+  FeatureCurve walk(Index v, Index e) {
+    FeatureCurve curve;
+    curve.vertices = {v};
+    while (e != kNoIndex) {
+      used_[e] = 1;
+      v = other_end(e, v);
+      curve.vertices.push_back(v);
+      e = kNoIndex;
+      if (corner_[v]) break;
+      for (Index candidate : edges_at(v))
+        if (!used_[candidate]) e = candidate;
+    }
+    for (Index w : curve.vertices) curve.points.push_back(mesh_.positions[w]);
+    return curve;
+  }
+
+  const TriangleMesh& mesh_;
+  std::vector<std::array<Index, 2>> edges_;
+  std::vector<char> used_, corner_;
+  std::vector<std::size_t> offsets_;  // of each vertex in around_
+  std::vector<Index> around_;
+};
+
+}  // namespace
+
+double FeatureCurve::length() const {
+  double length = 0;
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) length += (points[i + 1] - points[i]).norm();
+  return length;
+}
+
+FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
+                             std::span<const std::array<Index, 2>> tagged) {
+  if (!(angle_degrees >= 0 && angle_degrees <= 180))
+    throw InputError("feature_curves: angle_degrees must be in [0, 180], got " + std::to_string(angle_degrees));
+  std::vector<std::array<Index, 2>> sharp = sharp_edges(mesh, angle_degrees);
+  for (const auto& [a, b] : tagged) sharp.push_back({std::min(a, b), std::max(a, b)});
+  std::sort(sharp.begin(), sharp.end());
+  sharp.erase(std::unique(sharp.begin(), sharp.end()), sharp.end());
+  return EdgeWalk(mesh, sharp, angle_degrees).curves();
+}
+
+ClosestPoint polyline_tree(std::span<const Vec3> points) {
+  TriangleMesh segments;
+  segments.positions.assign(points.begin(), points.end());
+  for (Index i = 0; i + 1 < static_cast<Index>(points.size()); ++i) segments.triangles.push_back({i, i + 1, i + 1});
+  return ClosestPoint(segments);
+}
+
+}  // namespace subvol

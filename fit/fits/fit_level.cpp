@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/fits/fit_level.h"
+
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/subdivision/limit_surface.h"
+#include "subvol/subdivision/subdivision.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+namespace subvol {
+
+namespace {
+
+constexpr int kMaxSampleRefinements = 3;
+/// How far the finest level's samples lie from the limit surface (0) towards the mesh (1), and up to which mean gap
+/// between the two (in the mesh's unit; the fit's is the target's diagonal). A coarser mesh cannot follow the target
+/// anyway, and would only draw the limit surface away from it.
+constexpr double kMeshShare = 0.3, kMostGap = 5e-4;
+
+/// The boundary of a hex mesh as samples: its own vertices, without the limit.
+void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
+  const MeshTopology topology(mesh);
+  std::vector<Index> sample_of(mesh.num_vertices(), kNoIndex), rows;
+  for (Index f : topology.boundary_faces()) {
+    const auto face = topology.face(f);
+    std::array<Index, 4> quad;
+    for (int i = 0; i < 4; ++i) {
+      Index& sample = sample_of[face[i]];
+      if (sample == kNoIndex) {
+        sample = static_cast<Index>(rows.size());
+        rows.push_back(face[i]);
+      }
+      quad[i] = sample;
+    }
+    level.sample_triangles.push_back({quad[0], quad[1], quad[2]});
+    level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
+  }
+  level.samples = select_rows(nodes, rows);
+  for (const CreaseEdge& crease : mesh.tags.creases)
+    level.crease_edges.push_back({sample_of[crease.v0], sample_of[crease.v1]});
+}
+
+/// Both children of a crease end at its middle, which is a vertex of no other crease.
+std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags& control) {
+  std::map<Index, std::array<Index, 2>> ends_of_middle;
+  for (const CreaseEdge& crease : fine.creases) {
+    const auto [at, added] = ends_of_middle.try_emplace(crease.v1, std::array{crease.v0, crease.v0});
+    if (!added) at->second = {std::min(at->second[0], crease.v0), std::max(at->second[1], crease.v0)};
+  }
+  std::vector<Index> parents;
+  for (const CreaseEdge& crease : fine.creases) {
+    const auto& [v0, v1] = ends_of_middle[crease.v1];
+    const auto at = std::lower_bound(
+        control.creases.begin(), control.creases.end(), std::pair(v0, v1),
+        [](const CreaseEdge& c, const std::pair<Index, Index>& ends) { return std::pair(c.v0, c.v1) < ends; });
+    parents.push_back(static_cast<Index>(at - control.creases.begin()));
+  }
+  return parents;
+}
+
+/// Boundary nodes -> vertices of the boundary refined once, by bilinear interpolation in its quads.
+SparseMap bilinear_refinement(const BoundaryRefinement& once, std::size_t num_nodes) {
+  // A child quad has one old vertex, then the midpoint of the edge that leaves it, the face point, and the midpoint of
+  // the edge that arrives. So each edge point meets its two ends, and each face point its four corners.
+  std::vector<std::vector<Index>> parents(once.positions.num_rows());
+  const auto num_old = static_cast<Index>(once.vertices.size());
+  for (const auto& quad : once.quads) {
+    int corner = 0;
+    while (quad[corner] >= num_old) ++corner;
+    const Index node = once.vertices[quad[corner]];
+    for (int i = 0; i < 4; ++i) {
+      std::vector<Index>& list = parents[quad[(corner + i) % 4]];
+      if (std::find(list.begin(), list.end(), node) == list.end()) list.push_back(node);
+    }
+  }
+  SparseMap map;
+  map.num_cols = num_nodes;
+  for (std::vector<Index>& list : parents) {
+    std::sort(list.begin(), list.end());
+    for (Index node : list) {
+      map.columns.push_back(node);
+      map.values.push_back(1.0 / static_cast<double>(list.size()));
+    }
+    map.offsets.push_back(map.columns.size());
+  }
+  return map;
+}
+
+}  // namespace
+
+FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
+                        const FitOptions& options, std::size_t min_samples, bool finest) {
+  FitLevel level;
+  SubdivisionLevel refined = subdivide(control, options.boundary);
+  level.mesh = std::move(refined.fine);
+  level.parent_creases = parents_of_creases(level.mesh.tags, control.tags);
+  level.safe_nodes = compose(linear_split(control), previous_nodes);
+  level.refine = std::move(refined.matrix);
+  const SparseMap fine_from_unknowns = compose(level.refine, from_unknowns);
+  if (options.surface == FittedSurface::mesh) {
+    level.nodes = fine_from_unknowns;
+    sample_plain_boundary(level.mesh, level.nodes, level);
+    return level;
+  }
+  const SparseMap limit = limit_map(level.mesh);
+  level.nodes = compose(limit, fine_from_unknowns);
+  std::size_t boundary_faces = MeshTopology(level.mesh).boundary_faces().size();
+  int refinements = 0;
+  while (boundary_faces < min_samples && refinements < kMaxSampleRefinements) {
+    boundary_faces *= 4;
+    ++refinements;
+  }
+  BoundaryRefinement boundary;
+  std::optional<SparseMap> towards_mesh;
+  if (finest) {
+    boundary = refine_boundary(level.mesh, 1);
+    const SparseMap bilinear = bilinear_refinement(boundary, level.mesh.num_vertices());
+    const std::vector<Vec3> fine = level.refine.apply(control.positions);
+    const std::vector<Vec3> on_limit = boundary.positions.apply(fine), on_mesh = bilinear.apply(limit.apply(fine));
+    double gap = 0;
+    for (std::size_t i = 0; i < on_limit.size(); ++i) gap += (on_limit[i] - on_mesh[i]).norm();
+    // A tolerance is meant for both.
+    if (options.tolerance_percent || gap <= kMostGap * static_cast<double>(on_limit.size()))
+      towards_mesh = compose(bilinear, level.nodes);
+  }
+  if (!towards_mesh) boundary = refine_boundary(level.mesh, finest ? std::max(refinements, 1) : refinements);
+  level.samples = compose(boundary.positions, fine_from_unknowns);
+  if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, kMeshShare);
+  level.crease_edges = std::move(boundary.crease_edges);
+  for (const auto& q : boundary.quads) {
+    level.sample_triangles.push_back({q[0], q[1], q[2]});
+    level.sample_triangles.push_back({q[0], q[2], q[3]});
+  }
+  return level;
+}
+
+}  // namespace subvol

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/fits/fit_schedule.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace subvol {
+
+namespace {
+
+/// Up to which distance a template's own cells tell what the fitted ones should look like (measured on real templates).
+constexpr double kCloseDistance = 0.4;
+constexpr double kCoarseLambda = 0.05;
+/// With creases tied from the start, stiffer cells swell beside them, and folds made then do not go away.
+constexpr double kHeldLambda = 0.01;
+constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
+
+}  // namespace
+
+std::vector<Stage> FitSchedule::stages(int number) const {
+  if (number > 1) return number == levels ? last : middle;
+  std::vector<Stage> result = first;
+  if (number == levels) result.insert(result.end(), last.begin(), last.end());
+  return result;
+}
+
+Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight}; }
+
+double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
+
+std::vector<double> own_box_shares(double distance) {
+  return distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};
+}
+
+FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold) {
+  FitSchedule schedule;
+  schedule.levels = options.levels;
+  schedule.own_box_shares = own_box_shares(distance);
+  const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
+  schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
+  schedule.middle = {{coarse, kCloseTangentialWeight}};
+  schedule.last = {schedule.final_stage(options.lambda_close)};
+  schedule.continuation = {coarse, kFarTangentialWeight, 4};
+  return schedule;
+}
+
+}  // namespace subvol

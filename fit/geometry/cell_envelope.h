@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/geometry/barycentric.h"
+#include "fit/simd/wide.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace subvol {
+
+/// Parts a convex polygon by which of a set of linear functions is lowest: the Voronoi cells of nearby sites, when they
+/// are known to be few.
+///
+/// Each cell starts as the whole polygon and is cut by the functions found lowest at its corners until there are none
+/// lower than its own. Much cheaper than cutting in two again and again, as cells are not cut by the bisectors of
+/// others; but not safe where functions are alike within rounding, so the areas are checked in the end.
+class CellEnvelope {
+ public:
+  CellEnvelope() = default;
+  CellEnvelope(const CellEnvelope&) = delete;
+  CellEnvelope& operator=(const CellEnvelope&) = delete;
+
+  struct Cell {
+    int function;
+    std::array<double, 6> moments;
+  };
+
+  /// Begins a new set of functions.
+  void clear();
+  /// Adds eight functions by their values at the triangle's corners; what is kNever at all of them is none. `ranks`
+  /// decide between equal functions: the lowest comes first.
+  void add(const std::array<Wide, 3>& values, const std::array<std::int32_t, kWide>& ranks);
+  static constexpr double kNever = 1e300;
+
+  /// Finds the cells of a polygon.
+  ///
+  /// first   the function lowest at one of the polygon's corners; functions are numbered as they were added.
+  /// noise   differences of functions below it are rounding.
+  /// returns whether the cells part the polygon's area exactly; where they do not (ties), use something else.
+  bool compute(std::span<const Barycentric> polygon, int first, double noise);
+  const std::vector<Cell>& cells() const { return cells_; }
+
+ private:
+  static constexpr int kMaxCorners = 24, kMaxKnown = 7;
+  struct Polygon {
+    int size = 0;
+    std::array<Barycentric, kMaxCorners> at;
+    std::uint32_t checked = 0;  ///< bit i: no function is lower at corner i than the cell's
+  };
+  struct Known {
+    int count = 0;
+    bool queued = false;
+    std::array<int, kMaxKnown> neighbours;
+  };
+  using Block = std::array<Wide, 3>;
+  enum class Cut { untouched, cut, empty, tie };
+
+  Barycentric values(int function) const;
+  Wide lowest(const Barycentric& at) const;
+  int lowest_function(const Barycentric& at, double value) const;
+  Cut cut(int inside, int outside);
+  Cut find_cell(int function, std::span<const Barycentric> whole);
+  void note_neighbours(int cell, int found);
+
+  double noise_ = 0;
+  std::vector<Block> blocks_;
+  std::vector<std::int32_t> ranks_;
+  std::vector<Known> known_;
+  std::vector<int> queue_;
+  std::vector<Cell> cells_;
+  Polygon buffers_[2];
+  Polygon* polygon_ = &buffers_[0];  ///< the cell so far
+  Polygon* rest_ = &buffers_[1];     ///< the next, while it is cut
+};
+
+}  // namespace subvol

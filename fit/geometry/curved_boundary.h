@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/surface/triangle_mesh.h"
+
+#include <vector>
+
+namespace subvol {
+
+/// The boundary of a curved mesh as triangles. Vertices are common to neighbours, also across sharp edges.
+struct CurvedBoundary {
+  TriangleMesh triangles;
+  std::vector<Index> faces;  ///< of each triangle: a place in `MeshTopology::boundary_faces()`
+  double chord_error = 0;    ///< distance of the triangles to the curved surface, in the mesh's unit
+};
+
+}  // namespace subvol

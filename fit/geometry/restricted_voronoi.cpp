@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/geometry/restricted_voronoi.h"
+
+#include "fit/geometry/triangle_cutter.h"
+#include "subvol/base/error.h"
+#include "subvol/base/parallel_errors.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kChunk = 256;
+constexpr double kMaxLooseness = 2;  // of the tree's boxes, before it is built anew
+
+Vec3 box_centre(std::span<const Vec3> points) {
+  Vec3 low = points[0], high = points[0];
+  for (const Vec3& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return low + 0.5 * (high - low);
+}
+
+/// Positions relative to a centre, and the nearest site of each. The one before is a near-by start, no more.
+void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree& tree, std::vector<Vec3>& moved,
+            std::vector<Index>& nearest) {
+  moved.resize(positions.size());
+  nearest.resize(positions.size());
+  const std::size_t num_chunks = (positions.size() + kChunk - 1) / kChunk;
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) {
+    Index before = kNoIndex;
+    for (std::size_t i = chunk * kChunk; i < std::min(positions.size(), (chunk + 1) * kChunk); ++i) {
+      moved[i] = positions[i] - centre;
+      before = before == kNoIndex ? tree.nearest(moved[i]).place
+                                  : tree.nearest(moved[i], (tree.position(before) - moved[i]).squaredNorm()).place;
+      nearest[i] = before;
+    }
+  }
+}
+
+}  // namespace
+
+RestrictedVoronoi::RestrictedVoronoi(std::span<const Vec3> sites) {
+  if (sites.empty()) throw InputError("RestrictedVoronoi: sites must not be empty");
+  take_sites(sites);
+}
+
+void RestrictedVoronoi::update_sites(std::span<const Vec3> sites) {
+  if (sites.size() != num_sites()) throw InputError("RestrictedVoronoi::update_sites: the number of sites has changed");
+  take_sites(sites);
+}
+
+void RestrictedVoronoi::take_sites(std::span<const Vec3> sites) {
+  for (const Vec3& s : sites)
+    if (!s.allFinite()) throw InputError("RestrictedVoronoi: sites must be finite");
+  centre_ = box_centre(sites);
+  std::vector<Vec3> moved(sites.size());
+  for (std::size_t i = 0; i < sites.size(); ++i) moved[i] = sites[i] - centre_;
+  if (num_sites() == moved.size()) tree_.refit(moved);
+  if (num_sites() != moved.size() || tree_.looseness() > kMaxLooseness) tree_ = SiteTree(moved);
+}
+
+Index RestrictedVoronoi::nearest_site(const Vec3& point) const {
+  const Index place = tree_.nearest(point - centre_).place;
+  return place == kNoIndex ? kNoIndex : tree_.site(place);
+}
+
+void RestrictedVoronoi::compute(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
+                                std::vector<VoronoiPiece>& pieces) const {
+  for (const auto& t : triangles)
+    for (Index v : t)
+      if (v < 0 || static_cast<std::size_t>(v) >= positions.size())
+        throw InputError("RestrictedVoronoi::compute: triangle corners must be in [0, positions.size())");
+  std::vector<Vec3> moved;
+  std::vector<Index> nearest;
+  locate(positions, centre_, tree_, moved, nearest);
+
+  const std::size_t num_chunks = (triangles.size() + kChunk - 1) / kChunk;
+  struct Segment {
+    int thread;
+    std::size_t begin, end, target;
+  };
+  std::vector<Segment> segments(num_chunks);
+  std::vector<std::vector<VoronoiPiece>> found(static_cast<std::size_t>(omp_get_max_threads()));
+  const auto cut = [&](std::size_t chunk, int thread, TriangleCutter& cutter, std::vector<VoronoiPiece>& mine) {
+    segments[chunk] = {thread, mine.size(), 0, 0};
+    for (std::size_t t = chunk * kChunk; t < std::min(triangles.size(), (chunk + 1) * kChunk); ++t) {
+      const auto& v = triangles[t];
+      cutter.cut(static_cast<Index>(t), {moved[v[0]], moved[v[1]], moved[v[2]]},
+                 {nearest[v[0]], nearest[v[1]], nearest[v[2]]}, mine);
+    }
+    segments[chunk].end = mine.size();
+  };
+  const auto make_room = [&] {
+    std::size_t total = 0;
+    for (Segment& s : segments) {
+      s.target = total;
+      total += s.end - s.begin;
+    }
+    pieces.resize(total);
+  };
+  const auto join = [&](const Segment& s) {
+    const auto from = found[s.thread].begin();
+    std::copy(from + static_cast<std::ptrdiff_t>(s.begin), from + static_cast<std::ptrdiff_t>(s.end),
+              pieces.begin() + static_cast<std::ptrdiff_t>(s.target));
+  };
+  ParallelErrors errors;
+#pragma omp parallel
+  {
+    const int thread = omp_get_thread_num();
+    std::vector<VoronoiPiece>& mine = omp_get_num_threads() == 1 ? pieces : found[thread];
+    mine.clear();
+    std::optional<TriangleCutter> cutter;
+    errors.guard([&] { cutter.emplace(tree_); });
+#pragma omp for schedule(dynamic)
+    for (std::size_t chunk = 0; chunk < num_chunks; ++chunk)
+      errors.guard([&] { cut(chunk, thread, *cutter, mine); });
+#pragma omp single
+    if (omp_get_num_threads() > 1) errors.guard(make_room);
+    if (omp_get_num_threads() > 1)
+#pragma omp for schedule(dynamic)
+      for (std::size_t chunk = 0; chunk < num_chunks; ++chunk) errors.guard([&] { join(segments[chunk]); });
+  }
+  errors.rethrow();
+}
+
+std::vector<VoronoiPiece> RestrictedVoronoi::compute(std::span<const Vec3> positions,
+                                                     std::span<const std::array<Index, 3>> triangles) const {
+  std::vector<VoronoiPiece> pieces;
+  compute(positions, triangles, pieces);
+  return pieces;
+}
+
+}  // namespace subvol

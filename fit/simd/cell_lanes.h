@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/simd/lanes.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+namespace subvol {
+
+/// One number of each of kLanes hexes: kernels templated on their number type run on all of them at once.
+using Lanes = Eigen::Array<double, kLanes, 1>;
+
+inline double larger(double a, double b) { return a > b ? a : b; }
+inline double smaller(double a, double b) { return a < b ? a : b; }
+inline Lanes larger(const Lanes& a, const Lanes& b) { return (a > b).select(a, b); }
+inline Lanes smaller(const Lanes& a, const Lanes& b) { return (a < b).select(a, b); }
+inline double square_root(double a) { return std::sqrt(a); }
+inline Lanes square_root(const Lanes& a) {
+  Lanes result;
+  for (int lane = 0; lane < kLanes; ++lane) result[lane] = std::sqrt(a[lane]);
+  return result;
+}
+
+/// Corners of kLanes consecutive hexes, one per lane; `vertices` are those of the first.
+inline std::array<std::array<Lanes, 3>, 8> gather_hexes(std::span<const Vec3> positions, const Index* vertices) {
+  std::array<std::array<Lanes, 3>, 8> x;
+  for (int lane = 0; lane < kLanes; ++lane)
+    for (int v = 0; v < 8; ++v) {
+      const Vec3& p = positions[vertices[8 * lane + v]];
+      for (int axis = 0; axis < 3; ++axis) x[v][axis][lane] = p[axis];
+    }
+  return x;
+}
+
+/// Corners of one cell; those of its kind's number are set.
+inline std::array<Vec3, kMaxCellVertices> gather_cell(std::span<const Vec3> positions, const VolumeMesh& mesh,
+                                                      std::size_t cell) {
+  std::array<Vec3, kMaxCellVertices> x;
+  const auto vertices = mesh.cell(cell);
+  for (std::size_t v = 0; v < vertices.size(); ++v) x[v] = positions[vertices[v]];
+  return x;
+}
+
+/// Calls hexes(first) for kLanes consecutive hexes and cell(c) for every other cell, in parallel.
+///
+/// How cells are grouped depends on the mesh alone, so results do not depend on the number of threads.
+template <class Hexes, class Cell>
+void for_each_cell_block(const VolumeMesh& mesh, const Hexes& hexes, const Cell& cell) {
+  const std::size_t num_cells = mesh.num_cells(), num_blocks = (num_cells + kLanes - 1) / kLanes;
+#pragma omp parallel for schedule(static)
+  for (std::size_t block = 0; block < num_blocks; ++block) {
+    const std::size_t begin = block * kLanes, end = std::min(begin + kLanes, num_cells);
+    const auto is_hex = [](CellKind kind) { return kind == CellKind::hex; };
+    if (end - begin == kLanes && std::all_of(mesh.kinds.begin() + begin, mesh.kinds.begin() + end, is_hex))
+      hexes(begin);
+    else
+      for (std::size_t c = begin; c < end; ++c) cell(c);
+  }
+}
+
+}  // namespace subvol

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/simd/lanes.h"
+#include "fit/simd/wide.h"
+
+namespace subvol {
+
+static_assert(kWide == kLanes);
+
+/// The eight numbers, to be set one by one.
+inline double* lanes(Wide& w) { return reinterpret_cast<double*>(&w); }
+
+/// c = a b, or a b^T, of 3x3 matrices by rows.
+inline void product(const Wide* a, const Wide* b, Wide* c) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+}
+inline void product_with_transpose(const Wide* a, const Wide* b, Wide* c) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      c[3 * i + j] = a[3 * i] * b[3 * j] + a[3 * i + 1] * b[3 * j + 1] + a[3 * i + 2] * b[3 * j + 2];
+}
+inline void transpose_product(const Wide* a, const Wide* b, Wide* c) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) c[3 * i + j] = a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
+}
+
+}  // namespace subvol

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/elements/point_tables.h"
+#include "fit/energies/surface_term.h"
+#include "fit/energies/volume_term.h"
+#include "subvol/subdivision/sparse_map.h"
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// The function that a stage minimises over its unknowns x (control vertices, in the target's unit):
+///
+///   E(x) = E_S(N x + z0) + lambda E_W(M x + y0)                                Paper: Eqs. 1, 10
+///
+/// M takes the unknowns to the nodes of the finite element mesh, N to the samples of its boundary; gradients and
+/// Hessians come back through the transposes. E_S is taken with the correspondences of the last `SurfaceTerm::assign`.
+/// Nodes that are to stay have no entries in M and their positions in y0; samples likewise.
+struct FitProblem {
+  FitProblem(SparseMap node_map, SparseMap sample_map, std::unique_ptr<VolumeTerm> volume_energy,
+             std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight);
+
+  /// out = M x + y0.
+  void apply_nodes(std::span<const Vec3> x, std::span<Vec3> out) const;
+  /// out = N x + z0.
+  void apply_samples(std::span<const Vec3> x, std::span<Vec3> out) const;
+  /// out = N d, how the samples go with the unknowns; out = N^T g, a gradient by the samples pulled back.
+  void multiply_samples(std::span<const Vec3> d, std::span<Vec3> out) const;
+  void pull_back_samples(std::span<const Vec3> g, std::span<Vec3> out) const;
+
+  SparseMap nodes, nodes_transposed;      ///< M, M^T
+  std::vector<Vec3> fixed_nodes;          ///< y0, one per node; empty: none is fixed
+  SparseMap samples, samples_transposed;  ///< N, N^T
+  std::optional<PointTables> tables;      ///< N once more, for all products with it; none: by `samples`
+  std::vector<Vec3> fixed_samples;        ///< z0, one per sample; empty: none is fixed
+  std::unique_ptr<VolumeTerm> volume;
+  std::unique_ptr<SurfaceTerm> surface;   ///< null: none, N then has no rows
+  double lambda;                          ///< > 0
+};
+
+}  // namespace subvol

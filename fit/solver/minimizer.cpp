@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/solver/minimizer.h"
+
+#include "fit/solver/fit_problem.h"
+#include "subvol/base/error.h"
+
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+void cancel(MinimizerResult& result) {
+  result.stop = MinimizerStop::cancelled;
+  result.explanation = "stopped by the caller";
+}
+
+}  // namespace
+
+bool has_ended(const MinimizerOptions& options, MinimizerResult& result) {
+  if (!options.ended || !options.ended()) return false;
+  cancel(result);
+  return true;
+}
+
+bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result) {
+  result.iterations.push_back(record);
+  if (!options.progress || options.progress(record)) return true;
+  cancel(result);
+  return false;
+}
+
+void densify_again(FitProblem& problem, const MinimizerResult& result) {
+  if (result.densified.empty()) return;
+  if (result.densified_at.size() != problem.nodes.num_cols)
+    throw InputError("cells were densified at a state of " + std::to_string(result.densified_at.size()) +
+                     " unknowns, expected " + std::to_string(problem.nodes.num_cols));
+  std::vector<Vec3> nodes(problem.nodes.num_rows());
+  problem.apply_nodes(result.densified_at, nodes);
+  for (const std::vector<Index>& cells : result.densified) problem.volume->densify(cells, nodes);
+}
+
+}  // namespace subvol

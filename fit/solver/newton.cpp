@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/solver/newton.h"
+
+#include "fit/solver/vector_math.h"
+#include "subvol/base/format.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <string>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// The pulled-back Hessian M^T H_W M + N^T H_S N with its block-Jacobi preconditioner.
+class ReducedHessian {
+ public:
+  /// inverse_diagonal  of an earlier Hessian of the same problem, to be used again; empty: computed.
+  ReducedHessian(const FitProblem& problem, std::vector<Mat3>& inverse_diagonal)
+      : problem_(problem),
+        inverse_diagonal_(inverse_diagonal),
+        node_in_(problem.nodes.num_rows()),
+        node_out_(problem.nodes.num_rows()),
+        sample_in_(problem.samples.num_rows()),
+        sample_out_(problem.samples.num_rows()),
+        from_samples_(problem.nodes.num_cols) {
+    if (!inverse_diagonal_.empty()) return;
+    inverse_diagonal_.assign(problem.nodes.num_cols, Mat3::Zero());
+    problem.volume->add_diagonal_blocks(problem.nodes, problem.nodes_transposed, inverse_diagonal_);
+    if (problem.surface)
+      add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
+#pragma omp parallel for schedule(static)
+    for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
+      // Vertices of no cell have no energy: they stay.
+      const Mat3 block = inverse_diagonal_[j];
+      inverse_diagonal_[j] = block.trace() > 0 ? Mat3(block.inverse()) : Mat3(Mat3::Zero());
+    }
+  }
+
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) {
+    problem_.nodes.apply(in, node_in_);
+    problem_.volume->multiply(node_in_, node_out_);
+    problem_.nodes_transposed.apply(node_out_, out);
+    if (!problem_.surface) return;
+    problem_.multiply_samples(in, sample_in_);
+    problem_.surface->hessian().multiply(sample_in_, sample_out_);
+    problem_.pull_back_samples(sample_out_, from_samples_);
+    add_scaled(1, from_samples_, out);
+  }
+
+  void precondition(std::span<const Vec3> in, std::span<Vec3> out) const {
+#pragma omp parallel for schedule(static)
+    for (std::size_t j = 0; j < in.size(); ++j) out[j] = inverse_diagonal_[j] * in[j];
+  }
+
+ private:
+  const FitProblem& problem_;
+  std::vector<Mat3>& inverse_diagonal_;
+  std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
+};
+
+/// Solves H d = -g approximately, or not where the caller wants an end; returns the number of iterations.
+int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient, const MinimizerOptions& options,
+                        std::vector<Vec3>& d) {
+  const std::size_t n = gradient.size();
+  std::vector<Vec3> r(n), z(n), p(n), hp(n);
+  d.assign(n, Vec3::Zero());
+  for (std::size_t i = 0; i < n; ++i) r[i] = -gradient[i];
+  hessian.precondition(r, z);
+  p = z;
+  double rz = dot(r, z);
+  const double stop = options.cg_tolerance * options.cg_tolerance * rz;
+  int iteration = 0;
+  while (iteration < options.cg_max_iterations && rz > stop && !(options.ended && options.ended())) {
+    ++iteration;
+    hessian.multiply(p, hp);
+    const double php = dot(p, hp);
+    if (!(php > 0)) break;
+    add_scaled(rz / php, p, d);
+    add_scaled(-rz / php, hp, r);
+    hessian.precondition(r, z);
+    const double next = dot(r, z);
+    const double beta = next / rz;
+    rz = next;
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < n; ++i) p[i] = z[i] + beta * p[i];
+  }
+  return iteration;
+}
+
+/// Cells of `now` that are not in `before` (both ascending).
+std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vector<Index>& now) {
+  std::vector<Index> result;
+  std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(result));
+  return result;
+}
+
+/// One minimisation by Newton's method.
+class NewtonRun {
+ public:
+  NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+  MinimizerResult run();
+
+ private:
+  enum class Search {
+    found,    ///< a step
+    stiffer,  ///< no: cells are in its way, and stiffer now
+    no_step,  ///< there is none
+    level,    ///< not looked for: the direction does not lead down
+    ended     ///< by the caller
+  };
+
+  /// The energy, its gradient and Hessian at x. False: it is infinite.
+  bool linearize();
+  /// A direction and a step along it, the Hessian made stiffer where that would be short.
+  Search find_step(IterationRecord& record);
+  bool find_direction(IterationRecord& record);
+  /// The longest of t, t / 2, ... that decreases E and leaves no more cells uncertified; half of it where one that does
+  /// not was tried before.
+  Search search_line(bool may_stiffen, IterationRecord& record);
+  /// Goes the step that was found.
+  void take_step(IterationRecord& record);
+  /// Whether E has stopped decreasing, or the caller wants an end.
+  bool is_done(const IterationRecord& record);
+  void stop(MinimizerStop why, std::string explanation) {
+    result_.stop = why;
+    result_.explanation = std::move(explanation);
+  }
+
+  FitProblem& problem_;
+  std::vector<Vec3>& x_;
+  const MinimizerOptions& options_;
+  MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
+  std::vector<Vec3> y_, z_;  // nodes and samples at x
+  std::vector<Vec3> node_gradient_, sample_gradient_, gradient_, from_samples_;
+  std::vector<Vec3> d_, dy_, dz_, y_trial_, z_trial_;
+  std::vector<Mat3> inverse_diagonal_;
+  std::vector<Index> uncertified_;  // at x, or some steps before
+  double energy_ = 0, slope_ = 0, t_ = 0;
+  double trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
+  std::vector<Index> trial_uncertified_;
+  std::vector<Index> blocking_;  // cells that were in the way of this step
+  bool is_stiffened_ = false;    // the Hessian, for this step
+};
+
+NewtonRun::NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
+    : problem_(problem), x_(x), options_(options) {
+  if (options.begun) result_ = *options.begun;
+  result_.stop = MinimizerStop::iteration_limit;
+  densify_again(problem, result_);
+  y_.resize(problem.nodes.num_rows());
+  z_.resize(problem.samples.num_rows());
+  problem.apply_nodes(x, y_);
+  problem.apply_samples(x, z_);
+  for (auto* nodes : {&node_gradient_, &dy_, &y_trial_}) nodes->resize(y_.size());
+  for (auto* samples : {&sample_gradient_, &dz_, &z_trial_}) samples->resize(z_.size());
+  gradient_.resize(x.size());
+  from_samples_.resize(x.size());
+  uncertified_ = problem.volume->uncertified(y_);
+}
+
+bool NewtonRun::linearize() {
+  SurfaceTerm* surface = problem_.surface.get();
+  if (surface) surface->assign(z_);
+  std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
+  const double distance = surface ? surface->value(z_) : 0;
+  energy_ = distance + problem_.lambda * problem_.volume->linearize(y_, problem_.lambda, node_gradient_);
+  if (!std::isfinite(energy_)) return false;
+  problem_.nodes_transposed.apply(node_gradient_, gradient_);
+  if (surface) {
+    std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
+    surface->add_gradient(z_, sample_gradient_);
+    problem_.pull_back_samples(sample_gradient_, from_samples_);
+    add_scaled(1, from_samples_, gradient_);
+  }
+  return true;
+}
+
+bool NewtonRun::find_direction(IterationRecord& record) {
+  ReducedHessian reduced(problem_, inverse_diagonal_);
+  record.linear_iterations += conjugate_gradients(reduced, gradient_, options_, d_);
+  constexpr double kLevel = 1e-26;  // of an energy without dimension: less is rounding, and nobody's gain
+  slope_ = dot(gradient_, d_);
+  return slope_ < -kLevel;
+}
+
+NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
+  constexpr double kShortStep = 0.5;
+  constexpr int kMaxStiffenings = 5;
+  blocking_.clear();
+  is_stiffened_ = false;
+  for (int round = 0;; ++round) {
+    const bool downhill = find_direction(record);
+    if (has_ended(options_, result_)) return Search::ended;
+    if (!downhill) return Search::level;
+    problem_.nodes.apply(d_, dy_);
+    t_ = problem_.volume->max_step(y_, dy_);
+    // Few points would have the whole step be short: better that they stay.
+    const bool may_stiffen = round < kMaxStiffenings;
+    if (!may_stiffen || t_ >= kShortStep || !problem_.volume->stiffen(y_, dy_, kShortStep)) {
+      const Search found = search_line(may_stiffen, record);
+      if (found != Search::stiffer) return found;
+    }
+    inverse_diagonal_.clear();
+    is_stiffened_ = true;
+  }
+}
+
+NewtonRun::Search NewtonRun::search_line(bool may_stiffen, IterationRecord& record) {
+  constexpr double kArmijo = 1e-4;
+  constexpr int kMaxHalvings = 30;
+  problem_.multiply_samples(d_, dz_);
+  bool cut_back = false, drawn_back = !problem_.volume->keeps_off_inversion();
+  for (int halving = 0; halving < kMaxHalvings; ++halving, t_ *= 0.5) {
+    if (has_ended(options_, result_)) return Search::ended;
+    for (std::size_t i = 0; i < y_.size(); ++i) y_trial_[i] = y_[i] + t_ * dy_[i];
+    for (std::size_t i = 0; i < z_.size(); ++i) z_trial_[i] = z_[i] + t_ * dz_[i];
+    ++record.evaluations;
+    trial_surface_ = problem_.surface ? problem_.surface->value(z_trial_) : 0;
+    trial_volume_ = problem_.volume->value(y_trial_);
+    trial_ = trial_surface_ + problem_.lambda * trial_volume_;
+    if (!(trial_ <= energy_ + kArmijo * t_ * slope_)) continue;
+    trial_uncertified_ = problem_.volume->uncertified(y_trial_);
+    const std::vector<Index> failed = newly_failed(uncertified_, trial_uncertified_);
+    blocking_.insert(blocking_.end(), failed.begin(), failed.end());
+    if (failed.empty()) {
+      if (!cut_back || drawn_back) return Search::found;
+      drawn_back = true;
+    } else {
+      if (may_stiffen && problem_.volume->stiffen(failed)) return Search::stiffer;
+      cut_back = true;
+    }
+  }
+  return Search::no_step;
+}
+
+void NewtonRun::take_step(IterationRecord& record) {
+  add_scaled(t_, d_, x_);
+  problem_.apply_nodes(x_, y_);
+  problem_.apply_samples(x_, z_);
+  uncertified_ = std::move(trial_uncertified_);
+  record.surface_energy = trial_surface_;
+  record.volume_energy = trial_volume_;
+  record.step_length = t_;
+}
+
+bool NewtonRun::is_done(const IterationRecord& record) {
+  if (!record_step(record, options_, result_)) return true;
+  const double decrease = (energy_ - trial_) / energy_;
+  result_.small_steps = decrease < options_.relative_decrease ? result_.small_steps + 1 : 0;
+  if (result_.small_steps < 2) return false;
+  stop(MinimizerStop::converged, formatted("relative decrease of the energy %.2g in two steps running", decrease));
+  return true;
+}
+
+MinimizerResult NewtonRun::run() {
+  constexpr int kPreconditionerLife = 4;
+  const auto end = [&](MinimizerStop why, std::string explanation) {
+    stop(why, std::move(explanation));
+    return std::move(result_);
+  };
+  for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
+    // Here x and the result are all that passes on, so that they are enough to go on from.
+    if (iteration > 0 && iteration % kPreconditionerLife == 0) {
+      if (problem_.surface) problem_.surface->forget();
+      inverse_diagonal_.clear();
+      uncertified_ = problem_.volume->uncertified(y_);
+      if (options_.keep) options_.keep(x_, result_);
+    }
+    if (!linearize())
+      return end(MinimizerStop::infeasible_start, "the start has a cell that is inverted at a quadrature point");
+    if (iteration < 2 || is_stiffened_) inverse_diagonal_.clear();  // else it changes slowly
+    IterationRecord record;
+    const Search found = find_step(record);
+    if (found == Search::ended) return std::move(result_);
+    if (found == Search::level) return end(MinimizerStop::converged, "the gradient vanishes");
+    if (!blocking_.empty()) {
+      problem_.volume->densify(blocking_, y_);
+      result_.densified.push_back(std::move(blocking_));
+      result_.densified_at = x_;
+    }
+    if (found == Search::no_step)
+      return end(MinimizerStop::no_step, "no step along the search direction decreases the energy");
+    take_step(record);
+    if (is_done(record)) return std::move(result_);
+  }
+  return end(MinimizerStop::iteration_limit, "iteration limit");
+}
+
+}  // namespace
+
+MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options) {
+  return NewtonRun(problem, x, options).run();
+}
+
+}  // namespace subvol

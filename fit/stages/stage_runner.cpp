@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/stages/stage_runner.h"
+
+#include "fit/geometry/self_intersection.h"
+#include "fit/solver/lbfgs.h"
+#include "fit/solver/newton.h"
+#include "subvol/base/fingerprint.h"
+#include "subvol/base/format.h"
+
+namespace subvol {
+
+namespace {
+
+std::uint64_t start_of(const FitProblem& problem, const MinimizerOptions& minimizer, std::span<const Vec3> x) {
+  Fingerprint start;
+  start.add(problem.lambda).add(minimizer.max_iterations).add(minimizer.relative_decrease);
+  start.add(problem.nodes.num_rows()).add(problem.samples.num_rows());
+  return start.add(std::span<const double>(x.empty() ? nullptr : x.front().data(), 3 * x.size())).value();
+}
+
+}  // namespace
+
+bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction,
+                      std::vector<Vec3>& x, FitReport& report) const {
+  record.lambda = stage.lambda;
+  record.tangential_weight = stage.tangential_weight;
+  record.unknowns = x.size();
+  MinimizerOptions minimizer;
+  minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
+  if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) minimizer.max_iterations *= kLbfgsSteps;
+  minimizer.relative_decrease = stage.relative_decrease;
+  int iteration = 0;
+  minimizer.ended = [this] { return is_to_end(); };
+  minimizer.progress = [&](const IterationRecord& step) {
+    const double energy = step.surface_energy + stage.lambda * step.volume_energy;
+    const bool wanted = !options_.progress ||
+                        options_.progress({record.name.c_str(), record.level, ++iteration, energy, fraction});
+    return wanted && !is_over();
+  };
+  // What earlier stages of the same problem have left behind, those that come from a log have not.
+  if (problem.surface) problem.surface->forget();
+  SolvedStage solved{record.name, options_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
+  const SolvedStage* known = options_.log ? options_.log->recall(solved) : nullptr;
+  if (known) solved = *known;
+  bool going = true;
+  if (!known || !known->is_over()) {
+    iteration = static_cast<int>(solved.result.iterations.size());
+    solve(problem, minimizer, solved);
+    going = solved.is_over();
+  } else {
+    densify_again(problem, solved.result);
+    if (!solved.result.iterations.empty()) going = minimizer.progress(solved.result.iterations.back());
+  }
+  x = std::move(solved.x);
+  record.seconds = solved.seconds;
+  record.iterations = std::move(solved.result.iterations);
+  record.ended = solved.result.stop;
+  record.stop = std::move(solved.result.explanation);
+  const std::string name = record.name;
+  report.stages.push_back(std::move(record));
+  if (!going) give_up(name, report);
+  return going;
+}
+
+void StageRunner::give_up(const std::string& work, FitReport& report) const {
+  if (!in_time(work, report)) return;
+  report.stop_reason = StopReason::cancelled;
+  report.explanation = "cancelled in " + work;
+}
+
+std::optional<std::size_t> StageRunner::intersecting_pairs(const TriangleMesh& boundary, FitReport& report) const {
+  bool ended = false;
+  const SelfIntersections found = self_intersections(boundary, [&] { return ended = ended || is_to_end(); });
+  if (!ended) return found.pairs.size();
+  give_up("the search for self-intersections", report);
+  return {};
+}
+
+bool StageRunner::in_time(const std::string& work, FitReport& report) const {
+  if (!is_over()) return true;
+  report.stop_reason = StopReason::time_limit;
+  report.explanation = "time limit reached in " + work;
+  return false;
+}
+
+void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const {
+  constexpr double kFarPercent = 10;
+  if (mean_percent > kFarPercent)
+    report.warnings.push_back(formatted(
+        "the result is far from its target, %.3g %% on the mean: is the template roughly in place?", mean_percent));
+  const StageRecord* last = report.last_kept_stage();
+  if (last && last->ended == MinimizerStop::infeasible_start) {
+    report.stop_reason = StopReason::stalled;
+    report.explanation = last->name + " could not begin: " + last->stop;
+  } else if (tolerance_percent && mean_percent > *tolerance_percent) {
+    report.stop_reason = StopReason::tolerance_missed;
+    report.explanation =
+        formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
+  } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit &&
+             options_.max_iterations > 0) {
+    report.stop_reason = StopReason::iteration_limit;
+    report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
+                                   options_.max_iterations, mean_percent);
+  } else {
+    report.stop_reason = StopReason::converged;
+    report.explanation = formatted("all stages done, mean distance %.4g %%", mean_percent);
+  }
+}
+
+void StageRunner::solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const {
+  const double begin = seconds() - stage.seconds;
+  const MinimizerResult begun = stage.result;
+  if (!begun.iterations.empty()) minimizer.begun = &begun;
+  if (options_.log)
+    minimizer.keep = [&](std::span<const Vec3> x, const MinimizerResult& so_far) {
+      SolvedStage kept{stage.name, stage.start, std::vector<Vec3>(x.begin(), x.end()), so_far, seconds() - begin};
+      kept.result.stop = MinimizerStop::cancelled;
+      options_.log->add(std::move(kept));
+    };
+  stage.result = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, stage.x, minimizer)
+                                                      : minimize_newton(problem, stage.x, minimizer);
+  stage.seconds = seconds() - begin;
+  if (options_.log && stage.is_over()) options_.log->add(stage);
+}
+
+}  // namespace subvol

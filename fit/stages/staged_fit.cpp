@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/stages/staged_fit.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace subvol {
+
+FitSnapshot StagedFit::snapshot() { return {unknowns(), lambda_, mean_, report().stages.size(), states_.size()}; }
+
+void StagedFit::go_back(FitSnapshot snapshot) {
+  unknowns() = std::move(snapshot.x);
+  lambda_ = snapshot.lambda;
+  mean_ = snapshot.mean_percent;
+  states_.resize(snapshot.num_states);
+  report().undo_stages(snapshot.num_stages, report().stages.size());
+}
+
+void StagedFit::keep_state() {
+  if (keep_states_) states_.push_back({states_.empty() ? "template" : report().last_kept_stage()->name, unknowns()});
+}
+
+bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t& pairs) {
+  constexpr double kFactor = 4;
+  for (double lambda = kFactor * lambda_; pairs > 0 && lambda <= most_lambda; lambda *= kFactor) {
+    FitSnapshot softer = snapshot();
+    const std::optional<std::size_t> pairs_now = or_back(softer, [&] {
+      unknowns() = start.x;
+      return run_final_stage(lambda) ? intersecting_pairs() : std::nullopt;
+    });
+    if (pairs_now && *pairs_now <= pairs / 2) {
+      pairs = *pairs_now;
+      report().undo_stages(start.num_stages, softer.num_stages);
+      states_.resize(std::min(states_.size(), start.num_states + 1));  // up to the start, from which it went
+    } else {
+      go_back(std::move(softer));
+    }
+    if (!pairs_now) return false;
+  }
+  return true;
+}
+
+}  // namespace subvol

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/stages/untangle.h"
+
+#include "fit/certificate/certificate.h"
+#include "fit/energies/regularised_barrier.h"
+#include "subvol/base/format.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace subvol {
+
+namespace {
+
+/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell, and falls as fast as
+/// they come right (the rule of the published code). Where a round gains little it is at most half the last one.
+constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
+/// A round that takes off less of the energy is as far as it gets with its epsilon.
+constexpr double kStuck = 0.1;
+/// Cells that are still not certified after a round count so much more in the next.
+constexpr double kWeightGrowth = 1.5;
+constexpr int kSteps = 5;
+constexpr double kRelativeDecrease = 1e-2;
+/// A round without fewer failing cells gains if the worst determinant rises by this share.
+constexpr double kLeastRise = 0.01;
+
+/// The cells of a problem between rounds.
+class TangledCells {
+ public:
+  TangledCells(FitProblem& problem, const VolumeMesh& mesh)
+      : problem_(problem),
+        energy_(dynamic_cast<VolumeEnergy&>(*problem.volume)),
+        mesh_(mesh),
+        nodes_(problem.nodes.num_rows()),
+        least_(mesh.num_cells()),
+        weights_(mesh.num_cells(), 1) {}
+  TangledCells(const TangledCells&) = delete;
+  TangledCells& operator=(const TangledCells&) = delete;
+  ~TangledCells() { energy_.set_regularisation(0); }
+
+  /// Measures a state; true when every cell is certified.
+  bool look(std::span<const Vec3> x) {
+    problem_.apply_nodes(x, nodes_);
+    uncertified_ = certify(nodes_, mesh_).not_certified;
+    if (uncertified_.empty()) return true;
+    energy_.least_determinants(nodes_, least_);
+    // What is positive at its points and still fails is to be seen at more of them.
+    std::vector<Index> hidden;
+    for (const Index c : uncertified_)
+      if (least_[c] > 0) hidden.push_back(c);
+    if (!hidden.empty()) {
+      energy_.densify(hidden);
+      energy_.least_determinants(nodes_, least_);
+    }
+    determinant_ = *std::min_element(least_.begin(), least_.end());
+    return false;
+  }
+
+  void raise_weights() {
+    for (const Index c : uncertified_) weights_[c] *= kWeightGrowth;
+    energy_.set_weights(weights_);
+  }
+
+  double determinant() const { return determinant_; }
+  const std::vector<Index>& uncertified() const { return uncertified_; }
+  void set_epsilon(double epsilon) { energy_.set_regularisation(epsilon); }
+  double energy(std::span<const Vec3> x) {
+    problem_.apply_nodes(x, nodes_);
+    return energy_.value(nodes_);
+  }
+
+ private:
+  FitProblem& problem_;
+  VolumeEnergy& energy_;
+  const VolumeMesh& mesh_;
+  std::vector<Vec3> nodes_;
+  std::vector<double> least_, weights_;
+  std::vector<Index> uncertified_;
+  double determinant_ = 0;
+};
+
+}  // namespace
+
+UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
+                        const StageRunner& runner, const StageRecord& record, double fraction, std::vector<Vec3>& x,
+                        FitReport& report) {
+  TangledCells cells(problem, mesh);
+  if (cells.look(x)) return {};
+  double epsilon = std::max(kShareOfWorst * std::abs(cells.determinant()), kLeastEpsilon);
+  std::size_t fewest = cells.uncertified().size();
+  double best = cells.determinant();
+  int idle = 0;
+  for (int round = 0; round < options.max_rounds && idle < options.patience; ++round) {
+    cells.set_epsilon(epsilon);
+    StageRecord stage = record;
+    stage.name = record.name + formatted(", epsilon %.3g", epsilon);
+    const double before = cells.energy(x);
+    const Stage weights{problem.lambda, options.tangential_weight, kSteps, kRelativeDecrease};
+    const bool going = runner.run(problem, weights, std::move(stage), fraction, x, report);
+    const double decrease = 1 - cells.energy(x) / before;
+    if (cells.look(x) || !going) return {going, cells.uncertified()};
+    const bool gained = cells.uncertified().size() < fewest || cells.determinant() > best + kLeastRise * std::abs(best);
+    idle = gained ? 0 : idle + 1;
+    fewest = std::min(fewest, cells.uncertified().size());
+    best = std::max(best, cells.determinant());
+    double next = kShareOfWorst * std::abs(cells.determinant());
+    if (decrease < kStuck) {
+      next = std::min(next, kLeastFall * epsilon);
+      cells.raise_weights();
+    }
+    epsilon = std::max(next, kLeastEpsilon);
+  }
+  return {true, cells.uncertified()};
+}
+
+}  // namespace subvol

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/target/cloud_geometry.h"
+
+#include "fit/geometry/site_tree.h"
+#include "subvol/base/error.h"
+#include "subvol/base/length_range.h"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kNeighbors = 16;
+constexpr double kLeastShare = 1e-20;   // of the squared radius that would suit points all over a box's diagonal
+constexpr double kSlack = 1 + 1e-14;    // the tree sums up squared distances in another order
+
+/// A point of the tree by its distance from the one that is looked at.
+struct Neighbor {
+  double squared_distance;
+  Index place;
+  auto operator<=>(const Neighbor&) const = default;
+};
+
+/// The k nearest of the others, nearest first; k is at most their number.
+class NeighborSearch {
+ public:
+  NeighborSearch(const SiteTree& tree, std::size_t k, double least) : tree_(tree), k_(k), least_(least) {}
+
+  /// squared_radius  a guess at how far they are, >= least, on which the result does not depend: one that is much too
+  ///                 large looks at too many points. Receives a good one for points near by, >= least > 0 even where
+  ///                 points lie on each other.
+  const std::vector<Neighbor>& operator()(Index place, double& squared_radius) {
+    const Vec3& centre = tree_.position(place);
+    for (;; squared_radius *= 4) {
+      places_.clear();
+      const SiteTree::Ball ball{centre, squared_radius};
+      tree_.gather({&ball, 1}, tree_.num_sites(), places_);
+      if (places_.size() <= k_) continue;
+      found_.clear();
+      for (Index other : places_)
+        if (other != place) found_.push_back({(tree_.position(other) - centre).squaredNorm(), other});
+      std::partial_sort(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(k_), found_.end());
+      found_.resize(k_);
+      if (found_.back().squared_distance * kSlack <= squared_radius) break;
+    }
+    squared_radius = std::max({2 * found_.back().squared_distance, 1e-12 * squared_radius, least_});
+    return found_;
+  }
+
+ private:
+  const SiteTree& tree_;
+  std::size_t k_;
+  double least_;
+  std::vector<Index> places_;
+  std::vector<Neighbor> found_;
+};
+
+/// The direction in which a point and its neighbours are thinnest.
+Vec3 thin_direction(const SiteTree& tree, Index place, std::span<const Neighbor> neighbors) {
+  Vec3 mean = tree.position(place);
+  for (const Neighbor& n : neighbors) mean += tree.position(n.place);
+  mean /= static_cast<double>(neighbors.size() + 1);
+  const auto square = [&](Index p) -> Mat3 {
+    const Vec3 d = tree.position(p) - mean;
+    return d * d.transpose();
+  };
+  Mat3 covariance = square(place);
+  for (const Neighbor& n : neighbors) covariance += square(n.place);
+  const double size = covariance.trace();
+  if (!(size > 0)) return Vec3::UnitX();
+  return Eigen::SelfAdjointEigenSolver<Mat3>(covariance / size).eigenvectors().col(0).normalized();
+}
+
+}  // namespace
+
+CloudGeometry cloud_geometry(std::span<const Vec3> points) {
+  if (points.size() < 2) throw InputError("point cloud: at least two points are needed");
+  Vec3 low = points[0], high = points[0];
+  for (const Vec3& p : points) {
+    if (!p.allFinite()) throw InputError("point cloud: a position is not finite");
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  if (low == high) throw InputError("point cloud: all points are in one place");
+  require_length((high - low).maxCoeff(), "point cloud");
+  const SiteTree tree(points);
+  const std::size_t n = points.size(), k = std::min(kNeighbors, n - 1);
+  CloudGeometry result;
+  result.normals.resize(n);
+  result.areas.resize(n);
+  constexpr std::size_t kRun = 256;  // radii are handed on inside a run, whatever thread takes it
+  const double least = kLeastShare * (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t run = 0; run < (n + kRun - 1) / kRun; ++run) {
+    NeighborSearch neighbors(tree, k, least);
+    // What is beside a point in the tree is near it. The bounding box tells nothing: one point far away would put the
+    // whole cloud within reach.
+    const std::size_t first = run * kRun, beside = first + 1 < n ? first + 1 : first - 1;
+    double squared_radius = std::max(
+        least, (tree.position(static_cast<Index>(beside)) - tree.position(static_cast<Index>(first))).squaredNorm());
+    for (std::size_t i = first; i < std::min(n, first + kRun); ++i) {
+      const auto place = static_cast<Index>(i);
+      const std::vector<Neighbor>& found = neighbors(place, squared_radius);
+      const auto point = static_cast<std::size_t>(tree.site(place));
+      result.areas[point] = std::numbers::pi * found.back().squared_distance / static_cast<double>(k);
+      result.normals[point] = thin_direction(tree, place, found);
+    }
+  }
+  for (double a : result.areas) result.area += a;
+  if (!(result.area > 0)) throw InputError("point cloud: its points lie on each other in groups, with no area between");
+  result.spacing = std::sqrt(result.area / static_cast<double>(n));
+  return result;
+}
+
+}  // namespace subvol

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/target/target_surface.h"
+
+#include "fit/target/cloud_geometry.h"
+#include "fit/target/enclosed_volume.h"
+#include "fit/target/soup_topology.h"
+#include "subvol/base/error.h"
+#include "subvol/base/length_range.h"
+#include "subvol/surface/solid_topology.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kClosedEnough = 0.95;  // share of paired half-edges above which the signed sum is trusted
+constexpr double kFlatness = 1e-6;      // of the isoperimetric bound: below it, nothing is enclosed
+constexpr int kFloodResolution = 96;
+constexpr std::size_t kMaxSamples = std::size_t{1} << 27;
+constexpr double kOnEdge = 1e-9;        // barycentric coordinates up to this are 0
+
+/// Cells of a cloud's grid, by the spacing of its points: first those that hold ten of them or so where the surface
+/// goes straight through, then larger ones.
+constexpr double kCloudCells[] = {3, 4.5, 6.5};
+
+/// Volume of the sphere of the given area: no surface of that area encloses more.
+double isoperimetric_bound(double area) { return area * std::sqrt(area / std::numbers::pi) / 6; }
+
+struct Volume {
+  double value;
+  VolumeSource source;
+};
+
+/// The volume of the solid that the surface bounds once it is mended; 0 where it cannot be.
+double mended_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
+  try {
+    return solid_boundary({{positions.begin(), positions.end()}, {triangles.begin(), triangles.end()}}).volume;
+  } catch (const InputError&) {
+    return 0;
+  }
+}
+
+Volume find_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, double area) {
+  const double bound = isoperimetric_bound(area);
+  const double closed_share = soup_topology(positions, triangles).closed_share;
+  const double sum = closed_share >= kClosedEnough ? signed_volume(positions, triangles) : 0;
+  if (closed_share == 1 && sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};
+  if (const double mended = mended_volume(positions, triangles); mended > kFlatness * bound && mended <= bound)
+    return {mended, VolumeSource::mended};
+  if (sum > kFlatness * bound) return {sum, VolumeSource::signed_sum};
+  const double flooded = flooded_volume(positions, triangles, kFloodResolution);
+  if (flooded > kFlatness * bound) return {flooded, VolumeSource::flood};
+  return {bound / 2, VolumeSource::isoperimetric};
+}
+
+Volume find_volume(std::span<const Vec3> points, const CloudGeometry& geometry, const Vec3& extent) {
+  for (double cells : kCloudCells) {
+    const double resolution = std::clamp(extent.maxCoeff() / (cells * geometry.spacing), 1.0, 2.0 * kFloodResolution);
+    const double flooded = flooded_volume(points, static_cast<int>(resolution));
+    if (flooded > kFlatness * isoperimetric_bound(geometry.area)) return {flooded, VolumeSource::flood};
+  }
+  return {isoperimetric_bound(geometry.area) / 2, VolumeSource::isoperimetric};
+}
+
+}  // namespace
+
+const char* to_string(PointWeights weights) { return weights == PointWeights::equal ? "equal" : "area"; }
+
+const char* to_string(VolumeSource source) {
+  switch (source) {
+    case VolumeSource::signed_sum: return "signed sum";
+    case VolumeSource::mended: return "mended surface";
+    case VolumeSource::flood: return "flooded grid";
+    case VolumeSource::isoperimetric: return "area alone";
+    case VolumeSource::given: return "template";
+  }
+  return "unknown";
+}
+
+TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options)
+    : positions_(mesh.positions) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& corners = mesh.triangles[t];
+    for (Index v : corners) {
+      if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
+        throw InputError("target: triangle " + std::to_string(t) + " has a corner outside [0, number of positions)");
+      if (!mesh.positions[v].allFinite()) throw InputError("target: position " + std::to_string(v) + " is not finite");
+    }
+    const Vec3 &a = positions_[corners[0]], &b = positions_[corners[1]], &c = positions_[corners[2]];
+    const Vec3 normal = (b - a).cross(c - a);
+    const double length = normal.norm();
+    if (!std::isfinite(length)) throw InputError("target: triangle " + std::to_string(t) + " is too large");
+    if (!(length > 0)) continue;
+    triangles_.push_back(corners);
+    normals_.push_back(normal / length);
+    areas_.push_back(0.5 * length);
+    area_ += 0.5 * length;
+    for (const Vec3* p : {&a, &b, &c}) {
+      low = low.cwiseMin(*p);
+      high = high.cwiseMax(*p);
+    }
+  }
+  if (triangles_.empty()) throw InputError("target: no triangle has an area");
+  set_box(low, high);  // positions of no triangle take no part, whatever they are
+  rim_parts_ = rim_parts(positions_, triangles_);
+  const Volume volume = find_volume(positions_, triangles_, area_);
+  volume_ = volume.value;
+  volume_source_ = volume.source;
+  resample(options.sample_spacing);
+}
+
+TargetSurface::TargetSurface(const PointCloud& cloud, PointWeights weights) {
+  CloudGeometry geometry = cloud_geometry(cloud.points);
+  samples_ = cloud.points;
+  sample_normals_ = std::move(geometry.normals);
+  area_ = geometry.area;
+  sample_areas_ = weights == PointWeights::by_area
+                      ? std::move(geometry.areas)
+                      : std::vector<double>(samples_.size(), area_ / static_cast<double>(samples_.size()));
+  Vec3 low = samples_[0], high = low;
+  for (const Vec3& p : samples_) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  set_box(low, high);
+  const Volume volume = find_volume(samples_, geometry, high - low);
+  volume_ = volume.value;
+  volume_source_ = volume.source;
+}
+
+void TargetSurface::set_box(const Vec3& low, const Vec3& high) {
+  require_length((high - low).maxCoeff(), "target");
+  diagonal_ = (high - low).norm();
+  centre_ = low + 0.5 * (high - low);
+}
+
+void TargetSurface::set_volume(double volume) {
+  if (!(volume > 0) || !std::isfinite(volume)) throw InputError("TargetSurface: a volume must be positive and finite");
+  volume_ = volume;
+  volume_source_ = VolumeSource::given;
+}
+
+bool TargetSurface::on_rim(Index triangle, const std::array<double, 3>& barycentric) const {
+  const unsigned parts = rim_parts_[triangle];
+  for (int k = 0; k < 3; ++k) {
+    if (barycentric[(k + 2) % 3] <= kOnEdge && parts >> k & 1) return true;
+    if (barycentric[k] >= 1 - kOnEdge && parts >> (3 + k) & 1) return true;
+  }
+  return false;
+}
+
+void TargetSurface::resample(double spacing) {
+  if (!(spacing >= 0) || !std::isfinite(spacing))
+    throw InputError("TargetSurface: sample_spacing must be finite and >= 0");
+  if (is_cloud()) return;
+  samples_.clear();
+  sample_triangles_.clear();
+  sample_areas_.clear();
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const auto& [a, b, c] = triangles_[t];
+    const std::size_t first = samples_.size();
+    add_samples({positions_[a], positions_[b], positions_[c]}, static_cast<Index>(t), spacing);
+    sample_areas_.resize(samples_.size(), areas_[t] / static_cast<double>(samples_.size() - first));
+  }
+  sample_normals_.resize(samples_.size());
+  for (std::size_t j = 0; j < samples_.size(); ++j) sample_normals_[j] = normals_[sample_triangles_[j]];
+}
+
+void TargetSurface::add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing) {
+  if (samples_.size() >= kMaxSamples) throw InputError("TargetSurface: sample_spacing is too small for this target");
+  if (spacing > 0) {
+    int longest = 0;
+    double squared[3];
+    for (int k = 0; k < 3; ++k) {
+      squared[k] = (corners[(k + 1) % 3] - corners[k]).squaredNorm();
+      if (squared[k] > squared[longest]) longest = k;
+    }
+    const Vec3 &a = corners[longest], &b = corners[(longest + 1) % 3], &c = corners[(longest + 2) % 3];
+    const Vec3 middle = 0.5 * (a + b);
+    if (squared[longest] > spacing * spacing && middle != a && middle != b) {
+      add_samples({a, middle, c}, triangle, spacing);
+      add_samples({middle, b, c}, triangle, spacing);
+      return;
+    }
+  }
+  samples_.push_back((corners[0] + corners[1] + corners[2]) / 3);
+  sample_triangles_.push_back(triangle);
+}
+
+}  // namespace subvol

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/base/types.h"
+#include "subvol/surface/point_cloud.h"
+#include "subvol/surface/triangle_mesh.h"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace subvol {
+
+struct TargetSurfaceOptions {
+  /// Triangles with longer edges are sampled more than once; > 0, in the mesh's unit. 0: one sample per triangle.
+  double sample_spacing = 0;
+};
+
+/// How much each point of a cloud counts.
+enum class PointWeights {
+  equal,   ///< all alike: dense parts count more (default)
+  by_area  ///< by the area that it stands for (`cloud_geometry.h`): scans of uneven density count evenly
+};
+const char* to_string(PointWeights weights);
+
+/// How the enclosed volume was found.
+enum class VolumeSource {
+  signed_sum,    ///< sum of the triangles' signed tetrahedra: the surface is closed and oriented, up to small gaps
+  mended,        ///< the same once triangles were turned to agree and holes closed (`solid_boundary`)
+  flood,         ///< cells of a grid that the outside does not reach: not oriented, holes smaller than a cell
+  isoperimetric, ///< half the volume of the sphere of equal area: the surface encloses nothing
+  given          ///< by the caller
+};
+const char* to_string(VolumeSource source);
+
+/// What to fit, as the energies need it: triangles with normals, area A, enclosed volume V, samples; or points.
+///
+/// A soup is welcome: neither connectivity nor orientation nor closedness matters, but for V (see `VolumeSource`). Of a
+/// point cloud there are only samples, its points; their normals and the area are estimated (`cloud_geometry.h`).
+class TargetSurface {
+ public:
+  /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area, an
+  ///        extent that `require_length` takes, else InputError. Triangles without area are dropped; the others keep
+  ///        their order.
+  explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
+  /// InputError: as `cloud_geometry`, and an extent out of that range.
+  explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);
+
+  /// Whether there are points only: no triangles, nothing to integrate over.
+  bool is_cloud() const { return triangles_.empty(); }
+  const std::vector<Vec3>& positions() const { return positions_; }
+  const std::vector<std::array<Index, 3>>& triangles() const { return triangles_; }
+  /// Of each triangle: unit normal, by its corners' order; and area.
+  const std::vector<Vec3>& normals() const { return normals_; }
+  const std::vector<double>& areas() const { return areas_; }
+  /// Whether a triangle has an open edge, or a corner at one.
+  bool has_rim(Index triangle) const { return rim_parts_[triangle] != 0; }
+  /// Whether a point of a triangle, by its barycentric coordinates, lies on an open edge: what is nearest to a rim may
+  /// belong to something that the surface lacks.
+  bool on_rim(Index triangle, const std::array<double, 3>& barycentric) const;
+  /// About how many vertices the surface is known by.
+  std::size_t num_details() const { return is_cloud() ? samples_.size() : triangles_.size() / 2; }
+
+  double area() const { return area_; }      ///< A > 0
+  double volume() const { return volume_; }  ///< V > 0
+  VolumeSource volume_source() const { return volume_source_; }
+  /// For a surface that encloses nothing. InputError: not positive and finite.
+  void set_volume(double volume);
+  /// L = V / A, the length that makes the surface energy dimensionless.           Paper: Eq. 9
+  double length() const { return volume_ / area_; }
+  double diagonal() const { return diagonal_; }  ///< of the bounding box
+  Vec3 centre() const { return centre_; }        ///< of the bounding box
+
+  /// Points on the surface: the triangles' barycentres, or, where an edge is longer than the spacing, those of the
+  /// parts that halving its longest edges leads to. A cloud's points.
+  const std::vector<Vec3>& samples() const { return samples_; }
+  /// The triangle each lies in; empty for a cloud.
+  const std::vector<Index>& sample_triangles() const { return sample_triangles_; }
+  /// The unit normal at each, and the area that it stands for; areas add up to A.
+  const std::vector<Vec3>& sample_normals() const { return sample_normals_; }
+  const std::vector<double>& sample_areas() const { return sample_areas_; }
+  /// Takes samples with another spacing. A cloud keeps its points. InputError: negative, not finite, far too small.
+  void resample(double spacing);
+
+ private:
+  void add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing);
+  void set_box(const Vec3& low, const Vec3& high);
+
+  std::vector<Vec3> positions_, normals_, samples_, sample_normals_;
+  std::vector<std::array<Index, 3>> triangles_;
+  std::vector<double> areas_, sample_areas_;
+  std::vector<std::uint8_t> rim_parts_;
+  std::vector<Index> sample_triangles_;
+  double area_ = 0, volume_ = 0, diagonal_ = 0;
+  VolumeSource volume_source_ = VolumeSource::signed_sum;
+  Vec3 centre_ = Vec3::Zero();
+};
+
+}  // namespace subvol

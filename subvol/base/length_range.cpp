@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/length_range.h"
+
+#include "subvol/base/error.h"
+
+#include <sstream>
+
+namespace subvol {
+
+void require_length(double extent, const char* what) {
+  if (extent >= kLeastLength && extent <= kMostLength) return;
+  std::ostringstream said;
+  said << what << ": its extent is " << extent << ", expected " << kLeastLength << " to " << kMostLength;
+  throw InputError(said.str());
+}
+
+}  // namespace subvol

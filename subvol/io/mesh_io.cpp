@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/io/mesh_io.h"
+
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/mesh_formats.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/validate.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+
+namespace subvol {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Format {
+  const char* extension;
+  const char* description;
+  ParsedMesh (*parse)(const std::string& name, std::string_view bytes, const std::string& references);
+  std::string (*format)(const VolumeMesh& mesh);
+};
+
+constexpr Format kFormats[] = {
+    {".mesh", "Medit ASCII, versions 1 to 4", parse_medit, format_medit},
+    {".vtk", "legacy VTK 2.0 to 5.1, ASCII or binary, unstructured grid", parse_legacy_vtk, format_legacy_vtk},
+};
+
+const Format& format_of(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  for (const Format& format : kFormats)
+    if (extension == format.extension) return format;
+  throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(extension) + ", expected " +
+                   volume_mesh_formats());
+}
+
+bool is_warning(const MeshDefect& defect) {
+  return defect.kind == MeshDefect::Kind::inverted_cell || defect.kind == MeshDefect::Kind::unused_vertex;
+}
+
+/// Drops tags off the boundary: other programs also mark edges between subdomains. Returns how many.
+std::size_t drop_inner_tags(VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  const std::size_t dropped_edges = std::erase_if(mesh.tags.creases, [&](const CreaseEdge& crease) {
+    const Index e = topology.find_edge(crease.v0, crease.v1);
+    return e == kNoIndex || !topology.is_boundary_edge(e);
+  });
+  return dropped_edges + std::erase_if(mesh.tags.corners, [&](const CornerVertex& corner) {
+           return !topology.is_boundary_vertex(corner.vertex);
+         });
+}
+
+void warn_of(const std::vector<MeshDefect>& defects, MeshDefect::Kind kind, const std::string& what,
+             std::vector<std::string>& warnings) {
+  const auto is_kind = [&](const MeshDefect& defect) { return defect.kind == kind; };
+  const auto n = std::count_if(defects.begin(), defects.end(), is_kind);
+  if (n == 0) return;
+  const auto first = std::find_if(defects.begin(), defects.end(), is_kind);
+  warnings.push_back(std::to_string(n) + what + "; the first: " + first->message);
+}
+
+void check_mesh(const std::string& name, ParsedMesh& parsed) {
+  std::vector<MeshDefect> defects = validate(parsed.mesh);
+  const auto is_fatal = [](const MeshDefect& d) { return !is_warning(d) && d.kind != MeshDefect::Kind::bad_tag; };
+  if (std::any_of(defects.begin(), defects.end(), is_fatal)) {
+    constexpr int kMostNamed = 20;
+    std::string text;
+    int named = 0, more = 0;
+    for (const MeshDefect& defect : defects) {
+      if (!is_fatal(defect)) continue;
+      if (named == kMostNamed) {
+        ++more;
+        continue;
+      }
+      text += (named++ ? "; " : "") + defect.message + " (" + to_string(defect.kind) + ")";
+    }
+    throw InputError(name + ": " + text + (more ? "; and " + std::to_string(more) + " more defects" : ""));
+  }
+  if (const std::size_t n = drop_inner_tags(parsed.mesh))
+    parsed.warnings.push_back(std::to_string(n) + " tagged edges or corners are not on the boundary: dropped");
+  warn_of(defects, MeshDefect::Kind::inverted_cell,
+          " of " + std::to_string(parsed.mesh.num_cells()) + " cells are flat or left-handed somewhere",
+          parsed.warnings);
+  warn_of(defects, MeshDefect::Kind::unused_vertex, " vertices belong to no cell", parsed.warnings);
+}
+
+/// InputError: all vertices of the cells are in one place.
+void require_extent(const std::string& name, const VolumeMesh& mesh) {
+  const Vec3& first = mesh.positions[mesh.cell_vertices.front()];
+  if (std::all_of(mesh.cell_vertices.begin(), mesh.cell_vertices.end(),
+                  [&](Index v) { return mesh.positions[v] == first; }))
+    throw InputError(name + ": all vertices of the cells are in one place");
+}
+
+/// Whether a cell's determinant is negative at every corner.
+bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
+  const CellTopology& topology = cell_topology(mesh.kinds[c]);
+  const auto cell = mesh.cell(c);
+  for (int i = 0; i < topology.num_vertices; ++i) {
+    const auto& n = topology.corner_neighbors[i];
+    const Vec3& x = mesh.positions[cell[i]];
+    const Vec3 e0 = mesh.positions[cell[n[0]]] - x, e1 = mesh.positions[cell[n[1]]] - x,
+               e2 = mesh.positions[cell[n[2]]] - x;
+    if (!(e0.cross(e1).dot(e2) < 0)) return false;
+  }
+  return true;
+}
+
+/// The same cell seen from the other side.
+void turn_over(VolumeMesh& mesh, std::size_t c) {
+  const auto corner = [&](std::size_t i) -> Index& { return mesh.cell_vertices[mesh.cell_offsets[c] + i]; };
+  if (mesh.kinds[c] == CellKind::hex) {
+    std::swap(corner(1), corner(3));
+    std::swap(corner(5), corner(7));
+    return;
+  }
+  std::swap(corner(1), corner(2));
+  if (mesh.kinds[c] == CellKind::prism) std::swap(corner(4), corner(5));
+}
+
+/// Cells that are left-handed at every corner are no tangle but another way to number corners, if all cells are, or all
+/// prisms, which programs number in two ways: these are numbered anew, unless others would then see a common face from
+/// the same side. Without `mend` this is only said.
+void turn_over_mirrored(ParsedMesh& parsed, bool mend) {
+  VolumeMesh& mesh = parsed.mesh;
+  const auto all_mirrored = [&](bool only_prisms) {
+    bool found = false;
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+      if (only_prisms && mesh.kinds[c] != CellKind::prism) continue;
+      if (!is_left_handed(mesh, c)) return false;
+      found = true;
+    }
+    return found;
+  };
+  const bool all = all_mirrored(false);
+  if (!all && !all_mirrored(true)) return;
+  VolumeMesh turned = mesh;
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (all || mesh.kinds[c] == CellKind::prism) turn_over(turned, c), ++count;
+  const auto defects = validate(turned);
+  if (!all && std::any_of(defects.begin(), defects.end(), [](const MeshDefect& d) { return !is_warning(d); })) return;
+  if (mend) mesh = std::move(turned);
+  parsed.warnings.push_back((all ? "all " : "all prisms, ") + std::to_string(count) +
+                            " cells are left-handed at every corner, as of a mirrored mesh or of other numbering: "
+                            "their corners " + (mend ? "are" : "are not") + " numbered anew");
+}
+
+}  // namespace
+
+VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
+  const Format& format = format_of(path);
+  ParsedMesh parsed = format.parse(path.string(), read_file(path), options.references);
+  if (parsed.mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  require_extent(path.string(), parsed.mesh);
+  turn_over_mirrored(parsed, options.check);
+  if (options.check) check_mesh(path.string(), parsed);
+  if (options.warnings)
+    for (const std::string& warning : parsed.warnings) options.warnings->push_back(path.string() + ": " + warning);
+  return std::move(parsed.mesh);
+}
+
+void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {
+  const Format& format = format_of(path);
+  for (const MeshDefect& defect : validate(mesh))
+    if (defect.kind <= MeshDefect::Kind::not_finite || defect.kind == MeshDefect::Kind::bad_tag)
+      throw InputError("write_volume_mesh: " + defect.message);
+  write_file_atomically(path, format.format(mesh));
+}
+
+std::string volume_mesh_formats() {
+  std::string text;
+  for (const Format& format : kFormats)
+    text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
+  return text;
+}
+
+}  // namespace subvol

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
+#include "subvol/io/mesh_formats.h"
+#include "subvol/mesh/features.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+namespace subvol {
+
+namespace {
+
+struct CellSection {
+  const char* keyword;
+  CellKind kind;
+};
+constexpr CellSection kCellSections[] = {
+    {"Hexahedra", CellKind::hex}, {"Prisms", CellKind::prism}, {"Tetrahedra", CellKind::tet},
+    {"Pentahedra", CellKind::prism}};  // an old name of Prisms, never written
+
+/// Sections that say nothing about cells or features, and the numbers in each of their entries.
+struct SkippedSection {
+  const char* keyword;
+  std::size_t numbers_per_entry;
+  bool has_reference = false;  ///< its last number, of which one that is not 0 is missed
+};
+constexpr std::size_t kUntilKeyword = 0;  // files disagree on the length of an entry
+constexpr SkippedSection kSkippedSections[] = {
+    {"Triangles", 4, true}, {"Quadrilaterals", 5, true}, {"RequiredVertices", 1}, {"RequiredEdges", 1}, {"RequiredTriangles", 1},
+    {"RequiredQuadrilaterals", 1}, {"Normals", 3}, {"NormalAtVertices", 2}, {"NormalAtTriangleVertices", 3},
+    {"NormalAtQuadrilateralVertices", 4}, {"Tangents", 3}, {"TangentAtVertices", 2}, {"TangentAtEdges", 3},
+    {"TangentAtEdgeVertices", 3}, {"SubDomainFromMesh", kUntilKeyword}, {"SubDomainFromGeom", kUntilKeyword}};
+constexpr SkippedSection kSkippedValues[] = {{"AngleOfCornerBound", 1}, {"BoundingBox", 6}};
+
+/// Openings of the comments in which finite sharpness is kept; other readers pass over them.
+constexpr std::string_view kRidgeSharpness = "subvol:RidgeSharpness";
+constexpr std::string_view kCornerSharpness = "subvol:CornerSharpness";
+
+/// A number in the file (from 1) that can only be checked when everything has been read.
+struct Numbered {
+  std::int64_t number;
+  std::size_t line;
+};
+struct Sharpness {
+  Numbered item;
+  double value;
+};
+
+class MeditParser {
+ public:
+  MeditParser(const std::string& name, std::string_view bytes) : scan_(name, bytes) {
+    scan_.on_comment = [this](std::string_view text) { read_comment(text); };
+  }
+
+  ParsedMesh parse() {
+    read_header();
+    while (const auto keyword = scan_.next()) {
+      if (*keyword == "End") {
+        ended_ = true;
+        break;
+      }
+      read_section(*keyword);
+    }
+    if (!ended_) parsed_.warnings.push_back("the file has no End: it may have been cut short");
+    if (!has_vertices_) scan_.fail("the file has no Vertices");
+    check_cells();
+    resolve_tags();
+    left_out_.tell(parsed_.warnings);
+    return std::move(parsed_);
+  }
+
+ private:
+  void read_header() {
+    const auto first = scan_.next();
+    if (!first) scan_.fail("the file is empty, expected MeshVersionFormatted");
+    if (*first != "MeshVersionFormatted")
+      scan_.fail("expected MeshVersionFormatted (Medit ASCII), found " + in_quotes(*first));
+    const std::int64_t version = scan_.integer("the format version");
+    if (version < 1 || version > 4) scan_.fail("format version " + std::to_string(version) + ", expected 1 to 4");
+  }
+
+  void read_section(std::string_view keyword) {
+    const auto named = [&](const auto& section) { return keyword == section.keyword; };
+    if (keyword == "Dimension") return read_dimension();
+    if (keyword == "Vertices") return read_vertices();
+    if (keyword == "Edges") return read_edges();
+    if (keyword == "Ridges") return read_numbers(ridges_, "the number of Ridges", "an edge number");
+    if (keyword == "Corners") return read_numbers(corners_, "the number of Corners", "a vertex number");
+    if (keyword == "Pyramids") return refuse_pyramids();
+    if (const auto* s = std::find_if(std::begin(kCellSections), std::end(kCellSections), named);
+        s != std::end(kCellSections))
+      return read_cells(*s);
+    if (const auto* s = std::find_if(std::begin(kSkippedSections), std::end(kSkippedSections), named);
+        s != std::end(kSkippedSections))
+      return skip_section(*s);
+    if (const auto* s = std::find_if(std::begin(kSkippedValues), std::end(kSkippedValues), named);
+        s != std::end(kSkippedValues))
+      return skip_numbers(s->numbers_per_entry);
+    scan_.fail("expected a Medit keyword, found " + in_quotes(keyword) +
+               (parse_number(keyword) ? " (more numbers than the section's count says?)" : ""));
+  }
+
+  void read_dimension() {
+    const std::int64_t dimension = scan_.integer("the dimension");
+    if (dimension != 3) scan_.fail("dimension " + std::to_string(dimension) + ", expected 3");
+  }
+
+  void refuse_pyramids() {
+    if (const std::size_t n = scan_.count("the number of Pyramids", 6); n > 0)
+      scan_.fail(std::to_string(n) + " pyramids: " + kNoPyramids);
+  }
+
+  void skip_section(const SkippedSection& section) {
+    const std::string keyword = section.keyword;
+    const std::size_t n = scan_.count("the number of entries", section.numbers_per_entry);
+    if (section.has_reference) {
+      std::size_t num_marked = 0;
+      for (std::size_t i = 0; i < n; ++i) {
+        skip_numbers(section.numbers_per_entry - 1);
+        num_marked += scan_.number("a number") != 0;
+      }
+      left_out_.add("references of " + keyword, num_marked);
+      return;
+    }
+    if (keyword.starts_with("Required")) left_out_.add(keyword, n);
+    if (section.numbers_per_entry != kUntilKeyword) return skip_numbers(n * section.numbers_per_entry);
+    for (auto word = scan_.peek(); word && parse_number(*word); word = scan_.peek()) scan_.next();
+  }
+
+  void skip_numbers(std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) scan_.number("a number");
+  }
+
+  void read_vertices() {
+    if (has_vertices_) scan_.fail("a second section Vertices");
+    has_vertices_ = true;
+    const std::size_t n = scan_.count("the number of Vertices", 4);
+    parsed_.mesh.positions.resize(n);
+    std::size_t num_marked = 0;
+    for (Vec3& position : parsed_.mesh.positions) {
+      for (int i = 0; i < 3; ++i) position[i] = scan_.number("a coordinate");
+      num_marked += scan_.integer("a vertex reference") != 0;
+    }
+    left_out_.add("references of Vertices", num_marked);
+  }
+
+  void read_cells(const CellSection& section) {
+    const auto corners = static_cast<std::size_t>(cell_topology(section.kind).num_vertices);
+    const std::size_t n = scan_.count((std::string("the number of ") + section.keyword).c_str(), corners + 1);
+    std::array<Index, kMaxCellVertices> cell;
+    for (std::size_t c = 0; c < n; ++c) {
+      for (std::size_t i = 0; i < corners; ++i) cell[i] = read_vertex_number();
+      parsed_.mesh.add_cell(section.kind, {cell.data(), corners});
+      cell_lines_.push_back(scan_.word_line());
+      parsed_.mesh.references.push_back(read_reference());
+    }
+  }
+
+  /// Vertex number from 0. Without Vertices so far, only that it fits is checked here.
+  Index read_vertex_number() {
+    const std::int64_t number = scan_.integer("a vertex number");
+    check_number(number, has_vertices_ ? parsed_.mesh.num_vertices() : std::numeric_limits<Index>::max(), "vertex",
+                 scan_.word_line());
+    return static_cast<Index>(number - 1);
+  }
+
+  void check_number(std::int64_t number, std::size_t size, const char* what, std::size_t line) const {
+    if (number < 1 || static_cast<std::uint64_t>(number) > size)
+      scan_.fail(std::string(what) + " number " + std::to_string(number) + " is not in 1.." + std::to_string(size),
+                 line);
+  }
+
+  int read_reference() {
+    const std::int64_t reference = scan_.integer("a cell reference");
+    if (reference < std::numeric_limits<int>::min() || reference > std::numeric_limits<int>::max())
+      scan_.fail("a cell reference beyond 32 bits: " + std::to_string(reference));
+    return static_cast<int>(reference);
+  }
+
+  void read_edges() {
+    const std::size_t n = scan_.count("the number of Edges", 3);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Index v0 = read_vertex_number(), v1 = read_vertex_number();
+      edges_.push_back({std::min(v0, v1), std::max(v0, v1)});
+      left_out_.add("references of Edges", scan_.integer("an edge reference") != 0);
+    }
+  }
+
+  void read_numbers(std::vector<Numbered>& numbers, const char* count_name, const char* what) {
+    const std::size_t n = scan_.count(count_name, 1);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::int64_t number = scan_.integer(what);
+      numbers.push_back({number, scan_.word_line()});
+    }
+  }
+
+  void read_comment(std::string_view text) {
+    for (const auto& [opening, list] :
+         {std::pair(kRidgeSharpness, &ridge_sharpness_), std::pair(kCornerSharpness, &corner_sharpness_)}) {
+      if (!text.starts_with(opening)) continue;
+      TextScanner words("", text.substr(opening.size()));
+      const auto number = words.next(), value = words.next();
+      const auto n = number ? parse_integer(*number) : std::nullopt;
+      const auto sharpness = value ? parse_number(*value) : std::nullopt;
+      if (!n || !sharpness || !(*sharpness > 0) || words.next())
+        scan_.fail("expected '#" + std::string(opening) + " NUMBER SHARPNESS' with a sharpness > 0");
+      list->push_back({{*n, scan_.word_line()}, *sharpness});
+    }
+  }
+
+  void check_cells() const {
+    const VolumeMesh& mesh = parsed_.mesh;
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+      for (const Index v : mesh.cell(c))
+        check_number(std::int64_t{v} + 1, mesh.num_vertices(), "vertex", cell_lines_[c]);
+  }
+
+  void resolve_tags() {
+    FeatureTags& tags = parsed_.mesh.tags;
+    std::vector<double> edge_sharpness(edges_.size(), kInfiniteSharpness);
+    std::vector<double> corner_sharpness(parsed_.mesh.num_vertices(), kInfiniteSharpness);
+    assign_sharpness(ridge_sharpness_, "edge", edge_sharpness);
+    assign_sharpness(corner_sharpness_, "vertex", corner_sharpness);
+
+    for (const auto& [number, line] : ridges_) {
+      check_number(number, edges_.size(), "edge", line);
+      const auto [v0, v1] = edges_[number - 1];
+      check_number(std::int64_t{v1} + 1, parsed_.mesh.num_vertices(), "vertex", line);
+      if (v0 == v1) scan_.fail("a ridge from a vertex to itself", line);
+      tags.creases.push_back({v0, v1, edge_sharpness[number - 1]});
+    }
+    for (const auto& [number, line] : corners_) {
+      check_number(number, parsed_.mesh.num_vertices(), "vertex", line);
+      tags.corners.push_back({static_cast<Index>(number - 1), corner_sharpness[number - 1]});
+    }
+    tags = merge_tags(tags, {});
+    if (std::all_of(parsed_.mesh.references.begin(), parsed_.mesh.references.end(), [](int r) { return r == 0; }))
+      parsed_.mesh.references.clear();
+  }
+
+  void assign_sharpness(const std::vector<Sharpness>& given, const char* what, std::vector<double>& sharpness) const {
+    for (const auto& [item, value] : given) {
+      check_number(item.number, sharpness.size(), what, item.line);
+      sharpness[item.number - 1] = value;
+    }
+  }
+
+  TextScanner scan_;
+  ParsedMesh parsed_;
+  LeftOut left_out_;
+  bool has_vertices_ = false, ended_ = false;
+  std::vector<std::size_t> cell_lines_;
+  std::vector<std::array<Index, 2>> edges_;
+  std::vector<Numbered> ridges_, corners_;
+  std::vector<Sharpness> ridge_sharpness_, corner_sharpness_;
+};
+
+void append_cells(std::string& text, const VolumeMesh& mesh, const CellSection& section) {
+  const auto n = std::count(mesh.kinds.begin(), mesh.kinds.end(), section.kind);
+  if (n == 0) return;
+  text += std::string(section.keyword) + "\n" + std::to_string(n) + "\n";
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    if (mesh.kinds[c] != section.kind) continue;
+    for (const Index v : mesh.cell(c)) text += std::to_string(v + 1) + " ";
+    text += std::to_string(mesh.references.empty() ? 0 : mesh.references[c]) + "\n";
+  }
+}
+
+void append_sharpness(std::string& text, std::string_view opening, std::size_t number, double sharpness) {
+  if (sharpness >= kInfiniteSharpness) return;
+  text.append("#").append(opening).append(" ").append(std::to_string(number)).append(" ");
+  append_number(text, sharpness);
+  text += '\n';
+}
+
+void append_tags(std::string& text, const FeatureTags& tags) {
+  if (!tags.creases.empty()) {
+    const std::size_t n = tags.creases.size();
+    text += "Edges\n" + std::to_string(n) + "\n";
+    for (const CreaseEdge& crease : tags.creases)
+      text += std::to_string(crease.v0 + 1) + " " + std::to_string(crease.v1 + 1) + " 0\n";
+    text += "Ridges\n" + std::to_string(n) + "\n";
+    for (std::size_t i = 0; i < n; ++i) text += std::to_string(i + 1) + "\n";
+    for (std::size_t i = 0; i < n; ++i) append_sharpness(text, kRidgeSharpness, i + 1, tags.creases[i].sharpness);
+  }
+  if (!tags.corners.empty()) {
+    text += "Corners\n" + std::to_string(tags.corners.size()) + "\n";
+    for (const CornerVertex& corner : tags.corners) text += std::to_string(corner.vertex + 1) + "\n";
+    for (const CornerVertex& corner : tags.corners)
+      append_sharpness(text, kCornerSharpness, static_cast<std::size_t>(corner.vertex) + 1, corner.sharpness);
+  }
+}
+
+}  // namespace
+
+ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const std::string& references) {
+  if (!references.empty())
+    throw InputError(name + ": no cell data " + in_quotes(references) +
+                     ": a .mesh has one reference for each cell, without a name");
+  return MeditParser(name, bytes).parse();
+}
+
+std::string format_medit(const VolumeMesh& mesh) {
+  std::string text = "MeshVersionFormatted 2\nDimension 3\nVertices\n" + std::to_string(mesh.num_vertices()) + "\n";
+  for (const Vec3& position : mesh.positions) {
+    for (int i = 0; i < 3; ++i) {
+      append_number(text, position[i]);
+      text += ' ';
+    }
+    text += "0\n";
+  }
+  for (const CellSection& section : std::span(kCellSections).first(kNumCellKinds)) append_cells(text, mesh, section);
+  append_tags(text, mesh.tags);
+  return text + "End\n";
+}
+
+}  // namespace subvol

@@ -1,0 +1,494 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/binary_value.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
+#include "subvol/io/mesh_formats.h"
+#include "subvol/io/reference_arrays.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace subvol {
+
+namespace {
+
+/// A VTK cell type we know. corner[i]: place in the VTK cell of our corner i.
+struct VtkCell {
+  int type;
+  CellKind kind;
+  std::array<std::int8_t, kMaxCellVertices> corner;
+};
+constexpr VtkCell kVtkCells[] = {
+    {12, CellKind::hex, {0, 1, 2, 3, 4, 5, 6, 7}},
+    {11, CellKind::hex, {0, 1, 3, 2, 4, 5, 7, 6}},  // voxel: x runs fastest
+    {13, CellKind::prism, {0, 2, 1, 3, 5, 4}},      // wedge: the normal of 0 1 2 points away from 3 4 5
+    {10, CellKind::tet, {0, 1, 2, 3}},
+};
+
+constexpr int kPyramid = 14;
+/// Vertices, lines, polygons, linear and of higher order.
+constexpr int kLowerDimensions[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75, 76, 77};
+
+struct VtkType {
+  const char* name;
+  ValueType type;
+};
+constexpr VtkType kVtkTypes[] = {
+    {"float", kFloat32},       {"double", kFloat64},        {"char", kInt8},
+    {"signed_char", kInt8},    {"unsigned_char", kUInt8},   {"short", kInt16},
+    {"unsigned_short", kUInt16}, {"int", kInt32},           {"unsigned_int", kUInt32},
+    {"long", kInt64},          {"unsigned_long", kUInt64},  {"vtkidtype", kInt32},
+    {"vtktypeint64", kInt64},  {"vtktypeint32", kInt32},    {"vtktypeuint64", kUInt64},
+    {"vtktypeuint32", kUInt32},
+};
+
+/// An attribute that nothing is made of: keyword, name, number of components where it is given, type unless it is
+/// colours. Then so many values for each point, cell or, after its size, entry of a lookup table.
+struct VtkAttribute {
+  const char* keyword;
+  std::size_t components;  ///< 0: given
+  bool is_colors = false;  ///< bytes in binary files, fractions in text
+};
+constexpr VtkAttribute kSkippedAttributes[] = {
+    {"vectors", 3},    {"normals", 3},      {"tensors", 9},    {"tensors6", 6},
+    {"global_ids", 1}, {"pedigree_ids", 1}, {"edge_flags", 1}, {"texture_coordinates", 0},
+    {"color_scalars", 0, true}, {"lookup_table", 4, true},
+};
+
+class VtkParser {
+ public:
+  VtkParser(const std::string& name, std::string_view bytes, const std::string& references)
+      : scan_(name, bytes, TextScanner::Comments::none), name_(name), asked_(references) {}
+
+  ParsedMesh parse() {
+    read_header();
+    while (const auto word = scan_.next()) {
+      const std::string keyword = lower_case(*word);
+      if (keyword == "points") read_points();
+      else if (keyword == "cells") read_cells();
+      else if (keyword == "cell_types") read_cell_types();
+      else if (keyword == "cell_data") read_attributes(num_cells_, true);
+      else if (keyword == "point_data") read_attributes(parsed_.mesh.num_vertices(), false);
+      else if (keyword == "field") read_field(false);
+      else if (keyword == "metadata") skip_metadata();
+      else scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
+      if (stray_attribute_) break;  // the mesh itself stands before its attributes
+    }
+    if (!has_points_) scan_.fail("the file ends without POINTS");
+    if (!has_cells_) scan_.fail("the file ends without CELLS");
+    if (!has_types_) scan_.fail("the file ends without CELL_TYPES");
+    build_cells();
+    return std::move(parsed_);
+  }
+
+ private:
+  void read_header() {
+    constexpr std::string_view kOpening = "# vtk DataFile Version ";
+    const auto first = scan_.line();
+    if (!first || !lower_case(*first).starts_with(lower_case(kOpening)))
+      scan_.fail("expected '# vtk DataFile Version 2.0' to 5.1 in the first line");
+    TextScanner version("", first->substr(kOpening.size()));
+    const auto number = parse_number(version.next().value_or(""));
+    if (!number || *number < 2.0 || *number > 5.1) scan_.fail("expected version 2.0 to 5.1 of legacy VTK");
+    major_ = static_cast<int>(*number);
+    if (!scan_.line()) scan_.fail("the file ends where the title is expected");
+
+    const std::string format = lower_case(scan_.word("ASCII or BINARY"));
+    if (format != "ascii" && format != "binary") scan_.fail("expected ASCII or BINARY, found " + in_quotes(format));
+    binary_ = format == "binary";
+    const std::string_view dataset = scan_.word("DATASET");
+    if (lower_case(dataset) != "dataset") scan_.fail("expected DATASET, found " + in_quotes(dataset));
+    const std::string_view kind = scan_.word("UNSTRUCTURED_GRID");
+    if (lower_case(kind) != "unstructured_grid") scan_.fail("expected UNSTRUCTURED_GRID, found " + in_quotes(kind));
+  }
+
+  ValueType read_type() {
+    const std::string_view word = scan_.word("a data type");
+    const auto type = type_of(word);
+    if (!type) scan_.fail("unknown data type " + in_quotes(word));
+    return *type;
+  }
+
+  static std::optional<ValueType> type_of(std::string_view word) {
+    const std::string name = lower_case(word);
+    for (const VtkType& type : kVtkTypes)
+      if (name == type.name) return type.type;
+    return std::nullopt;
+  }
+
+  /// A count of things of which each takes at least one word or byte.
+  std::size_t read_count(const char* what) {
+    const std::int64_t n = scan_.integer(what);
+    if (n < 0) scan_.fail(std::string(what) + " is negative: " + std::to_string(n));
+    if (n > std::numeric_limits<Index>::max() || static_cast<std::uint64_t>(n) > scan_.bytes_left())
+      scan_.fail(std::string(what) + " is " + std::to_string(n) + ", more than the rest of the file can hold");
+    return static_cast<std::size_t>(n);
+  }
+
+  /// n values that follow the current line; visit(i, value) for each.
+  template <class Visit>
+  void read_values(std::size_t n, ValueType type, const char* what, const Visit& visit) {
+    if (!binary_) {
+      if (n > scan_.bytes_left()) scan_.fail(std::string("the file ends within ") + what);
+      for (std::size_t i = 0; i < n; ++i) visit(i, scan_.number(what));
+      return;
+    }
+    if (n == 0) return;
+    scan_.line();
+    if (n > scan_.bytes_left() / type.size) scan_.fail(std::string("the file ends within ") + what);
+    const std::string_view bytes = scan_.bytes(n * type.size, what);
+    for (std::size_t i = 0; i < n; ++i) visit(i, decode(bytes.data() + i * type.size, type, std::endian::big));
+  }
+
+  /// Those beyond 1e15 come as 1e15: nothing counted here is as large.
+  std::vector<std::int64_t> read_whole_numbers(std::size_t n, ValueType type, const char* what) {
+    if (type.is_real()) scan_.fail(std::string(what) + " must be of a whole-number type");
+    std::vector<std::int64_t> numbers;
+    numbers.reserve(std::min(n, scan_.bytes_left()));
+    read_values(n, type, what, [&](std::size_t, double value) {
+      if (value != std::floor(value)) scan_.fail(std::string(what) + " must be whole numbers");
+      numbers.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
+    });
+    return numbers;
+  }
+
+  void read_points() {
+    if (has_points_) scan_.fail("a second section POINTS");
+    has_points_ = true;
+    const std::size_t n = read_count("the number of points");
+    const ValueType type = read_type();
+    if (n > scan_.bytes_left() / 3) scan_.fail("the file ends within the coordinates");
+    parsed_.mesh.positions.resize(n);
+    read_values(3 * n, type, "a coordinate", [&](std::size_t i, double value) {
+      if (!std::isfinite(value)) scan_.fail("point " + std::to_string(i / 3) + " has a coordinate that is not finite");
+      parsed_.mesh.positions[i / 3][static_cast<Eigen::Index>(i % 3)] = value;
+    });
+  }
+
+  void read_cells() {
+    if (has_cells_) scan_.fail("a second section CELLS");
+    has_cells_ = true;
+    cells_line_ = scan_.word_line();
+    const std::size_t n = read_count("the number of cells"), size = read_count("the size of CELLS");
+    const auto next = major_ >= 5 ? scan_.peek() : std::nullopt;
+    if (next && lower_case(*next) == "offsets")
+      read_offsets_and_connectivity(n, size);
+    else if (next && binary_)
+      scan_.fail("expected OFFSETS, found " + in_quotes(*next));
+    else
+      split_counted_lists(n, read_whole_numbers(size, kInt32, "cell corners"));
+    num_cells_ = offsets_.size() - 1;
+  }
+
+  // Before 5.0: for each cell its number of corners, then the corners.
+  void split_counted_lists(std::size_t n, const std::vector<std::int64_t>& numbers) {
+    std::size_t at = 0;
+    for (std::size_t c = 0; c < n; ++c) {
+      if (at == numbers.size()) scan_.fail("CELLS has fewer cells than it says", cells_line_);
+      const std::int64_t corners = numbers[at++];
+      if (corners < 0 || static_cast<std::uint64_t>(corners) > numbers.size() - at)
+        scan_.fail(
+            "cell " + std::to_string(c) + " has " + std::to_string(corners) + " corners, beyond the size of CELLS",
+            cells_line_);
+      corners_.insert(corners_.end(), numbers.begin() + at, numbers.begin() + at + corners);
+      at += static_cast<std::size_t>(corners);
+      offsets_.push_back(corners_.size());
+    }
+    if (at != numbers.size()) scan_.fail("the size of CELLS is larger than its cells", cells_line_);
+  }
+
+  // From 5.0 on: n counts the offsets, one more than there are cells.
+  void read_offsets_and_connectivity(std::size_t n, std::size_t size) {
+    scan_.next();
+    const std::vector<std::int64_t> offsets = read_whole_numbers(n, read_type(), "offsets");
+    std::string_view word = scan_.word("CONNECTIVITY");
+    if (lower_case(word) == "metadata") {
+      skip_metadata();
+      word = scan_.word("CONNECTIVITY");
+    }
+    if (lower_case(word) != "connectivity") scan_.fail("expected CONNECTIVITY, found " + in_quotes(word));
+    corners_ = read_whole_numbers(size, read_type(), "connectivity");
+    if (offsets.empty()) return;
+    if (offsets.front() != 0 || offsets.back() != static_cast<std::int64_t>(size) ||
+        !std::is_sorted(offsets.begin(), offsets.end()))
+      scan_.fail("OFFSETS must rise from 0 to the size of CONNECTIVITY", cells_line_);
+    offsets_.assign(offsets.begin(), offsets.end());
+  }
+
+  void read_cell_types() {
+    if (has_types_) scan_.fail("a second section CELL_TYPES");
+    has_types_ = true;
+    types_line_ = scan_.word_line();
+    const std::size_t n = read_count("the number of cell types");
+    types_ = read_whole_numbers(n, kInt32, "cell types");
+  }
+
+  // Attributes may be of many kinds; read are the scalars of cells, of which one may become the references.
+  void read_attributes(std::size_t expected, bool of_cells) {
+    const std::int64_t n = scan_.integer("the number of attribute entries");
+    if (n < 0 || static_cast<std::uint64_t>(n) != expected)
+      scan_.fail("attributes for " + std::to_string(n) + " entries, expected " + std::to_string(expected));
+    while (!stray_attribute_) {
+      const auto word = scan_.peek();
+      if (!word) return;
+      const std::string keyword = lower_case(*word);
+      if (keyword == "cell_data" || keyword == "point_data") return;
+      scan_.next();
+      if (keyword == "scalars") read_scalars(expected, of_cells);
+      else if (keyword == "field") read_field(of_cells);
+      else if (keyword == "metadata") skip_metadata();
+      else if (!skip_attribute(keyword, expected, of_cells)) end_attributes(*word);
+    }
+  }
+
+  /// False: its kind or type is not known.
+  bool skip_attribute(const std::string& keyword, std::size_t n, bool of_cells) {
+    const auto* attribute = std::find_if(std::begin(kSkippedAttributes), std::end(kSkippedAttributes),
+                                         [&](const VtkAttribute& a) { return keyword == a.keyword; });
+    if (attribute == std::end(kSkippedAttributes)) return false;
+    const std::string_view name = scan_.word("the name of an attribute");
+    std::size_t components = attribute->components;
+    if (components == 0) components = read_count("the number of components");
+    if (keyword == "lookup_table") n = read_count("the size of a lookup table");
+    const auto type = attribute->is_colors ? std::optional(binary_ ? kUInt8 : kFloat32)
+                                           : type_of(scan_.word("a data type"));
+    if (!type) return false;
+    if (keyword == "lookup_table") read_array(n, components, *type, "", Array::no_data);
+    else read_array(n, components, *type, name, of_cells && !keyword.ends_with("_ids") ? Array::of_cells : Array::other);
+    return true;
+  }
+
+  /// At one that cannot be passed over.
+  void end_attributes(std::string_view word) {
+    stray_attribute_ = true;
+    if (std::none_of(arrays_.begin(), arrays_.end(), may_be_references) || !asked_.empty())
+      parsed_.warnings.push_back("attributes from " + in_quotes(word) + " on are not read");
+  }
+
+  void read_scalars(std::size_t n, bool of_cells) {
+    const std::string_view name = scan_.word("the name of the scalars");
+    const auto type = type_of(scan_.word("a data type"));
+    if (!type) return end_attributes(name);
+    std::int64_t components = 1;
+    if (const auto word = scan_.peek(); word && parse_integer(*word)) components = *parse_integer(*scan_.next());
+    if (components < 1 || components > 4) scan_.fail("scalars have 1 to 4 components");
+    if (const auto word = scan_.peek(); word && lower_case(*word) == "lookup_table") {
+      scan_.next();
+      scan_.word("the name of a lookup table");
+    }
+    read_array(n, static_cast<std::size_t>(components), *type, name, of_cells ? Array::of_cells : Array::other);
+  }
+
+  void read_field(bool of_cells) {
+    scan_.word("the name of the field");
+    const std::size_t num_arrays = read_count("the number of arrays");
+    for (std::size_t i = 0; i < num_arrays; ++i) {
+      auto name = scan_.word("the name of an array");
+      while (lower_case(name) == "metadata") {
+        skip_metadata();
+        name = scan_.word("the name of an array");
+      }
+      const std::size_t components = read_count("the number of components"), n = read_count("the number of tuples");
+      if (components > 0 && n > scan_.bytes_left() / components) scan_.fail("the file ends within an array");
+      const std::string_view type_name = scan_.word("a data type");
+      if (lower_case(type_name) == "string") {
+        scan_.line();
+        for (std::size_t j = 0; j < components * n; ++j) skip_string();
+        ++num_arrays_;
+        continue;
+      }
+      const auto type = type_of(type_name);
+      if (!type) {
+        if (!has_types_) scan_.fail("unknown data type " + in_quotes(type_name));
+        return end_attributes(name);
+      }
+      read_array(n, components, *type, name, of_cells ? Array::of_cells : Array::other);
+    }
+  }
+
+  /// A line in text; in binary its length in 1, 2, 4 or 8 bytes, as the top two bits say, then the characters.
+  void skip_string() {
+    if (!binary_) {
+      if (!scan_.line()) scan_.fail("the file ends within an array");
+      return;
+    }
+    const std::string_view first = scan_.bytes(1, "an array");
+    const auto lead = static_cast<unsigned char>(first[0]);
+    const std::size_t more = (std::size_t{1} << (3 - (lead >> 6))) - 1;
+    std::size_t length = lead & 63u;
+    for (const char c : scan_.bytes(more, "an array")) length = length << 8 | static_cast<unsigned char>(c);
+    scan_.bytes(length, "an array");
+  }
+
+  enum class Array { of_cells, other, no_data };  ///< a lookup table is no data
+
+  void read_array(std::size_t n, std::size_t components, ValueType type, std::string_view name, Array kind) {
+    if (components > 0 && n > scan_.bytes_left() / components) scan_.fail("the file ends within an array");
+    CellNumbers array{decoded(name), type.is_real(), {}};
+    bool keep = kind == Array::of_cells && components == 1 && n == num_cells_;
+    const auto take = [&](std::size_t, double value) {
+      keep = keep && value == std::floor(value);
+      if (keep) array.values.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
+    };
+    if (binary_ || !type.is_real())
+      read_values(n * components, type, "an array", take);
+    else  // quality values and the like may well be nan
+      for (std::size_t i = 0; i < n * components; ++i) {
+        const auto value = parse_number(scan_.word("an array"));
+        take(i, value.value_or(std::numeric_limits<double>::quiet_NaN()));
+      }
+    if (keep)
+      arrays_.push_back(std::move(array));
+    else if (kind == Array::of_cells)
+      others_.push_back(std::move(array.name));
+    num_arrays_ += kind != Array::no_data;
+  }
+
+  /// Names are words: VTK writes a blank in one as %20.
+  static std::string decoded(std::string_view word) {
+    std::string name;
+    for (std::size_t i = 0; i < word.size(); ++i) {
+      int code = 0;
+      const char* digits = word.data() + i + 1;
+      const bool is_code = word[i] == '%' && i + 2 < word.size() &&
+                           std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2;
+      name += is_code ? static_cast<char>(code) : word[i];
+      i += is_code ? 2 : 0;
+    }
+    return name;
+  }
+
+  void choose_references() {
+    std::optional<std::size_t> chosen;
+    try {
+      chosen = subvol::choose_references(arrays_, asked_, others_);
+    } catch (const InputError& error) {
+      throw InputError(name_ + ": " + error.what());
+    }
+    LeftOut left_out;
+    left_out.add("data arrays", num_arrays_ - (chosen ? 1 : 0));
+    left_out.tell(parsed_.warnings);
+    if (!chosen) return;
+    references_ = arrays_[*chosen].values;
+    const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), may_be_references) - 1;
+    if (rivals > 0 && asked_.empty())
+      parsed_.warnings.push_back("references are taken from the cell data " + in_quotes(arrays_[*chosen].name) +
+                                 "; there are " + std::to_string(rivals) +
+                                 " more of whole numbers, of which --references NAME chooses another");
+  }
+
+  /// METADATA runs to the next empty line.
+  void skip_metadata() {
+    scan_.line();
+    while (const auto line = scan_.line())
+      if (line->find_first_not_of(" \t") == std::string_view::npos) break;
+  }
+
+  void build_cells() {
+    choose_references();
+    if (types_.size() != num_cells_)
+      scan_.fail(std::to_string(types_.size()) + " cell types for " + std::to_string(num_cells_) + " cells",
+                 types_line_);
+    for (std::size_t c = 0; c < num_cells_; ++c) {
+      const auto known = std::find_if(std::begin(kVtkCells), std::end(kVtkCells),
+                                      [&](const VtkCell& cell) { return cell.type == types_[c]; });
+      if (known != std::end(kVtkCells)) {
+        add_cell(c, *known);
+        continue;
+      }
+      const std::string name = "cell " + std::to_string(c);
+      if (types_[c] == kPyramid)
+        scan_.fail(name + " is a pyramid, of " + std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) +
+                       ": " + kNoPyramids,
+                   types_line_);
+      if (std::find(std::begin(kLowerDimensions), std::end(kLowerDimensions), types_[c]) == std::end(kLowerDimensions))
+        scan_.fail(name + " has VTK type " + std::to_string(types_[c]) +
+                       ", expected 10 (tet), 11 (voxel), 12 (hex) or 13 (wedge)", types_line_);
+      ++num_skipped_;
+    }
+    if (num_skipped_ > 0)
+      parsed_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
+    if (num_beyond_ > 0)
+      parsed_.warnings.push_back("the references of " + std::to_string(num_beyond_) +
+                                 " cells are beyond 32 bits, and become 0");
+    auto& references = parsed_.mesh.references;
+    if (std::all_of(references.begin(), references.end(), [](int r) { return r == 0; })) references.clear();
+  }
+
+  void add_cell(std::size_t c, const VtkCell& vtk_cell) {
+    const auto size = static_cast<std::size_t>(cell_topology(vtk_cell.kind).num_vertices);
+    const std::span<const std::int64_t> corners(corners_.data() + offsets_[c], offsets_[c + 1] - offsets_[c]);
+    if (corners.size() != size)
+      scan_.fail("cell " + std::to_string(c) + " of VTK type " + std::to_string(vtk_cell.type) + " has " +
+                     std::to_string(corners.size()) + " corners, expected " + std::to_string(size), cells_line_);
+    std::array<Index, kMaxCellVertices> cell;
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::int64_t v = corners[static_cast<std::size_t>(vtk_cell.corner[i])];
+      if (v < 0 || static_cast<std::uint64_t>(v) >= parsed_.mesh.num_vertices())
+        scan_.fail("cell " + std::to_string(c) + " names point " + std::to_string(v) + " of " +
+                       std::to_string(parsed_.mesh.num_vertices()), cells_line_);
+      cell[i] = static_cast<Index>(v);
+    }
+    parsed_.mesh.add_cell(vtk_cell.kind, {cell.data(), size});
+    const std::int64_t reference = references_.empty() ? 0 : references_[c];
+    const bool fits = reference >= std::numeric_limits<int>::min() && reference <= std::numeric_limits<int>::max();
+    parsed_.mesh.references.push_back(fits ? static_cast<int>(reference) : 0);
+    num_beyond_ += !fits;
+  }
+
+  TextScanner scan_;
+  std::string name_, asked_;
+  ParsedMesh parsed_;
+  std::vector<CellNumbers> arrays_;   ///< of which the references may be chosen
+  std::vector<std::string> others_;   ///< names of the other cell data
+  int major_ = 0;
+  bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false;
+  std::size_t num_arrays_ = 0, num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
+  std::vector<std::size_t> offsets_{0};
+  std::vector<std::int64_t> corners_, types_, references_;
+};
+
+const VtkCell& vtk_cell_of(CellKind kind) {
+  return *std::find_if(std::begin(kVtkCells), std::end(kVtkCells), [&](const VtkCell& c) { return c.kind == kind; });
+}
+
+}  // namespace
+
+ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes, const std::string& references) {
+  return VtkParser(name, bytes, references).parse();
+}
+
+std::string format_legacy_vtk(const VolumeMesh& mesh) {
+  std::string text = "# vtk DataFile Version 3.0\nsubvol volume mesh\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS " +
+                     std::to_string(mesh.num_vertices()) + " double\n";
+  for (const Vec3& position : mesh.positions)
+    for (int i = 0; i < 3; ++i) {
+      append_number(text, position[i]);
+      text += i < 2 ? ' ' : '\n';
+    }
+  text += "CELLS " + std::to_string(mesh.num_cells()) + " " +
+          std::to_string(mesh.num_cells() + mesh.cell_vertices.size()) + "\n";
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const auto cell = mesh.cell(c);
+    const auto& corner = vtk_cell_of(mesh.kinds[c]).corner;  // each of these orders is its own inverse
+    text += std::to_string(cell.size());
+    for (std::size_t i = 0; i < cell.size(); ++i)
+      text.append(" ").append(std::to_string(cell[static_cast<std::size_t>(corner[i])]));
+    text += '\n';
+  }
+  text += "CELL_TYPES " + std::to_string(mesh.num_cells()) + "\n";
+  for (const CellKind kind : mesh.kinds) text += std::to_string(vtk_cell_of(kind).type) + "\n";
+  if (!mesh.references.empty()) {
+    text += "CELL_DATA " + std::to_string(mesh.num_cells()) + "\nSCALARS reference int 1\nLOOKUP_TABLE default\n";
+    for (const int reference : mesh.references) text += std::to_string(reference) + "\n";
+  }
+  return text;
+}
+
+}  // namespace subvol

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/io/reference_arrays.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace subvol {
+
+namespace {
+
+/// Names as `plain` makes them, without a plural's s; those that come first are meant first.
+constexpr std::string_view kReferenceNames[] = {
+    "reference",  "ref",        "meditref",   "material",  "materialid", "mat",      "matid",      "attribute",
+    "gmshphysical", "physical", "cellentityid", "region",  "regionid",   "subdomain", "subdomainid", "domain",
+    "domainid",   "zone",       "zoneid",     "block",     "blockid",    "elementblockid", "part",  "partid",
+    "component",  "componentid", "label",     "tag",       "celltag",    "marker",   "gmshgeometrical"};
+
+/// Numbers of things, one for each cell or process.
+constexpr std::string_view kIdNames[] = {"id", "cellid", "elementid", "elemid", "cellnumber", "elementnumber", "index",
+                                         "cellindex", "processid", "vtkprocessid", "processorid", "rank", "procid"};
+
+/// Small letters and digits, without a plural's s.
+std::string plain(std::string_view name) {
+  std::string text;
+  for (const char c : lower_case(name))
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) text += c;
+  if (text.size() > 2 && text.ends_with('s')) text.pop_back();
+  return text;
+}
+
+bool is_id_or_ghost(std::string_view name) {
+  const std::string text = plain(name);
+  const bool is_id = text.ends_with("id") || text.ends_with("number") || text.ends_with("index");
+  return text.find("ghost") != std::string::npos ||
+         (is_id && (text.starts_with("global") || text.starts_with("pedigree") ||
+                    text.find("original") != std::string::npos)) ||
+         std::find(std::begin(kIdNames), std::end(kIdNames), text) != std::end(kIdNames);
+}
+
+std::size_t rank(const CellNumbers& array) {
+  return static_cast<std::size_t>(std::find(std::begin(kReferenceNames), std::end(kReferenceNames), plain(array.name)) -
+                                  std::begin(kReferenceNames));
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text.append(text.empty() ? "" : ", ").append(in_quotes(name));
+  return text;
+}
+
+}  // namespace
+
+bool may_be_references(const CellNumbers& array) {
+  return !is_id_or_ghost(array.name) && (!array.is_real || rank(array) < std::size(kReferenceNames));
+}
+
+std::optional<std::size_t> choose_references(const std::vector<CellNumbers>& arrays, const std::string& name,
+                                             const std::vector<std::string>& others) {
+  if (name.empty()) {
+    std::optional<std::size_t> chosen;
+    for (std::size_t i = 0; i < arrays.size(); ++i)
+      if (may_be_references(arrays[i]) && (!chosen || rank(arrays[i]) < rank(arrays[*chosen]))) chosen = i;
+    return chosen;
+  }
+  const auto is_named = [&](const CellNumbers& array) { return array.name == name; };
+  const auto is_like = [&](const CellNumbers& array) { return lower_case(array.name) == lower_case(name); };
+  auto found = std::find_if(arrays.begin(), arrays.end(), is_named);
+  if (found == arrays.end()) found = std::find_if(arrays.begin(), arrays.end(), is_like);
+  if (found != arrays.end()) return static_cast<std::size_t>(found - arrays.begin());
+  std::vector<std::string> names;
+  for (const CellNumbers& array : arrays) names.push_back(array.name);
+  throw InputError("no cell data " + in_quotes(name) + " of whole numbers to take references from; there are " +
+                   (names.empty() ? "none" : listed(names)) +
+                   (others.empty() ? "" : ", and these of fractions or of several components: " + listed(others)));
+}
+
+}  // namespace subvol

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/io/surface_io.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/length_range.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/sound_points.h"
+#include "subvol/io/surface_formats.h"
+#include "subvol/surface/boundary.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <numeric>
+#include <span>
+
+namespace subvol {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Twice a triangle's area, relative to its longest edge squared, at or below which it has no direction left.
+constexpr double kNoArea = 1e-15;
+
+struct Format {
+  const char* extension;
+  const char* description;
+  ParsedSurface (*parse)(const std::string& name, std::string_view bytes);
+};
+constexpr Format kFormats[] = {{".off", "OFF text", parse_off},
+                               {".obj", "Wavefront OBJ polygons", parse_obj},
+                               {".stl", "STL text or binary", parse_stl},
+                               {".ply", "PLY 1.0 text or binary", parse_ply}};
+
+/// Remarks about one file.
+class Remarks {
+ public:
+  Remarks(std::string name, std::vector<std::string>* warnings) : name_(std::move(name)), warnings_(warnings) {}
+  void count(std::size_t n, const char* what) {
+    if (n > 0 && warnings_) warnings_->push_back(name_ + ": " + std::to_string(n) + " " + what);
+  }
+  void tell(const std::vector<std::string>& remarks) {
+    if (!warnings_) return;
+    for (const std::string& remark : remarks) warnings_->push_back(name_ + ": " + remark);
+  }
+  [[noreturn]] void fail(const std::string& message) const { throw InputError(name_ + ": " + message); }
+
+ private:
+  std::string name_;
+  std::vector<std::string>* warnings_;
+};
+
+/// Keeps the faces that are polygons; their corners without repetitions of the one before.
+void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
+  PolygonMesh kept;
+  std::size_t num_shortened = 0, num_dropped = 0;
+  std::vector<Index> corners, sorted;
+  for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
+    const std::size_t size = mesh.face_offsets[f + 1] - mesh.face_offsets[f];
+    corners.assign(mesh.face_vertices.begin() + mesh.face_offsets[f],
+                   mesh.face_vertices.begin() + mesh.face_offsets[f + 1]);
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
+    sorted = corners;
+    std::sort(sorted.begin(), sorted.end());
+    if (corners.size() < 3 || std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
+      ++num_dropped;
+      continue;
+    }
+    if (corners.size() > kMaxPolygonCorners)
+      remarks.fail("face " + std::to_string(f) + " has " + std::to_string(corners.size()) +
+                   " corners, expected at most " + std::to_string(kMaxPolygonCorners));
+    num_shortened += corners.size() < size;
+    kept.face_vertices.insert(kept.face_vertices.end(), corners.begin(), corners.end());
+    kept.face_offsets.push_back(kept.face_vertices.size());
+  }
+  mesh.face_vertices = std::move(kept.face_vertices);
+  mesh.face_offsets = std::move(kept.face_offsets);
+  remarks.count(num_shortened, "faces repeat a corner: the repetition is dropped");
+  remarks.count(num_dropped, "faces have fewer than three different corners or name one twice: dropped");
+  if (mesh.num_faces() == 0) remarks.fail(num_dropped ? "no usable faces" : "no faces");
+}
+
+/// Drops positions that `corners` does not name and renumbers it. Returns how many went.
+std::size_t drop_unused(std::vector<Vec3>& positions, std::span<Index> corners) {
+  std::vector<Index> renumbered(positions.size(), kNoIndex);
+  for (const Index v : corners) renumbered[static_cast<std::size_t>(v)] = 0;
+  std::size_t kept = 0;
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    if (renumbered[v] == kNoIndex) continue;
+    positions[kept] = positions[v];
+    renumbered[v] = static_cast<Index>(kept++);
+  }
+  const std::size_t dropped = positions.size() - kept;
+  positions.resize(kept);
+  for (Index& v : corners) v = renumbered[static_cast<std::size_t>(v)];
+  return dropped;
+}
+
+void check_extent(const std::vector<Vec3>& positions, const Remarks& remarks) {
+  Vec3 lower = positions.front(), upper = positions.front();
+  for (const Vec3& x : positions) {
+    if (!x.allFinite()) remarks.fail("a coordinate is not finite");
+    lower = lower.cwiseMin(x), upper = upper.cwiseMax(x);
+  }
+  if (lower == upper) remarks.fail("all vertices are in one place: the bounding box is a point");
+  const double largest = std::max(lower.cwiseAbs().maxCoeff(), upper.cwiseAbs().maxCoeff());
+  const double extent = (upper - lower).maxCoeff();
+  std::string figure;
+  append_number(figure, largest > kMostLength ? largest : extent);
+  if (largest > kMostLength)
+    remarks.fail("coordinates up to " + figure + ": areas overflow; scale the surface down");
+  if (extent < kLeastLength)
+    remarks.fail("the bounding box is only " + figure + " wide: areas underflow; scale it up");
+}
+
+using Triangle = std::array<Index, 3>;
+
+bool has_area(const std::vector<Vec3>& x, const Triangle& t) {
+  const Vec3 a = x[t[1]] - x[t[0]], b = x[t[2]] - x[t[0]], c = x[t[2]] - x[t[1]];
+  return a.cross(b).norm() > kNoArea * std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
+}
+
+/// For every vertex a number that it shares with exactly the vertices in the same place.
+std::vector<Index> places(const std::vector<Vec3>& x) {
+  std::vector<Index> order(x.size()), place(x.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  const auto before = [&](Index v, Index w) {
+    return std::lexicographical_compare(x[v].data(), x[v].data() + 3, x[w].data(), x[w].data() + 3);
+  };
+  std::sort(order.begin(), order.end(), before);
+  for (std::size_t i = 0; i < order.size(); ++i)
+    place[order[i]] = i > 0 && !before(order[i - 1], order[i]) ? place[order[i - 1]] : order[i];
+  return place;
+}
+
+/// Drops all but the first of triangles with the same three places. Returns how many went.
+std::size_t drop_duplicates(TriangleMesh& mesh) {
+  const std::vector<Index> place = places(mesh.positions);
+  std::vector<std::pair<Triangle, std::size_t>> keys(mesh.triangles.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    for (int j = 0; j < 3; ++j) keys[i].first[j] = place[mesh.triangles[i][j]];
+    std::sort(keys[i].first.begin(), keys[i].first.end());
+    keys[i].second = i;
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<char> duplicate(keys.size(), 0);
+  for (std::size_t i = 1; i < keys.size(); ++i)
+    if (keys[i].first == keys[i - 1].first) duplicate[keys[i].second] = 1;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    if (!duplicate[i]) mesh.triangles[kept++] = mesh.triangles[i];
+  mesh.triangles.resize(kept);
+  return keys.size() - kept;
+}
+
+/// Keeps the first of points in one place. Returns how many went.
+std::size_t drop_repeated(std::vector<Vec3>& points) {
+  const std::vector<Index> place = places(points);
+  std::vector<Index> first(points.size(), kNoIndex);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Index& known = first[static_cast<std::size_t>(place[i])];
+    if (known != kNoIndex) continue;
+    known = static_cast<Index>(i);
+    points[kept++] = points[i];
+  }
+  const std::size_t dropped = points.size() - kept;
+  points.resize(kept);
+  return dropped;
+}
+
+}  // namespace
+
+PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* warnings) {
+  const std::string extension = lower_case(path.extension().string());
+  const auto* format = std::find_if(std::begin(kFormats), std::end(kFormats),
+                                    [&](const Format& f) { return extension == f.extension; });
+  if (format == std::end(kFormats))
+    throw InputError(path.string() + ": unknown surface extension " + in_quotes(extension) + ", expected " +
+                     surface_formats());
+  Remarks remarks(path.string(), warnings);
+  ParsedSurface parsed = format->parse(path.string(), read_file(path));
+  remarks.tell(parsed.warnings);
+  PolygonMesh& mesh = parsed.mesh;
+  drop_bad_faces(mesh, remarks);
+  remarks.count(drop_unused(mesh.positions, mesh.face_vertices), "vertices belong to no face: dropped");
+  check_extent(mesh.positions, remarks);
+  return std::move(mesh);
+}
+
+TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* warnings) {
+  Remarks remarks(path.string(), warnings);
+  TriangleMesh mesh = triangulate(read_polygon_mesh(path, warnings));
+  const std::size_t num_flat =
+      std::erase_if(mesh.triangles, [&](const Triangle& t) { return !has_area(mesh.positions, t); });
+  remarks.count(num_flat, "triangles have no area: dropped");
+  remarks.count(drop_duplicates(mesh), "triangles are there more than once: the first is kept");
+  if (mesh.triangles.empty()) remarks.fail("no triangle has any area");
+  drop_unused(mesh.positions, {mesh.triangles.front().data(), 3 * mesh.triangles.size()});
+  return mesh;
+}
+
+bool is_point_cloud_file(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".xyz" || (extension == ".ply" && !ply_has_faces(path.string(), read_file(path)));
+}
+
+PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warnings) {
+  const std::string extension = lower_case(path.extension().string());
+  Remarks remarks(path.string(), warnings);
+  PointCloud cloud;
+  if (extension == ".xyz") {
+    std::size_t longer_lines = 0;
+    cloud.points = parse_xyz(path.string(), read_file(path), longer_lines);
+    remarks.count(longer_lines, "lines have more than three columns: the rest is skipped");
+  } else if (extension == ".ply") {
+    ParsedSurface parsed = parse_ply(path.string(), read_file(path));
+    remarks.tell(parsed.warnings);
+    PolygonMesh& mesh = parsed.mesh;
+    remarks.count(mesh.num_faces(), "faces are skipped: only the points are read");
+    cloud.points = std::move(mesh.positions);
+  } else {
+    remarks.fail("unknown extension " + in_quotes(extension) + " of points, expected " + point_cloud_formats());
+  }
+  return sound_points(std::move(cloud.points), path.string(), warnings);
+}
+
+PointCloud sound_points(std::vector<Vec3> points, const std::string& name, std::vector<std::string>* warnings) {
+  Remarks remarks(name, warnings);
+  if (points.empty()) remarks.fail("no points");
+  check_extent(points, remarks);
+  remarks.count(drop_repeated(points), "points are there more than once: the first is kept");
+  if (points.size() < kLeastCloudPoints)
+    remarks.fail("only " + std::to_string(points.size()) + " points, expected at least " +
+                 std::to_string(kLeastCloudPoints));
+  return {std::move(points)};
+}
+
+std::vector<double> read_vertex_attribute(const fs::path& path, const std::string& attribute) {
+  if (lower_case(path.extension().string()) != ".ply")
+    throw InputError(path.string() + ": only .ply files have vertex properties");
+  return parse_ply_attribute(path.string(), read_file(path), attribute);
+}
+
+bool is_surface_extension(const std::string& extension) {
+  return std::any_of(std::begin(kFormats), std::end(kFormats),
+                     [&](const Format& format) { return extension == format.extension; });
+}
+
+std::string surface_formats() {
+  std::string text;
+  for (const Format& format : kFormats)
+    text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
+  return text;
+}
+
+std::string point_cloud_formats() { return ".xyz (text), .ply (without faces)"; }
+
+}  // namespace subvol

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/binary_value.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
+#include "subvol/io/surface_formats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace subvol {
+
+namespace {
+
+struct NamedType {
+  const char* name;
+  ValueType type;
+};
+constexpr NamedType kPlyTypes[] = {
+    {"char", kInt8},     {"uchar", kUInt8},   {"short", kInt16},    {"ushort", kUInt16}, {"int", kInt32},
+    {"uint", kUInt32},   {"float", kFloat32}, {"double", kFloat64}, {"int8", kInt8},     {"uint8", kUInt8},
+    {"int16", kInt16},   {"uint16", kUInt16}, {"int32", kInt32},    {"uint32", kUInt32}, {"float32", kFloat32},
+    {"float64", kFloat64}};
+
+struct Property {
+  enum class Use { none, x, y, z, corners, attribute };
+  Use use = Use::none;
+  bool is_list = false;
+  ValueType count_type = kUInt8, type = kFloat32;
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<Property> properties;
+
+  std::size_t least_bytes(bool text) const {
+    std::size_t bytes = 0;
+    for (const Property& p : properties) bytes += text ? 2 : p.is_list ? p.count_type.size : p.type.size;
+    return bytes;
+  }
+  bool has(Property::Use use) const {
+    return std::any_of(properties.begin(), properties.end(), [&](const Property& p) { return p.use == use; });
+  }
+};
+
+class PlyParser {
+ public:
+  /// attribute  vertex property whose values are kept as well; empty: none.
+  PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "")
+      : name_(name),
+        size_(bytes.size()),
+        scan_(name, bytes, TextScanner::Comments::none),
+        attribute_(std::move(attribute)) {}
+
+  ParsedSurface parse() {
+    read_header();
+    for (const Element& element : elements_) read_element(element);
+    for (const Index v : mesh_.face_vertices)
+      if (static_cast<std::size_t>(v) >= mesh_.positions.size())
+        throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
+                         std::to_string(mesh_.positions.size()));
+    ParsedSurface parsed{std::move(mesh_), {}};
+    left_out_.tell(parsed.warnings);
+    return parsed;
+  }
+
+  /// Whether the header, which is all that is read, announces faces.
+  bool has_faces() {
+    read_header();
+    return std::any_of(elements_.begin(), elements_.end(),
+                       [](const Element& element) { return element.name == "face" && element.count > 0; });
+  }
+
+  /// What `parse` found of the attribute, one value per vertex that has it.
+  std::vector<double> take_attribute() { return std::move(values_); }
+
+ private:
+  /// Where the text is lines, the line tells the place; in binary data, the byte.
+  [[noreturn]] void fail(const std::string& message) const {
+    if (text_) scan_.fail(message);
+    throw InputError(name_ + ": byte " + std::to_string(size_ - scan_.bytes_left()) + ": " + message);
+  }
+
+  void read_header() {
+    const auto first = scan_.line();
+    if (first != std::optional<std::string_view>("ply")) scan_.fail("expected ply in the first line");
+    bool has_format = false;
+    while (const auto line = scan_.line()) {
+      TextScanner words(name_, *line, TextScanner::Comments::none);
+      const std::string_view keyword = words.next().value_or("comment");
+      if (keyword == "end_header") {
+        if (!has_format) scan_.fail("the header has no format");
+        return;
+      }
+      if (keyword == "format") has_format = true, read_format(words);
+      else if (keyword == "element") read_element_line(words);
+      else if (keyword == "property") read_property_line(words);
+      else if (keyword != "comment" && keyword != "obj_info")
+        scan_.fail("unknown header keyword " + in_quotes(keyword));
+    }
+    scan_.fail("the file ends where end_header is expected");
+  }
+
+  void read_format(TextScanner& words) {
+    const std::string_view format = words.next().value_or("");
+    if (words.next().value_or("") != "1.0") scan_.fail("expected version 1.0 of the format");
+    text_ = format == "ascii";
+    order_ = format == "binary_big_endian" ? std::endian::big : std::endian::little;
+    if (!text_ && format != "binary_big_endian" && format != "binary_little_endian")
+      scan_.fail("unknown format " + in_quotes(format));
+  }
+
+  void read_element_line(TextScanner& words) {
+    const std::string_view name = words.next().value_or("");
+    const auto count = parse_integer(words.next().value_or(""));
+    if (!count || *count < 0) scan_.fail("expected 'element NAME COUNT'");
+    if (*count > std::numeric_limits<Index>::max() || static_cast<std::uint64_t>(*count) > scan_.bytes_left())
+      scan_.fail("element " + in_quotes(name) + " has a count of " + std::to_string(*count) +
+                 ", more than the rest of the file can hold");
+    elements_.push_back({std::string(name), static_cast<std::size_t>(*count), {}});
+  }
+
+  void read_property_line(TextScanner& words) {
+    if (elements_.empty()) scan_.fail("a property before any element");
+    Property property;
+    std::string_view word = words.next().value_or("");
+    if (word == "list") {
+      property.is_list = true;
+      property.count_type = type_of(words.next().value_or(""));
+      if (property.count_type.is_real()) scan_.fail("the length of a list must be a whole number");
+      word = words.next().value_or("");
+    }
+    property.type = type_of(word);
+    const std::string_view name = words.next().value_or("");
+    property.use = use_of(elements_.back().name, name, property.is_list);
+    elements_.back().properties.push_back(property);
+    note(elements_.back(), property, name);
+  }
+
+  /// Normals are not missed: faces have them.
+  void note(const Element& element, const Property& property, std::string_view name) {
+    const bool is_normal = name == "nx" || name == "ny" || name == "nz";
+    if (element.count == 0 || property.use != Property::Use::none || is_normal) return;
+    const bool is_known = element.name == "vertex" || element.name == "face";
+    left_out_.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
+  }
+
+  ValueType type_of(std::string_view word) const {
+    for (const NamedType& type : kPlyTypes)
+      if (word == type.name) return type.type;
+    scan_.fail("unknown property type " + in_quotes(word));
+  }
+
+  Property::Use use_of(std::string_view element, std::string_view name, bool is_list) const {
+    if (element == "vertex" && !is_list) {
+      if (name == "x") return Property::Use::x;
+      if (name == "y") return Property::Use::y;
+      if (name == "z") return Property::Use::z;
+      if (!attribute_.empty() && name == attribute_) return Property::Use::attribute;
+    }
+    const bool corners = name == "vertex_indices" || name == "vertex_index";
+    return element == "face" && is_list && corners ? Property::Use::corners : Property::Use::none;
+  }
+
+  void read_element(const Element& element) {
+    const bool vertices = element.name == "vertex", faces = element.name == "face";
+    if (vertices && !(element.has(Property::Use::x) && element.has(Property::Use::y) && element.has(Property::Use::z)))
+      fail("vertices without x, y and z");
+    if (faces && !element.has(Property::Use::corners)) fail("faces without vertex_indices");
+    // An element without properties takes no bytes: its count means nothing.
+    if (element.properties.empty()) return;
+    if (element.count > (scan_.bytes_left() + 1) / element.least_bytes(text_))
+      fail("element " + in_quotes(element.name) + " has a count of " + std::to_string(element.count) +
+           ", more than the rest of the file can hold");
+    for (std::size_t i = 0; i < element.count; ++i) {
+      if (vertices) mesh_.positions.emplace_back();
+      for (const Property& property : element.properties) read_property(property);
+      if (faces) mesh_.face_offsets.push_back(mesh_.face_vertices.size());
+    }
+  }
+
+  void read_property(const Property& property) {
+    using Use = Property::Use;
+    if (property.is_list) {
+      const double n = read_whole(property.count_type, "the length of a list");
+      if (n < 0 || n > static_cast<double>(scan_.bytes_left())) fail("a list of impossible length");
+      for (double i = 0; i < n; ++i) {
+        if (property.use == Use::corners)
+          add_corner(read_whole(property.type, "a vertex number"));
+        else
+          skip_value(property.type);
+      }
+    } else if (property.use == Use::none) {
+      skip_value(property.type);
+    } else if (property.use == Use::attribute) {
+      values_.push_back(read_number(property.type, "a value of " + attribute_));
+    } else {
+      mesh_.positions.back()[static_cast<int>(property.use) - static_cast<int>(Use::x)] =
+          read_number(property.type, "a coordinate");
+    }
+  }
+
+  void add_corner(double v) {
+    if (v < 0 || v > std::numeric_limits<Index>::max()) fail("vertex number out of range");
+    mesh_.face_vertices.push_back(static_cast<Index>(v));
+  }
+
+  double read_whole(ValueType type, const char* what) {
+    if (text_) return static_cast<double>(scan_.integer(what));
+    const double value = read_binary(type);
+    if (value != std::floor(value)) fail(std::string(what) + " must be a whole number");
+    return value;
+  }
+
+  double read_number(ValueType type, const std::string& what) {
+    if (text_) return scan_.number(what.c_str());
+    const double value = read_binary(type);
+    if (!std::isfinite(value)) fail(what + " is not finite");
+    return value;
+  }
+
+  void skip_value(ValueType type) {
+    if (text_) scan_.word("a value");
+    else read_binary(type);
+  }
+
+  double read_binary(ValueType type) {
+    if (type.size > scan_.bytes_left()) fail("the file ends within its data");
+    return decode(scan_.bytes(type.size, "the data").data(), type, order_);
+  }
+
+  std::string name_;
+  std::size_t size_;
+  TextScanner scan_;
+  bool text_ = true;
+  std::endian order_ = std::endian::little;
+  std::vector<Element> elements_;
+  LeftOut left_out_;
+  PolygonMesh mesh_;
+  std::string attribute_;
+  std::vector<double> values_;
+};
+
+}  // namespace
+
+ParsedSurface parse_ply(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).parse(); }
+
+bool ply_has_faces(const std::string& name, std::string_view bytes) { return PlyParser(name, bytes).has_faces(); }
+
+std::vector<double> parse_ply_attribute(const std::string& name, std::string_view bytes, const std::string& attribute) {
+  PlyParser parser(name, bytes, attribute);
+  const std::size_t num_vertices = parser.parse().mesh.positions.size();
+  std::vector<double> values = parser.take_attribute();
+  if (values.size() != num_vertices) throw InputError(name + ": the vertices have no property " + in_quotes(attribute));
+  return values;
+}
+
+}  // namespace subvol

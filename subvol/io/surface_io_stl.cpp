@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/binary_value.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
+#include "subvol/io/surface_formats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kHeaderBytes = 84;    // 80 bytes of anything, then the number of facets
+constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, two bytes that say how many of attributes follow
+constexpr std::size_t kFirstVertexByte = 12;
+constexpr std::size_t kAttributeCountByte = 48;
+
+/// STL repeats a vertex in every facet: equal positions become one vertex.
+class Welder {
+ public:
+  void add(const Vec3& position) {
+    // + 0.0 makes one zero of the two.
+    const std::array<double, 3> key = {position[0] + 0.0, position[1] + 0.0, position[2] + 0.0};
+    const auto [it, is_new] = vertices_.try_emplace(key, static_cast<Index>(mesh_.positions.size()));
+    if (is_new) mesh_.positions.push_back(position);
+    mesh_.face_vertices.push_back(it->second);
+    if (mesh_.face_vertices.size() % 3 == 0) mesh_.face_offsets.push_back(mesh_.face_vertices.size());
+  }
+  bool is_empty() const { return mesh_.face_vertices.empty(); }
+  PolygonMesh take() { return std::move(mesh_); }
+
+ private:
+  std::map<std::array<double, 3>, Index> vertices_;
+  PolygonMesh mesh_;
+};
+
+std::size_t num_binary_facets(std::string_view bytes) {
+  return static_cast<std::size_t>(decode(bytes.data() + kHeaderBytes - 4, kUInt32, std::endian::little));
+}
+
+bool has_room_for_facets(std::string_view bytes) {
+  return num_binary_facets(bytes) <= (bytes.size() - kHeaderBytes) / kFacetBytes;
+}
+
+/// Whatever the header says: four bytes of text announce more than 150 million facets, and no text has control
+/// characters where a number of facets or a facet is.
+bool is_binary(std::string_view bytes) {
+  const auto is_no_text = [](unsigned char c) { return c < '\t'; };
+  if (bytes.size() < kHeaderBytes) return false;
+  const std::string_view first = bytes.substr(0, kHeaderBytes + kFacetBytes);
+  return has_room_for_facets(bytes) || std::any_of(first.begin(), first.end(), is_no_text);
+}
+
+/// Where the facets are, and where the last ends.
+struct BinaryFacets {
+  std::vector<std::size_t> begins;
+  std::size_t end;
+};
+
+/// Walks the facets, each with as many bytes of attributes as it says. Nothing: one is not within the file.
+std::optional<BinaryFacets> facets_with_attributes(std::string_view bytes) {
+  BinaryFacets facets{{}, kHeaderBytes};
+  for (std::size_t f = 0, n = num_binary_facets(bytes); f < n; ++f) {
+    if (facets.end > bytes.size() || bytes.size() - facets.end < kFacetBytes) return std::nullopt;
+    facets.begins.push_back(facets.end);
+    const double more =
+        decode(bytes.data() + facets.end + kAttributeCountByte, kUInt16, std::endian::little);
+    facets.end += kFacetBytes + static_cast<std::size_t>(more);
+  }
+  if (facets.end > bytes.size()) return std::nullopt;
+  return facets;
+}
+
+/// Many programs keep a colour where the count of attribute bytes should be: then the facets alone fill the file.
+BinaryFacets binary_facets(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
+  const std::size_t n = num_binary_facets(bytes), plain_end = kHeaderBytes + kFacetBytes * n;
+  if (!has_room_for_facets(bytes))
+    throw InputError(name + ": byte 80: " + std::to_string(n) + " facets, more than the file can hold");
+  if (bytes.size() == plain_end) {
+    BinaryFacets facets{std::vector<std::size_t>(n), plain_end};
+    for (std::size_t f = 0; f < n; ++f) facets.begins[f] = kHeaderBytes + f * kFacetBytes;
+    return facets;
+  }
+  auto facets = facets_with_attributes(bytes);
+  if (!facets || (facets->end != bytes.size() && facets->end != plain_end))
+    throw InputError(name + ": byte " + std::to_string(plain_end) + ": the " + std::to_string(n) +
+                     " facets end here without their attributes" +
+                     (facets ? ", and at byte " + std::to_string(facets->end) + " with them" : "") +
+                     ", but the file has " + std::to_string(bytes.size()) + " bytes");
+  if (facets->end != bytes.size())  // no facet has attributes: there is no doubt where they are
+    warnings.push_back(std::to_string(bytes.size() - plain_end) + " bytes after the last facet are passed over");
+  return std::move(*facets);
+}
+
+PolygonMesh parse_binary(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
+  const BinaryFacets facets = binary_facets(name, bytes, warnings);
+  Welder welder;
+  LeftOut left_out;
+  for (std::size_t f = 0; f < facets.begins.size(); ++f) {
+    const std::size_t facet = facets.begins[f];
+    if (decode(bytes.data() + facet + kAttributeCountByte, kUInt16, std::endian::little) != 0)
+      left_out.add("facets' attributes");
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t vertex = facet + kFirstVertexByte * (i + 1);
+      Vec3 position;
+      for (int j = 0; j < 3; ++j) position[j] = decode(bytes.data() + vertex + 4 * j, kFloat32, std::endian::little);
+      if (!position.allFinite())
+        throw InputError(name + ": byte " + std::to_string(vertex) + ": facet " + std::to_string(f) +
+                         " has a coordinate that is not finite");
+      welder.add(position);
+    }
+  }
+  left_out.tell(warnings);
+  return welder.take();
+}
+
+void expect(TextScanner& scan, const char* word) {
+  const std::string_view found = scan.word(word);
+  if (lower_case(found) != word) scan.fail(std::string("expected ") + word + ", found " + in_quotes(found));
+}
+
+void parse_facet(TextScanner& scan, Welder& welder) {
+  expect(scan, "normal");
+  for (int i = 0; i < 3; ++i) scan.word("a normal");  // not used, and often nan
+  expect(scan, "outer");
+  expect(scan, "loop");
+  for (int i = 0; i < 3; ++i) {
+    expect(scan, "vertex");
+    Vec3 position;
+    for (int j = 0; j < 3; ++j) position[j] = scan.number("a coordinate");
+    welder.add(position);
+  }
+  expect(scan, "endloop");
+  expect(scan, "endfacet");
+}
+
+PolygonMesh parse_text(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
+  TextScanner scan(name, bytes, TextScanner::Comments::none);
+  Welder welder;
+  LeftOut left_out;
+  std::size_t num_solids = 0;
+  bool in_solid = false;
+  while (const auto word = scan.next()) {
+    const std::string keyword = lower_case(*word);
+    if (keyword == "facet" && in_solid) {
+      parse_facet(scan, welder);
+    } else if (keyword == (in_solid ? "endsolid" : "solid")) {
+      in_solid = !in_solid;
+      num_solids += in_solid;
+      scan.line();  // the solid's name
+    } else if (word->data() == bytes.data() && !in_solid) {
+      scan.fail("expected solid, as STL in text begins, or the 84 bytes and the facets of a binary file, found " +
+                in_quotes(*word));
+    } else {
+      scan.fail(std::string("expected ") + (in_solid ? "facet or endsolid" : "solid") + ", found " + in_quotes(*word));
+    }
+  }
+  if (in_solid && welder.is_empty())
+    scan.fail("the file ends after " + std::to_string(bytes.size()) + " bytes without a facet, in text or in binary");
+  if (in_solid) scan.fail("the file ends where facet or endsolid is expected");
+  if (num_solids > 1) left_out.add("solids, which become one", num_solids);
+  left_out.tell(warnings);
+  return welder.take();
+}
+
+}  // namespace
+
+ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
+  ParsedSurface parsed;
+  if (is_binary(bytes) && !has_room_for_facets(bytes)) require_no_utf16(name, bytes);
+  parsed.mesh = is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes, parsed.warnings);
+  return parsed;
+}
+
+}  // namespace subvol

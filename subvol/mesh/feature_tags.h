@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/base/types.h"
+
+#include <vector>
+
+namespace subvol {
+
+/// Sharpness at and above which a crease or corner never softens (OpenSubdiv's convention).
+inline constexpr double kInfiniteSharpness = 10.0;
+
+/// A boundary edge kept sharp through `sharpness` refinements (fractions blend; >= kInfiniteSharpness: for ever).
+struct CreaseEdge {
+  Index v0, v1;  ///< v0 < v1
+  double sharpness = kInfiniteSharpness;
+  friend bool operator==(const CreaseEdge&, const CreaseEdge&) = default;
+};
+
+/// A boundary vertex kept in its place.
+struct CornerVertex {
+  Index vertex;
+  double sharpness = kInfiniteSharpness;
+  friend bool operator==(const CornerVertex&, const CornerVertex&) = default;
+};
+
+/// Which parts of a mesh's boundary are features. Each edge and vertex at most once, sorted; sharpness > 0.
+struct FeatureTags {
+  std::vector<CreaseEdge> creases;
+  std::vector<CornerVertex> corners;
+  bool empty() const { return creases.empty() && corners.empty(); }
+  friend bool operator==(const FeatureTags&, const FeatureTags&) = default;
+};
+
+}  // namespace subvol

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/mesh/features.h"
+
+#include "subvol/base/error.h"
+#include "subvol/mesh/mesh_topology.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace subvol {
+
+namespace {
+
+/// In [0, 180]; 0 where a vector vanishes. By atan2: acos would lose half the digits near 0 and 180.
+double angle_between_degrees(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+}
+
+/// Area vector of a triangle or quad (half the cross product of the diagonals, for any warp), up to its length.
+Vec3 face_normal(const VolumeMesh& mesh, std::span<const Index> face) {
+  const auto& x = mesh.positions;
+  const Vec3 d0 = x[face[2]] - x[face[0]], d1 = x[face[face.size() - 1]] - x[face[1]];
+  return d0.cross(d1).normalized();
+}
+
+std::vector<CreaseEdge> creases_by_angle(const VolumeMesh& mesh, const MeshTopology& topology, double angle_degrees) {
+  std::vector<std::array<Index, 2>> edge_faces(topology.num_edges(), {kNoIndex, kNoIndex});
+  for (const Index f : topology.boundary_faces()) {
+    const auto face = topology.face(f);
+    for (std::size_t i = 0; i < face.size(); ++i) {
+      auto& faces = edge_faces[topology.find_edge(face[i], face[(i + 1) % face.size()])];
+      (faces[0] == kNoIndex ? faces[0] : faces[1]) = f;
+    }
+  }
+  std::vector<CreaseEdge> creases;
+  for (std::size_t e = 0; e < edge_faces.size(); ++e) {
+    const auto [f0, f1] = edge_faces[e];
+    if (f1 == kNoIndex) continue;
+    const Vec3 n0 = face_normal(mesh, topology.face(f0)), n1 = face_normal(mesh, topology.face(f1));
+    const auto [v0, v1] = topology.edge(static_cast<Index>(e));
+    if (angle_between_degrees(n0, n1) > angle_degrees) creases.push_back({v0, v1});
+  }
+  return creases;
+}
+
+std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const std::vector<CreaseEdge>& creases,
+                                     double angle_degrees) {
+  struct Spokes {
+    int count = 0;
+    std::array<Index, 2> ends = {kNoIndex, kNoIndex};
+  };
+  std::vector<Spokes> spokes(mesh.num_vertices());
+  const auto add = [&](Index at, Index end) {
+    Spokes& s = spokes[at];
+    if (s.count < 2) s.ends[s.count] = end;
+    ++s.count;
+  };
+  for (const CreaseEdge& crease : creases) add(crease.v0, crease.v1), add(crease.v1, crease.v0);
+
+  std::vector<CornerVertex> corners;
+  for (std::size_t v = 0; v < spokes.size(); ++v) {
+    const Spokes& s = spokes[v];
+    if (s.count < 2) continue;
+    const auto& x = mesh.positions;
+    const double turn = angle_between_degrees(x[v] - x[s.ends[0]], x[s.ends[1]] - x[v]);
+    if (s.count > 2 || turn > angle_degrees) corners.push_back({static_cast<Index>(v)});
+  }
+  return corners;
+}
+
+/// Sorts by key and keeps the sharpest of equal ones.
+template <class Tag, class Key>
+void unify(std::vector<Tag>& tags, const Key& key) {
+  std::sort(tags.begin(), tags.end(), [&](const Tag& a, const Tag& b) {
+    return key(a) != key(b) ? key(a) < key(b) : a.sharpness > b.sharpness;
+  });
+  tags.erase(std::unique(tags.begin(), tags.end(), [&](const Tag& a, const Tag& b) { return key(a) == key(b); }),
+             tags.end());
+}
+
+}  // namespace
+
+FeatureTags features_by_angle(const VolumeMesh& mesh, double angle_degrees) {
+  if (!(angle_degrees >= 0 && angle_degrees <= 180))
+    throw InputError("features_by_angle: angle_degrees must be in [0, 180], got " + std::to_string(angle_degrees));
+  const MeshTopology topology(mesh);
+  FeatureTags tags;
+  tags.creases = creases_by_angle(mesh, topology, angle_degrees);
+  tags.corners = corners_of(mesh, tags.creases, angle_degrees);
+  return merge_tags(tags, {});
+}
+
+FeatureTags merge_tags(const FeatureTags& a, const FeatureTags& b) {
+  FeatureTags merged = a;
+  merged.creases.insert(merged.creases.end(), b.creases.begin(), b.creases.end());
+  merged.corners.insert(merged.corners.end(), b.corners.begin(), b.corners.end());
+  for (CreaseEdge& crease : merged.creases)
+    if (crease.v0 > crease.v1) std::swap(crease.v0, crease.v1);
+  unify(merged.creases, [](const CreaseEdge& c) { return std::pair(c.v0, c.v1); });
+  unify(merged.corners, [](const CornerVertex& c) { return c.vertex; });
+  return merged;
+}
+
+}  // namespace subvol

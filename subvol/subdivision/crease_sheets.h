@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/subdivision/surface_refinement.h"
+
+#include <vector>
+
+namespace subvol {
+
+/// Interior rows beside creases of two or more cells.
+///
+/// Around a crease of k cells the plain interior rows have the dominant eigenvalue
+///
+///   lambda = (5 + c + sqrt((c + 9)(c + 1))) / 16,   c = cos(pi / k)
+///
+/// against 1/2 of the two boundary faces there. For k = 2 it is 1/2 too, but coupled to theirs (a Jordan block): the
+/// interior face that leaves the crease (its *sheet*) turns without end towards the mean of the boundary faces. For
+/// k = 3 it is .5797: the sheets shrink more slowly than the boundary and all turn one way. Either inverts cells, level
+/// by level, where the crease is reflex. Weights >= 0 that couple the sheets cannot cure it: with a dominant eigenvalue
+/// of 1/2 or less the sheets become positive combinations of the boundary faces, which lie outside a reflex sector. So
+/// the sheets are uncoupled where they meet a crease, each refined as a surface of its own:
+///
+///   face of a sheet      its centroid
+///   edge of a sheet with one end at the crease
+///                        the smooth Catmull-Clark edge rule among the sheet's faces beside the crease; the midpoint
+///                        at a fixed end, or where there is only one such face
+///
+/// Every sheet then has the eigenvalue 1/2 in its own direction, like the boundary faces, and cells that are positive
+/// around a crease stay so. Only topology and tags decide. Boundary rows are not touched, so the boundary remains
+/// OpenSubdiv's; inside, the map is only continuous across sheets at the crease. Weights stay >= 0, rows sum to 1, and
+/// lattices are reproduced.
+class CreaseSheets {
+ public:
+  /// Creases of at least this many cells are treated.
+  static constexpr int kMinCells = 2;
+
+  CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology, const BoundarySurface& boundary);
+
+  /// Share, 0 to 1, of the sheet's rule in an interior face's or edge's row: min(1, sharpness) of the crease.
+  double face_share(Index f) const { return face_shares_.empty() ? 0 : face_shares_[f]; }
+  double edge_share(Index e) const { return edge_shares_.empty() ? 0 : edge_shares_[e]; }
+
+  /// Adds `weight` times the sheet's row of an interior edge.
+  void add_edge(Index e, double weight, RowBuilder& row) const;
+
+ private:
+  struct EdgeFace {
+    Index edge, face;
+  };
+  void visit_face(Index f, const std::vector<double>& crease_shares);
+
+  const MeshTopology& topology_;
+  std::vector<double> face_shares_, edge_shares_;
+  std::vector<char> fixed_;           // vertices that stay
+  std::vector<EdgeFace> edge_faces_;  // sheet faces of each treated edge, sorted
+};
+
+}  // namespace subvol

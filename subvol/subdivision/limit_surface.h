@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/subdivision/sparse_map.h"
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Control vertices -> nodes whose boundary lies on the Catmull-Clark limit surface; interior vertices stay.
+///
+/// Square, num_vertices() rows; boundary rows sum to 1 and use boundary vertices only. Exact for smooth vertices,
+/// creases, corners, semi-sharp features and darts, beside quads and triangles.
+/// InputError: as `tagged_boundary` (a boundary that is not a manifold, bad tags). Cost: linear.
+SparseMap limit_map(const VolumeMesh& mesh);
+
+/// The boundary of a volume mesh refined by itself, its vertices at limit positions.
+struct BoundaryRefinement {
+  SparseMap positions;  ///< refined boundary vertices x control vertices of the volume mesh
+  /// Faces of the refined boundary, outward. All quads, but for level 0 of a boundary with triangles: those have
+  /// kNoIndex as their last corner.
+  std::vector<std::array<Index, 4>> quads;
+  std::vector<Index> face_of_quad;  ///< boundary face each came from: a place in MeshTopology::boundary_faces()
+  std::vector<Index> vertices;      ///< volume vertex of each of the first vertices.size() refined vertices
+  /// Refined edges along the mesh's creases, in the order of its tags: 2^levels for each.
+  std::vector<std::array<Index, 2>> crease_edges;
+
+  /// Tangents of the limit surface, one row per *normal site*: one site per vertex on smooth parts, one per side where
+  /// creases cut the surface. Empty unless asked for.
+  SparseMap tangent_u, tangent_v;
+  std::vector<std::array<Index, 4>> quad_sites;  ///< site of each corner of `quads`
+};
+
+/// levels         0 .. 8 further refinements of the boundary alone; each quarters its quads.
+/// with_tangents  fills tangent_u, tangent_v and quad_sites as well.
+///
+/// Each refined vertex lies exactly on the limit surface (as `limit_map`), so the quads are a tessellation of it.
+/// Cost: about 1 microsecond per refined vertex.
+BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with_tangents = false);
+
+/// Unit normals of the limit surface at the sites of a refinement made with tangents; outward.
+///
+/// points  positions.apply(control positions). A site whose tangents are parallel gets the mean normal of its quads.
+std::vector<Vec3> limit_normals(const BoundaryRefinement& refinement, std::span<const Vec3> control,
+                                std::span<const Vec3> points);
+
+/// A point of the limit surface with its derivatives by the face's parameters.
+struct LimitPoint {
+  Vec3 position, du, dv;
+  Vec3 normal() const { return du.cross(dv).normalized(); }
+};
+
+/// Evaluates the limit surface anywhere, by OpenSubdiv's base face representation.
+///
+/// Positions are exact but for the immediate neighbourhood of darts and of semi-sharp features (2e-4 of the extent);
+/// normals at extraordinary vertices are good to 1e-5. The boundary must consist of quads (one `subdivide` sees to it).
+class LimitSurface {
+ public:
+  explicit LimitSurface(const VolumeMesh& mesh);
+  ~LimitSurface();
+  LimitSurface(LimitSurface&&) noexcept;
+  LimitSurface& operator=(LimitSurface&&) noexcept;
+
+  std::size_t num_faces() const;
+  /// face  a place in MeshTopology::boundary_faces(), whose corners are (u, v) = (0,0), (1,0), (1,1), (0,1).
+  /// InputError: face, u or v out of range. Cost: about 100 ns once the face has been prepared (at its first use; not
+  /// to be called from several threads at a time).
+  LimitPoint evaluate(Index face, double u, double v) const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace subvol

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/surface/surface_topology.h"
+
+#include <array>
+#include <span>
+
+namespace subvol {
+
+/// A smooth boundary of a volume mesh, patch by patch, to be evaluated at dyadic parameters.
+///
+/// A patch is a quad of the boundary refined once: the part of a boundary face next to one of its corners.
+///
+///   (0, kUnits) ------ (kUnits, kUnits)      corner 0 is a vertex of the mesh, corner 2 the centre of the face;
+///       |  3          2  |                   sides 3-0 and 0-1 are halves of the mesh's edges. Across every side the
+///       |  0          1  |                   parameter along it runs the same way in the neighbour.
+///   (0, 0) ----------- (kUnits, 0)
+class PatchSurface {
+ public:
+  static constexpr int kMaxDepth = 14;
+  static constexpr int kUnits = 1 << kMaxDepth;  ///< parameters are integers from 0 to kUnits
+
+  virtual ~PatchSurface() = default;
+
+  std::size_t num_patches() const { return quads().num_faces(); }
+  /// The quads of one refinement: corner k of patch p is corner 4 p + k. Normals part at edges of infinite sharpness.
+  virtual const SurfaceTopology& quads() const = 0;
+  /// Boundary face of each patch (a place in MeshTopology::boundary_faces()), and which of its corners.
+  virtual const std::array<Index, 2>& face_corner(Index patch) const = 0;
+  /// Whether the patch's sides 0-1 and 3-0 lie on creases, of any sharpness.
+  virtual const std::array<bool, 2>& sharp_sides(Index patch) const = 0;
+
+  /// Makes ready for parameters that are multiples of kUnits / 2^depth; 0 <= depth <= kMaxDepth.
+  virtual void prepare(int depth) = 0;
+
+  /// Points of the surface at u.size() x v.size() parameters, u fastest; normals too unless null.
+  ///
+  /// u, v       ascending, within the patch, multiples of what has been prepared.
+  /// normals    unit, outward where the patch is not folded; zero where tangents are parallel; of this patch's side.
+  /// Reads only: may be called from several threads.
+  virtual void evaluate(Index patch, std::span<const int> u, std::span<const int> v, Vec3* positions,
+                        Vec3* normals = nullptr) const = 0;
+};
+
+/// The unit vector along du x dv; zero where they are parallel up to rounding.
+Vec3 unit_normal(const Vec3& du, const Vec3& dv);
+
+/// Which patches the faces of a boundary have: face, corner of each, and which of its two outer sides are sharp.
+struct PatchLayout {
+  std::vector<std::array<Index, 2>> face_corners;
+  std::vector<std::array<bool, 2>> sharp_sides;
+};
+PatchLayout patch_layout(const SurfaceTopology& boundary);
+
+}  // namespace subvol

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/subdivision/repeated_subdivision.h"
+
+#include "subvol/base/error.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+namespace subvol {
+namespace {
+
+constexpr int kMostLevels = 8;
+
+// Vertices, edges and faces are numbered with 32 bits, and a hex mesh has about three times as many faces as cells.
+void require_numberable(const VolumeMesh& mesh, int levels) {
+  const double most = static_cast<double>(std::numeric_limits<Index>::max()) / 3.5;
+  const double cells = static_cast<double>(mesh.num_cells()) * std::pow(8.0, levels);
+  if (cells > most)
+    throw InputError("levels " + std::to_string(levels) + " would make up to " + std::to_string(cells) +
+                     " cells; at most " + std::to_string(most) + " can be numbered");
+}
+
+}  // namespace
+
+VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule, SparseMap* matrix) {
+  if (levels < 0 || levels > kMostLevels)
+    throw InputError("levels must be in [0, " + std::to_string(kMostLevels) + "], got " + std::to_string(levels));
+  require_numberable(control, levels);
+  VolumeMesh fine = control;
+  if (matrix) *matrix = identity_map(control.num_vertices());
+  for (int level = 0; level < levels; ++level) {
+    SubdivisionLevel refined = subdivide(fine, rule);
+    if (matrix) *matrix = compose(refined.matrix, *matrix);
+    fine = std::move(refined.fine);
+  }
+  return fine;
+}
+
+}  // namespace subvol

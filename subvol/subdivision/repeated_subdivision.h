@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/subdivision/subdivision.h"
+
+namespace subvol {
+
+/// Refines several times: V_fine = S_levels ... S_1 V_control.
+///
+/// levels  0 .. 8. matrix: if given, the product of the S, with a row for every fine and a column for every control
+/// vertex. InputError: levels out of range, more cells than can be numbered, and as `subdivide`.
+VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule = BoundaryRule::catmull_clark,
+                                SparseMap* matrix = nullptr);
+
+}  // namespace subvol

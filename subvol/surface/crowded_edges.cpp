@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/surface/crowded_edges.h"
+
+#include "subvol/base/text_scanner.h"
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kMostListed = 10;
+
+}  // namespace
+
+void CrowdedEdges::add(const std::string& from, const std::string& to, std::size_t num_faces) {
+  if (++count_ > kMostListed) return;
+  list_ += (list_.empty() ? "" : "; ") + ("from vertex " + from) + " to " + to + " has " + std::to_string(num_faces);
+}
+
+std::string CrowdedEdges::text() const {
+  return std::to_string(count_) + (count_ == 1 ? " edge has" : " edges have") + " more than two faces" +
+         (count_ > kMostListed ? ", the first " + std::to_string(kMostListed) : "") + ": " + list_ +
+         " (vertices are numbered from 0, those of no face left out)";
+}
+
+std::string vertex_text(Index number, const Vec3* position) {
+  std::string text = std::to_string(number);
+  if (!position) return text;
+  const char* separator = " (";
+  for (int i = 0; i < 3; ++i, separator = " ") {
+    text += separator;
+    append_number(text, (*position)[i]);
+  }
+  return text + ")";
+}
+
+}  // namespace subvol

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/surface/surface_topology.h"
+
+#include "subvol/base/error.h"
+#include "subvol/surface/crowded_edges.h"
+
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+std::string name_of(Index v, std::span<const Index> names) {
+  return std::to_string(names.empty() ? v : names[static_cast<std::size_t>(v)]);
+}
+
+/// What a closed surface is here: the boundary of something.
+std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
+
+void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind,
+                  std::span<const Vec3> positions) {
+  const std::size_t num_corners = surface.corner_vertices.size();
+  surface.vertex_corners.assign(num_vertices, kNoIndex);
+  std::vector<Index> valence(num_vertices, 0);
+  for (std::size_t h = num_corners; h-- > 0;) {
+    const Index v = surface.corner_vertices[h];
+    surface.vertex_corners[v] = static_cast<Index>(h);
+    ++valence[v];
+  }
+  // Corners as chains on that end of their edge that has fewer: a lookup is short even beside a vertex of all faces.
+  std::vector<Index> head(num_vertices, kNoIndex), next(num_corners);
+  const auto hook = [&](Index a, Index b) {
+    return valence[a] < valence[b] || (valence[a] == valence[b] && a < b) ? a : b;
+  };
+  for (std::size_t h = num_corners; h-- > 0;) {
+    const Index corner = static_cast<Index>(h);
+    Index& first = head[hook(surface.corner_vertices[h], surface.corner_vertices[surface.next(corner)])];
+    next[h] = first;
+    first = corner;
+  }
+  surface.twins.assign(num_corners, kNoIndex);
+  surface.corner_edges.assign(num_corners, kNoIndex);
+  surface.edge_corners.reserve(num_corners / 2);
+  const auto joins = [&](Index g, Index v, Index w) {
+    const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
+    return (begin == v && end == w) || (begin == w && end == v);
+  };
+  CrowdedEdges crowded;
+  std::string first_fault;
+  const auto vertex = [&](Index v) {
+    return vertex_text(names.empty() ? v : names[static_cast<std::size_t>(v)],
+                       positions.empty() ? nullptr : &positions[static_cast<std::size_t>(v)]);
+  };
+  for (std::size_t i = 0; i < num_corners; ++i) {
+    const Index h = static_cast<Index>(i);
+    const Index from = surface.corner_vertices[h], to = surface.corner_vertices[surface.next(h)];
+    Index twin = kNoIndex;
+    int same = 0, opposite = 0;
+    for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g]) {
+      const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
+      if (begin == to && end == from) twin = g, ++opposite;
+      if (begin == from && end == to) ++same;
+    }
+    const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
+    if (same + opposite > 2) {
+      bool is_first = true;  // of the corners at this edge
+      for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g])
+        is_first = is_first && (g >= h || !joins(g, from, to));
+      if (is_first) crowded.add(vertex(from), vertex(to), static_cast<std::size_t>(same + opposite));
+      continue;
+    }
+    if (same != 1 || (opposite != 1 && !border)) {
+      const std::string edge = prefix(kind) + "edge " + name_of(from, names) + "-" + name_of(to, names);
+      if (first_fault.empty())
+        first_fault = same > 1 ? edge + ": its two faces run the same way along it"
+                               : edge + " must lie between two " + prefix(kind) + "faces of opposite direction; it has " +
+                                     std::to_string(same + opposite);
+      continue;
+    }
+    surface.twins[h] = twin;
+    if (border || h < twin) {
+      surface.corner_edges[h] = static_cast<Index>(surface.edge_corners.size());
+      surface.edge_corners.push_back(h);
+    } else {
+      surface.corner_edges[h] = surface.corner_edges[twin];
+    }
+  }
+  if (!crowded.empty()) throw InputError((kind == SurfaceKind::closed ? "boundary: " : "surface: ") + crowded.text());
+  if (!first_fault.empty()) throw InputError(first_fault);
+}
+
+void check_fans(const SurfaceTopology& surface, std::span<const Index> names, SurfaceKind kind) {
+  std::vector<int> counts(surface.num_vertices(), 0);
+  for (Index v : surface.corner_vertices) ++counts[v];
+  for (std::size_t v = 0; v < surface.num_vertices(); ++v) {
+    const Index start = surface.vertex_corners[v];
+    int fan = 0;
+    Index h = start;
+    for (; h != kNoIndex && (fan == 0 || h != start); h = surface.rotate(h)) ++fan;
+    if (h == kNoIndex)  // an open fan: what lies clockwise of the start
+      for (h = start; (h = surface.twins[h]) != kNoIndex; h = surface.next(h)) ++fan;
+    if (fan != counts[v])
+      throw InputError(prefix(kind) + "vertex " + name_of(static_cast<Index>(v), names) + " must have one fan of " +
+                       prefix(kind) + "faces; it has more");
+  }
+}
+
+float checked_sharpness(double sharpness, const std::string& what) {
+  if (!(sharpness > 0)) throw InputError(what + ": sharpness must be positive");
+  return static_cast<float>(sharpness);
+}
+
+}  // namespace
+
+SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_offsets,
+                              std::vector<Index> face_vertices, std::span<const Index> names, SurfaceKind kind,
+                              std::span<const Vec3> positions) {
+  SurfaceTopology surface;
+  surface.face_offsets = std::move(face_offsets);
+  surface.corner_vertices = std::move(face_vertices);
+  surface.corner_faces.resize(surface.corner_vertices.size());
+  for (std::size_t f = 0; f < surface.num_faces(); ++f)
+    for (Index h = surface.face_offsets[f]; h < surface.face_offsets[f + 1]; ++h)
+      surface.corner_faces[h] = static_cast<Index>(f);
+  pair_corners(surface, num_vertices, names, kind, positions);
+  check_fans(surface, names, kind);
+  surface.edge_sharpness.assign(surface.num_edges(), 0.0f);
+  surface.vertex_sharpness.assign(num_vertices, 0.0f);
+  return surface;
+}
+
+BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology) {
+  BoundarySurface boundary;
+  std::vector<Index> number(mesh.num_vertices(), kNoIndex);
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v) {
+    if (!topology.is_boundary_vertex(static_cast<Index>(v))) continue;
+    number[v] = static_cast<Index>(boundary.vertices.size());
+    boundary.vertices.push_back(static_cast<Index>(v));
+  }
+  std::vector<Index> offsets{0}, corners;
+  for (Index f : topology.boundary_faces()) {
+    boundary.faces.push_back(f);
+    for (Index v : topology.face(f)) corners.push_back(number[v]);
+    offsets.push_back(static_cast<Index>(corners.size()));
+  }
+  boundary.topology =
+      build_surface(boundary.vertices.size(), std::move(offsets), std::move(corners), boundary.vertices);
+
+  SurfaceTopology& surface = boundary.topology;
+  std::vector<Index> surface_edge(topology.num_edges(), kNoIndex);
+  for (std::size_t e = 0; e < surface.num_edges(); ++e) {
+    const Index h = surface.edge_corners[e];
+    const Index a = boundary.vertices[surface.corner_vertices[h]];
+    const Index b = boundary.vertices[surface.corner_vertices[surface.next(h)]];
+    boundary.edges.push_back(topology.find_edge(a, b));
+    surface_edge[boundary.edges.back()] = static_cast<Index>(e);
+  }
+  const auto in_range = [&](Index v) { return v >= 0 && static_cast<std::size_t>(v) < mesh.num_vertices(); };
+  for (const CreaseEdge& crease : mesh.tags.creases) {
+    const std::string what = "crease " + std::to_string(crease.v0) + "-" + std::to_string(crease.v1);
+    const Index e = in_range(crease.v0) && in_range(crease.v1) ? topology.find_edge(crease.v0, crease.v1) : kNoIndex;
+    if (e == kNoIndex || surface_edge[e] == kNoIndex) throw InputError(what + " is not an edge of the boundary");
+    surface.edge_sharpness[surface_edge[e]] = checked_sharpness(crease.sharpness, what);
+  }
+  for (const CornerVertex& corner : mesh.tags.corners) {
+    const std::string what = "corner " + std::to_string(corner.vertex);
+    if (!in_range(corner.vertex) || number[corner.vertex] == kNoIndex)
+      throw InputError(what + " is not a vertex of the boundary");
+    surface.vertex_sharpness[number[corner.vertex]] = checked_sharpness(corner.sharpness, what);
+  }
+  return boundary;
+}
+
+}  // namespace subvol

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/base/types.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace subvol {
+
+/// Triangles in space: no connectivity, orientation or closedness is promised (a soup is welcome).
+struct TriangleMesh {
+  std::vector<Vec3> positions;
+  std::vector<std::array<Index, 3>> triangles;
+};
+
+/// Polygons in space (triangles, quads and more), for surfaces whose faces matter: boundaries, shells, exports.
+struct PolygonMesh {
+  std::vector<Vec3> positions;
+  std::vector<std::size_t> face_offsets{0};
+  std::vector<Index> face_vertices;
+  std::size_t num_faces() const { return face_offsets.size() - 1; }
+};
+
+}  // namespace subvol

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/auto_template.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/parallel_errors.h"
+#include "subvol/templates/pillow.h"
+#include "subvol/templates/solid_fraction.h"
+#include "subvol/templates/template_frames.h"
+#include "subvol/templates/voxel_evolution.h"
+#include "subvol/templates/voxel_score.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+/// Where a grid lies.
+struct Placement {
+  Mat3 frame;
+  double size = 0;                   ///< edge of a cell
+  std::array<bool, 3> half_offset{}; ///< moved by half a cell along each axis
+};
+
+/// Edges of cells that are tried, by the one that the count and the volume make.
+constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
+constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
+/// Most cells of one grid, empty ones and those to spare counted in, where so many are asked for in the solid: half a
+/// gigabyte per thread or less.
+double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
+
+/// The box around a surface, in the coordinates of a frame.
+Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
+  Eigen::AlignedBox3d box;
+  for (const auto& t : surface.triangles)
+    for (Index v : t) box.extend(Vec3(frame.transpose() * surface.positions[v]));
+  return box;
+}
+
+/// Along each axis the whole number of cells of the grid around a box, whether an integer holds it or not. Two layers
+/// of cells are to spare on all sides: one stays empty, one lets holes go around.
+Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
+  constexpr int kSpare = 2;
+  return (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
+}
+
+/// Those frames whose grids for so many cells in the solid have few enough in all. The farther apart the solid's parts
+/// are, or the thinner its walls, the more of a grid is empty.
+std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t cells, double most,
+                                        std::span<const Mat3> frames) {
+  const double size = kLeastSize * std::cbrt(solid.volume / static_cast<double>(cells));
+  std::vector<Mat3> result;
+  for (const Mat3& frame : frames)
+    if (cells_around(box_in(frame, solid.surface), size).prod() <= most) result.push_back(frame);
+  return result;
+}
+
+/// The grid around a surface, of so many cells that they can be numbered.
+VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
+  const Eigen::AlignedBox3d box = box_in(placement.frame, surface);
+  const Eigen::Array3d cells = cells_around(box, placement.size);
+  VoxelGrid grid;
+  Vec3 low = box.center();
+  for (int a = 0; a < 3; ++a) {
+    const auto axis = static_cast<std::size_t>(a);
+    grid.cells[axis] = static_cast<int>(cells[a]);
+    low[a] -= placement.size * (grid.cells[axis] / 2.0 + (placement.half_offset[axis] ? 0.5 : 0.0));
+  }
+  grid.edges = placement.size * placement.frame;
+  grid.origin = placement.frame * low;
+  return grid;
+}
+
+/// A carved grid with the right topology and count.
+struct Candidate {
+  Placement placement;
+  VoxelGrid grid;
+  std::vector<char> kept;
+  double score = 0;
+};
+
+std::size_t num_boundary_faces(const VoxelSolid& solid) {
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < solid.num_cells(); ++c)
+    if (solid.filled(static_cast<Index>(c)))
+      for (Index offset : solid.face_offsets()) count += !solid.filled(static_cast<Index>(c) + offset);
+  return count;
+}
+
+/// The search for one number of cells.
+class Search {
+ public:
+  Search(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t cells, std::vector<Mat3> frames)
+      : solid_(solid), options_(options), cells_(static_cast<double>(cells)), frames_(std::move(frames)) {}
+
+  /// False where cancelled. Candidates come in the order of their grids.
+  bool run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
+           double fraction_share);
+
+ private:
+  std::vector<Placement> placements() const;
+  double pillowed_size(const Mat3& frame) const;
+  std::optional<Candidate> best_of(const Placement& placement, std::size_t& num_right) const;
+  double count_of(const VoxelSolid& solid) const {
+    return static_cast<double>(solid.num_filled() + (options_.pillow ? num_boundary_faces(solid) : 0));
+  }
+
+  const SolidBoundary& solid_;
+  const AutoTemplateOptions& options_;
+  double cells_;
+  std::vector<Mat3> frames_;
+};
+
+/// Size of the cells for which a grid's inner cells and a layer around them are as many as asked.
+double Search::pillowed_size(const Mat3& frame) const {
+  constexpr int kHalvings = 10, kLines = 3;
+  const double plain = std::cbrt(solid_.volume / cells_);
+  double low = plain, high = 4 * plain;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double size = std::sqrt(low * high);
+    const VoxelGrid grid = placed_grid(solid_.surface, {frame, size, {}});
+    const std::vector<double> fractions = solid_fractions(solid_.surface, grid, kLines);
+    VoxelSolid solid(grid.cells, VertexRule::pillowable);
+    for (std::size_t c = 0; c < fractions.size(); ++c)
+      if (fractions[c] > 0.5 && solid.may_flip(static_cast<Index>(c))) solid.flip(static_cast<Index>(c));
+    (count_of(solid) > cells_ ? low : high) = size;
+  }
+  return std::sqrt(low * high);
+}
+
+/// All sizes, frames and offsets, the likeliest first.
+std::vector<Placement> Search::placements() const {
+  std::vector<double> sizes;
+  for (const Mat3& frame : frames_)
+    sizes.push_back(options_.pillow ? pillowed_size(frame) : std::cbrt(solid_.volume / cells_));
+  std::vector<Placement> result;
+  for (double factor : kSizes)
+    for (int offset = 0; offset < 8; ++offset)
+      for (std::size_t f = 0; f < frames_.size(); ++f)
+        result.push_back({frames_[f], factor * sizes[f], {(offset & 1) != 0, (offset & 2) != 0, (offset & 4) != 0}});
+  return result;
+}
+
+std::optional<Candidate> Search::best_of(const Placement& placement, std::size_t& num_right) const {
+  constexpr double kWanted = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
+  constexpr std::array<double, 9> kThresholds{0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.12, 0.9};
+  Candidate best{placement, placed_grid(solid_.surface, placement), {}, 0};
+  const std::vector<double> fractions = solid_fractions(solid_.surface, best.grid);
+  const auto look_at = [&](VoxelStart start, double threshold) {
+    VoxelGoal goal{fractions, threshold, solid_.topology};
+    std::optional<VoxelSolid> solid = start_solid(start, best.grid.cells, VertexRule::pillowable, goal);
+    if (!solid) return;
+    goal.threshold = kWanted;
+    evolve(*solid, goal);
+    reach_thin_parts(*solid, goal);
+    const double share = count_of(*solid) / cells_;
+    if (share < kLeastCellShare || share > kMostCellShare) return;
+    ++num_right;
+    const double score =
+        voxel_score(*solid, fractions) + kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
+    if (!best.kept.empty() && score >= best.score) return;
+    best.score = score;
+    best.kept.assign(solid->filled().begin(), solid->filled().end());
+  };
+  for (double threshold : kThresholds) look_at(VoxelStart::cut, threshold);
+  look_at(VoxelStart::grown, kWanted);
+  look_at(VoxelStart::shrunk, kWanted);
+  if (best.kept.empty()) return std::nullopt;
+  return best;
+}
+
+bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
+                 double fraction_share) {
+  constexpr std::size_t kBatch = 16;    // grids between two looks at the clock of the caller
+  constexpr std::size_t kEnough = 200;  // right candidates, after which hardly anything better turns up
+  const std::vector<Placement> all = placements();
+  std::size_t right = 0;
+  for (std::size_t first = 0; first < all.size() && right < kEnough; first += kBatch) {
+    const auto fraction = static_cast<double>(first) / static_cast<double>(all.size());
+    if (options_.progress && !options_.progress(fraction_before + fraction_share * fraction)) return false;
+    const std::size_t count = std::min(kBatch, all.size() - first);
+    std::array<std::optional<Candidate>, kBatch> found;
+    std::array<std::size_t, kBatch> num_right{};
+    ParallelErrors errors;
+#pragma omp parallel for schedule(dynamic)
+    for (std::size_t i = 0; i < count; ++i) errors.guard([&] { found[i] = best_of(all[first + i], num_right[i]); });
+    errors.rethrow();
+    for (std::size_t i = 0; i < count; ++i) {
+      right += num_right[i];
+      if (found[i]) candidates.push_back(std::move(*found[i]));
+    }
+    result.grids += count;
+  }
+  result.candidates += right;
+  return true;
+}
+
+AutoTemplate finished(const Candidate& candidate, const AutoTemplateOptions& options, const BettiNumbers& topology,
+                      std::size_t cells) {
+  AutoTemplate result{voxel_mesh(candidate.grid, candidate.kept), topology, cells, options.pillow,
+                      candidate.placement.frame, candidate.score};
+  if (options.pillow) result.mesh = pillow(result.mesh);
+  return result;
+}
+
+}  // namespace
+
+AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options, std::size_t most) {
+  if (options.cells < kLeastTemplateCells || options.cells > kMostTemplateCells)
+    throw InputError("the number of cells must be in [" + std::to_string(kLeastTemplateCells) + ", " +
+                     std::to_string(kMostTemplateCells) + "], got " + std::to_string(options.cells));
+  if (most < 1) throw InputError("auto_templates: at least one template must be asked for");
+  const SolidBoundary solid = solid_boundary(surface);
+  const std::vector<Mat3> frames = template_frames(solid.surface);
+  constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, 20};
+  AutoTemplateResult result;
+  result.wanted = solid.topology;
+  const double most_cells = most_grid_cells(options.cells);
+  for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
+    const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
+    std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_cells, frames);
+    if (usable.empty() && rung == 0)
+      throw InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
+                       std::to_string(std::lround(most_cells)) +
+                       " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one "
+                       "by one");
+    if (usable.empty()) break;
+    std::vector<Candidate> candidates;
+    const double done = static_cast<double>(rung) / kLadder.size();
+    // Most often the first rung is all there is.
+    if (!Search(solid, options, cells, std::move(usable))
+             .run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
+      result.cancelled = true;
+      return result;
+    }
+    if (candidates.empty()) continue;
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const auto& a, const auto& b) { return a.score < b.score; });
+    for (std::size_t i = 0; i < std::min(most, candidates.size()); ++i)
+      result.templates.push_back(finished(candidates[i], options, solid.topology, cells));
+    break;
+  }
+  return result;
+}
+
+}  // namespace subvol

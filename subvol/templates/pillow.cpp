@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/pillow.h"
+
+#include "subvol/base/error.h"
+#include "subvol/surface/surface_topology.h"
+#include "subvol/templates/template_edit.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+// Below 1/6 a mesh of equal cubes cannot be inverted: each edge keeps more than half its length in its own direction.
+constexpr double kShare = 0.15;
+constexpr double kSameNormal = 0.99;  // cosine above which two faces count as one plane
+
+std::vector<char> marked(const VolumeMesh& mesh, std::span<const Index> cells) {
+  std::vector<char> in_set(mesh.num_cells(), cells.empty());
+  for (Index c : cells) {
+    if (c < 0 || static_cast<std::size_t>(c) >= mesh.num_cells())
+      throw InputError("pillow: there is no cell " + std::to_string(c));
+    if (in_set[c]) throw InputError("pillow: cell " + std::to_string(c) + " is given twice");
+    in_set[c] = 1;
+  }
+  return in_set;
+}
+
+/// A face of the set's boundary, seen from outside.
+struct Face {
+  std::array<Index, 4> corners;
+  std::size_t size, cell;
+  std::span<const Index> vertices() const { return {corners.data(), size}; }
+};
+
+std::vector<Face> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const char> in_set) {
+  std::vector<Face> faces;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    if (!in_set[c]) continue;
+    const CellTopology& local = cell_topology(mesh.kinds[c]);
+    for (int f = 0; f < local.num_faces; ++f) {
+      const auto& cells = topology.face_cells(topology.cell_faces(c)[f]);
+      const Index other = cells[0] == static_cast<Index>(c) ? cells[1] : cells[0];
+      if (other != kNoIndex && in_set[other]) continue;
+      Face face{{}, static_cast<std::size_t>(local.face_sizes[f]), c};
+      for (std::size_t i = 0; i < face.size; ++i) face.corners[i] = mesh.cell(c)[local.faces[f][i]];
+      faces.push_back(face);
+    }
+  }
+  return faces;
+}
+
+/// Numbers of the new vertices by the old ones', from `first`, in the old order; kNoIndex away from the faces.
+std::vector<Index> new_numbers(std::size_t num_vertices, std::span<const Face> faces) {
+  std::vector<Index> number(num_vertices, kNoIndex);
+  for (const Face& face : faces)
+    for (Index v : face.vertices()) number[v] = 0;
+  Index next = static_cast<Index>(num_vertices);
+  for (Index& n : number)
+    if (n != kNoIndex) n = next++;
+  return number;
+}
+
+void require_manifold(std::span<const Face> faces, std::span<const Index> number, std::size_t num_vertices) {
+  std::vector<Index> names, offsets{0}, corners;
+  for (std::size_t v = 0; v < num_vertices; ++v)
+    if (number[v] != kNoIndex) names.push_back(static_cast<Index>(v));
+  for (const Face& face : faces) {
+    for (Index v : face.vertices()) corners.push_back(number[v] - static_cast<Index>(num_vertices));
+    offsets.push_back(static_cast<Index>(corners.size()));
+  }
+  try {
+    build_surface(names.size(), offsets, corners, names);
+  } catch (const InputError& error) {
+    throw InputError(std::string("pillow: the boundary of the cells is no manifold: ") + error.what());
+  }
+}
+
+Vec3 unit_normal(const VolumeMesh& mesh, std::span<const Index> face) {
+  const auto p = [&](std::size_t i) -> const Vec3& { return mesh.positions[face[i]]; };
+  return (face.size() == 4 ? (p(2) - p(0)).cross(p(3) - p(1)) : (p(1) - p(0)).cross(p(2) - p(0))).normalized();
+}
+
+/// How far each vertex of the faces moves: against the sum of its distinct normals, by its shortest edge in the set.
+std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const Face> faces, std::span<const char> in_set) {
+  std::vector<double> shortest(mesh.num_vertices(), std::numeric_limits<double>::infinity());
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    if (!in_set[c]) continue;
+    const CellTopology& local = cell_topology(mesh.kinds[c]);
+    for (int e = 0; e < local.num_edges; ++e) {
+      const Index a = mesh.cell(c)[local.edges[e][0]], b = mesh.cell(c)[local.edges[e][1]];
+      const double length = (mesh.positions[a] - mesh.positions[b]).norm();
+      shortest[a] = std::min(shortest[a], length);
+      shortest[b] = std::min(shortest[b], length);
+    }
+  }
+  std::vector<std::vector<Vec3>> normals(mesh.num_vertices());
+  for (const Face& face : faces) {
+    const Vec3 n = unit_normal(mesh, face.vertices());
+    for (Index v : face.vertices())
+      if (std::none_of(normals[v].begin(), normals[v].end(), [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
+        normals[v].push_back(n);
+  }
+  std::vector<Vec3> steps(mesh.num_vertices(), Vec3::Zero());
+  for (std::size_t v = 0; v < steps.size(); ++v)
+    for (const Vec3& n : normals[v]) steps[v] -= kShare * shortest[v] * n;
+  return steps;
+}
+
+/// Shortens steps around cells that are inverted until none is.
+void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps) {
+  constexpr int kRounds = 20;
+  std::vector<Index> old(mesh.num_vertices(), kNoIndex);
+  for (std::size_t v = 0; v < number.size(); ++v)
+    if (number[v] != kNoIndex) old[number[v]] = static_cast<Index>(v);
+  std::vector<double> share(number.size(), 1.0);
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<char> shorten(number.size(), 0);
+    bool any = false;
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+      if (corners_positive(mesh, c)) continue;
+      for (Index v : mesh.cell(c))
+        if (old[v] != kNoIndex) shorten[old[v]] = 1, any = true;
+    }
+    if (!any) return;
+    for (std::size_t v = 0; v < shorten.size(); ++v) {
+      if (!shorten[v]) continue;
+      share[v] /= 2;
+      mesh.positions[number[v]] = mesh.positions[v] + share[v] * steps[v];
+    }
+  }
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (!corners_positive(mesh, c))
+      throw InputError("pillow: no direction keeps all cells valid around vertex " +
+                       std::to_string(old[mesh.cell(c)[0]] == kNoIndex ? mesh.cell(c)[0] : old[mesh.cell(c)[0]]));
+}
+
+}  // namespace
+
+VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
+  require_sound(mesh, "pillow");
+  const std::vector<char> in_set = marked(mesh, cells);
+  const std::vector<Face> faces = boundary_of_set(mesh, MeshTopology(mesh), in_set);
+  const std::vector<Index> number = new_numbers(mesh.num_vertices(), faces);
+  require_manifold(faces, number, mesh.num_vertices());
+  const std::vector<Vec3> steps = steps_inward(mesh, faces, in_set);
+
+  VolumeMesh result = mesh;
+  for (std::size_t v = 0; v < number.size(); ++v)
+    if (number[v] != kNoIndex) result.positions.push_back(mesh.positions[v] + steps[v]);
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    for (std::size_t i = mesh.cell_offsets[c]; in_set[c] && i < mesh.cell_offsets[c + 1]; ++i)
+      if (const Index n = number[mesh.cell_vertices[i]]; n != kNoIndex) result.cell_vertices[i] = n;
+  std::vector<Index> corners;
+  for (const Face& face : faces) {
+    corners.clear();
+    for (Index v : face.vertices()) corners.push_back(number[v]);
+    corners.insert(corners.end(), face.vertices().begin(), face.vertices().end());
+    result.add_cell(face.size == 4 ? CellKind::hex : CellKind::prism, corners);
+    if (!mesh.references.empty()) result.references.push_back(mesh.references[face.cell]);
+  }
+  shorten_steps(result, number, steps);
+  return result;
+}
+
+}  // namespace subvol

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/template_frames.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+namespace subvol {
+
+namespace {
+
+struct Facet {
+  Vec3 centre, area_vector;
+};
+
+std::vector<Facet> facets_of(const TriangleMesh& surface) {
+  std::vector<Facet> facets;
+  facets.reserve(surface.triangles.size());
+  for (const auto& t : surface.triangles) {
+    const Vec3 &a = surface.positions[t[0]], &b = surface.positions[t[1]], &c = surface.positions[t[2]];
+    facets.push_back({(a + b + c) / 3, (b - a).cross(c - a) / 2});
+  }
+  return facets;
+}
+
+Mat3 right_handed(Mat3 frame) {
+  if (frame.determinant() < 0) frame.col(2) = -frame.col(2);
+  return frame;
+}
+
+Mat3 principal_frame(const std::vector<Facet>& facets) {
+  double area = 0;
+  Vec3 mean = Vec3::Zero();
+  for (const Facet& f : facets) {
+    area += f.area_vector.norm();
+    mean += f.area_vector.norm() * f.centre;
+  }
+  mean /= area;
+  Mat3 spread = Mat3::Zero();
+  for (const Facet& f : facets) spread += f.area_vector.norm() * (f.centre - mean) * (f.centre - mean).transpose();
+  return right_handed(Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors());
+}
+
+/// Directions by the area that faces them, up to sign, the largest first.
+std::vector<Vec3> facing_directions(const std::vector<Facet>& facets) {
+  constexpr double kBins = 8;  // per unit: neighbouring bins are about 7 degrees apart
+  std::map<std::array<int, 3>, Vec3> bins;
+  for (const Facet& f : facets) {
+    const double area = f.area_vector.norm();
+    if (!(area > 0)) continue;
+    std::array<int, 3> key{};
+    for (std::size_t a = 0; a < 3; ++a)
+      key[a] = static_cast<int>(std::lround(kBins * f.area_vector[static_cast<Index>(a)] / area));
+    const std::array<int, 3> opposite{-key[0], -key[1], -key[2]};
+    Vec3& sum = bins.try_emplace(std::max(key, opposite), Vec3::Zero()).first->second;
+    sum += key >= opposite ? f.area_vector : Vec3(-f.area_vector);
+  }
+  std::vector<Vec3> directions;
+  for (const auto& [key, sum] : bins) directions.push_back(sum);
+  std::stable_sort(directions.begin(), directions.end(),
+                   [](const Vec3& a, const Vec3& b) { return a.norm() > b.norm(); });
+  return directions;
+}
+
+Mat3 facing_frame(const std::vector<Facet>& facets) {
+  constexpr double kPerpendicular = 0.3;  // cosine below which a second direction counts as one across the first
+  const std::vector<Vec3> directions = facing_directions(facets);
+  Mat3 frame;
+  frame.col(0) = directions.front().normalized();
+  Vec3 second = frame.col(0).unitOrthogonal();
+  for (const Vec3& d : directions) {
+    if (std::abs(d.normalized().dot(frame.col(0))) > kPerpendicular) continue;
+    second = (d - d.dot(frame.col(0)) * frame.col(0)).normalized();
+    break;
+  }
+  frame.col(1) = second;
+  frame.col(2) = frame.col(0).cross(second);
+  return frame;
+}
+
+/// Whether the axes agree, in any order and direction.
+bool same_axes(const Mat3& a, const Mat3& b) {
+  constexpr double kSame = 0.999;  // cosine of 2.5 degrees
+  return ((a.transpose() * b).cwiseAbs().colwise().maxCoeff().array() > kSame).all();
+}
+
+}  // namespace
+
+std::vector<Mat3> template_frames(const TriangleMesh& surface) {
+  const std::vector<Facet> facets = facets_of(surface);
+  std::vector<Mat3> frames{Mat3::Identity()};
+  for (const Mat3& frame : {principal_frame(facets), facing_frame(facets)})
+    if (std::none_of(frames.begin(), frames.end(), [&](const Mat3& other) { return same_axes(frame, other); }))
+      frames.push_back(frame);
+  return frames;
+}
+
+}  // namespace subvol

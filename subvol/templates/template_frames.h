@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/surface/triangle_mesh.h"
+
+#include <vector>
+
+namespace subvol {
+
+/// Directions along which a grid may suit a surface: the coordinate axes, the principal axes of its area, and the two
+/// perpendicular directions that most of its area faces. Each a rotation; frames with the same axes are given once.
+/// surface  with at least one triangle of non-zero area. Cost: linear.
+std::vector<Mat3> template_frames(const TriangleMesh& surface);
+
+}  // namespace subvol

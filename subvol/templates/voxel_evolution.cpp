@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/voxel_evolution.h"
+
+#include "subvol/templates/voxel_steps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <queue>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+constexpr int kLongLoop = 40;  // cells; longer loops are no better
+
+/// Shortest way, in cells, through cells with filled(c) == side between two groups of a cell's face neighbours, not
+/// through the cell itself. 0 where there is none.
+class LoopLengths {
+ public:
+  explicit LoopLengths(std::size_t num_cells) : stamp_(num_cells, 0) {}
+
+  int length(const VoxelSolid& solid, Index cell, bool side, const std::array<std::uint32_t, 2>& groups) {
+    stamps_ += 2;  // stamps_ - 1: an end, stamps_: reached
+    queue_.clear();
+    stamp_[cell] = stamps_;
+    const auto for_each_in = [&](std::uint32_t group, const auto& visit) {
+      for (std::size_t f = 0; f < 6; ++f)
+        if (group >> f & 1) visit(cell + solid.face_offsets()[f]);
+    };
+    for_each_in(groups[1], [&](Index c) { stamp_[c] = stamps_ - 1; });
+    for_each_in(groups[0], [&](Index c) {
+      stamp_[c] = stamps_;
+      queue_.push_back(c);
+    });
+    int steps = 1;
+    for (std::size_t q = 0, end = queue_.size(); q < queue_.size(); ++steps, end = queue_.size())
+      for (; q < end; ++q) {
+        if (!solid.may_flip(queue_[q])) continue;  // the outer layer has no neighbours beyond; ways around it are long
+        for (Index offset : solid.face_offsets()) {
+          const Index c = queue_[q] + offset;
+          if (solid.filled(c) != side || stamp_[c] == stamps_) continue;
+          if (stamp_[c] == stamps_ - 1) return steps + 1;
+          stamp_[c] = stamps_;
+          queue_.push_back(c);
+        }
+      }
+    return 0;
+  }
+
+ private:
+  std::vector<int> stamp_;
+  std::vector<Index> queue_;
+  int stamps_ = 0;
+};
+
+/// A flip that adds or removes one handle.
+struct HandleFlip {
+  Index cell = kNoIndex;
+  double gain = 0;
+  bool through_filled = false;               ///< the side on which the loop runs
+  std::array<std::uint32_t, 2> ends{};       ///< faces at either end of the loop
+};
+
+/// Whether flipping a cell changes the number of handles in the direction wanted, and how.
+bool handle_flip(const VoxelSolid& solid, Index cell, bool add_handle, HandleFlip& flip) {
+  if (!solid.may_flip(cell) || !solid.good_after_flip(cell)) return false;
+  const VoxelSolid::Contact k = solid.contact(cell);
+  const bool two_discs = k.components == 2 && k.euler_number == 2;
+  const bool annulus = k.components == 1 && k.euler_number == 0;
+  // Two discs: the cell closes a loop of the solid. Annulus: it stops up a loop of the outside.
+  const bool closes = !solid.filled(cell);
+  if (!(two_discs && add_handle == closes) && !(annulus && add_handle != closes)) return false;
+  const std::vector<std::uint32_t> groups = VoxelSolid::face_groups(two_discs ? k.shared : k.open);
+  if (groups.size() != 2 || groups[0] == 0 || groups[1] == 0) return false;
+  flip.cell = cell;
+  flip.through_filled = two_discs;
+  flip.ends = {groups[0], groups[1]};
+  return true;
+}
+
+/// The best flip that changes the number of handles, or none. To add one, long loops are best; to remove one, short
+/// ones. Flips may go against the fractions by `tolerance`.
+std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& goal, bool add_handle, double tolerance,
+                                      LoopLengths& loops) {
+  constexpr std::size_t kLookedAt = 40;  // most promising flips whose loops are measured
+  std::vector<HandleFlip> flips;
+  for (std::size_t c = 0; c < solid.num_cells(); ++c) {
+    HandleFlip flip;
+    flip.gain = solid.may_flip(static_cast<Index>(c)) ? goal.gain(solid, static_cast<Index>(c)) : -1;
+    if (flip.gain > -tolerance && handle_flip(solid, static_cast<Index>(c), add_handle, flip)) flips.push_back(flip);
+  }
+  std::stable_sort(flips.begin(), flips.end(),
+                   [](const HandleFlip& a, const HandleFlip& b) { return a.gain > b.gain; });
+  if (flips.size() > kLookedAt) flips.resize(kLookedAt);
+  std::optional<Index> best;
+  double best_score = 0;
+  for (const HandleFlip& flip : flips) {
+    const int length = loops.length(solid, flip.cell, flip.through_filled, flip.ends);
+    if (length == 0) continue;  // it would join or part components, or open or shut a cavity
+    const double measure = std::min(length, kLongLoop);
+    const double score = (flip.gain + tolerance) * (add_handle ? measure : 1 / measure);
+    if (!best || score > best_score) best = flip.cell, best_score = score;
+  }
+  return best;
+}
+
+}  // namespace
+
+void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
+  using Entry = std::pair<double, Index>;
+  const auto less = [](const Entry& a, const Entry& b) {
+    return a.first != b.first ? a.first < b.first : a.second > b.second;
+  };
+  std::priority_queue<Entry, std::vector<Entry>, decltype(less)> queue(less);
+  std::vector<char> waiting(solid.num_cells(), 0);
+  const auto offer = [&](Index c) {
+    if (waiting[c] || !solid.may_flip(c) || solid.filled(c) == goal.wants(c)) return;
+    waiting[c] = 1;
+    queue.push({goal.gain(solid, c), c});
+  };
+  for (std::size_t c = 0; c < solid.num_cells(); ++c) offer(static_cast<Index>(c));
+  // A cell is flipped once at most: afterwards it is as wanted.
+  while (!queue.empty()) {
+    const Index c = queue.top().second;
+    queue.pop();
+    waiting[c] = 0;
+    if (!solid.is_simple(c)) continue;
+    solid.flip(c);
+    for (Index offset : solid.all_offsets()) offer(c + offset);
+  }
+}
+
+bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
+  constexpr int kMostFlips = 3;  // of one cell: repairs may undo each other for ever
+  std::vector<char> flips(solid.num_cells(), 0);
+  std::vector<Index> bad;
+  for (std::size_t p = 0; p < solid.num_points(); ++p)
+    if (!solid.good(static_cast<Index>(p))) bad.push_back(static_cast<Index>(p));
+  while (!bad.empty()) {
+    // Best flip of all cells at the oldest bad point.
+    const Index p = bad.back();
+    if (solid.good(p)) {
+      bad.pop_back();
+      continue;
+    }
+    Index best = kNoIndex;
+    double best_score = 0;
+    for (Index c : solid.cells_around(p)) {
+      if (c == kNoIndex || !solid.may_flip(c) || flips[c] >= kMostFlips) continue;
+      const double score = solid.good_gain(c) + goal.gain(solid, c);
+      if (best == kNoIndex || score > best_score) best = c, best_score = score;
+    }
+    if (best == kNoIndex) return false;
+    ++flips[best];
+    solid.flip(best);
+    for (Index q : solid.points(best))
+      if (!solid.good(q)) bad.push_back(q);
+  }
+  return true;
+}
+
+bool drop_surplus(VoxelSolid& solid, const VoxelGoal& goal) {
+  std::vector<int> component;
+  // Keeps the largest components of one side; the outside counts as the one that holds the first cell.
+  const auto drop = [&](bool side, int wanted) {
+    const int count = solid.components(side, component);
+    if (count < wanted) return false;
+    if (count == wanted) return true;
+    std::vector<double> size(static_cast<std::size_t>(count), 0.0);
+    for (std::size_t c = 0; c < component.size(); ++c)
+      if (component[c] >= 0) size[component[c]] += side ? goal.fractions[c] : 1 - goal.fractions[c];
+    if (!side) size[component[0]] = static_cast<double>(component.size()) + 1;
+    std::vector<int> order(size.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
+    std::vector<char> kept(size.size(), 0);
+    for (int i = 0; i < wanted; ++i) kept[order[i]] = 1;
+    for (std::size_t c = 0; c < component.size(); ++c)
+      if (component[c] >= 0 && !kept[component[c]]) solid.flip(static_cast<Index>(c));
+    return true;
+  };
+  return drop(true, goal.topology.components) && drop(false, goal.topology.cavities + 1);
+}
+
+bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
+  const BettiNumbers now = solid.topology();
+  if (now.components != goal.topology.components || now.cavities != goal.topology.cavities) return false;
+  // Many wrong handles mean that the grid is too coarse; mending them one by one would not make a likeness.
+  constexpr int kMostFlips = 24;
+  const int missing = goal.topology.handles - now.handles;
+  if (missing == 0) return true;
+  if (std::abs(missing) > kMostFlips) return false;
+  LoopLengths loops(solid.num_cells());
+  for (int i = 0; i < std::abs(missing); ++i) {
+    std::optional<Index> cell;
+    for (double tolerance : {0.25, 1.0})  // a little against the shape, or if need be through it
+      if (!cell) cell = best_handle_flip(solid, goal, missing > 0, tolerance, loops);
+    if (!cell) return false;
+    solid.flip(*cell);
+    evolve(solid, goal);
+  }
+  return solid.topology() == goal.topology;
+}
+
+void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
+  constexpr double kLeastFraction = 0.02;
+  constexpr int kNear = 2, kRounds = 3;
+  std::vector<char> given_up(solid.num_cells(), 0);
+  std::vector<Index> previous, path, far;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<int> steps = voxel_steps(
+        solid, [&](Index c) { return solid.filled(c); }, [&](Index c) { return goal.fractions[c] > kLeastFraction; },
+        &previous);
+    far.clear();
+    for (std::size_t c = 0; c < steps.size(); ++c)
+      if (steps[c] >= kNear && !given_up[c]) far.push_back(static_cast<Index>(c));
+    if (far.empty()) return;
+    std::stable_sort(far.begin(), far.end(), [&](Index a, Index b) { return steps[a] > steps[b]; });
+    for (Index end : far) {
+      path.clear();
+      for (Index c = end; !solid.filled(c); c = previous[c]) path.push_back(c);
+      if (path.size() < static_cast<std::size_t>(kNear)) continue;
+      given_up[end] = 1;
+      for (; !path.empty() && solid.may_flip(path.back()) && solid.is_simple(path.back()); path.pop_back())
+        solid.flip(path.back());
+    }
+  }
+}
+
+std::optional<VoxelSolid> start_solid(VoxelStart start, const std::array<int, 3>& cells, VertexRule rule,
+                                      const VoxelGoal& goal) {
+  VoxelSolid solid(cells, rule);
+  const auto fill = [&](const auto& chosen) {
+    for (std::size_t c = 0; c < solid.num_cells(); ++c)
+      if (solid.may_flip(static_cast<Index>(c)) && chosen(static_cast<Index>(c))) solid.flip(static_cast<Index>(c));
+  };
+  if (start == VoxelStart::cut) {
+    fill([&](Index c) { return goal.wants(c); });
+    if (solid.num_filled() == 0 || !make_points_good(solid, goal) || !drop_surplus(solid, goal)) return std::nullopt;
+  } else {
+    if (goal.topology.components != 1 || goal.topology.cavities != 0) return std::nullopt;
+    const auto fullest = std::max_element(goal.fractions.begin(), goal.fractions.end()) - goal.fractions.begin();
+    fill([&](Index c) { return start == VoxelStart::shrunk || c == fullest; });
+    evolve(solid, goal);
+  }
+  if (!match_handles(solid, goal)) return std::nullopt;
+  return solid;
+}
+
+}  // namespace subvol

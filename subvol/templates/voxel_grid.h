@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
+
+#include <array>
+#include <span>
+
+namespace subvol {
+
+/// A box of equal cells in space. Cell (i, j, k) has the number i + cells[0] (j + cells[1] k).
+struct VoxelGrid {
+  std::array<int, 3> cells{1, 1, 1};  ///< along each axis, >= 1
+  Vec3 origin = Vec3::Zero();         ///< the corner where all coordinates are least
+  Mat3 edges = Mat3::Identity();      ///< columns: the edges of a cell, right-handed
+
+  std::size_t num_cells() const {
+    return static_cast<std::size_t>(cells[0]) * static_cast<std::size_t>(cells[1]) * static_cast<std::size_t>(cells[2]);
+  }
+  Index cell(int i, int j, int k) const { return i + cells[0] * (j + cells[1] * k); }
+  std::array<int, 3> place(Index cell) const {
+    return {cell % cells[0], cell / cells[0] % cells[1], cell / cells[0] / cells[1]};
+  }
+  /// Lattice coordinates to space.
+  Vec3 point(double i, double j, double k) const { return origin + edges * Vec3(i, j, k); }
+};
+
+/// The box from `low` to `high`, cut into so many cells along each axis.
+/// InputError: counts < 1, more cells than can be numbered, a corner that is not finite, or high <= low along an axis.
+VoxelGrid box_grid(const Vec3& low, const Vec3& high, const std::array<int, 3>& counts);
+
+/// The same with cells about as large as asked: each axis is cut into equal parts, their number rounded, at least 1.
+/// size > 0.
+VoxelGrid box_grid(const Vec3& low, const Vec3& high, double size);
+
+/// Low and high corner of the box around a surface's triangles, moved outward by a share of its diagonal.
+std::array<Vec3, 2> box_around(const TriangleMesh& surface, double margin_percent);
+
+/// Hexes of the cells kept, in the grid's order, on the lattice points they use, in lattice order.
+/// kept  one entry per cell, non-zero: kept; or empty: all.
+VolumeMesh voxel_mesh(const VoxelGrid& grid, std::span<const char> kept = {});
+
+}  // namespace subvol

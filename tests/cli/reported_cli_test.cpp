@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Small inputs made after public bug reports, as their users would run them.
+
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+#include "tests/support/workplace.h"
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+
+#include <optional>
+
+using subvol::test::content_of;
+using subvol::test::Run;
+using subvol::test::Workplace;
+
+namespace {
+
+/// Nothing, and a word of it, where the inputs are not there.
+std::optional<std::string> reported_inputs() {
+  const auto data = subvol::test::data_dir();
+  if (data && std::filesystem::is_directory(*data / "reported")) return (*data / "reported").string() + "/";
+  WARN("SKIPPED: no folder with reported inputs");
+  return std::nullopt;
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+TEST_CASE("Reported STL files are read as what they are, or refused by their bytes", "[cli]") {
+  const auto inputs = reported_inputs();
+  if (!inputs) return;
+  const Workplace place;
+  for (const char* name : {"01-f_trailing.stl", "02-d_cr.stl", "33-payload.stl"}) {
+    const Run run = place.run("convert " + *inputs + name + " --force -o a.obj");
+    CAPTURE(name, run.err);
+    REQUIRE(run.status == 0);
+    const subvol::PolygonMesh cube = subvol::read_polygon_mesh(place / "a.obj");
+    CHECK(cube.positions.size() == 8);
+    CHECK(cube.num_faces() == 12);
+    double volume = 0;
+    for (std::size_t f = 0; f < cube.num_faces(); ++f) {
+      const auto corner = [&](std::size_t i) { return cube.positions[cube.face_vertices[cube.face_offsets[f] + i]]; };
+      volume += corner(0).dot(corner(1).cross(corner(2))) / 6;
+    }
+    CHECK(volume == Approx(1));
+  }
+  for (const auto& [name, word] : {std::pair("01-c_header_only.stl", "80 bytes"), {"01-e_truncated.stl", "byte 80"}}) {
+    const Run run = place.run("convert " + *inputs + name + " -o b.obj");
+    CAPTURE(name, run.err);
+    CHECK(run.status == 3);
+    CHECK(has(run.err, word));
+    CHECK(!has(run.err, "endsolid"));
+  }
+}
+
+TEST_CASE("Reported files of cells give the references that are meant, and are told when they cannot be read", "[cli]") {
+  const auto inputs = reported_inputs();
+  if (!inputs) return;
+  const Workplace place;
+  for (const char* name : {"37-double_ids.vtk", "37-orig_first.vtk"}) {
+    const Run run = place.run("convert " + *inputs + name + " --force -o a.mesh");
+    CAPTURE(name, run.err);
+    REQUIRE(run.status == 0);
+    CHECK(subvol::read_volume_mesh(place / "a.mesh").references == std::vector<int>{7, 9});
+  }
+  for (const char* name : {"04-m.msh", "05-m.inp"}) {
+    const Run run = place.run("convert " + *inputs + name + " -o b.mesh");
+    CAPTURE(name, run.err);
+    CHECK(run.status == 3);
+    CHECK(has(run.err, "unknown extension"));
+  }
+  const Run mirrored = place.run("optimize " + *inputs + "09-all_mirrored.mesh -o b.mesh");
+  CAPTURE(mirrored.err);
+  CHECK(mirrored.status == 0);
+  CHECK(has(mirrored.err, "numbered anew"));
+  REQUIRE(place.run("convert " + *inputs + "11-mixed.mesh -o b.msh").status == 0);
+  CHECK(has(content_of(place / "b.msh"), "$PhysicalNames\n2\n"));
+}
+
+TEST_CASE("What reported files hold beside the mesh is counted", "[cli]") {
+  const auto inputs = reported_inputs();
+  if (!inputs) return;
+  const Workplace place;
+  CHECK(has(place.run("convert " + *inputs + "03-three.stl -o a.obj").err, "3 solids"));
+  CHECK(has(place.run("convert " + *inputs + "03-groups.obj -o b.obj").err, "uses of materials"));
+  CHECK(has(place.run("convert " + *inputs + "03-labels.mesh -o a.mesh").err, "references of Quadrilaterals"));
+}
+
+TEST_CASE("Reported surfaces are told with their own numbers, and which way they face", "[cli]") {
+  const auto inputs = reported_inputs();
+  if (!inputs) return;
+  const Workplace place;
+  const Run flap = place.run("template auto " + *inputs + "21-flap_inward.off -o a.mesh");
+  CAPTURE(flap.err);
+  CHECK(flap.status == 3);
+  CHECK((has(flap.err, "from vertex 4 (") && has(flap.err, ") to 6 (")));
+  for (const char* name : {"21-inward_minus1.off", "21-inward_minus50.off"}) {
+    const Run run = place.run("shell " + *inputs + name + " --thickness 1% --straight --force -o a.mesh");
+    CAPTURE(name, run.err);
+    CHECK(has(run.err, "point inward"));
+    CHECK(has(run.err, "open edges"));
+    CHECK(!has(run.err, "closed surface"));
+  }
+}

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/read_back.h"
+
+#include "export/cutaway.h"
+#include "export/gltf_writer.h"
+#include "export/obj_writer.h"
+#include "export/usd_writer.h"
+#include "subvol/base/error.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+#include "tests/support/element_fixtures.h"
+#include "tests/support/sample_meshes.h"
+#include "tests/support/temporary_folder.h"
+
+#include <catch2/catch.hpp>
+
+#include <functional>
+
+#include <sys/stat.h>
+
+using namespace subvol;
+using namespace subvol::test;
+using Catch::Contains;
+
+namespace {
+
+/// Hexes, prisms and tets with references and tags, in an order that no format keeps.
+VolumeMesh tagged_mesh() {
+  PointSource source(1);
+  VolumeMesh mesh = renumbered(mixed_cells(), source.random());
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) mesh.references.push_back(static_cast<int>(c % 2) + 1);
+  const MeshTopology topology(mesh);
+  const auto edge = topology.face(topology.boundary_faces()[0]);
+  mesh.tags.creases.push_back({std::min(edge[0], edge[1]), std::max(edge[0], edge[1]), 1.5});
+  mesh.tags.corners.push_back({edge[0], kInfiniteSharpness});
+  return mesh;
+}
+
+HighOrderMesh curved_mesh(const VolumeMesh& mesh) {
+  PointSource source(2);
+  HighOrderMesh curved(ElementSpace(mesh, Basis::legendre, 2), mesh);
+  for (std::size_t i = mesh.num_vertices(); i < curved.coefficients.size(); ++i)
+    curved.coefficients[i] += 0.01 * source.vector();
+  return curved;
+}
+
+/// Every spoilt thing is told from the file.
+template <class Thing>
+void tells(const std::filesystem::path& path, const Thing& written,
+           std::initializer_list<std::function<void(Thing&)>> spoilers) {
+  CHECK_NOTHROW(require_written(path, written));
+  for (const auto& spoil : spoilers) {
+    Thing other = written;
+    spoil(other);
+    CHECK_THROWS_AS(require_written(path, other), IoError);
+    CHECK_THROWS_WITH(require_written(path, other), Contains(path.filename().string()));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("cells that were written are told from cells that differ in anything") {
+  const TemporaryFolder folder;
+  const VolumeMesh mesh = tagged_mesh();
+  const auto moved = [](VolumeMesh& m) { m.positions[3].y() = std::nextafter(m.positions[3].y(), 9.0); };
+  const auto turned = [](VolumeMesh& m) { std::swap(m.cell_vertices[0], m.cell_vertices[1]); };
+  const auto fewer = [](VolumeMesh& m) {
+    m.kinds.pop_back();
+    m.cell_offsets.pop_back();
+    m.cell_vertices.resize(m.cell_offsets.back());
+    m.references.pop_back();
+  };
+  const auto more = [](VolumeMesh& m) { m.positions.push_back(Vec3::Zero()); };
+  const auto other_reference = [](VolumeMesh& m) { m.references[0] += 7; };
+  for (const char* name : {"a.mesh", "a.vtk"}) {
+    write_volume_mesh(folder / name, mesh);
+    tells<VolumeMesh>(folder / name, mesh, {moved, turned, fewer, more, other_reference});
+  }
+  tells<VolumeMesh>(
+      folder / "a.mesh", mesh,
+      {[](VolumeMesh& m) { m.tags.creases[0].sharpness = 2; }, [](VolumeMesh& m) { m.tags.corners.clear(); }});
+  for (const char* name : {"a.vtu", "a.msh"}) {
+    write_volume(folder / name, mesh, {});
+    tells<VolumeMesh>(folder / name, mesh, {moved, turned, fewer, more});
+  }
+}
+
+TEST_CASE("curved cells that were written are told from others") {
+  const TemporaryFolder folder;
+  const VolumeMesh straight = tagged_mesh();
+  const HighOrderMesh mesh = curved_mesh(straight);
+  const HighOrderFileOptions options{.references = straight.references};
+  for (const char* name : {"a.vtu", "a.msh", "a.mesh", "a.vtk"}) {
+    write_volume(folder / name, mesh, options);
+    CHECK_NOTHROW(require_written(folder / name, mesh, options));
+    HighOrderMesh other = mesh;
+    other.coefficients[mesh.space.num_vertices()].x() += 1e-9;  // in the midst of an edge
+    CHECK_THROWS_WITH(require_written(folder / name, other, options), Contains(name));
+  }
+}
+
+TEST_CASE("surfaces and scenes that were written are told from others") {
+  const TemporaryFolder folder;
+  VolumeMesh mesh = lattice(2, 2, 2);
+  for (Vec3& p : mesh.positions) p /= 3;
+  const PolygonMesh surface = boundary_surface(mesh, MeshTopology(mesh));
+  write_obj(folder / "a.obj", surface);
+  write_usd(folder / "a.usda", surface, {});
+  for (const char* name : {"a.obj", "a.usda"})
+    tells<PolygonMesh>(folder / name, surface,
+                       {[](PolygonMesh& m) { m.positions[1].z() += 1e-12; },
+                        [](PolygonMesh& m) { std::swap(m.face_vertices[2], m.face_vertices[3]); },
+                        [](PolygonMesh& m) { m.positions.pop_back(); }});
+  Scene scene = cutaway_scene(mesh, std::vector<double>(mesh.num_cells(), 1));
+  SceneShape shape{"before", scene.nodes[0].primitive.positions, scene.nodes[0].primitive.normals};
+  scene.nodes[0].shapes = {shape};
+  for (const bool quantize : {false, true})
+    for (const char* name : {"a.glb", "a.gltf"}) {
+      scene.quantize = quantize;
+      write_gltf(folder / name, scene);
+      tells<Scene>(folder / name, scene,
+                   {[](Scene& s) { s.nodes[0].primitive.positions[2].x() += 1e-4; },
+                    [](Scene& s) { std::swap(s.nodes[0].primitive.indices[0], s.nodes[0].primitive.indices[1]); },
+                    [](Scene& s) { s.nodes.pop_back(); }, [](Scene& s) { s.nodes[1].name = "other"; },
+                    [](Scene& s) { s.nodes[0].shapes.clear(); }});
+    }
+}
+
+TEST_CASE("a file that is gone or cut off is an error, one that is no file is passed over") {
+  const TemporaryFolder folder;
+  const VolumeMesh mesh = tagged_mesh();
+  for (const char* name : {"a.mesh", "a.vtk", "a.vtu", "a.msh"}) {
+    const auto path = folder / name;
+    CHECK_THROWS_AS(require_written(path, mesh), IoError);
+    const bool linear = path.extension() == ".mesh" || path.extension() == ".vtk";
+    linear ? write_volume_mesh(path, mesh) : write_volume(path, mesh, {});
+    const std::string bytes = content_of(path);
+    folder.file(name, bytes.substr(0, bytes.size() / 2));
+    CHECK_THROWS_AS(require_written(path, mesh), IoError);
+  }
+  REQUIRE(mkfifo((folder / "pipe.mesh").c_str(), 0600) == 0);
+  CHECK_NOTHROW(require_written(folder / "pipe.mesh", mesh));
+}

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "shell/extrude.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/features.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/validate.h"
+#include "subvol/surface/boundary.h"
+#include "subvol/surface/winding_number.h"
+#include "subvol/templates/carve.h"
+#include "subvol/templates/cell_split.h"
+#include "subvol/templates/pillow.h"
+#include "subvol/templates/sheet.h"
+#include "subvol/templates/vertex_merge.h"
+#include "subvol/templates/voxel_grid.h"
+#include "tests/support/mesh_checks.h"
+#include "tests/support/sample_meshes.h"
+#include "tests/support/surface_fixtures.h"
+
+#include <catch2/catch.hpp>
+
+#include <numbers>
+#include <set>
+
+using namespace subvol;
+using test::check_mesh_is;
+using test::euler_number;
+using test::volume_of;
+
+namespace {
+
+Index vertex_at(const VolumeMesh& mesh, const Vec3& place) {
+  for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+    if ((mesh.positions[v] - place).norm() < 1e-9) return static_cast<Index>(v);
+  return kNoIndex;
+}
+
+VolumeMesh tagged_lattice(int nx, int ny, int nz) {
+  VolumeMesh mesh = test::lattice(nx, ny, nz);
+  mesh.tags = features_by_angle(mesh, 40);
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("A grid fills its box by counts and by size", "[templates]") {
+  const VolumeMesh mesh = voxel_mesh(box_grid(Vec3(-1, 0, 2), Vec3(1, 3, 3), {4, 3, 1}));
+  CHECK(mesh.num_cells() == 12);
+  CHECK(mesh.num_vertices() == 5 * 4 * 2);
+  check_mesh_is(mesh, 1, 6);
+  CHECK(box_grid(Vec3(-1, 0, 2), Vec3(1, 3, 3), 0.45).cells == std::array{4, 7, 2});
+  CHECK(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 10).cells == std::array{1, 1, 1});
+  CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 0), {1, 1, 1}), InputError);
+  CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {1, 0, 1}), InputError);
+  CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {100000, 100000, 100000}), InputError);
+  CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 0.0), InputError);
+}
+
+TEST_CASE("Winding numbers agree with the sum over all triangles", "[templates]") {
+  test::RandomPoints random(11);
+  for (const TriangleMesh& surface : {test::cube_surface(12, true), test::triangle_soup(500, 0.3, 4)}) {
+    const WindingNumber winding(surface);
+    for (const Vec3& p : random.points(200, 1.5)) {
+      double sum = 0;
+      for (const auto& t : surface.triangles) {
+        const Vec3 a = surface.positions[t[0]] - p, b = surface.positions[t[1]] - p, c = surface.positions[t[2]] - p;
+        const double la = a.norm(), lb = b.norm(), lc = c.norm();
+        sum += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+      }
+      CHECK(std::abs(winding.at(p) - sum / (4 * std::numbers::pi)) < 0.01);
+    }
+  }
+  const WindingNumber ball(test::cube_surface(12, true));
+  CHECK(ball.at(Vec3(0.1, 0.2, 0)) == Approx(1).margin(0.01));
+  CHECK(ball.at(Vec3(2, 0, 0)) == Approx(0).margin(0.01));
+  CHECK_THROWS_AS(WindingNumber(TriangleMesh{}), InputError);
+}
+
+TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[templates]") {
+  const VolumeMesh grid = voxel_mesh(box_grid(Vec3::Constant(-1.2), Vec3::Constant(1.2), {8, 8, 8}));
+  const TriangleMesh ball = test::cube_surface(10, true);
+  const std::vector<char> inside = cells_inside(grid, ball);
+  for (std::size_t c = 0; c < grid.num_cells(); ++c) {
+    Vec3 centre = Vec3::Zero();
+    for (Index v : grid.cell(c)) centre += grid.positions[v] / 8;
+    // A cell has the half diagonal 0.26; the ball's triangles lie within 0.05 of the sphere.
+    if (centre.norm() < 0.68) CHECK(inside[c]);
+    if (centre.norm() > 1.27) CHECK(!inside[c]);
+  }
+  const VolumeMesh carved = carve(grid, [&](std::size_t c) { return inside[c] != 0; });
+  check_mesh_is(carved, 1, 0.027 * static_cast<double>(carved.num_cells()));
+  CHECK(volume_of(carved) == Approx(4 * std::numbers::pi / 3).epsilon(0.15));
+
+  const VolumeMesh lattice = tagged_lattice(3, 3, 3);
+  const std::vector<char> low = cells_in_box(lattice, Vec3(0, 0, 0), Vec3(3, 3, 2));
+  const VolumeMesh slab = carve(lattice, [&](std::size_t c) { return low[c] != 0; });
+  check_mesh_is(slab, 1, 18);
+  CHECK(slab.tags.corners.size() == 4);  // those above have gone
+  const std::vector<char> centre = cells_listed(lattice, std::array<Index, 1>{13});
+  check_mesh_is(carve(lattice, [&](std::size_t c) { return centre[c] == 0; }), 2, 26);
+
+  CHECK_THROWS_AS(carve(lattice, [](std::size_t) { return false; }), InputError);
+  CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 4; }), InputError);   // along an edge
+  CHECK_THROWS_AS(carve(lattice, [](std::size_t c) { return c == 0 || c == 13; }), InputError);  // at a vertex
+  CHECK_THROWS_AS(cells_listed(lattice, std::array<Index, 1>{27}), InputError);
+  CHECK_THROWS_AS(cells_inside(lattice, ball, 0), InputError);
+}
+
+TEST_CASE("A pillow adds a cell per boundary face and moves nothing that was there", "[templates]") {
+  const VolumeMesh lattice = tagged_lattice(2, 3, 2);
+  const VolumeMesh pillowed = pillow(lattice);
+  CHECK(pillowed.num_cells() == lattice.num_cells() + 2 * (6 + 6 + 4));
+  check_mesh_is(pillowed, 1, 12);
+  CHECK(pillowed.tags == lattice.tags);
+  CHECK(std::equal(lattice.positions.begin(), lattice.positions.end(), pillowed.positions.begin()));
+  for (std::size_t c = 0; c < pillowed.num_cells(); ++c) CHECK(test::min_scaled_jacobian(pillowed, c) > 0.15);
+  // The layer is one cell thick: taking its sheet out undoes it, but for places.
+  const Index corner = vertex_at(lattice, Vec3(0, 0, 0)), inner = pillowed.cell(0)[0];
+  const VolumeMesh again = collapse_sheet(pillowed, corner, inner);
+  check_mesh_is(again, 1, 12);
+  CHECK(again.num_cells() == lattice.num_cells());
+}
+
+TEST_CASE("A pillow around some cells, and of prisms and tets", "[templates]") {
+  const VolumeMesh lattice = test::lattice(3, 3, 3);
+  const VolumeMesh around_centre = pillow(lattice, std::array<Index, 1>{13});
+  CHECK(around_centre.num_cells() == 27 + 6);
+  check_mesh_is(around_centre, 1, 27);
+  const VolumeMesh mixed = pillow(test::mixed_cells());
+  CHECK(validate(mixed).empty());
+  CHECK(euler_number(mixed) == 1);
+  CHECK(volume_of(mixed) == Approx(volume_of(test::mixed_cells())));
+
+  CHECK_THROWS_AS(pillow(VolumeMesh{}), InputError);
+  CHECK_THROWS_AS(pillow(lattice, std::array<Index, 1>{27}), InputError);
+  CHECK_THROWS_AS(pillow(lattice, std::array<Index, 2>{1, 1}), InputError);
+  CHECK_THROWS_AS(pillow(lattice, std::array<Index, 2>{0, 13}), InputError);  // they touch at a vertex
+}
+
+TEST_CASE("Splitting a sheet and collapsing a part of it are inverse", "[templates]") {
+  const VolumeMesh lattice = tagged_lattice(2, 2, 3);
+  const Index a = vertex_at(lattice, Vec3(0, 0, 1)), b = vertex_at(lattice, Vec3(0, 0, 2));
+  const VolumeMesh split = split_sheet(lattice, a, b, 3);
+  CHECK(split.num_cells() == 4 * 5);
+  check_mesh_is(split, 1, 12);
+  CHECK(split.tags.creases.size() == lattice.tags.creases.size() + 4 * 2);
+  const Index n = static_cast<Index>(lattice.num_vertices());  // first new vertex, on a-b
+  const VolumeMesh half_way = collapse_sheet(split, a, n);
+  const VolumeMesh back = collapse_sheet(half_way, a, vertex_at(half_way, Vec3(0, 0, 1 + 2.0 / 3)));
+  check_mesh_is(back, 1, 12);
+  CHECK(back.cell_vertices == lattice.cell_vertices);
+  CHECK(back.positions == lattice.positions);
+  CHECK(back.tags == lattice.tags);
+  CHECK(sheet_edges(MeshTopology(lattice), a, b).size() == 9);
+
+  CHECK_THROWS_AS(split_sheet(lattice, a, a), InputError);
+  CHECK_THROWS_AS(split_sheet(lattice, a, 10000), InputError);
+  CHECK_THROWS_AS(split_sheet(lattice, a, b, 1), InputError);
+  const VolumeMesh mixed = test::mixed_cells();
+  CHECK_THROWS_AS(split_sheet(mixed, 0, 3), InputError);   // runs into triangles of a prism
+  check_mesh_is(split_sheet(mixed, 0, 4), 1, volume_of(mixed));
+  CHECK(split_sheet(mixed, 0, 4).num_cells() == mixed.num_cells() + 3);
+}
+
+TEST_CASE("Collapsing faces and edges keeps conformity or is refused", "[templates]") {
+  const VolumeMesh lattice = test::lattice(4, 4, 2);
+  const VolumeMesh folded =
+      collapse_face(lattice, vertex_at(lattice, Vec3(1, 1, 0)), vertex_at(lattice, Vec3(2, 2, 0)));
+  CHECK(folded.num_cells() == lattice.num_cells() - 2);
+  check_mesh_is(folded, 1, 32);
+  CHECK_THROWS_AS(collapse_face(lattice, 0, 1), InputError);
+  CHECK_THROWS_AS(collapse_edge(lattice, 0, 1), InputError);  // hexes around one edge become nothing known
+
+  const VolumeMesh tets = split_into_tets(test::lattice(3, 3, 3));
+  const Index p = vertex_at(tets, Vec3(1, 1, 1)), q = vertex_at(tets, Vec3(2, 1, 1));
+  const MeshTopology topology(tets);
+  REQUIRE(topology.find_edge(p, q) != kNoIndex);
+  const VolumeMesh fewer = collapse_edge(tets, p, q);
+  CHECK(fewer.num_cells() ==
+        tets.num_cells() - static_cast<std::size_t>(topology.num_edge_cells(topology.find_edge(p, q))));
+  check_mesh_is(fewer, 1, 27);
+  CHECK_THROWS_AS(collapse_sheet(test::lattice(1, 1, 1), 0, 1), InputError);  // nothing would be left
+}
+
+TEST_CASE("Merging glues coincident faces and keeps tags that stay on the boundary", "[templates]") {
+  VolumeMesh left = tagged_lattice(2, 2, 2), right = left;
+  for (Vec3& p : right.positions) p.x() += 2;
+  right.references.assign(right.num_cells(), 7);
+  const VolumeMesh both = joined(left, right);
+  CHECK(both.num_cells() == 16);
+  CHECK(both.references.front() == 0);
+  CHECK(both.references.back() == 7);
+  const VolumeMesh glued = glue(both, 1e-9);
+  check_mesh_is(glued, 1, 16);
+  CHECK(glued.num_vertices() == 2 * 27 - 9);
+  CHECK(validate(glued).empty());
+  CHECK(glue(glued, 1e-9).num_vertices() == glued.num_vertices());
+  CHECK_THROWS_AS(glue(both, 2), InputError);
+  CHECK_THROWS_AS(glue(both, -1), InputError);
+  CHECK_THROWS_AS(glue(joined(left, left), 1e-9), InputError);  // the same cells twice
+}
+
+TEST_CASE("Merging refuses a distance at which cells would go or change their kind", "[templates]") {
+  VolumeMesh thin = test::lattice(1, 1, 1), apart = test::lattice(2, 2, 2);
+  for (Vec3& p : thin.positions) p.z() *= 0.005;
+  for (Vec3& p : apart.positions) p.x() += 5;
+  const VolumeMesh both = joined(apart, thin);
+  CHECK(glue(both, 0.004).num_cells() == 9);
+  CHECK_THROWS_WITH(glue(both, 0.06), Catch::Contains("corners of cell 8") && Catch::Contains("0.06"));
+  VolumeMesh wedge = test::lattice(1, 1, 1);  // nearly a prism
+  for (Vec3& p : wedge.positions)
+    if (p.x() > 0) p.z() *= 0.005;
+  CHECK_THROWS_AS(glue(wedge, 0.06), InputError);
+  CHECK(glue(wedge, 0.004).kinds == wedge.kinds);
+}
+
+TEST_CASE("Merging takes boundaries of many vertices in one plane", "[templates]") {
+  const VolumeMesh below = test::lattice(300, 300, 1);
+  VolumeMesh above = below;
+  for (Vec3& p : above.positions) p.z() += 1;
+  const VolumeMesh glued = glue(joined(below, above), 1e-6);
+  CHECK(glued.num_cells() == 2 * 300 * 300);
+  CHECK(glued.num_vertices() == 3 * 301 * 301);
+  CHECK(volume_of(glued) == Approx(2 * 300 * 300));
+}
+
+TEST_CASE("Hexes become tets and prisms without new vertices", "[templates]") {
+  VolumeMesh lattice = tagged_lattice(3, 2, 2);
+  test::jitter(lattice, 0.1);
+  const double volume = volume_of(lattice);
+  const VolumeMesh tets = split_into_tets(lattice);
+  CHECK(validate(tets).empty());
+  CHECK(euler_number(tets) == 1);
+  CHECK(tets.num_vertices() == lattice.num_vertices());
+  CHECK(volume_of(tets) == Approx(volume).epsilon(0.05));  // the quads were warped
+  CHECK(validate(split_into_tets(test::mixed_cells())).empty());
+
+  const VolumeMesh straight = tagged_lattice(3, 2, 2);
+  check_mesh_is(split_into_tets(straight), 1, 12);
+  for (const Vec3& along : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)}) {
+    const VolumeMesh prisms =
+        split_into_prisms(straight, vertex_at(straight, Vec3(0, 0, 0)), vertex_at(straight, along));
+    CHECK(prisms.num_cells() == 24);
+    check_mesh_is(prisms, 1, 12);
+  }
+  const VolumeMesh column = test::lattice(1, 1, 2000);
+  const VolumeMesh prisms =
+      split_into_prisms(column, vertex_at(column, Vec3(0, 0, 0)), vertex_at(column, Vec3(0, 0, 1)));
+  CHECK(prisms.num_cells() == 4000);
+  check_mesh_is(prisms, 1, 2000);
+  CHECK_THROWS_AS(split_into_prisms(straight, 0, 100), InputError);
+  CHECK_THROWS_AS(split_into_prisms(test::mixed_cells(), 0, 1), InputError);
+}
+
+TEST_CASE("Extruding stacks hexes on quads and prisms on triangles", "[templates]") {
+  PolygonMesh plate;  // a quad and a triangle
+  plate.positions = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0), Vec3(2, 0.5, 0)};
+  plate.face_vertices = {0, 1, 2, 3, 1, 4, 2};
+  plate.face_offsets = {0, 4, 7};
+  const VolumeMesh up = extrude(plate, {.thickness = 2, .layers = 2, .direction = Vec3(0, 0, 3)});
+  CHECK(up.num_cells() == 4);
+  check_mesh_is(up, 1, 2 * 1.5);
+  CHECK(up.references == std::vector<int>{1, 1, 2, 2});
+  const VolumeMesh leaning = extrude(plate, {.thickness = std::sqrt(2.0), .direction = Vec3(1, 0, 1)});
+  check_mesh_is(leaning, 1, 1.5);
+  check_mesh_is(extrude(plate, {.thickness = 1}), 1, 1.5);
+  CHECK_THROWS_AS(extrude(plate, {.thickness = 0}), InputError);
+  CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .layers = 0}), InputError);
+  CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .direction = Vec3(0, 0, -1)}), InputError);
+  CHECK_THROWS_AS(extrude(plate, {.thickness = 1, .direction = Vec3(0, 0, 0)}), InputError);
+}
