@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The layers only point down: docs/architecture.md, "Who may include whom".
+// The rooms only point down: docs/architecture.md, "Rooms".
 
 #include "tests/support/data.h"
 
@@ -10,122 +10,295 @@
 #include <fstream>
 #include <functional>
 #include <map>
-#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace fs = std::filesystem;
 
 namespace {
 
-const fs::path kRoot = subvol::test::source_dir();
-const std::vector<std::string> kLayers{"subvol", "fit",     "shell", "export", "cli",
-                                       "python", "samples", "bench", "tests"};
-
-const std::map<std::string, std::set<std::string>> kMayInclude{
-    {"subvol", {"subvol"}},
-    {"fit", {"subvol", "fit"}},
-    {"shell", {"subvol", "fit", "shell"}},
-    {"export", {"subvol", "export"}},  // and kFitForExport
-    {"cli", {"subvol", "fit", "shell", "export", "cli"}},
-    {"python", {"subvol", "fit", "shell", "export", "cli", "python"}},
-    {"samples", {"subvol", "fit", "shell", "export", "samples"}},
-    {"bench", {"subvol", "fit", "shell", "export", "samples", "bench"}},
-    {"tests", {"subvol", "fit", "shell", "export", "cli", "samples", "tests"}},
+/// A folder whose files belong together, and what these may include besides one another: rooms with all rooms inside
+/// them, or single headers.
+struct Room {
+  std::string folder;
+  std::vector<std::string> may_include;
 };
-// Results of a fit may be shown, its energies and solver not.
-const std::set<std::string> kFitForExport{"fit/quality/quality.h", "fit/certificate/certificate.h", "fit/elements/element_space.h",
-                                          "fit/elements/high_order_mesh.h", "fit/elements/pattern_table.h",
-                                          "fit/quality/high_order_quality.h", "fit/geometry/curved_boundary.h",
-                                          "fit/elements/boundary_samples.h"};
+
+/// Lowest first: a room may include only rooms before it.
+const std::vector<Room> kRooms{
+    {"subvol/base", {}},
+    {"subvol/mesh", {"subvol/base"}},
+    {"subvol/surface", {"subvol/base", "subvol/mesh"}},
+    {"subvol/io", {"subvol/base", "subvol/mesh", "subvol/surface"}},
+    {"subvol/subdivision", {"subvol/base", "subvol/mesh", "subvol/surface"}},
+    {"subvol/templates", {"subvol/base", "subvol/mesh", "subvol/surface"}},
+    {"fit/simd", {"subvol"}},
+    {"fit/elements", {"subvol", "fit/simd"}},
+    {"fit/certificate", {"subvol", "fit/simd", "fit/elements"}},
+    {"fit/quality", {"subvol", "fit/elements", "fit/certificate"}},
+    {"fit/geometry", {"subvol", "fit/simd"}},
+    {"fit/target", {"subvol", "fit/geometry"}},
+    {"fit/features", {"subvol", "fit/geometry"}},
+    {"fit/energies",
+     {"subvol", "fit/simd", "fit/elements", "fit/certificate", "fit/geometry", "fit/target", "fit/features"}},
+    {"fit/solver", {"subvol", "fit/elements", "fit/energies"}},
+    {"fit/stages",
+     {"subvol", "fit/certificate", "fit/geometry", "fit/target", "fit/features", "fit/energies", "fit/solver"}},
+    {"fit/fits", {"subvol", "fit/elements", "fit/solver", "fit/stages"}},
+    {"fit", {"subvol"}},  // and every room of fit
+    {"shell", {"subvol", "fit"}},
+    // The result of a fit may be shown, but no energy, no solver and no fit.
+    {"export", {"subvol", "fit/elements", "fit/quality", "fit/geometry/curved_boundary.h"}},
+    {"cli/runs", {"subvol", "fit", "shell", "export"}},
+    {"cli/verbs", {"subvol", "fit", "shell", "export", "cli/runs"}},
+    {"python", {"subvol", "fit", "shell", "export", "cli/runs"}},
+    {"samples", {"subvol", "fit", "shell", "export"}},
+    {"bench", {"subvol", "fit", "shell", "export", "samples"}},
+    {"tests", {"subvol", "fit", "shell", "export", "cli", "samples"}},
+};
+
+/// A library of others, known by how its includes begin, and the files that may include it: those in these folders
+/// whose names end so.
+struct Library {
+  std::string include;
+  std::vector<std::string> folders;
+  std::string ending;
+};
+
+const std::vector<Library> kLibraries{
+    {"CGAL/", {"fit/geometry", "shell"}, "_cgal.cpp"},
+    {"opensubdiv/", {"subvol/subdivision", "bench", "tests"}, ".cpp"},
+    {"tiny_gltf", {"export"}, ".cpp"},
+    {"CLI/", {"cli/verbs"}, ""},
+    {"pybind11/", {"python"}, ""},
+};
 
 struct Source {
-  std::string path, layer;
-  std::vector<std::string> includes;
+  std::string path;                        ///< from the root of the project
+  std::vector<std::string> includes;       ///< of files of ours: "..."
+  std::vector<std::string> libraries{};    ///< of others' files: <...>
 };
 
-std::vector<std::string> includes_of(const fs::path& file) {
-  std::vector<std::string> found;
+/// Whether a path is this file, or is in this folder or in one inside it.
+bool is_in(std::string_view path, std::string_view place) {
+  return path.starts_with(place) && (path.size() == place.size() || path[place.size()] == '/');
+}
+
+std::string folder_of(const std::string& path) { return path.substr(0, path.rfind('/')); }
+
+/// The innermost room of a file; null: it has none. A room that is made of rooms holds only files of its own.
+const Room* room_of(const std::string& path) {
+  const Room* found = nullptr;
+  for (const Room& room : kRooms)
+    if (is_in(path, room.folder) && (!found || room.folder.size() > found->folder.size())) found = &room;
+  return found && found->folder == "fit" && folder_of(path) != "fit" ? nullptr : found;
+}
+
+// --- The checks: each lists what is wrong with the sources -----------------------------------------------------------
+
+std::vector<std::string> files_without_room(const std::vector<Source>& sources) {
+  std::vector<std::string> wrong;
+  for (const Source& source : sources)
+    if (!room_of(source.path)) wrong.push_back(source.path + " is in no room");
+  return wrong;
+}
+
+std::vector<std::string> upward_includes(const std::vector<Source>& sources) {
+  std::vector<std::string> wrong;
+  for (const Source& source : sources) {
+    const Room* room = room_of(source.path);
+    if (!room) continue;
+    for (const std::string& include : source.includes) {
+      const auto has_it = [&](const std::string& place) { return is_in(include, place); };
+      const auto& places = room->may_include;
+      if (!has_it(room->folder) && std::none_of(places.begin(), places.end(), has_it))
+        wrong.push_back(source.path + " includes " + include);
+    }
+  }
+  return wrong;
+}
+
+std::vector<std::string> stray_libraries(const std::vector<Source>& sources) {
+  std::vector<std::string> wrong;
+  for (const Source& source : sources)
+    for (const std::string& include : source.libraries)
+      for (const Library& library : kLibraries) {
+        const auto has_it = [&](const std::string& folder) { return is_in(source.path, folder); };
+        if (include.starts_with(library.include) &&
+            (std::none_of(library.folders.begin(), library.folders.end(), has_it) ||
+             !source.path.ends_with(library.ending)))
+          wrong.push_back(source.path + " includes " + include);
+      }
+  return wrong;
+}
+
+std::vector<std::string> cycles(const std::vector<Source>& sources) {
+  std::map<std::string, std::vector<std::string>> graph;
+  for (const Source& source : sources) graph[source.path] = source.includes;
+  enum class State { fresh, open, done };
+  std::map<std::string, State> states;
+  std::vector<std::string> wrong, way;
+  const std::function<void(const std::string&)> visit = [&](const std::string& path) {
+    if (!graph.count(path) || states[path] == State::done) return;
+    way.push_back(path);
+    if (states[path] == State::open) {
+      std::string cycle;
+      for (auto at = std::find(way.begin(), way.end(), path); at != way.end(); ++at)
+        cycle += (cycle.empty() ? "" : " -> ") + *at;
+      wrong.push_back(cycle);
+    } else {
+      states[path] = State::open;
+      for (const std::string& include : graph[path]) visit(include);
+      states[path] = State::done;
+    }
+    way.pop_back();
+  };
+  for (const auto& [path, includes] : graph) visit(path);
+  return wrong;
+}
+
+/// Includes of files that are not there by this name: each is to be named from the root of the project.
+std::vector<std::string> unknown_files(const std::vector<Source>& sources) {
+  std::vector<std::string> wrong;
+  for (const Source& source : sources)
+    for (const std::string& include : source.includes)
+      if (std::none_of(sources.begin(), sources.end(), [&](const Source& other) { return other.path == include; }))
+        wrong.push_back(source.path + " includes " + include);
+  return wrong;
+}
+
+// --- The sources of the project --------------------------------------------------------------------------------------
+
+Source read_source(const fs::path& root, const fs::path& file) {
+  Source source{fs::relative(file, root).generic_string(), {}};
   std::ifstream stream(file);
   for (std::string line; std::getline(stream, line);) {
     if (!line.starts_with("#include ")) continue;
     const auto open = line.find_first_of("\"<"), close = line.find_last_of("\">");
-    found.push_back(line.substr(open + 1, close - open - 1));
+    (line[open] == '"' ? source.includes : source.libraries).push_back(line.substr(open + 1, close - open - 1));
   }
-  return found;
+  return source;
 }
 
 std::vector<Source> all_sources() {
+  const fs::path root = subvol::test::source_dir();
   std::vector<Source> sources;
-  for (const std::string& layer : kLayers) {
-    if (!fs::exists(kRoot / layer)) continue;
-    for (const auto& entry : fs::directory_iterator(kRoot / layer)) {
-      const auto extension = entry.path().extension();
-      if (extension != ".h" && extension != ".cpp") continue;
-      sources.push_back({layer + '/' + entry.path().filename().string(), layer, includes_of(entry.path())});
-    }
-  }
+  for (const char* top : {"subvol", "fit", "shell", "export", "cli", "python", "samples", "bench", "tests"})
+    for (const auto& entry : fs::recursive_directory_iterator(root / top))
+      if (entry.path().extension() == ".h" || entry.path().extension() == ".cpp")
+        sources.push_back(read_source(root, entry.path()));
   std::sort(sources.begin(), sources.end(), [](const Source& a, const Source& b) { return a.path < b.path; });
   return sources;
 }
 
-std::string layer_of(const std::string& include) {
-  const std::string folder = include.substr(0, include.find('/'));
-  return std::find(kLayers.begin(), kLayers.end(), folder) != kLayers.end() ? folder : "";
-}
+using Strings = std::vector<std::string>;
 
 }  // namespace
 
-TEST_CASE("Files include only their own layer and those below", "[includes]") {
+TEST_CASE("Every source is in a room, and every room has sources", "[includes]") {
   const auto sources = all_sources();
-  REQUIRE(sources.size() > 20);
-  for (const Source& source : sources) {
-    for (const std::string& include : source.includes) {
-      const std::string layer = layer_of(include);
-      if (layer.empty() || kMayInclude.at(source.layer).count(layer)) continue;
-      if (source.layer == "export" && kFitForExport.count(include)) continue;
-      FAIL_CHECK(source.path << " includes " << include);
-    }
+  CHECK(files_without_room(sources) == Strings{});
+  for (const Room& room : kRooms) {
+    INFO(room.folder);
+    CHECK(std::any_of(sources.begin(), sources.end(), [&](const Source& s) { return room_of(s.path) == &room; }));
   }
 }
 
-TEST_CASE("CGAL, OpenSubdiv and tinygltf stay inside their .cpp files, pybind11 in its folder", "[includes]") {
-  for (const Source& source : all_sources()) {
-    if (source.layer == "tests") continue;
-    for (const std::string& include : source.includes) {
-      INFO(source.path << " includes " << include);
-      if (include.starts_with("CGAL/")) CHECK(source.path.ends_with("_cgal.cpp"));
-      if (include.starts_with("opensubdiv/")) CHECK(source.path.ends_with(".cpp"));
-      if (include.starts_with("tiny_gltf")) CHECK(source.path.ends_with(".cpp"));
-      if (include.starts_with("pybind11/")) CHECK(source.layer == "python");
-    }
-  }
+TEST_CASE("Rooms may include only rooms before them", "[includes]") {
+  for (std::size_t i = 0; i < kRooms.size(); ++i)
+    for (const std::string& place : kRooms[i].may_include)
+      for (std::size_t above = i; above < kRooms.size(); ++above) {
+        INFO(kRooms[i].folder << " may include " << place);
+        CHECK(!is_in(kRooms[above].folder, place));
+      }
 }
 
-TEST_CASE("No header includes itself through others", "[includes]") {
-  std::map<std::string, std::vector<std::string>> graph;
-  for (const Source& source : all_sources()) graph[source.path] = source.includes;
-  enum class State { fresh, open, done };
-  std::map<std::string, State> states;
-  const std::function<void(const std::string&)> visit = [&](const std::string& path) {
-    if (!graph.count(path) || states[path] == State::done) return;
-    if (states[path] == State::open) {
-      FAIL_CHECK("a cycle of includes through " << path);
-      return;
-    }
-    states[path] = State::open;
-    for (const std::string& include : graph[path]) visit(include);
-    states[path] = State::done;
-  };
-  for (const auto& [path, includes] : graph) visit(path);
+TEST_CASE("Every room is described in docs/architecture.md", "[includes]") {
+  std::ifstream stream(fs::path(subvol::test::source_dir()) / "docs" / "architecture.md");
+  Strings rows;
+  for (std::string line; std::getline(stream, line);)
+    if (line.starts_with("| `")) rows.push_back(line.substr(3, line.find('`', 3) - 3));
+  Strings folders;
+  for (const Room& room : kRooms) folders.push_back(room.folder);
+  CHECK(rows == folders);
+}
+
+TEST_CASE("Files include only what their room may", "[includes]") { CHECK(upward_includes(all_sources()) == Strings{}); }
+
+TEST_CASE("Libraries of others are included only where they belong", "[includes]") {
+  CHECK(stray_libraries(all_sources()) == Strings{});
+}
+
+TEST_CASE("No header includes itself through others", "[includes]") { CHECK(cycles(all_sources()) == Strings{}); }
+
+TEST_CASE("Every file that is included is named from the root", "[includes]") {
+  CHECK(unknown_files(all_sources()) == Strings{});
 }
 
 TEST_CASE("Every source says its licence in the first line", "[includes]") {
   for (const Source& source : all_sources()) {
-    std::ifstream stream(kRoot / source.path);
+    std::ifstream stream(fs::path(subvol::test::source_dir()) / source.path);
     std::string first;
     std::getline(stream, first);
     INFO(source.path);
     CHECK(first == "// SPDX-License-Identifier: GPL-3.0-or-later");
+  }
+}
+
+TEST_CASE("The checks of includes report what is wrong", "[includes]") {
+  SECTION("a file in no room") {
+    CHECK(files_without_room({{"fit/attic/old.h", {}}, {"subvol/lost.h", {}}, {"fit/optimize_mesh.h", {}}}) ==
+          Strings{"fit/attic/old.h is in no room", "subvol/lost.h is in no room"});
+  }
+  SECTION("an include of a room above, and of one beside") {
+    CHECK(upward_includes({{"fit/target/fit_target.h", {"fit/geometry/closest_point.h", "fit/stages/fit_report.h"}},
+                           {"subvol/io/mesh_io.cpp", {"subvol/templates/carve.h"}},
+                           {"subvol/base/types.h", {"cli/runs/report.h"}}}) ==
+          Strings{"fit/target/fit_target.h includes fit/stages/fit_report.h",
+                  "subvol/io/mesh_io.cpp includes subvol/templates/carve.h",
+                  "subvol/base/types.h includes cli/runs/report.h"});
+  }
+  SECTION("an include of an entry point by a room of fit") {
+    CHECK(upward_includes({{"fit/fits/fit_level.h", {"fit/subdivision_fit.h"}}}).size() == 1);
+    CHECK(upward_includes({{"fit/subdivision_fit.h", {"fit/fits/fit_level.h"}}}).empty());
+  }
+  SECTION("a header of fit that export may not see, beside one that it may") {
+    CHECK(upward_includes({{"export/scene.h", {"fit/geometry/curved_boundary.h", "fit/geometry/closest_point.h"}}}) ==
+          Strings{"export/scene.h includes fit/geometry/closest_point.h"});
+  }
+  SECTION("verbs in the Python module") {
+    CHECK(upward_includes({{"python/fits.cpp", {"cli/runs/report.h", "cli/verbs/commands.h"}}}) ==
+          Strings{"python/fits.cpp includes cli/verbs/commands.h"});
+  }
+  SECTION("a folder whose name only begins like a room's") {
+    CHECK(upward_includes({{"fit/simd/wide.h", {"subvolume/types.h"}}}).size() == 1);
+  }
+  SECTION("a cycle, once") {
+    CHECK(cycles({{"a.h", {"b.h"}}, {"b.h", {"c.h"}}, {"c.h", {"b.h"}}, {"d.h", {"a.h"}}}) ==
+          Strings{"b.h -> c.h -> b.h"});
+    CHECK(cycles({{"a.h", {"a.h"}}}) == Strings{"a.h -> a.h"});
+    CHECK(cycles({{"a.h", {"b.h", "c.h"}}, {"b.h", {"c.h"}}, {"c.h", {}}}).empty());
+  }
+  SECTION("libraries outside their place") {
+    CHECK(stray_libraries({{"fit/geometry/self_intersection.h", {}, {"CGAL/box_intersection_d.h"}},
+                           {"subvol/io/read_cgal.cpp", {}, {"CGAL/IO/OFF.h"}},
+                           {"fit/geometry/self_intersection_cgal.cpp", {}, {"CGAL/box_intersection_d.h", "vector"}},
+                           {"subvol/subdivision/limit_surface.h", {}, {"opensubdiv/far/topologyRefiner.h"}},
+                           {"fit/fits/fit_level.cpp", {}, {"opensubdiv/far/topologyRefiner.h"}},
+                           {"cli/runs/writing.cpp", {}, {"tiny_gltf.h"}},
+                           {"cli/runs/report.h", {}, {"CLI/CLI.hpp"}},
+                           {"cli/verbs/main.cpp", {}, {"CLI/CLI.hpp"}},
+                           {"cli/runs/loading.cpp", {}, {"pybind11/pybind11.h"}}}) ==
+          Strings{"fit/geometry/self_intersection.h includes CGAL/box_intersection_d.h",
+                  "subvol/io/read_cgal.cpp includes CGAL/IO/OFF.h",
+                  "subvol/subdivision/limit_surface.h includes opensubdiv/far/topologyRefiner.h",
+                  "fit/fits/fit_level.cpp includes opensubdiv/far/topologyRefiner.h",
+                  "cli/runs/writing.cpp includes tiny_gltf.h", "cli/runs/report.h includes CLI/CLI.hpp",
+                  "cli/runs/loading.cpp includes pybind11/pybind11.h"});
+  }
+  SECTION("a file that is not named from the root") {
+    CHECK(unknown_files({{"tests/support/data.h", {}}, {"tests/main.cpp", {"data.h", "tests/support/data.h"}}}) ==
+          Strings{"tests/main.cpp includes data.h"});
   }
 }
