@@ -28,8 +28,9 @@ std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima
                      std::span<const VertexField> fields = {});
 
 /// Linear cells as Gmsh 4.1 ASCII: tets (4), hexes (5), prisms (6); one volume per reference, which is a physical group
-/// named `reference R`, of number R or, where that is not positive, of the first number that is free; `scaled_jacobian` as element data, the fields as node data. Element numbers start at 1,
-/// volume by volume, then kind by kind. Doubles survive. Tags are not carried. Errors as above.
+/// named `reference R`, of number R or, where that is not positive, of the first number that is free; `scaled_jacobian`
+/// as element data, the fields as node data. Element numbers start at 1, volume by volume, then kind by kind. Doubles
+/// survive. Tags are not carried. Errors as above.
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                      std::span<const VertexField> fields = {});
 

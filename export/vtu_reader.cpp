@@ -30,7 +30,8 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
   for (const auto& [key, expected] : {std::pair{"type", "UnstructuredGrid"}, {"version", "2.2"},
                                       {"byte_order", "LittleEndian"}, {"header_type", "UInt64"}})
     if (attribute(header, key) != expected)
-      refuse_foreign("its " + std::string(key) + " is " + in_quotes(attribute(header, key)) + ", not '" + expected + "'");
+      refuse_foreign("its " + std::string(key) + " is " + in_quotes(attribute(header, key)) + ", not '" + expected +
+                     "'");
   if (header.find("compressor") != std::string_view::npos) refuse_foreign("its arrays are compressed");
   for (std::size_t at = bytes.find("<DataArray", begin); at != std::string_view::npos;
        at = bytes.find("<DataArray", at + 1))

@@ -28,8 +28,8 @@ std::optional<Number> parse(std::string_view word) {
 
 constexpr std::size_t kNotFound = std::string_view::npos;
 
-/// Whether so many of the first units of two bytes (or all there are, but one at least) are printable or blank ASCII, in
-/// the byte order that puts the zero at `zero`: 0 or 1.
+/// Whether so many of the first units of two bytes (or all there are, but one at least) are printable or blank ASCII,
+/// in the byte order that puts the zero at `zero`: 0 or 1.
 bool has_wide_ascii(std::string_view bytes, std::size_t zero) {
   constexpr std::size_t kUnits = 4;
   if (bytes.size() < 2) return false;

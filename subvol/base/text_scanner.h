@@ -16,9 +16,10 @@ std::string read_file(const std::filesystem::path& path);
 
 /// Words and numbers of a text file held in memory, one after the other, with the line for complaints.
 ///
-/// Words are separated by blanks, tabs and line ends. Lines end with LF, CR LF or CR; where the first line of a file ends
-/// with CR alone, a LF behind a CR ends a line of its own, because it may be the first byte of binary data. A word that starts with '#' opens a comment up to the end of the
-/// line, unless comments are off. Nothing is allocated by what a file claims: check counts with `count`.
+/// Words are separated by blanks, tabs and line ends. Lines end with LF, CR LF or CR; where the first line of a file
+/// ends with CR alone, a LF behind a CR ends a line of its own, because it may be the first byte of binary data. A word
+/// that starts with '#' opens a comment up to the end of the line, unless comments are off. Nothing is allocated by
+/// what a file claims: check counts with `count`.
 class TextScanner {
  public:
   enum class Comments { hash, none };

@@ -7,7 +7,8 @@ namespace subvol {
 
 void LeftOut::add(std::string_view what, std::size_t n) {
   if (n == 0) return;
-  const auto known = std::find_if(counts_.begin(), counts_.end(), [&](const auto& count) { return count.first == what; });
+  const auto is_known = [&](const auto& count) { return count.first == what; };
+  const auto known = std::find_if(counts_.begin(), counts_.end(), is_known);
   if (known == counts_.end())
     counts_.emplace_back(std::string(what), n);
   else

@@ -27,8 +27,8 @@ struct ReadOptions {
 ///   .vtk   legacy VTK 2.0 to 5.1, ASCII or binary, UNSTRUCTURED_GRID; a VTK wedge is renumbered to our prism
 ///
 /// Vertices and cells keep the file's order (Medit: section by section). Nothing is flipped or repaired, but with a
-/// warning: tags off the boundary are dropped; and with `check` cells are numbered anew where all of them, or all prisms,
-/// are left-handed at every corner. Cells of lower dimension are skipped.
+/// warning: tags off the boundary are dropped; and with `check` cells are numbered anew where all of them, or all
+/// prisms, are left-handed at every corner. Cells of lower dimension are skipped.
 ///
 /// Throws InputError with file and line (binary VTK: the line is that of the last text) for anything else: unknown
 /// extension, keyword or cell type; pyramids and cells of higher order; indices out of range; numbers that are not

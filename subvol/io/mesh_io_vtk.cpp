@@ -260,7 +260,8 @@ class VtkParser {
                                            : type_of(scan_.word("a data type"));
     if (!type) return false;
     if (keyword == "lookup_table") read_array(n, components, *type, "", Array::no_data);
-    else read_array(n, components, *type, name, of_cells && !keyword.ends_with("_ids") ? Array::of_cells : Array::other);
+    else read_array(n, components, *type, name,
+                    of_cells && !keyword.ends_with("_ids") ? Array::of_cells : Array::other);
     return true;
   }
 

@@ -34,9 +34,9 @@ struct SolidBoundary {
 /// oriented inward and lies in another component's box. Holes are closed by a fan around the mean of their rim, as if
 /// they were discs. Triangles with two equal corners, and those without a neighbour, are dropped.
 ///
-/// InputError: more than two triangles at an edge, with the number of such edges and the vertices and coordinates of the
-/// first ten; a surface that cannot be oriented, or one that encloses no volume. A vertex with several fans of triangles counts as that many. Cost: sorts of the vertices, edges
-/// and components.
+/// InputError: more than two triangles at an edge, with the number of such edges and the vertices and coordinates of
+/// the first ten; a surface that cannot be oriented, or one that encloses no volume. A vertex with several fans of
+/// triangles counts as that many. Cost: sorts of the vertices, edges and components.
 SolidBoundary solid_boundary(const TriangleMesh& surface);
 
 }  // namespace subvol

@@ -148,7 +148,8 @@ TEST_CASE("whole-number cell data become references, in whatever form they come"
                     "POINT_DATA 11\nSCALARS q float\nLOOKUP_TABLE default\n" + others +
                         "CELL_DATA 5\nFIELD FieldData 2\nq 1 5 float\n" + floats +
                         "METADATA\nINFORMATION 0\n\npart 1 5 int\n" + values,
-                    "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\n" + array_of(std::vector<float>(15, 0.5f), binary));
+                    "CELL_DATA 5\nSCALARS part int\nLOOKUP_TABLE default\n" + values + "VECTORS v float\n" +
+                        array_of(std::vector<float>(15, 0.5f), binary));
   CHECK(read_bytes(base + after).references == std::vector<int>{5, 6, 7});
 }
 
