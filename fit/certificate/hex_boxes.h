@@ -134,8 +134,12 @@ class HexBoxes {
     return result;
   }
   void find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result);
+  /// Share of the mean edges that the errors of one direction's models have in `remainder`: they are multiplied with the
+  /// growth of the directions before it. Without that factor boxes would keep models that no bound can be had with.
   double error_size(const Box& box, int direction) {
-    return line_error(box, direction).size;
+    double size = line_error(box, direction).size;
+    for (int d = 0; d < direction; ++d) size *= line_error(box, d).growth;
+    return size;
   }
   /// What errors of single precision do to J, share of the mean edges.
   double narrow_error_size(const Box& box) const;

@@ -330,7 +330,7 @@ TEST_CASE("what cannot be subdivided is refused with its name", "[subdivision]")
   mesh.cell_vertices[3] = 99;
   CHECK_THROWS_AS(subdivide(mesh), InputError);
   mesh = voxels(2, 2, 1, [](int i, int j, int) { return i == j; });  // two cubes sharing an edge
-  CHECK_THROWS_WITH(subdivide(mesh), Catch::Contains("boundary edge"));
+  CHECK_THROWS_WITH(subdivide(mesh), Catch::Contains("boundary: 1 edge has more than two faces"));
   mesh = voxels(2, 2, 2, [](int i, int j, int k) { return i == j && j == k; });  // two cubes sharing a vertex
   CHECK_THROWS_WITH(subdivide(mesh), Catch::Contains("boundary vertex"));
   mesh = lattice(2, 2, 2);

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `fit`, `convert` and `check` say of the polynomial cells in .vtu and .msh.
+
+#include "export/high_order_file.h"
+#include "tests/support/element_fixtures.h"
+#include "tests/support/workplace.h"
+
+#include <catch2/catch.hpp>
+
+#include <string>
+
+using namespace subvol;
+using namespace subvol::test;
+using Catch::Contains;
+
+namespace {
+
+/// A hex whose edge modes of one number have this amplitude.
+HighOrderMesh waved_hex(Basis basis, int order, int mode, double amplitude) {
+  const VolumeMesh straight = single_cell(CellKind::hex);
+  HighOrderMesh mesh(ElementSpace(straight, basis, order), straight);
+  for (std::size_t e = 0; e < mesh.space.topology().num_edges(); ++e)
+    mesh.coefficients[mesh.space.edge_nodes(e) + static_cast<std::size_t>(mode) - 1] = Vec3(0, 0, amplitude);
+  return mesh;
+}
+
+/// The text with the points of another file of the same size.
+std::string with_points_of(std::string text, const std::string& other) {
+  const auto range = [](const std::string& file) {
+    const std::size_t begin = file.find('>', file.find("Name=\"Points\"")) + 1;
+    return std::pair(begin, file.find('<', begin));
+  };
+  const auto [begin, end] = range(text);
+  const auto [from, to] = range(other);
+  return text.replace(begin, end - begin, other.substr(from, to - from));
+}
+
+}  // namespace
+
+TEST_CASE("convert: Fourier cells become polynomials within the tolerance, or the status says that they did not",
+          "[cli]") {
+  const Workplace place;
+  write_volume(place / "low.vtu", waved_hex(Basis::fourier, 3, 2, 0.02));
+  const Run low = place.run("convert low.vtu -o low.msh -o again.vtu");
+  CHECK(low.status == 0);
+  CHECK(low.err.find("polynomial cells") == std::string::npos);
+
+  // The ninth sine has more half waves than a polynomial of order 12 follows.
+  write_volume(place / "high.vtu", waved_hex(Basis::fourier, 10, 9, 0.02));
+  const Run high = place.run("convert high.vtu -o high_again.vtu");
+  CHECK(high.status == 4);
+  CHECK_THAT(high.err, Contains("high_again.vtu: its polynomial cells are up to") && Contains("--map-tolerance"));
+  const Run tolerated = place.run("convert high.vtu -o tolerated.vtu --map-tolerance 5");
+  INFO(tolerated.err);
+  CHECK(tolerated.status == 0);
+  CHECK(place.run("convert high.vtu -o refused.vtu --map-tolerance -1").status == 2);
+}
+
+TEST_CASE("fit: the report tells of the polynomial cells of Fourier fits, and needs none for Legendre fits", "[cli]") {
+  const Workplace place;
+  const std::string fit = "fit target.off --template template.mesh --order 2 --max-iterations 3 ";
+  place.run(fit + "--basis fourier -o f.vtu --report f.json");
+  const nlohmann::json cells = place.json("f.json")["polynomial_cells"];
+  REQUIRE(cells.size() == 1);
+  CHECK(cells[0]["file"] == "f.vtu");
+  CHECK(cells[0]["within_map_tolerance"] == true);
+  CHECK(cells[0]["distance_from_map_percent"] <= 0.001);
+  CHECK(cells[0]["orders"]["basis"] == "legendre");
+  CHECK(cells[0]["quality"]["cells"] == 7);
+  CHECK(cells[0].contains("distance"));
+
+  place.run(fit + "-o l.vtu --report l.json");
+  const nlohmann::json report = place.json("l.json");
+  CHECK(report["orders"]["basis"] == "legendre");
+  CHECK_FALSE(report.contains("polynomial_cells"));
+}
+
+TEST_CASE("check: Lagrange cells of a .vtu are judged as they stand", "[cli]") {
+  const Workplace place;
+  const HighOrderMesh flat = waved_hex(Basis::legendre, 4, 1, 0), bent = waved_hex(Basis::legendre, 4, 1, 0.1),
+                      folded = waved_hex(Basis::legendre, 4, 3, 2);
+  write_volume(place / "flat.vtu", flat);
+  write_volume(place / "bent.vtu", bent);
+  write_volume(place / "folded.vtu", folded);
+  const Run same = place.run("check bent.vtu");
+  CHECK(same.status == 0);
+  CHECK_THAT(same.out, Contains("as other programs read them: the same map"));
+
+  const std::string text = content_of(place / "flat.vtu");
+  place.file("differs.vtu", with_points_of(text, content_of(place / "bent.vtu")));
+  REQUIRE(place.run("check differs.vtu --json --report differs.json").status == 0);
+  const nlohmann::json differs = place.json("differs.json")["lagrange_cells"];
+  CHECK(differs["differs_from_map"] == true);
+  CHECK(differs["difference_from_map_percent"] > 1);
+  CHECK(differs["valid"] == true);
+
+  place.file("inverted.vtu", with_points_of(text, content_of(place / "folded.vtu")));
+  const Run inverted = place.run("check inverted.vtu --report inverted.json");
+  CHECK(inverted.status == 1);
+  CHECK_THAT(inverted.out, Contains("0 of 1 certified") && Contains("NOT VALID"));
+  CHECK(place.json("inverted.json")["valid"] == false);
+}
