@@ -198,7 +198,10 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
   for (std::size_t c = 0; c < points.size(); ++c)
     points[c] = std::max({kLeastPoints, points_for_order(space.pattern_order(space.pattern(c))),
                           stays_dense_ ? points_[c] : 0});
-  auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
+  // Equal steps integrate cosines exactly (paper: Eq. 6), and polynomials poorly, the more so at the ends of edges.
+  const QuadratureRule rule =
+      space.basis() == Basis::fourier ? QuadratureRule::trapezoidal : QuadratureRule::gauss_lobatto;
+  auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points, rule);
   volume->set_distortion(options_.distortion);
   return volume;
 }

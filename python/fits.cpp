@@ -220,7 +220,7 @@ surface       what is to agree with the target: the cage's 'limit' surface, or t
 boundary      'catmull-clark' or 'averaging'
 cage_only     only the points of the template move
 crease_angle  degrees: keep edges of the target sharper than this sharp
-lambda_far    weight of the cells' shape far from the target
+lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
 
 With order, 1 .. 16, curved cells:
 basis     'legendre' or 'fourier'

@@ -5,12 +5,22 @@
 #include "subvol/subdivision/row_assembly.h"
 
 #include <algorithm>
+#include <string>
 
 namespace subvol {
+namespace {
+
+[[noreturn]] void throw_sizes(const char* function, std::size_t in, std::size_t expected_in, std::size_t out,
+                              std::size_t expected_out) {
+  throw InputError(std::string(function) + ": expected " + std::to_string(expected_in) + " points in and " +
+                   std::to_string(expected_out) + " out, got " + std::to_string(in) + " and " + std::to_string(out));
+}
+
+}  // namespace
 
 void SparseMap::apply(std::span<const Vec3> in, std::span<Vec3> out) const {
   if (in.size() != num_cols || out.size() != num_rows())
-    throw InputError("SparseMap::apply: sizes do not match the map");
+    throw_sizes("SparseMap::apply", in.size(), num_cols, out.size(), num_rows());
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < num_rows(); ++i) {
     double x = 0, y = 0, z = 0;
@@ -32,7 +42,7 @@ std::vector<Vec3> SparseMap::apply(std::span<const Vec3> in) const {
 
 void SparseMap::apply_transposed(std::span<const Vec3> in, std::span<Vec3> out) const {
   if (in.size() != num_rows() || out.size() != num_cols)
-    throw InputError("SparseMap::apply_transposed: sizes do not match the map");
+    throw_sizes("SparseMap::apply_transposed", in.size(), num_rows(), out.size(), num_cols);
   // A fixed number of slices, each with its own accumulator: the order of every sum is the same for any team size.
   constexpr std::size_t kSlices = 8;
   const std::size_t slices = num_rows() < 4096 ? 1 : kSlices;

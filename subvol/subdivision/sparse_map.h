@@ -25,7 +25,7 @@ struct SparseMap {
   std::span<const double> row_values(std::size_t i) const { return {values.data() + offsets[i], row_size(i)}; }
   std::size_t row_size(std::size_t i) const { return offsets[i + 1] - offsets[i]; }
 
-  /// out = W in. in.size() == num_cols, out.size() == num_rows(); must not overlap. Rows run in parallel; every row is
+  /// out = W in. in.size() == num_cols, out.size() == num_rows(), else InputError; must not overlap. Rows run in parallel; every row is
   /// summed in column order, so the bits do not depend on the number of threads.
   void apply(std::span<const Vec3> in, std::span<Vec3> out) const;
   std::vector<Vec3> apply(std::span<const Vec3> in) const;

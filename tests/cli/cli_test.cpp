@@ -4,7 +4,7 @@
 #include "samples/shapes.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/mesh_topology.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/glb_reader.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/temporary_folder.h"
@@ -326,6 +326,10 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   };
   refuses("", 2, "subcommand");
   refuses("frobnicate", 2, "frobnicate");
+  refuses("--helpp", 2, "there is no option '--helpp'; did you mean --help?");
+  refuses("fit --helpp", 2, "did you mean --help?");
+  refuses("fit target.off --tolerence 1 -o out.glb", 2, "did you mean --tolerance?");
+  refuses("template carve --zzzzzzz", 2, "template carve --help lists them");
   refuses("fit target.off --cells 3 -o out.glb", 2, "--cells");
   refuses("fit target.off --template template.mesh", 2, "-o");
   refuses(std::string(kFit) + "--levels 0 -o out.glb", 2, "levels");
@@ -465,6 +469,9 @@ TEST_CASE("Every verb explains itself", "[cli]") {
   const Run version = place.run("--version");
   CHECK(version.status == 0);
   CHECK(version.out.starts_with("subvol "));
+  CHECK(place.run("help").out == place.run("--help").out);
+  CHECK(place.run("help fit").out == place.run("fit --help").out);
+  CHECK(place.run("help template auto").out == place.run("template auto --help").out);
 }
 
 TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]") {
@@ -489,11 +496,8 @@ TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]")
 }
 
 TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][data]") {
-  const auto data = subvol::test::data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = subvol::test::require_data();
+  if (!data) return;
   const Workplace place;
   std::istringstream list(content_of(*data / "bad" / "EXPECT.txt"));
   for (std::string line; std::getline(list, line);) {

@@ -9,7 +9,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/templates/auto_template.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/sample_meshes.h"
 
@@ -224,11 +224,8 @@ TEST_CASE("a high-order fit refuses what it cannot do") {
 }
 
 TEST_CASE("real templates of prisms and tets are fitted with curved elements") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: the folder of real inputs is not there");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   for (const char* name : {"mixed_prismlayer_bone", "tet_hand"}) {
     CAPTURE(name);
     const TriangleMesh target = read_triangle_mesh(*data / "fit" / name / "target.off");

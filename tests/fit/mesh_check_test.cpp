@@ -7,7 +7,7 @@
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
 #include <Eigen/Geometry>
@@ -279,11 +279,8 @@ TEST_CASE("a check tells its parts in their order and ends where it is told to",
 }
 
 TEST_CASE("checks of published templates agree with what is known of them", "[mesh_check][data]") {
-  const auto folder = test::data_dir();
-  if (!folder) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto folder = test::require_data();
+  if (!folder) return;
   struct Known {
     const char* name;
     double min_scaled_jacobian, mean_distance;

@@ -7,7 +7,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
@@ -209,11 +209,8 @@ TEST_CASE("Optimisation refuses options out of range and meshes that are not sou
 }
 
 TEST_CASE("Most cells of a real mesh inverted: all become valid, and the boundary stays") {
-  const auto data = test::data_dir();
-  if (!data) {
-    WARN("SKIPPED: no real data");
-    return;
-  }
+  const auto data = test::require_data();
+  if (!data) return;
   const VolumeMesh start = read_volume_mesh(*data / "optimize" / "block_stress" / "input.mesh", {.check = false});
   const TriangleMesh surface = surface_of(start);
   const OptimizeResult result = optimize_mesh(start, nullptr, {});

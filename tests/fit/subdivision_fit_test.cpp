@@ -13,7 +13,7 @@
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
 #include "subvol/io/mesh_io.h"
@@ -321,11 +321,8 @@ TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proport
 }
 
 TEST_CASE("Real cases fit with certified cells", "[data]") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   for (const char* name : {"doubletorus17", "mixed_fandisk"}) {
     CAPTURE(name);
     const TriangleMesh target = read_triangle_mesh(*data / "fit" / name / "target.off");
@@ -338,11 +335,8 @@ TEST_CASE("Real cases fit with certified cells", "[data]") {
 }
 
 TEST_CASE("Sharp edges of real cases stay sharp", "[data]") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("skipped: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   // Both gave up corners and edges of thin parts when only the template's angles told of creases.
   for (const char* name : {"cad_fandisk49", "joint129"}) {
     CAPTURE(name);

@@ -8,7 +8,7 @@
 #include "subvol/base/error.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/shell_fixtures.h"
 #include "tests/support/surface_fixtures.h"
 
@@ -158,11 +158,8 @@ TEST_CASE("Shells that cannot be curved are refused", "[shell]") {
 }
 
 TEST_CASE("A real surface gets a valid curved shell", "[shell][data]") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   const PolygonMesh surface = read_polygon_mesh(*data / "shell/bumpy_cube/surface.off");
   Vec3 low = surface.positions[0], high = low;
   for (const Vec3& p : surface.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);

@@ -11,7 +11,7 @@
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/shell_fixtures.h"
 #include "tests/support/surface_fixtures.h"
 
@@ -445,11 +445,8 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
 }
 
 TEST_CASE("Real surfaces get valid shells on every side", "[shell][data]") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   for (const char* name : {"sphere/surface.off", "bumpy_cube/surface.off", "cubespikes_quads/surface.obj",
                            "knight1000/surface.off", "spot/surface.off"}) {
     const PolygonMesh surface = read_polygon_mesh(*data / "shell" / name);

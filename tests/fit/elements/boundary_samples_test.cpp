@@ -4,7 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -117,11 +117,8 @@ TEST_CASE("a surface term takes boundary samples as they are", "[boundary sample
 }
 
 TEST_CASE("boundary samples of real templates of all kinds are closed", "[boundary samples][data]") {
-  const auto folder = data_dir();
-  if (!folder) {
-    WARN("SKIPPED: no data folder");
-    return;
-  }
+  const auto folder = require_data();
+  if (!folder) return;
   for (const std::string name : {"mixed_screwdriver", "mixed_prismlayer_bone", "mixed_fandisk", "tet_hand", "bone87"}) {
     CAPTURE(name);
     const VolumeMesh mesh = read_volume_mesh(*folder / "fit" / name / "template.mesh");

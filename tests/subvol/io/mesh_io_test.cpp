@@ -4,7 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/validate.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/temporary_folder.h"
 
@@ -253,11 +253,8 @@ TEST_CASE("a mesh that could not be read back is not written") {
 }
 
 TEST_CASE("the real templates load and are sound but for the inverted cells they are known for") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   std::size_t num_read = 0;
   for (const auto& folder : std::filesystem::directory_iterator(*data / "fit")) {
     const auto path = folder.path() / "template.mesh";
@@ -275,11 +272,8 @@ TEST_CASE("the real templates load and are sound but for the inverted cells they
 }
 
 TEST_CASE("every bad volume mesh of the collection gets the outcome it asks for") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   std::istringstream lines(content_of(*data / "bad" / "EXPECT.txt"));
   std::size_t num_tried = 0;
   for (std::string line; std::getline(lines, line);) {

@@ -2,7 +2,7 @@
 #include "subvol/io/surface_io.h"
 
 #include "subvol/base/error.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/temporary_folder.h"
 
 #include <catch2/catch.hpp>
@@ -370,11 +370,8 @@ TEST_CASE("an unknown surface extension is refused with the known ones") {
 }
 
 TEST_CASE("every bad surface of the collection gets the outcome it asks for, and the real ones load") {
-  const auto data = data_dir();
-  if (!data) {
-    WARN("SKIPPED: no folder with real data");
-    return;
-  }
+  const auto data = require_data();
+  if (!data) return;
   std::istringstream lines(content_of(*data / "bad" / "EXPECT.txt"));
   std::size_t num_tried = 0, num_read = 0;
   for (std::string line; std::getline(lines, line);) {

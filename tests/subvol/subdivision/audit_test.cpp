@@ -2,7 +2,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/subdivision/audit.h"
 #include "subvol/subdivision/subdivision.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
@@ -52,11 +52,8 @@ TEST_CASE("creases where the audit finds folds keep the cells of a short reflex 
 }
 
 TEST_CASE("creased templates stay positive after the audit's remedy", "[audit][data]") {
-  const auto folder = data_dir();
-  if (!folder) {
-    WARN("no real inputs: set SUBVOL_DATA");
-    return;
-  }
+  const auto folder = require_data();
+  if (!folder) return;
   for (const char* name : {"hanger139", "cad_fandisk49", "cad_cube17", "doubletorus17"}) {
     VolumeMesh mesh = read_volume_mesh(*folder / "fit" / name / "template.mesh");
     tag_creases(mesh, 40);

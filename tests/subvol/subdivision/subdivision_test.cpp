@@ -3,7 +3,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/subdivision/row_assembly.h"
 #include "subvol/subdivision/subdivision.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/opensubdiv_oracle.h"
 #include "tests/support/sample_meshes.h"
 
@@ -119,11 +119,8 @@ TEST_CASE("the boundary is OpenSubdiv's for darts, corners and creases of differ
 }
 
 TEST_CASE("the boundary is OpenSubdiv's on real templates of all cell kinds", "[subdivision][opensubdiv][data]") {
-  const auto folder = data_dir();
-  if (!folder) {
-    WARN("no real inputs: set SUBVOL_DATA");
-    return;
-  }
+  const auto folder = require_data();
+  if (!folder) return;
   for (const char* name : {"hanger139", "bone87", "cad_fandisk49", "joint129", "mixed_fandisk", "mixed_prismlayer_bone",
                            "mixed_screwdriver", "tet_bone144", "far_ball_spot", "rod59"})
     for (double sharpness : {0.0, kInfiniteSharpness, 2.5, 1.3, 0.4}) {

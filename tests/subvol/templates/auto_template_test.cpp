@@ -10,7 +10,7 @@
 #include "subvol/templates/auto_template.h"
 #include "subvol/templates/solid_fraction.h"
 #include "subvol/templates/template_frames.h"
-#include "tests/support/data.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/surface_fixtures.h"
 
@@ -315,11 +315,8 @@ TEST_CASE("Of several templates the one that fits best is chosen", "[templates]"
 }
 
 TEST_CASE("Real targets get templates of their topology", "[templates][data]") {
-  const auto folder = test::data_dir();
-  if (!folder) {
-    WARN("SKIPPED: no real inputs");
-    return;
-  }
+  const auto folder = test::require_data();
+  if (!folder) return;
   for (const char* name : {"rod59", "hanger139", "far_asm122"}) {
     INFO(name);
     const TriangleMesh target = read_triangle_mesh(*folder / "fit" / name / "target.off");
