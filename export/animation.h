@@ -11,7 +11,7 @@ namespace subvol {
 /// The course of a fit: one node "surface" that passes through the states one after another and ends as the result.
 ///
 /// Each state is a shape (`SceneNode::shapes`) with its own normals; an edge at which faces of the result meet at more
-/// than `crease_angle_degrees` is shaded sharp in all shapes. There is no wireframe: viewers cannot deform such lines.
+/// than `crease_angle_degrees` is shaded sharp in all shapes. There is no wireframe: viewers fail at animated lines.
 /// InputError: a state whose number of positions differs from the mesh's; options out of range.
 
 /// The limit surface of a control cage, refined at least once and at most 4 times, as long as it stays below 20 000

@@ -36,7 +36,7 @@ struct SurfaceSceneOptions {
 ///
 /// finest   the cage refined k >= 0 times (so that cells are ordered by parent, then corner), whose cells give the
 ///          quality: a patch has the minimum over the descendants of its child cell. Null: the cage's own cells.
-/// InputError: a finest mesh whose number of cells fits no k; options out of range; what `tessellate` refuses.
+/// InputError: a finest mesh whose number of cells fits no k; options out of range; a cage that `tessellate` refuses.
 Scene surface_scene(const VolumeMesh& cage, const VolumeMesh* finest = nullptr,
                     const SurfaceSceneOptions& options = {});
 

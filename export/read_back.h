@@ -16,13 +16,13 @@
 
 namespace subvol {
 
-/// .mesh (with tags), .vtk, .vtu, .msh.
+/// Checks a .mesh (with tags), .vtk, .vtu or .msh.
 void require_written(const std::filesystem::path& path, const VolumeMesh& mesh);
-/// .vtu (with the map), .msh; .mesh and .vtk as linear cells.
+/// Checks a .vtu (with the map), a .msh, or a .mesh or .vtk of linear cells.
 void require_written(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
-/// .obj, .usda.
+/// Checks an .obj or .usda.
 void require_written(const std::filesystem::path& path, const PolygonMesh& surface);
-/// .glb, .gltf.
+/// Checks a .glb or .gltf.
 void require_written(const std::filesystem::path& path, const Scene& scene);
 
 }  // namespace subvol

@@ -41,7 +41,7 @@ struct TessellatedSurface {
 /// Every patch becomes a grid of quads. Its cuts belong to the strips of patches that cross opposite sides, so that
 /// neighbors agree along their common edge: there are no cracks, no T-junctions, and only quads. An interval of a strip
 /// is halved as long as a quad that spans it is too far from the surface, so cuts gather where the surface bends. At
-/// singular corners (three or more faces on one side of a crease, where halving a quad multiplies its error by only
+/// singular corners (three or more faces on one side of a crease, where halving a quad only multiplies its error by
 /// 0.6) this takes a few more cuts near the corner instead of more everywhere. Distances are measured at 5 x 5 points
 /// of each quad (see `chord_distance`) and increased by what a quadratic patch may add between them.
 ///

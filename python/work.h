@@ -53,7 +53,7 @@ class Work {
     return std::move(*result);
   }
 
-  /// Callback for the library's options. The library may call it from any thread.
+  /// Callback for the library's options. It is called by the thread that called the library.
   std::function<bool(const FitProgress&)> progress() {
     return [this](const FitProgress& told) { return tell(told); };
   }

@@ -34,7 +34,7 @@ inline bool is_cloud(const Target& target) { return std::holds_alternative<Point
 
 /// Loads points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
-/// Load a surface or the boundary of a volume mesh; points are refused.
+/// Load a surface or the boundary of a volume mesh, as triangles or as polygons; points are refused.
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 

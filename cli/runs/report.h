@@ -13,7 +13,7 @@ namespace subvol::cli {
 /// The stages of a fit, with every iteration.
 Json stages_json(const FitReport& report);
 
-/// How a fit went: why it stopped, its stages, and the distance of its template.
+/// How a fit went: why it stopped, its stages, and the initial distance of its template.
 Json fit_json(const FitReport& report);
 
 /// Seconds by part.

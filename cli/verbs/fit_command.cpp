@@ -269,7 +269,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
     order->excludes(verb.get_option(other));
 }
 
-/// The same run with curved elements, for which lambda has another default.
+/// Arguments of the same run with curved elements, for which lambda has another default.
 HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
   HighOrderFitOptions& fit = result.fit;
