@@ -36,11 +36,9 @@ struct BlockSparse {
   void set_zero();
 };
 
-/// Returns the pattern that couples the nodes of every element with one another and every node with itself. The blocks
-/// are zero.
+/// Returns a zero matrix whose pattern couples the nodes of every element with one another, and every node with itself.
 ///
-/// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1]. Each must be in [0, num_rows), else
-/// InputError.
+/// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], all in [0, num_rows), else InputError.
 BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes);
 
 /// Adds the 3x3 diagonal blocks of M^T H M: D_j += sum_ik M_ij H_ik M_kj. Runs in parallel; the result has the same

@@ -12,8 +12,7 @@
 
 namespace subvol {
 
-/// Cells of one kind, order and quadrature, in batches of eight: the tables that they share, and the data of each
-/// batch.
+/// Cells of one kind, order and quadrature, in batches of eight: the tables that they share and the data of each batch.
 struct CellGroup {
   CellKind kind;
   int order, points_per_direction;

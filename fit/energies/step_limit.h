@@ -12,8 +12,7 @@
 namespace subvol {
 
 /// Finds the largest t = limit * 0.8^n, n <= 200, such that every det(J + s D), 0 <= s <= t, keeps at least a tenth of
-/// det J, over all admitted pairs (J, D). Pairs may come from several threads at once; t does not depend on their
-/// order.
+/// det J, over all admitted pairs (J, D). Several threads may admit pairs at once; t does not depend on their order.
 class StepLimit {
  public:
   explicit StepLimit(double limit) {

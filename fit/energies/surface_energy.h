@@ -23,7 +23,7 @@ namespace subvol {
 ///
 /// A, V, y_j   area, enclosed volume and samples of the target.
 /// S~          triangles between samples; x moves linearly with their corners.
-/// tau         tangential weight in [0, 1]: small where the surfaces are close, so that samples slide along T.
+/// tau         tangential weight in [0, 1]: small if the surfaces are close, so that samples slide along T.
 ///
 /// `assign` finds the cells and freezes them: the site that every point belongs to, given by its barycentric
 /// coordinates in its triangle, and dx. E_S is then quadratic in z. Its gradient is exact for moving cells only for

@@ -51,7 +51,7 @@ class SurfaceTerm {
   std::span<const std::array<Index, 3>> triangles() const { return triangles_; }
 
  protected:
-  /// One corner of a sample triangle, as seen from its sample: `entries` are the places of its blocks in the sample's
+  /// One corner of a sample triangle, as seen from its sample: `entries` are the places of its blocks in that sample's
   /// row.
   struct Incidence {
     Index triangle;

@@ -11,8 +11,7 @@ namespace subvol {
 
 namespace {
 
-/// Divides a segment into equal parts no longer than `spacing` (at most 1e5) and calls visit(midpoint, length) for
-/// each.
+/// Divides a segment into at most 1e5 equal parts, no longer than `spacing` otherwise; calls visit(midpoint, length).
 template <class Visit>
 void sample_segment(const Vec3& a, const Vec3& b, double spacing, const Visit& visit) {
   constexpr double kMostParts = 1e5;

@@ -14,7 +14,7 @@ namespace {
 /// Number of parts of a segment of T or S, each represented by its midpoint.
 constexpr int kPointsPerSegment = 2;
 
-/// Returns where between a (0) and b (1) the closest point to p is.
+/// Returns the position, from a (0) to b (1), of the point of the segment closest to p.
 double place_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const double squared = (b - a).squaredNorm();
   return squared > 0 ? std::clamp((p - a).dot(b - a) / squared, 0.0, 1.0) : 0.0;

@@ -13,8 +13,7 @@
 namespace subvol {
 
 /// Squared distance between crease curves of the fitted surface S and the feature curves of the target T that they
-/// follow, both ways, with frozen correspondences. It is added to a `SurfaceTerm`, which scales it like the rest of
-/// E_S.
+/// follow, both ways, with frozen correspondences. It is added to a `SurfaceTerm`, which scales it like its own terms.
 ///
 ///   E_C = width (sum_k b_k (y_k - s(y_k))^T M (y_k - s(y_k)) + sum_q c_q (x_q - t(x_q))^T M (x_q - t(x_q)))
 ///   M = I - (1 - tau) d d^T,  d: direction of T's curve; M = I if t(x_q) is an end of an open curve

@@ -246,8 +246,7 @@ class PathFinder {
     return nearest;
   }
 
-  /// Returns a path through the vertex nearest to the curve's middle: for closed curves, and curves whose ends are
-  /// close.
+  /// Returns a path through the vertex nearest to the curve's middle: for curves that are closed, or nearly so.
   std::vector<Index> path_by_middle(std::span<const Vec3> points, Index from, Index to,
                                     std::span<const MiddlePlace> places) const {
     const auto place =

@@ -9,7 +9,7 @@ namespace subvol {
 
 namespace {
 
-constexpr double kAreaTolerance = 1e-14;  // of the triangle's area
+constexpr double kAreaTolerance = 1e-14;  // share of the triangle's area
 
 }  // namespace
 

@@ -36,8 +36,7 @@ struct VoronoiPiece {
 /// A triangle's cells are found among the few sites that may matter to it, and accepted if their areas add up to its
 /// own. Otherwise (ties, many sites close together) it is cut in two by bisectors until every part lies in one cell. As
 /// cells are convex, the corners of a part decide that: so no area is lost or counted twice for any position of the
-/// sites, and nearest-site queries suffice, however far away the sites are. Shares of a triangle add up to 1 up to
-/// rounding.
+/// sites, and nearest-site queries suffice, however far away the sites are. Shares of a triangle sum to 1 to rounding.
 ///
 /// Ties: if sites are equally near within rounding on a set of positive area (equal sites, a triangle in a bisector),
 /// one of them gets all of it; of equal sites, the one with the lowest number.

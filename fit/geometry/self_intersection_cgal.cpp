@@ -46,8 +46,7 @@ class PairTest {
  private:
   Kernel::Triangle_3 triangle(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
 
-  /// Triangles that share their first corner meet elsewhere exactly if the opposite edge of one of them meets the
-  /// other.
+  /// Triangles that share their first corner meet elsewhere exactly if the opposite edge of either meets the other.
   bool meet_beyond_corner(const Triangle& a, const Triangle& b) const {
     // Most pairs are decided here: opposite edges far from the other triangle, or strictly on one side of its plane.
     if (boxes_are_apart(a, b) && boxes_are_apart(b, a)) return false;

@@ -13,8 +13,8 @@
 
 namespace subvol {
 
-/// The function that a stage minimizes over its degrees of freedom x (control vertices or coefficients, in the target's
-/// unit):
+/// The function that a stage minimizes over its degrees of freedom x (control vertices or coefficients), in the
+/// target's unit:
 ///
 ///   E(x) = E_S(N x + z0) + lambda E_W(M x + y0)                                Paper: Eqs. 1, 10
 ///

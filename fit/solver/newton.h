@@ -16,7 +16,7 @@ namespace subvol {
 ///
 /// x  feasible start (finite E), else `infeasible_start`; receives the result. With `begun`, x as passed to `keep`: the
 ///    minimization then ends at the same bits as the interrupted one would have. The problem must be in the same state
-///    as at the start of that one. InputError: a refined cell of `begun` does not exist.
+///    as at the start of that one. InputError: as for `densify_again`.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 }  // namespace subvol

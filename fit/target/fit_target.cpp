@@ -44,8 +44,7 @@ std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
 }
 
 void Normalisation::take_in(VolumeMesh& mesh) const {
-  // Below this range, cells vanish in the rounding of the target's coordinates; above it, the target in that of the
-  // cells.
+  // Below this range, cells vanish in the rounding of the target's coordinates; above it, the target in that of cells.
   constexpr double kLeastSize = 1e-6, kMostSize = 1e6;
   mesh.positions = to_unit(std::move(mesh.positions));
   Eigen::AlignedBox3d box;

@@ -23,8 +23,8 @@ struct Normalisation {
   explicit Normalisation(const TriangleMesh& target);
   explicit Normalisation(const PointCloud& target);
   std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
-  /// Transforms a mesh to these coordinates. InputError: its cells together are 1e6 times smaller or larger than the
-  /// target, or 1e6 diagonals away from it.
+  /// Transforms a mesh to these coordinates. InputError: the mesh is more than 1e6 times smaller or larger than the
+  /// target, or more than 1e6 diagonals away from it.
   void take_in(VolumeMesh& mesh) const;
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };

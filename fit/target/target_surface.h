@@ -26,7 +26,7 @@ const char* to_string(PointWeights weights);
 /// How the enclosed volume was found.
 enum class VolumeSource {
   signed_sum,    ///< sum of the triangles' signed tetrahedra: the surface is closed and oriented, up to small gaps
-  mended,        ///< the same after orienting triangles and closing holes (`solid_boundary`)
+  mended,        ///< that sum after orienting triangles and closing holes (`solid_boundary`)
   flood,         ///< grid cells that cannot be reached from outside: any orientation, holes smaller than a cell
   isoperimetric, ///< half the volume of the sphere of equal area: the surface encloses nothing
   given          ///< set by the caller
