@@ -103,7 +103,7 @@ struct BoundOptions {
 ///   S_b = sym(L J_b D) - diag(row sums of sym(|L| R D))
 ///   all S_b positive definite   =>   det J(u) >= min_b det S_b / (det L det D) > 0 for all u
 ///
-/// since sym(L J D) - sum_b B_b S_b is positive semidefinite, det M >= det sym M where sym M > 0 (Ostrowski, Taussky)
+/// since sym(L J D) - sum_b B_b S_b is positive semidefinite, det M >= det sym M if sym M > 0 (Ostrowski, Taussky),
 /// and det^(1/3) is concave (Minkowski). D scales the columns of the mean matrix M to length 1. The bound holds for any
 /// L; in the limit of small boxes every L with sym(L M D) > 0 succeeds. How large a box can be decided depends on L:
 ///

@@ -49,7 +49,7 @@ class PrismMatrices {
   /// The result is valid until the next call.
   Product times(const Mat3& l);
 
-  /// The same in single precision: computed from L (X_b - X_m), where X_m is the middle coefficient.
+  /// Loads the L J_b in single precision, computed from L (X_b - X_m), where X_m is the middle coefficient.
   class NarrowProduct {
    public:
     using Vector = Narrow;

@@ -36,7 +36,6 @@ namespace subvol {
 /// 1, 50, 400 ms; less for prisms. Fourier tets above order 12 with coefficients of all orders are impractical: the
 /// models of one part take seconds, and those of many parts exceed the memory limit. Straight-sided ones are
 /// unaffected.
-/// not.
 class SimplexModels {
  public:
   static constexpr int kMostTiers = kWide;
