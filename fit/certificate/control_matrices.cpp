@@ -185,7 +185,7 @@ struct Extremes {
   Vector sizes[5] = {};  // without t01, which is less than t00 or t11 if the second minor is positive
 };
 
-/// Result for a box if some of these T_b are not positive definite. begin: number of the first one.
+/// Result for a box if T_b is not positive definite for some of these matrices. begin: number of the first matrix.
 template <class Vector>
 Bound failed_at(std::size_t begin, const MatrixOf<Vector>& m, const Extremes<Vector>& own) {
   const Vector det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -

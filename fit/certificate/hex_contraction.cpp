@@ -35,8 +35,8 @@ struct Lines {
   const int* used;
 };
 
-/// out[o out_stride + m] = more[o] + (weight of 1) in[0][m] + sum_{k > 0} table[k][o] in[k][m], o < num_out, for all
-/// m < length, and for some beyond it, up to whole vectors. by_size: uses |in| instead of in.
+/// out[o out_stride + m] = more[o] + c in[0][m] + sum_{k > 0} table[k][o] in[k][m], o < num_out, for all m < length,
+/// and for some beyond it, up to whole vectors; c is the weight of the function 1 (`Of`). by_size: uses |in|.
 template <int num_out, Of of, bool by_size, class Number>
 void contract_to(const Number* table, const Lines<Number>& in, const Number* more, Number* out, int out_stride) {
   const auto contract = [&]<class Vector>(int m, const Vector&) {
@@ -84,8 +84,8 @@ void contract(int num_out, const Number* table, const Lines<Number>& in, const N
   kAll[num_out](table, in, more, out, out_stride);
 }
 
-/// out[i out_stride], lane p, = more[i] + (weight of 1) in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n.
-/// Reads up to kSome numbers, and writes as many vectors, beyond the end.
+/// out[i out_stride], lane p, = more[i] + c in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n; c is the weight
+/// of the function 1 (`Of`). Reads up to kSome numbers, and writes as many vectors, beyond the end.
 template <Of of, class Vector>
 void contract_to_lanes(const NumberOf<Vector>* table, const NumberOf<Vector>* in, int n, const Vector* more,
                        Vector* out, int out_stride) {

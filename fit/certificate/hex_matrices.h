@@ -53,7 +53,7 @@ using NarrowHexCoefficients = HexCoefficientsOf<Narrow>;
 ///
 ///   J_b = o (X_b - X_below) + (q - o) (X_above - X_b),   o the index of b along the column's direction
 ///
-/// The L J_b are the matrices of L X_b, so L costs three products per coefficient instead of nine.
+/// The L J_b are the matrices of L X_b, so L costs three products per coordinate instead of nine.
 template <class Lanes>
 class HexMatricesOf {
  public:

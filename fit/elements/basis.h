@@ -26,8 +26,8 @@ void line_functions(Basis basis, int order, double x, double* values, double* de
 
 /// Computes the modes without their zeros at the ends: psi_i(x) = phi_i(x) / (x (1 - x)), i = 1 .. order - 1, smooth.
 ///
-/// For Legendre, psi_i is a polynomial of degree i - 1. No division by small numbers; the parity is that of phi_i.
-/// values, derivatives: order - 1 entries each.
+/// For Legendre, psi_i is a polynomial of degree i - 1. Its parity is that of phi_i. It is computed without dividing by
+/// small numbers. values, derivatives: order - 1 entries each.
 void mode_kernels(Basis basis, int order, double x, double* values, double* derivatives);
 
 /// "fourier", "legendre".

@@ -7,9 +7,9 @@
 
 namespace subvol {
 
-/// Projects a given map onto a mesh, entity by entity: vertices are interpolated, then the modes of edges, of faces and
-/// of cells fit the remainder by least squares, weighted as the integral (Gauss points in the entity's frame, order + 2
-/// in each direction).
+/// Projects a given map onto a space, entity by entity: vertices are interpolated, then the modes of edges, of faces
+/// and of cells fit the remainder by least squares, weighted as the integral (order + 2 Gauss points in each direction
+/// of the entity's frame).
 ///
 /// map    (cell, canonical point) -> position, finite (else InputError). Each edge and face is evaluated from one of
 ///        its cells.
