@@ -7,7 +7,7 @@
 
 namespace subvol {
 
-/// How a number is stored in a binary file.
+/// Storage format of a number in a binary file.
 struct ValueType {
   enum class Class { real, whole, natural };
   std::size_t size;  ///< bytes: 1, 2, 4 or 8; a real has 4 or 8

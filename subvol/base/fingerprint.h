@@ -10,7 +10,7 @@
 namespace subvol {
 
 /// 64-bit hash (FNV-1a) that tells data apart: it detects changed files and mistaken inputs, not forgeries. It depends
-/// on the order of the added values, on the lengths of arrays and on the byte order of this machine.
+/// on the order of the added values, on the lengths of arrays and on how this machine stores numbers.
 class Fingerprint {
  public:
   template <class T>

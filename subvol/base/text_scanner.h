@@ -19,8 +19,8 @@ std::string read_file(const std::filesystem::path& path);
 ///
 /// Words are separated by blanks, tabs and line ends. Lines end with LF, CR LF or CR; if the first line of a file ends
 /// with CR alone, an LF after a CR ends a line of its own, because it may be the first byte of binary data. A word that
-/// starts with '#' opens a comment up to the end of the line, unless comments are off. No memory is allocated on the
-/// word of a file: check its counts with `count`.
+/// starts with '#' opens a comment up to the end of the line, unless comments are off. A file may claim any count:
+/// read counts with `count` before allocating memory for them.
 class TextScanner {
  public:
   enum class Comments { hash, none };

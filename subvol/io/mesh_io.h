@@ -9,7 +9,7 @@
 
 namespace subvol {
 
-/// How strictly a volume mesh is read.
+/// Options for reading a volume mesh.
 struct ReadOptions {
   /// If true, a mesh with a defect that `validate` finds is refused; inverted cells and unused vertices only give
   /// warnings, and tags off the boundary are dropped with a warning. If false, only the file itself must be valid, and

@@ -15,7 +15,7 @@ namespace subvol {
 /// surface, interior vertices stay.
 ///
 /// Square, num_vertices() rows; boundary rows sum to 1 and use boundary vertices only. Exact for smooth vertices,
-/// creases, corners, semi-sharp features and darts, beside quads and triangles.
+/// creases, corners, semi-sharp features and darts, next to quads and triangles.
 /// InputError: as `tagged_boundary` (a boundary that is not a manifold, bad tags). Cost: linear.
 SparseMap limit_map(const VolumeMesh& mesh);
 

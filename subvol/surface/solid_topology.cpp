@@ -178,7 +178,7 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
           {run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
   });
   std::sort(rims.begin(), rims.end());
-  std::vector<std::size_t> left(mesh.positions.size(), rims.size());  // each vertex's first edge in no loop
+  std::vector<std::size_t> left(mesh.positions.size(), rims.size());  // each vertex's first unused edge
   for (std::size_t i = rims.size(); i-- > 0;) left[rims[i][0]] = i;
   for (std::size_t start = 0; start < rims.size(); ++start) {
     if (start < left[rims[start][0]]) continue;
