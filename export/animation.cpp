@@ -13,10 +13,10 @@
 namespace subvol {
 namespace {
 
-/// Polygons whose vertices are linear in the positions of a mesh.
+/// Polygons whose vertices depend linearly on the positions of a mesh.
 struct MovingSurface {
   SparseMap positions;
-  PolygonMesh polygons;  ///< where they come to rest
+  PolygonMesh polygons;  ///< at rest, as in the result
 };
 
 PolygonMesh at(const MovingSurface& surface, const FitState& state) {

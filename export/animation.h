@@ -8,17 +8,19 @@
 
 namespace subvol {
 
-/// A fit as it went: one node "surface" that passes through the states one after the other and ends as the result.
+/// The course of a fit: one node "surface" that passes through the states one after another and ends as the result.
 ///
-/// Each state is a shape (`SceneNode::shapes`) with normals of its own; faces that meet at more than
-/// `crease_angle_degrees` in the result are shaded apart in all. There is no wireframe: viewers fail at such lines.
-/// InputError: states of another number of positions than the mesh; options out of range.
+/// Each state is a shape (`SceneNode::shapes`) with its own normals; an edge at which faces of the result meet at more
+/// than `crease_angle_degrees` is shaded sharp in all shapes. There is no wireframe: viewers fail at animated lines.
+/// InputError: a state whose number of positions differs from the mesh's; options out of range.
 
-/// The limit surface of a control cage, refined as often as it stays below 20 000 quads, but once at least.
+/// The limit surface of a control cage, refined at least once and at most 4 times, as long as it stays below 20 000
+/// quads.
 Scene animation_scene(const VolumeMesh& cage, std::span<const FitState> states,
                       const SurfaceSceneOptions& options = {});
 
-/// The boundary of a high-order mesh, two quads to an interval of the order. Positions of states are coefficients.
+/// The boundary of a high-order mesh, each face cut into 2 * (largest order) intervals per side. The positions of
+/// states are coefficients.
 Scene animation_scene(const HighOrderMesh& mesh, std::span<const FitState> states,
                       const SurfaceSceneOptions& options = {});
 

@@ -27,7 +27,8 @@ std::span<const int> gmsh_types(CellKind kind) {
   return kind == CellKind::prism ? std::span<const int>(kGmshPrisms) : std::span<const int>(kGmshHexes);
 }
 
-/// A volume of a .msh: cells of one reference and order. Gmsh takes all tets of a volume for tets of one order.
+/// A volume of a .msh: the cells of one reference and order. Gmsh assumes that all tets of a volume have the same
+/// order.
 struct Volume {
   int reference, order;
   auto operator<=>(const Volume&) const = default;
@@ -43,15 +44,15 @@ Blocks blocks_of(const CellView& mesh) {
   return blocks;
 }
 
-/// Volume numbers, from 1 in the order of the references.
+/// Numbers of the volumes, from 1 in the order of the references.
 std::map<Volume, int> volume_numbers(const Blocks& blocks) {
   std::map<Volume, int> numbers;
   for (const auto& [key, cells] : blocks) numbers.try_emplace(key.first, static_cast<int>(numbers.size()) + 1);
   return numbers;
 }
 
-/// The physical group of each reference, > 0: programs lose cells without a group where others have one, or refuse the
-/// file. A positive reference is its own group, any other has the first number that is free.
+/// The physical group of each reference, > 0: if only some cells have a group, programs lose the others or refuse the
+/// file. A positive reference is its own group; any other gets the first free number.
 std::map<int, int> physical_groups(const Blocks& blocks) {
   std::map<int, int> groups;
   std::set<int> taken;

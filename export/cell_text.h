@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-// The text of .vtu and .msh files, for linear and for Lagrange cells alike.
+// Text of .vtu and .msh files, for linear and for Lagrange cells alike.
 
 #include "export/volume_writer.h"
 
@@ -11,8 +11,8 @@
 
 namespace subvol {
 
-/// Cells with points on regular grids, listed as the file format wants them. The arrays are consistent; see the
-/// writers.
+/// Cells with points on regular grids, in the order of the file format. The writers make sure that the arrays are
+/// consistent.
 struct CellView {
   std::span<const Vec3> positions;
   std::span<const CellKind> kinds;
@@ -26,20 +26,22 @@ struct CellView {
   std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
 };
 
-/// field_data: `<DataArray>` elements for the file's field data, or empty. Cell data `order` goes with them.
+/// Text of a .vtu. field_data: `<DataArray>` elements for the file's field data, or empty. `orders`, if there are any,
+/// become the cell data `order`.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {});
 
-/// Largest order of a kind that Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
+/// Largest order that Gmsh evaluates for a kind of cell: 10 for tets, 2 for prisms, 9 for hexes.
 int max_gmsh_order(CellKind kind);
-/// Its number for cells of a kind and order, 1 .. max_gmsh_order (asserted); and VTK's for Lagrange cells of a kind.
+/// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted); VTK's for Lagrange cells of a
+/// kind.
 int gmsh_type(CellKind kind, int order);
 std::uint8_t vtk_type(CellKind kind);
-/// Orders: 1 .. max_gmsh_order (asserted).
+/// Text of a .msh. Orders: 1 .. max_gmsh_order (asserted).
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
                          std::span<const VertexField> fields);
 
-/// InputError unless there is one finite number per cell, or none at all.
+/// Throws InputError unless there is one finite number per cell, or none at all.
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells);
 
 }  // namespace subvol

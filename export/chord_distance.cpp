@@ -9,7 +9,7 @@
 namespace subvol {
 namespace {
 
-constexpr double kNeighbourReach = 0.25;  // of the triangle's size; further out the neighbour may bend away
+constexpr double kNeighbourReach = 0.25;  // relative to the triangle's size; farther out the neighbor may bend away
 
 double segment_distance2(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 ab = b - a;
@@ -18,7 +18,7 @@ double segment_distance2(const Vec3& p, const Vec3& a, const Vec3& b) {
   return (p - a - t * ab).squaredNorm();
 }
 
-/// A triangle prepared for many distances; edge k runs from corner k to corner k + 1.
+/// A triangle prepared for many distance queries; edge k runs from corner k to corner k + 1.
 class Triangle {
  public:
   Triangle(const Vec3& a, const Vec3& b, const Vec3& c, int hard_edge)
@@ -44,7 +44,7 @@ class Triangle {
   }
 
  private:
-  /// Projects into the triangle or a neighbour's share.
+  /// True if p projects into the triangle or into the part of a neighbor that counts as covered.
   bool is_covered(const Vec3& p) const {
     for (int k = 0; k < 3; ++k)
       if ((p - corners_[k]).dot(inward_[k]) < -reach_[k]) return false;

@@ -15,19 +15,19 @@ struct CellSamples {
   const Vec3& at(int i, int j) const { return points[j * (kCellSteps + 1) + i]; }
 };
 
-/// A tessellation of those points, to be judged.
+/// The tessellation of those points to be judged.
 struct ChordQuery {
-  std::array<int, 2> steps;          ///< along each side of one of its quads: 1, 2 or 4
-  std::array<bool, 2> hard_sides{};  ///< whether a crease runs along j = 0, and along i = 0
+  std::array<int, 2> steps;          ///< of one of its quads, along each side: 1, 2 or 4
+  std::array<bool, 2> hard_sides{};  ///< true if a crease runs along j = 0, and along i = 0
 };
 
-/// Largest distance from the points of a surface to a coarser tessellation of the same points.
+/// Returns the largest distance from the points of a surface to a coarser tessellation of the same points.
 ///
 ///   max over p of the distance of p to the triangle that holds its parameters
 ///
 /// Quads are cut from their first to their third corner. A point beyond an edge of its triangle is covered by the
-/// neighbour there, so only its height over the triangle's plane counts, unless the edge lies on a hard side or the
-/// point is out by more than a quarter of the longest edge.
+/// neighbor there, so only its height over the triangle's plane counts, unless the edge lies on a hard side or the
+/// point lies beyond the edge by more than a quarter of the triangle's longest edge.
 double chord_distance(const CellSamples& samples, const ChordQuery& query);
 
 }  // namespace subvol

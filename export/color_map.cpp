@@ -20,7 +20,7 @@ constexpr std::array<Rgb, 9> kViridis{{{0x44, 0x01, 0x54},
                                        {0xfd, 0xe7, 0x25}}};
 constexpr Rgb kVermilion{0xd5, 0x5e, 0x00};
 
-/// The sRGB transfer function, decoded: the table is in sRGB, files want linear light.
+/// Decodes the sRGB transfer function: the table is in sRGB, but files need linear light.
 double linear(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4); }
 
 }  // namespace

@@ -5,13 +5,13 @@
 
 namespace subvol {
 
-/// Colour of a scaled Jacobian: viridis from 0 (dark violet) to 1 (yellow), vermilion for every value <= 0.
+/// Color of a scaled Jacobian: viridis from 0 (dark violet) to 1 (yellow), vermilion for every value <= 0.
 ///
-/// Even in lightness and readable with any colour vision; vermilion does not occur in viridis, so that an inverted cell
-/// cannot be taken for a poor one. Values above 1 count as 1; NaN is vermilion.
+/// The map is even in lightness and readable with any color vision; vermilion does not occur in viridis, so that an
+/// inverted cell cannot be mistaken for a poor one. Values above 1 count as 1; NaN is vermilion.
 LinearColor quality_color(double scaled_jacobian);
 
-/// Name of the map as it stands in exported files.
+/// Name of the map as it appears in exported files.
 inline constexpr const char* kQualityColorMap = "viridis over scaled Jacobian 0..1, vermilion at 0 and below";
 
 }  // namespace subvol

@@ -16,7 +16,7 @@
 namespace subvol {
 namespace {
 
-/// Faces that are seen, as MeshTopology numbers them, and the cells behind them.
+/// Visible faces, by their numbers in MeshTopology, and the cells behind them.
 struct SeenFaces {
   std::vector<Index> faces, cells;
 };
@@ -27,9 +27,9 @@ Vec3 centre(const HighOrderMesh& mesh, std::size_t c) {
   return sum / static_cast<double>(mesh.space.vertices(c).size());
 }
 
-/// Whether each cell stays: those with their centres up to the plane.
+/// Returns for each cell whether it stays: true if its center lies up to the plane.
 std::vector<char> kept_cells(const HighOrderMesh& mesh, const CutPlane& plane) {
-  constexpr double kRounding = 1e-9;  // share of the extent by which centres of one layer may differ
+  constexpr double kRounding = 1e-9;  // share of the extent by which the centers of one layer may differ
   Eigen::AlignedBox3d box, centres;
   for (std::size_t v = 0; v < mesh.space.num_vertices(); ++v) box.extend(mesh.coefficients[v]);
   for (std::size_t c = 0; c < mesh.space.num_cells(); ++c) centres.extend(centre(mesh, c));
@@ -42,7 +42,7 @@ std::vector<char> kept_cells(const HighOrderMesh& mesh, const CutPlane& plane) {
   return kept;
 }
 
-/// Samples of faces as polygons of their own, turned to face out of the cells behind them.
+/// Samples of faces as separate polygons, oriented to face out of the cells behind them.
 PolygonMesh polygons_of(const BoundarySamples& samples, const HighOrderMesh& mesh, const SeenFaces& seen) {
   const MeshTopology& topology = mesh.space.topology();
   std::vector<char> turned(topology.num_faces(), 0);
@@ -54,7 +54,7 @@ PolygonMesh polygons_of(const BoundarySamples& samples, const HighOrderMesh& mes
   return as_polygons(triangles);
 }
 
-/// Gives every face vertices of its own, behind those that are there: colours then end where faces do.
+/// Gives every face its own vertices, appended to the existing ones, so that colors end at the edges of faces.
 void part_faces(PolygonMesh& mesh, const std::vector<Index>& polygon_faces) {
   std::vector<Index> copy(mesh.positions.size(), kNoIndex), face_of_copy(mesh.positions.size(), kNoIndex);
   for (std::size_t p = 0; p < mesh.num_faces(); ++p)
@@ -108,7 +108,7 @@ Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_mini
   if (!(plane.share > 0 && plane.share < 1)) throw InputError("CutPlane::share: expected a number between 0 and 1");
 
   const std::vector<char> kept = kept_cells(mesh, plane);
-  std::array<SeenFaces, 2> seen;  // of the surface, of the cut
+  std::array<SeenFaces, 2> seen;  // of the surface and of the cut
   std::vector<double> face_quality(topology.num_faces(), 1);
   for (std::size_t i = 0; i < topology.num_faces(); ++i) {
     const auto f = static_cast<Index>(i);

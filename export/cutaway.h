@@ -7,21 +7,22 @@
 
 namespace subvol {
 
-/// What is taken off a mesh to show the cells inside: those whose centre is beyond a plane across an axis.
+/// Selects the cells to remove so that the inside becomes visible: those whose center lies beyond a plane perpendicular
+/// to an axis.
 struct CutPlane {
   static constexpr int kShortest = -1;
-  int axis = kShortest;  ///< 0, 1, 2, or the one along which the mesh is shortest: the largest section
-  double share = 0.5;    ///< where it stands between the lowest and the highest of the cells' centres; in (0, 1)
+  int axis = kShortest;  ///< 0, 1, 2, or the axis along which the mesh is shortest, which gives the largest section
+  double share = 0.5;    ///< position between the lowest and the highest cell center, in (0, 1)
 };
 
-/// What a mesh is like inside: its cells up to a plane, whole ones, coloured by their quality.
+/// The inside of a mesh: its cells up to a plane, as whole cells, colored by their quality.
 ///
-/// Nodes: "surface" (what is left of the boundary, shaded smoothly; a vertex has the least quality around), "cut" (the
-/// faces of cells that were taken off, each by itself and of its own cell's colour) and "wireframe" (the edges
-/// of both). Curved faces are cut into quads, two to an interval of the order and four at least.
+/// Nodes: "surface" (what remains of the boundary, shaded smoothly; a vertex has the least quality around it), "cut"
+/// (the faces that the removed cells uncover, each separate and in the color of its own cell) and "wireframe" (the
+/// edges of both). Each side of a curved face is cut into 2 * (largest order) intervals, at least four.
 ///
 /// cell_minima  one scaled Jacobian per cell.
-/// InputError: no cells; minima of another number; an axis or share out of range. A mesh of one layer stays whole.
+/// InputError: no cells; a wrong number of minima; an axis or share out of range. A mesh of one layer stays whole.
 Scene cutaway_scene(const VolumeMesh& mesh, std::span<const double> cell_minima, const CutPlane& plane = {},
                     const SurfaceSceneOptions& options = {});
 Scene cutaway_scene(const HighOrderMesh& mesh, std::span<const double> cell_minima, const CutPlane& plane = {},

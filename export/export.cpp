@@ -29,7 +29,7 @@ Eigen::AlignedBox3d bounding_box(std::span<const Vec3> positions) {
   return box;
 }
 
-/// Lines over vertices of their own.
+/// Line segments with their own vertices.
 ScenePrimitive wire_primitive(const std::vector<Vec3>& positions, const Segments& segments) {
   ScenePrimitive wire;
   wire.topology = ScenePrimitive::Topology::lines;
@@ -48,7 +48,7 @@ ScenePrimitive wire_primitive(const std::vector<Vec3>& positions, const Segments
 
 /// Triangles over shaded vertices.
 ScenePrimitive shaded_primitive(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
-  // Cut by shaded vertices, so that the triangles name those.
+  // Triangulates the polygons with shaded vertices, so that the triangles refer to those.
   const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices};
   ScenePrimitive primitive;
   primitive.positions = shaded.positions;
@@ -58,7 +58,7 @@ ScenePrimitive shaded_primitive(const PolygonMesh& mesh, const ShadedPolygons& s
   return primitive;
 }
 
-/// The edges of polygons, once each, by shaded vertices.
+/// The edges of polygons, once each, as pairs of shaded vertices.
 Segments edges_of(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
   Segments edges;
   std::set<std::pair<Index, Index>> drawn;
@@ -96,7 +96,7 @@ Scene make_scene(ScenePrimitive surface, const Segments& wires, const SurfaceSce
   return scene;
 }
 
-/// The cell of every boundary face and the local numbers of the face's corners in it.
+/// The cell of a boundary face and the local numbers of the face's corners in it.
 struct BoundaryFaceCell {
   Index cell;
   std::array<int, 4> corners;
@@ -132,7 +132,8 @@ double chord_length(const VolumeMesh& cage, const SurfaceSceneOptions& options) 
 std::vector<double> patch_quality(const VolumeMesh& cage, const TessellatedSurface& surface,
                                   std::span<const double> finest_cell_minima) {
   const std::size_t num_cells = finest_cell_minima.size(), num_children = cage.cell_vertices.size();
-  std::size_t per_child = 1;  // cells of the finest mesh below one child of the cage; 0: it is the cage itself
+  std::size_t per_child = 1;  // cells of the finest mesh below one child of the cage; 0: the finest mesh is the cage
+                              // itself
   if (num_cells == cage.num_cells()) per_child = 0;
   while (per_child > 0 && num_children * per_child < num_cells) per_child *= 8;
   if (per_child > 0 && num_children * per_child != num_cells)

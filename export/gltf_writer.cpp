@@ -22,7 +22,7 @@ namespace gltf = tinygltf;
 
 constexpr double kUnitNormalTolerance = 1e-6;
 
-/// What may go wrong in one array of one node, with its name in front.
+/// Reports a problem in one array of one node, starting with the node's name.
 struct Complaint {
   std::string node;
   [[noreturn]] void operator()(const std::string& array, const std::string& problem) const {
@@ -42,19 +42,19 @@ bool is_attribute_name(const std::string& name) {
          });
 }
 
-/// Where the coordinates of a file are: position = origin + unit coordinate.
+/// Coordinate system of a file: position = origin + unit * coordinate.
 struct Placement {
   Vec3 origin;
   double unit = 1;
-  bool quantize = false;  ///< coordinates are within -1 .. 1, and so written as small whole numbers
+  bool quantize = false;  ///< coordinates are within -1 .. 1, and are written as small integers
 };
 
-/// Appends typed arrays to one buffer, each behind a bufferView and an accessor of its own.
+/// Appends typed arrays to one buffer, each with its own bufferView and accessor.
 class BufferWriter {
  public:
   explicit BufferWriter(gltf::Model& model) : model_(model) { model_.buffers.emplace_back(); }
 
-  /// Values of `width` components per element; returns the accessor's number.
+  /// Adds values with `width` components per element; returns the accessor's number.
   template <class T>
   int add(const std::vector<T>& values, int width, int component_type, int target, const std::string& name,
           bool with_bounds = false, bool normalized = false) {
@@ -70,7 +70,7 @@ class BufferWriter {
     return static_cast<int>(model_.accessors.size()) - 1;
   }
 
-  /// Triples of numbers in [-1, 1] as whole numbers of a type, each triple padded to four.
+  /// Adds triples of numbers in [-1, 1] as integers of a type, each triple padded to four.
   template <class Int>
   int add_quantized(const std::vector<float>& values, int component_type, const std::string& name, bool with_bounds) {
     std::vector<Int> whole, padded;
@@ -177,7 +177,7 @@ void check_sizes(const ScenePrimitive& primitive, const Complaint& refuse) {
 }
 
 int add_indices(BufferWriter& buffer, const ScenePrimitive& primitive) {
-  // 65535 itself restarts a primitive in some graphics interfaces, so glTF forbids it as an index.
+  // The index 65535 restarts a primitive in some graphics interfaces, so glTF forbids it.
   constexpr std::size_t kMaxShortVertices = 65535;
   constexpr int kTarget = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
   if (primitive.positions.size() <= kMaxShortVertices)
@@ -201,7 +201,7 @@ int add_material(gltf::Model& model, const SceneNode& node, const Complaint& ref
   return static_cast<int>(model.materials.size()) - 1;
 }
 
-/// What takes `from` to `to`, number by number.
+/// Returns to - from, number by number.
 std::vector<float> differences(std::vector<float> to, const std::vector<float>& from) {
   for (std::size_t i = 0; i < to.size(); ++i) to[i] -= from[i];
   return to;
@@ -275,7 +275,7 @@ int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, co
   return static_cast<int>(model.nodes.size()) - 1;
 }
 
-/// Plays the shapes of a node one after the other, then the primitive itself: weight k is 1 at time k.
+/// Plays the shapes of a node one after another, then the primitive itself: weight k is 1 at time k.
 void add_animation(gltf::Model& model, BufferWriter& buffer, int node, std::size_t num_shapes,
                    double seconds_per_shape) {
   std::vector<float> times, weights;
@@ -350,7 +350,7 @@ Placement placement(const Scene& scene) {
   double extent = 0;
   for (const SceneNode& node : scene.nodes)
     for (const Vec3& p : node.primitive.positions) extent = std::max(extent, (p - scene.origin).cwiseAbs().maxCoeff());
-  // Positions that are not finite are refused by name where they are written.
+  // Positions that are not finite are refused by name when they are written.
   place.quantize = extent > 0 && std::isfinite(extent);
   if (place.quantize) place.unit = extent;
   return place;
@@ -397,7 +397,7 @@ std::string gltf_bytes(const Scene& scene, GltfContainer container) {
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception&) {
-    // Everything numeric has been checked; what the JSON writer still refuses is text that is not UTF-8.
+    // All numbers have been checked; the only thing that the JSON writer still refuses is text that is not UTF-8.
     throw InputError("scene: names and extras: expected UTF-8 text");
   }
   if (!done || !stream) throw IoError("glTF: the writer failed");

@@ -37,8 +37,8 @@ void require_writable(const HighOrderMesh& mesh, const HighOrderFileOptions& opt
       throw InputError(field.name + ": expected one finite number per vertex");
 }
 
-/// The fields at the points of Lagrange cells. These have the numbers that the points of the straight-sided mesh have,
-/// so one coordinate of a mesh of order 1 carries each field along.
+/// The fields at the points of Lagrange cells. These points are numbered like those of the straight-sided mesh, so each
+/// field is carried along as a coordinate of a mesh of order 1.
 std::vector<VertexField> fields_at_points(const HighOrderMesh& mesh, std::span<const int> orders, NodeOrdering ordering,
                                           std::span<const VertexField> fields) {
   std::vector<VertexField> result;
@@ -108,7 +108,7 @@ CellKind kind_of(const VtuArrays& file, std::uint8_t type) {
   return type == 71 ? CellKind::tet : type == 72 ? CellKind::hex : CellKind::prism;
 }
 
-/// The corners of the cells; positions are those of the points.
+/// Reads the corners of the cells; positions are those of the points.
 VolumeMesh read_corners(const VtuArrays& file, std::int64_t num_vertices) {
   const auto points = file.get<double>("Points");
   const auto nodes = file.get<std::int64_t>("connectivity"), ends = file.get<std::int64_t>("offsets");
@@ -148,7 +148,7 @@ std::vector<int> read_orders(const VtuArrays& file, const std::string& array) {
   return {orders.begin(), orders.end()};
 }
 
-/// Looked at before the space is built, so that a small file cannot ask for a large one.
+/// Checks the sizes before the space is built, so that a small file cannot request a large one.
 void require_nodes(const VtuArrays& file, const VolumeMesh& mesh, const EntityOrders& orders, std::size_t num_nodes) {
   const MeshTopology topology(mesh);
   const auto in_range = [](const std::vector<int>& list) {

@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kVanishes = 1e-13;
 
-/// A point of a patch in the face's cell: the patch's corners are the face's, two middles of edges, and the centre.
+/// A point of a patch in the face's cell: the corners of the patch are one corner of the face, two midpoints of edges,
+/// and the center.
 Vec3 patch_point(const std::vector<Vec3>& corners, std::size_t corner, double u, double v) {
   const std::size_t n = corners.size();
   const Vec3 &here = corners[corner], &next = corners[(corner + 1) % n], &before = corners[(corner + n - 1) % n];
@@ -57,7 +58,8 @@ HighOrderPatches::Face HighOrderPatches::make_face(const HighOrderMesh& mesh, In
   for (const Index v : space.topology().face(f))
     face.corners.push_back(canonical_vertices(face.kind)[std::find(vertices.begin(), vertices.end(), v) -
                                                          vertices.begin()]);
-  // Functions vanish, up to rounding, on the faces that they do not belong to, and elsewhere not at a point so odd.
+  // Functions vanish, up to rounding, on the faces that they do not belong to, and others do not vanish at a point so
+  // irregular.
   ShapeFunctions at = shapes(face);
   at.set_point(patch_point(face.corners, 0, 1 / std::numbers::pi, 1 / std::numbers::e));
   const auto modes = space.modes(c);

@@ -8,22 +8,22 @@
 
 namespace subvol {
 
-/// The curved boundary of a high-order mesh, in the patches of its straight-sided mesh: quarters of quads, where u and
-/// v are halves of the face's coordinates, and thirds of triangles, bilinear in its barycentric coordinates.
+/// The curved boundary of a high-order mesh, as the patches of its straight-sided mesh: quarters of quads, in which u
+/// and v are halves of the face's coordinates, and thirds of triangles, bilinear in barycentric coordinates.
 ///
-/// Faces of such a mesh meet in edges that are hardly ever quite smooth: an edge becomes a crease of infinite sharpness
-/// where the normals beside it differ by more than an angle.
+/// The faces of such a mesh hardly ever meet quite smoothly: an edge becomes a crease of infinite sharpness if the
+/// normals on its two sides differ by more than an angle.
 class HighOrderPatches : public PatchSurface {
  public:
-  /// crease_angle_degrees: in [0, 180]; 180: no creases. `mesh` is copied as far as needed.
-  /// InputError: the angle out of range; a boundary that is no surface (as `build_surface`).
+  /// crease_angle_degrees: in [0, 180]; 180: no creases. The needed parts of `mesh` are copied.
+  /// InputError: the angle out of range; a boundary that is not a surface (as `build_surface`).
   HighOrderPatches(const HighOrderMesh& mesh, double crease_angle_degrees);
 
   const SurfaceTopology& quads() const override { return quads_; }
   const std::array<Index, 2>& face_corner(Index patch) const override { return layout_.face_corners[patch]; }
   const std::array<bool, 2>& sharp_sides(Index patch) const override { return layout_.sharp_sides[patch]; }
   void prepare(int) override {}
-  /// Cost: at order 4 about 0.3 microseconds per point.
+  /// Cost: about 0.3 microseconds per point at order 4.
   void evaluate(Index patch, std::span<const int> u, std::span<const int> v, Vec3* positions,
                 Vec3* normals = nullptr) const override;
 
@@ -31,12 +31,12 @@ class HighOrderPatches : public PatchSurface {
   double bounding_box_diagonal() const;
 
  private:
-  /// A boundary face seen from its cell: where its corners are, and what of the cell's functions does not vanish on it.
+  /// A boundary face in its cell: the places of its corners, and the cell's functions that do not vanish on it.
   struct Face {
     CellKind kind;
     std::vector<Vec3> corners;
     std::vector<LocalMode> modes;
-    std::vector<Vec3> coefficients;  ///< with their signs
+    std::vector<Vec3> coefficients;  ///< multiplied by their signs
   };
   struct Frame {
     Vec3 position, normal;

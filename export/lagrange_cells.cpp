@@ -14,7 +14,7 @@
 namespace subvol {
 namespace {
 
-/// Values at the nodes of one kind and order -> coefficients of the modes of a cell.
+/// Maps values at the nodes of one kind and order to coefficients of the modes of a cell.
 class Interpolation {
  public:
   Interpolation(const ElementSpace& space, std::size_t pattern, NodeOrdering ordering)
@@ -37,7 +37,7 @@ class Interpolation {
 
   std::size_t num_nodes() const { return lattice_.size(); }
 
-  /// values: one row per node. returns one row per mode, without the cell's signs.
+  /// values: one row per node. Returns one row per mode, without the cell's signs.
   Eigen::MatrixX3d coefficients(const Eigen::MatrixX3d& values) const {
     return is_hex_ ? of_hex(values) : Eigen::MatrixX3d(factors_.solve(values));
   }
@@ -57,7 +57,7 @@ class Interpolation {
     return result;
   }
 
-  /// A hex has the modes N_i N_j N_k, i fastest: it is solved along one axis after the other.
+  /// A hex has the modes N_i N_j N_k, i fastest: the system is solved along one axis after another.
   Eigen::MatrixX3d of_hex(const Eigen::MatrixX3d& values) const {
     const int n = order_ + 1;
     const auto place = [n](int i, int j, int k) { return (k * n + j) * n + i; };
@@ -79,10 +79,10 @@ class Interpolation {
   int order_;
   bool is_hex_;
   std::vector<LatticePoint> lattice_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;  // of a hex: along one axis
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;  // for a hex: along one axis
 };
 
-/// Every cell with vertices of its own, at its first nodes: readers list the corners first.
+/// Gives every cell its own vertices, at its first nodes: these orderings list the corners first.
 VolumeMesh separate_cells(const CellView& cells) {
   VolumeMesh mesh;
   std::vector<Index> corners;

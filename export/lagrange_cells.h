@@ -7,15 +7,16 @@
 
 namespace subvol {
 
-/// The polynomials that a reader of Lagrange cells evaluates: in each cell the only one of its order that meets its
-/// points on the regular grid. Positions, Jacobians, certificates and qualities of the result are those of the file.
+/// Returns the polynomials that a reader of Lagrange cells evaluates: in each cell the only one of its order that
+/// passes through its points on the regular grid. Positions, Jacobians, certificates and qualities of the result are
+/// those of the file.
 ///
-/// returns  a mesh with the Legendre basis in which every cell has vertices of its own, in the order of the cells, so
-///          that it stands for files whose cells do not fit together.
+/// returns  a mesh with the Legendre basis in which every cell has its own vertices, in the order of the cells, so that
+///          it can represent files whose cells do not fit together.
 /// ordering  vtk or gmsh, which list the corners first; rows is refused.
-/// InputError: an order out of range, a number of nodes other than that of the cell's kind and order, a node without
-/// a point. Coefficients are met to rounding times the condition of the interpolation, about 1e-11 of the cell's size
-/// at order 12. Cost: one factorisation for each kind and order (prism of order 12: 1 s), then a product per cell.
+/// InputError: an order out of range, a number of nodes other than that of the cell's kind and order, a node without a
+/// point. The points are matched to rounding times the condition of the interpolation, about 1e-11 of the cell's size
+/// at order 12. Cost: one factorization for each kind and order (prism of order 12: 1 s), then a product per cell.
 HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering);
 
 }  // namespace subvol

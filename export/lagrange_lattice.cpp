@@ -35,7 +35,7 @@ constexpr Face kGmshTetFaces[] = {{0, 2, 1, -1}, {0, 1, 3, -1}, {0, 3, 2, -1}, {
 constexpr Face kGmshPrismFaces[] = {{0, 2, 1, -1}, {3, 4, 5, -1}, {0, 1, 4, 3}, {0, 3, 5, 2}, {1, 2, 5, 4}};
 constexpr Face kGmshHexFaces[] = {{0, 3, 2, 1}, {0, 1, 5, 4}, {0, 4, 7, 3}, {1, 2, 6, 5}, {2, 3, 7, 6}, {4, 5, 6, 7}};
 
-/// A part of the grid, by its corners; its edges have `order` steps.
+/// A part of the grid, given by its corners; its edges have `order` steps.
 struct Part {
   Lattice corners;
   int order;
@@ -57,7 +57,7 @@ void add_rows_inside_face(Lattice& out, const Part& part, const Face& face) {
     for (int i = 1; i < (is_triangle(face) ? p - j : p); ++i) out.push_back(first + i * i_step + j * j_step);
 }
 
-/// The polygon one step further in than `part`, a triangle or quad with all its edges.
+/// The polygon one step inside `part`, which is a triangle or quad with all its edges.
 Part inner_polygon(const Part& part) {
   const int n = static_cast<int>(part.corners.size());
   Part inner{part.corners, n == 3 ? part.order - 3 : part.order - 2};
@@ -81,7 +81,7 @@ void add_nested_inside_face(Lattice& out, const Part& part, const Face& face) {
   if (part.order > 1) add_nested_polygon(out, inner_polygon(polygon));
 }
 
-/// The cell one step further in.
+/// The cell one step inside `part`.
 Part inner_cell(CellKind kind, const Part& part) {
   Part inner{part.corners, kind == CellKind::tet ? part.order - 4 : part.order - 2};
   for (std::size_t k = 0; k < part.corners.size(); ++k)
@@ -90,7 +90,7 @@ Part inner_cell(CellKind kind, const Part& part) {
   return inner;
 }
 
-/// Corner first lists; faces and cells nested where the flags say so, else in rows.
+/// Lists of edges and faces by their corners; flags for nested faces and cells, which are in rows otherwise.
 struct Scheme {
   std::span<const Edge> edges;
   std::span<const Face> faces;
@@ -109,7 +109,7 @@ Scheme gmsh_scheme(CellKind kind) {
   return {kGmshHexEdges, kGmshHexFaces, true, true};
 }
 
-/// All points, or with inset = 1 those inside only, u fastest.
+/// Adds all points, or with inset = 1 only the inner ones, u fastest.
 void add_rows(Lattice& out, CellKind kind, int order, int inset) {
   const int last = order - inset;
   for (int k = inset; k <= last; ++k) {

@@ -11,21 +11,22 @@ namespace subvol {
 /// A point of the regular grid of a cell: canonical coordinates times the order.
 using LatticePoint = Eigen::Vector3i;
 
-/// In which order the points of a cell's grid are listed.
+/// Order in which the points of a cell's grid are listed.
 enum class NodeOrdering {
-  vtk,   ///< Lagrange cells 71, 72, 73, as VTK numbers them in .vtu files from version 2.1 on
-  gmsh,  ///< Gmsh's cells of any order; prisms of order 1 and 2 only
+  vtk,   ///< Lagrange cells 71, 72, 73, as numbered in .vtu files from version 2.1 on
+  gmsh,  ///< Gmsh's cells of any order; prisms only of order 1 and 2
   rows   ///< u fastest, then v, then w
 };
 
-/// The grid points of one kind of cell of an order >= 1: (p+1)^3 of a hex, (p+1)^2 (p+2)/2 of a prism,
-/// (p+1)(p+2)(p+3)/6 of a tet. InputError: an order below 1; for gmsh a prism of an order above 2.
+/// Returns the grid points of one kind of cell of an order >= 1: (p+1)^3 of a hex, (p+1)^2 (p+2)/2 of a prism,
+/// (p+1)(p+2)(p+3)/6 of a tet. InputError: an order below 1; for gmsh, a prism of an order above 2.
 ///
-/// VTK and Gmsh both list corners, points inside edges, inside faces, inside the cell, and differ in which way edges
-/// and faces run and in what is inside: rows, or again a smaller cell of the same kind with its corners first.
+/// VTK and Gmsh both list the corners, then the points inside edges, inside faces, and inside the cell. They differ in
+/// the direction of edges and faces and in the order of inner points: rows, or recursively a smaller cell of the same
+/// kind with its corners first.
 std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering ordering);
 
-/// The number of these points.
+/// Number of these points.
 std::size_t num_lattice_points(CellKind kind, int order);
 
 }  // namespace subvol

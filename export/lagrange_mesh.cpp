@@ -17,16 +17,16 @@
 namespace subvol {
 namespace {
 
-/// Where a grid point lies: on which part of its cell, and with which share of that part's corners.
+/// Location of a grid point: the part of its cell on which it lies, and its weights at the cell's vertices.
 struct LatticeNode {
   enum class On { vertex, edge, face, cell };
   On on = On::cell;
   int part = 0;                 ///< local number of the vertex, edge or face
-  /// Of the local vertices; sum: order, to the power of the cell's line factors.
+  /// Weights of the local vertices; their sum is order^d with d = 1 for a tet, 2 for a prism, 3 for a hex.
   std::array<std::int64_t, 8> weights{};
 };
 
-/// Shares of the corners, exact whole numbers.
+/// Weights of the corners, as exact integers.
 std::array<std::int64_t, 8> corner_weights(CellKind kind, std::int64_t p, const LatticePoint& at) {
   const std::int64_t u = at[0], v = at[1], w = at[2];
   if (kind == CellKind::tet) return {p - u - v - w, u, v, w};
@@ -68,7 +68,7 @@ LatticeNode classify(CellKind kind, int order, const LatticePoint& at) {
   return node;
 }
 
-/// The grid of one kind and order, looked at once.
+/// The grid of one kind and order, with its points classified once.
 struct Lattice {
   std::vector<LatticeNode> nodes;
   std::vector<Vec3> points;
@@ -83,7 +83,7 @@ Lattice make_lattice(CellKind kind, int order, NodeOrdering ordering) {
   return lattice;
 }
 
-/// Gives points numbers: those of an edge or face in its own frame, so that all cells around agree.
+/// Numbers points: those on an edge or face in its own frame, so that all cells around it agree.
 class NodeNumbering {
  public:
   explicit NodeNumbering(const ElementSpace& space) : space_(space), count_(space.num_vertices()) {}
@@ -121,7 +121,7 @@ class NodeNumbering {
  private:
   using Blocks = std::map<std::pair<Index, int>, Index>;
 
-  /// First number of the points inside an edge or face of a grid of this order.
+  /// First number of the points inside an edge or face with a grid of this order.
   Index block(Blocks& blocks, Index entity, int order, int size) {
     const auto [it, added] = blocks.try_emplace({entity, order}, static_cast<Index>(count_));
     if (added) count_ += static_cast<std::size_t>(size);
@@ -137,7 +137,7 @@ class NodeNumbering {
 
 using LatticeKey = std::pair<CellKind, int>;
 
-/// Samples every cell and keeps each point from the first cell that has it.
+/// Samples every cell and takes each point from the first cell that has it.
 void evaluate(const HighOrderMesh& mesh, const std::map<LatticeKey, Lattice>& lattices, LagrangeMesh& out) {
   std::vector<Index> first_cell(out.positions.size(), kNoIndex);
   for (std::size_t c = out.num_cells(); c-- > 0;)
@@ -147,7 +147,8 @@ void evaluate(const HighOrderMesh& mesh, const std::map<LatticeKey, Lattice>& la
     groups[{mesh.space.pattern(c), out.orders[c]}].push_back(static_cast<Index>(c));
   const std::size_t num_vertices = mesh.space.num_vertices();
   for (const auto& [key, members] : groups) {
-    const std::vector<Index>& cells = members;  // Clang before 16 takes no structured binding into a parallel region
+    const std::vector<Index>& cells = members;  // Clang before 16 does not accept structured bindings in a parallel
+                                                // region
     const PatternTable table(mesh.space, key.first,
                              lattices.at({mesh.space.pattern_kind(key.first), key.second}).points);
     const auto sample = [&](Index c, std::vector<Vec3>& x) {
@@ -169,7 +170,7 @@ void evaluate(const HighOrderMesh& mesh, const std::map<LatticeKey, Lattice>& la
   }
 }
 
-/// Corners of the pieces of a cell of a kind, by grid points, n intervals a side.
+/// Corners of the pieces of a cell of one kind with n intervals per side, as grid points.
 std::vector<std::vector<LatticePoint>> pieces(CellKind kind, int n) {
   std::vector<std::vector<LatticePoint>> result;
   const auto add = [&](const LatticePoint& at, std::initializer_list<LatticePoint> corners) {
@@ -248,7 +249,8 @@ VolumeMesh linear_cells(const HighOrderMesh& mesh, int intervals, std::vector<In
     throw InputError("linear_cells: " + std::to_string(intervals) +
                      " intervals make more cells than an index can tell");
   const LagrangeMesh grid = lagrange_mesh(mesh, std::vector<int>(num_cells, intervals), NodeOrdering::rows);
-  std::map<CellKind, std::vector<std::vector<int>>> places;  // of the corners of each piece in the grid's rows
+  std::map<CellKind, std::vector<std::vector<int>>> places;  // positions of the corners of each piece in the grid's
+                                                             // rows
   for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex}) {
     std::map<std::array<int, 3>, int> place;
     for (const LatticePoint& at : cell_lattice(kind, intervals, NodeOrdering::rows))

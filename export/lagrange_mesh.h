@@ -9,16 +9,15 @@
 
 namespace subvol {
 
-/// Points of the regular grids of all cells, those on common vertices, edges and faces once.
+/// Points of the regular grids of all cells; each point on common vertices, edges and faces occurs once.
 ///
-/// A common edge or face is shared by the cells that have the same order; where orders differ, each has points of its
-/// own.
+/// An edge or face is shared by its cells of equal order; cells of different orders have separate points on it.
 struct LagrangeMesh {
   std::vector<Vec3> positions;  ///< the mesh's vertices with their numbers, then the other points
   std::vector<CellKind> kinds;
   std::vector<int> orders;      ///< one per cell
   std::vector<std::size_t> cell_offsets{0};
-  std::vector<Index> cell_nodes;///< points of every cell, as `cell_lattice` lists them
+  std::vector<Index> cell_nodes;///< points of every cell, in the order of `cell_lattice`
 
   std::size_t num_cells() const { return kinds.size(); }
   std::span<const Index> cell(std::size_t c) const {
@@ -26,20 +25,22 @@ struct LagrangeMesh {
   }
 };
 
-/// Samples the cells on grids of the given orders, one per cell, >= 1. What is polynomial of that order (legendre:
-/// every cell at its `lagrange_orders`) is met everywhere, all else at the points.
+/// Samples the cells on grids of the given orders, one per cell, >= 1. Cells that are polynomials of that order
+/// (Legendre: every cell at its order from `lagrange_orders`) are reproduced everywhere, all others only at the points.
 ///
-/// InputError: wrong number of orders, what `cell_lattice` refuses. Parallel, same bits for any number of threads.
+/// InputError: a wrong number of orders, an order that `cell_lattice` refuses. Parallel; the same bits for any number
+/// of threads.
 LagrangeMesh lagrange_mesh(const HighOrderMesh& mesh, std::span<const int> orders, NodeOrdering ordering);
 
-/// For every cell the largest order of its edges, faces and itself, but no more than `limit`.
+/// Returns for every cell the largest order of its edges, faces and interior, but no more than `limit`.
 std::vector<int> lagrange_orders(const ElementSpace& space, int limit);
 
-/// The curved cells as many small linear ones: n^3 hexes of a hex, n^3 prisms of a prism, n^3 tets of a tet.
+/// Returns the curved cells as many small linear ones: n^3 hexes per hex, n^3 prisms per prism, n^3 tets per tet.
 ///
-/// Conforming as the mesh is: all edges are cut alike, at equal parameters. With 1 the straight-sided mesh itself.
-/// intervals  n >= 1, else InputError, as when there were more than 2^31 - 1 cells. parents: cell of each small one, or
-///            null.
+/// The result is conforming like the mesh: all edges are cut alike, at equal parameters. n = 1 gives the straight-sided
+/// mesh itself.
+/// intervals  n >= 1, else InputError; InputError also if there would be more than 2^31 - 1 cells. parents: receives
+///            the cell of each small one; may be null.
 VolumeMesh linear_cells(const HighOrderMesh& mesh, int intervals, std::vector<Index>* parents = nullptr);
 
 }  // namespace subvol

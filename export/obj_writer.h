@@ -8,13 +8,13 @@
 
 namespace subvol {
 
-/// A polygon mesh as Wavefront .obj text: `v` and `f` lines only, faces as they are (quads stay quads).
+/// Returns a polygon mesh as Wavefront .obj text: `v` and `f` lines only, with the faces unchanged (quads stay quads).
 ///
-/// Coordinates have 17 significant digits where they need them, so that reading gives the same doubles.
+/// Coordinates have up to 17 significant digits, as many as are needed to read back the same doubles.
 /// InputError: no faces, a face of fewer than three corners, an index out of range, a coordinate that is not finite.
 std::string obj_text(const PolygonMesh& mesh, const std::string& name = "surface");
 
-/// Writes `obj_text` to a file, all of it or nothing. IoError: the file cannot be written.
+/// Writes `obj_text` to a file, the whole text or nothing. IoError: the file cannot be written.
 void write_obj(const std::filesystem::path& path, const PolygonMesh& mesh);
 
 }  // namespace subvol

@@ -15,9 +15,9 @@ namespace subvol {
 namespace {
 
 struct Corner {
-  std::size_t entry;   ///< in face_vertices
+  std::size_t entry;   ///< index in face_vertices
   std::size_t face;
-  Index before, after; ///< the neighbours on the face
+  Index before, after; ///< the neighbors on the face
 };
 
 std::vector<std::vector<Corner>> corners_of_vertices(const PolygonMesh& mesh) {
@@ -40,10 +40,10 @@ std::vector<Vec3> area_vectors(const PolygonMesh& mesh) {
   return areas;
 }
 
-/// The first corner of the group of each corner: groups grow over smooth edges.
+/// Returns the first corner of the group of each corner: groups grow over smooth edges.
 std::vector<std::size_t> smooth_groups(const std::vector<Corner>& corners, const std::vector<Vec3>& areas,
                                        double cos_angle) {
-  std::vector<std::pair<Index, std::size_t>> spokes;  // other end of an edge at the vertex, corner
+  std::vector<std::pair<Index, std::size_t>> spokes;  // the other end of an edge at the vertex, and the corner
   for (std::size_t i = 0; i < corners.size(); ++i) {
     spokes.push_back({corners[i].before, i});
     spokes.push_back({corners[i].after, i});

@@ -13,17 +13,17 @@
 namespace subvol {
 namespace {
 
-constexpr int kSamples = 2;  ///< a pixel, in each direction
+constexpr int kSamples = 2;  ///< per pixel, in each direction
 constexpr LinearColor kGrey{0.35, 0.40, 0.45, 1};
 constexpr double kAmbient = 0.3;
-constexpr double kWireShade = 0.35;  ///< of the surface below
+constexpr double kWireShade = 0.35;  ///< factor on the surface's color
 
 double srgb(double linear) {
   const double x = std::clamp(linear, 0.0, 1.0);
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
 }
 
-/// Colour and depth of every sample.
+/// Color and depth of every sample.
 class Canvas {
  public:
   Canvas(const RasterView& view, int width, int height)
@@ -41,7 +41,7 @@ class Canvas {
       throw InputError("rasterize: expected a view with a direction and an up that is not parallel to it");
   }
 
-  /// Sample coordinates, x to the right and y down, and depth, which grows towards the viewer.
+  /// Sample coordinates, x to the right and y down, and depth, which grows toward the viewer.
   Vec3 project(const Vec3& p) const {
     const Vec3 q = scale_ * (axes_ * (p - centre_));
     return {0.5 * width_ + q[0], 0.5 * height_ - q[1], q[2]};
@@ -54,7 +54,8 @@ class Canvas {
   }
 
   void draw_triangle(const std::array<Vec3, 3>& p, const std::array<Vec3, 3>& color) {
-    constexpr double kOnEdge = 1e-9;  // samples on an edge are of both triangles, else of none by chance
+    constexpr double kOnEdge = 1e-9;  // samples on an edge belong to both triangles; otherwise rounding could leave
+                                      // them to neither
     const double area = (p[1] - p[0]).head<2>().x() * (p[2] - p[0]).y() - (p[1] - p[0]).y() * (p[2] - p[0]).x();
     if (!(std::abs(area) > 0) || !std::isfinite(area)) return;
     const auto range = [](double low, double high, int limit) {
@@ -76,7 +77,7 @@ class Canvas {
       }
   }
 
-  /// Darkens what is there; the line lies a little in front of its surface.
+  /// Darkens the visible samples on a line, which lies slightly in front of its surface.
   void draw_line(const Vec3& a, const Vec3& b) {
     constexpr double kInFront = 2;  // samples
     const double steps = std::ceil(std::max(std::abs(b.x() - a.x()), std::abs(b.y() - a.y())));
@@ -122,12 +123,12 @@ class Canvas {
   }
 
   int width_, height_;
-  double scale_;  // samples a unit of length
+  double scale_;  // samples per unit of length
   Vec3 centre_;
-  Mat3 axes_;     // rows: right, up, towards the viewer
+  Mat3 axes_;     // rows: right, up, toward the viewer
   std::vector<double> depths_;
   std::vector<Vec3> colors_;   // linear
-  std::vector<bool> wired_;    // whether a line has darkened it: a second one leaves it
+  std::vector<bool> wired_;    // true if a line has darkened the sample: a second one leaves it
 };
 
 }  // namespace

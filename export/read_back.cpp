@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 namespace gltf = tinygltf;
 
-/// A file under comparison.
+/// A file that is compared with what was written to it.
 class WrittenFile {
  public:
   explicit WrittenFile(const fs::path& path) : path_(path) {}
@@ -44,7 +44,7 @@ class WrittenFile {
   fs::path path_;
 };
 
-/// compare(file), where there is something to read.
+/// Calls compare(file) if there is a file to read.
 template <class Compare>
 void read_back(const fs::path& path, const Compare& compare) {
   std::error_code ignored;
@@ -58,7 +58,7 @@ void read_back(const fs::path& path, const Compare& compare) {
 
 int reference(std::span<const int> references, std::size_t c) { return references.empty() ? 0 : references[c]; }
 
-/// Cells in the order that a key sorts them in, else by number.
+/// Cells sorted by a key, and by number for equal keys.
 template <class Key>
 std::vector<std::size_t> sorted_cells(std::size_t num_cells, const Key& key) {
   std::vector<std::size_t> order(num_cells);
@@ -88,7 +88,7 @@ void compare_linear(const WrittenFile& file, const VolumeMesh& wanted, bool is_m
   file.same_count("cells", found.num_cells(), wanted.num_cells());
   for (std::size_t v = 0; v < wanted.num_vertices(); ++v)
     file.same(found.positions[v] == wanted.positions[v], "vertex", v);
-  // Medit has a section for each kind: hexes, prisms, tets.
+  // Medit has one section for each kind: hexes, prisms, tets.
   const auto section = [&](std::size_t c) {
     return !is_medit ? 0 : wanted.kinds[c] == CellKind::hex ? 1 : wanted.kinds[c] == CellKind::prism ? 2 : 3;
   };
@@ -199,7 +199,7 @@ void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, std::span
 
 // --- .obj, .usda ----------------------------------------------------------------------------------------------------
 
-/// tolerance  of coordinates.
+/// tolerance  largest difference of coordinates.
 void compare_polygons(const WrittenFile& file, const PolygonMesh& found, const PolygonMesh& wanted, double tolerance) {
   file.same_count("vertices", found.positions.size(), wanted.positions.size());
   file.same_count("faces", found.num_faces(), wanted.num_faces());
@@ -212,7 +212,7 @@ void compare_polygons(const WrittenFile& file, const PolygonMesh& found, const P
     file.same(found.face_vertices[k] == wanted.face_vertices[k], "corner", k);
 }
 
-/// As it is written: no polygon is dropped, as a reader of other programs' files does.
+/// Reads the polygons as written: none is dropped, unlike in the reader for other programs' files.
 PolygonMesh obj_polygons(const WrittenFile& file) {
   const std::string bytes = read_file(file.path());
   TextScanner lines(file.path().string(), bytes, TextScanner::Comments::none);
@@ -231,7 +231,7 @@ PolygonMesh obj_polygons(const WrittenFile& file) {
   return mesh;
 }
 
-/// The numbers of a value of a .usda: an array, or a tuple, whose closing bracket is the first one.
+/// Reads the numbers of a value of a .usda: an array, or a tuple, which ends at the first closing bracket.
 std::vector<double> usda_numbers(const WrittenFile& file, const std::string& bytes, const std::string& declaration,
                                  const std::string& brackets = "[]") {
   const std::string opening = ' ' + declaration + " = " + brackets[0];
@@ -245,7 +245,7 @@ std::vector<double> usda_numbers(const WrittenFile& file, const std::string& byt
   return values;
 }
 
-/// origin  receives what the file adds to its points.
+/// origin  receives the translation that the file adds to its points.
 PolygonMesh usda_polygons(const WrittenFile& file, Vec3& origin) {
   const std::string bytes = read_file(file.path());
   PolygonMesh mesh;
@@ -334,7 +334,7 @@ void compare_node(const WrittenFile& file, const gltf::Model& model, const gltf:
   file.same_count(where + "shapes", primitive.targets.size(), wanted.shapes.size());
   const bool quantized = positions.type() == TINYGLTF_COMPONENT_TYPE_SHORT;
   const double step = quantized && !node.scale.empty() ? node.scale[0] / 32767 : 1;
-  constexpr double kHalfStep = 0.51;  // and the rounding to float before it
+  constexpr double kHalfStep = 0.51;  // half a step, plus the rounding to float before it
   for (std::size_t v = 0; v < positions.count(); ++v)
     for (std::size_t k = 0; k < 3; ++k) {
       const double x = wanted.primitive.positions[v][static_cast<int>(k)] - origin[static_cast<int>(k)];
@@ -383,7 +383,7 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
 }
 
 void require_written(const fs::path& path, const PolygonMesh& surface) {
-  // A translation that is taken off and added again rounds twice.
+  // Subtracting the translation and adding it again rounds twice.
   constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
   double reach = 0;
   for (const Vec3& p : surface.positions) reach = std::max(reach, p.cwiseAbs().maxCoeff());

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-// Files that have been written are read back and compared with what went into them: how many things there are, where
-// they are (exactly, or within the steps of a quantized scene), and of which kind.
+// Written files are read back and compared with the data that went into them: the numbers of elements, their positions
+// (exact, or within the steps of a quantized scene), and their kinds.
 //
-// All throw IoError, naming the file and the first thing that differs, or why it cannot be read. What is no regular
-// file (a pipe, a device) is passed over: what went in does not come out again. Cost: about that of writing.
+// All functions throw IoError, naming the file and the first difference, or why the file cannot be read. Files that are
+// not regular (a pipe, a device) are skipped, because they do not return what was written. Cost: about that of writing.
 
 #include "export/high_order_file.h"
 #include "export/scene.h"
@@ -16,13 +16,13 @@
 
 namespace subvol {
 
-/// .mesh (with tags), .vtk, .vtu, .msh.
+/// Checks a .mesh (with tags), .vtk, .vtu or .msh.
 void require_written(const std::filesystem::path& path, const VolumeMesh& mesh);
-/// .vtu (with the map), .msh; .mesh and .vtk as linear cells.
+/// Checks a .vtu (with the map), a .msh, or a .mesh or .vtk of linear cells.
 void require_written(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
-/// .obj, .usda.
+/// Checks an .obj or .usda.
 void require_written(const std::filesystem::path& path, const PolygonMesh& surface);
-/// .glb, .gltf.
+/// Checks a .glb or .gltf.
 void require_written(const std::filesystem::path& path, const Scene& scene);
 
 }  // namespace subvol

@@ -11,24 +11,25 @@
 namespace subvol {
 namespace {
 
-constexpr double kBetweenSamples = 16.0 / 15;  // a quadratic's largest value over a triangle against that at quarters
-constexpr double kAlike = 0.7;                 // errors of two ways to cut that do not tell them apart
+constexpr double kBetweenSamples = 16.0 / 15;  // the largest value of a quadratic over a triangle, relative to that at
+                                               // quarter points
+constexpr double kAlike = 0.7;                 // ratio of errors above which two ways to cut count as equally good
 constexpr int kShortest = kCellSteps;          // quads have samples between their corners
 
-/// An interval of a strip that should be halved for a quad's sake.
+/// An interval of a strip that should be halved to improve a quad.
 struct Wish {
   Index strip;
   std::size_t interval;
   double error;
 };
 
-/// What is known of one patch as it is cut now.
+/// State of one patch with its present cuts.
 struct PatchState {
   double error = 0;
   std::vector<Wish> wishes;
 };
 
-/// Samples of the quads of one patch.
+/// Samples the quads of one patch and judges them.
 class PatchJudge {
  public:
   PatchJudge(const PatchSurface& patches, const StripCuts& cuts, Index patch)
@@ -93,7 +94,7 @@ int depth_of(const StripCuts& cuts) {
   return std::countr_zero(static_cast<unsigned>(PatchSurface::kUnits / shortest));
 }
 
-/// For every strip the largest error that asks for an interval to be halved; 0 where nothing does.
+/// For every interval of every strip, the largest error that asks for halving it; 0 if none does.
 using Demand = std::vector<std::vector<double>>;
 
 Demand total_demand(const StripCuts& cuts, const std::vector<PatchState>& states) {
@@ -107,7 +108,7 @@ Demand total_demand(const StripCuts& cuts, const std::vector<PatchState>& states
   return demand;
 }
 
-/// Quads if all demands above a threshold were met.
+/// Number of quads if all demands above a threshold are met.
 std::size_t num_quads_above(double threshold, const Demand& demand, const StripCuts& cuts, std::size_t num_patches) {
   std::vector<std::size_t> intervals(demand.size());
   for (std::size_t s = 0; s < demand.size(); ++s)
@@ -121,7 +122,7 @@ std::size_t num_quads_above(double threshold, const Demand& demand, const StripC
   return sum;
 }
 
-/// The smallest threshold, by doubling, that keeps to the bound on quads.
+/// Returns the smallest threshold, found by doubling, that keeps to the bound on quads.
 double affordable_threshold(const Demand& demand, const StripCuts& cuts, std::size_t num_patches,
                             double max_chord_error, std::size_t max_quads) {
   double most = 0;
@@ -132,7 +133,7 @@ double affordable_threshold(const Demand& demand, const StripCuts& cuts, std::si
   return threshold;
 }
 
-/// Meets the demands above a threshold; returns which strips have changed.
+/// Meets the demands above a threshold; returns for each strip whether it has changed.
 std::vector<char> halve_above(double threshold, const Demand& demand, StripCuts& cuts) {
   std::vector<char> changed(demand.size(), 0);
   for (std::size_t s = 0; s < demand.size(); ++s) {
@@ -184,7 +185,7 @@ CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t 
   StripCuts& cuts = result.cuts;
   std::vector<PatchState> states(patches.num_patches());
   std::vector<char> changed(cuts.num_strips(), 1);
-  double share = 0;  // each round takes about half of what is left
+  double share = 0;  // each round is assumed to take half of the remaining time
   while (std::any_of(changed.begin(), changed.end(), [](char c) { return c != 0; })) {
     patches.prepare(depth_of(cuts) + std::countr_zero(static_cast<unsigned>(kCellSteps)));
     ParallelErrors errors;

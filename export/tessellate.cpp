@@ -45,7 +45,7 @@ class Assembler {
     for (int j = 1; j < grid.nv; ++j)
       for (int i = 1; i < grid.nu; ++i) grid.vertices[grid.at(i, j)] = add_vertex(grid, grid.at(i, j));
     add_quads(patch, grid);
-    // These two sides lie on cage edges; the others run to the middle of the face.
+    // These two sides lie on cage edges; the others run to the center of the face.
     for (const int side : {0, 3}) add_wire(4 * patch + side, grid, side);
   }
 
@@ -58,7 +58,7 @@ class Assembler {
     std::size_t at(int i, int j) const { return static_cast<std::size_t>(j) * (nu + 1) + i; }
     std::size_t corner(int k) const { return at(k == 1 || k == 2 ? nu : 0, k >= 2 ? nv : 0); }
     int side_length(int side) const { return side % 2 == 0 ? nu : nv; }
-    /// Place t of a side, counted the way its parameter runs.
+    /// Grid index of place t of a side, counted in the direction of its parameter.
     std::size_t on_side(int side, int t) const {
       if (side % 2 == 0) return at(t, side == 0 ? 0 : nv);
       return at(side == 3 ? 0 : nu, t);
@@ -74,7 +74,7 @@ class Assembler {
     return static_cast<Index>(out_.positions.size()) - 1;
   }
 
-  /// All corners of the smooth piece around a corner get one vertex.
+  /// Gives one vertex to all corners of the smooth piece around a corner.
   void number_corner(Index patch, int k, Grid& grid) {
     const Index corner = 4 * patch + k, point = quads_.corner_vertices[corner];
     const std::size_t place = grid.corner(k);
@@ -96,7 +96,7 @@ class Assembler {
     do num_hard += is_hard(quads_, h), h = quads_.rotate(h);
     while (h != corner);
     const auto parts = [&](Index edge) { return num_hard > 1 && is_hard(quads_, edge); };
-    // Counter-clockwise to the end of the piece, then clockwise.
+    // Visits the piece counterclockwise to its end, then clockwise.
     do corner_vertices_[h] = vertex, h = quads_.rotate(h);
     while (h != corner && !parts(h));
     if (h == corner && !parts(h)) return;
@@ -152,8 +152,8 @@ class Assembler {
   std::vector<char> drawn_;             // by edge
 };
 
-/// Makes means of the patches' normals, replaces missing ones by those of the quads around, and turns the others to
-/// their side.
+/// Normalizes the sums of the patches' normals, replaces missing ones by those of the quads around, and orients the
+/// others to agree with those quads.
 void finish_normals(TessellatedSurface& surface) {
   std::vector<Vec3> facets(surface.positions.size(), Vec3::Zero());
   for (const auto& quad : surface.quads)

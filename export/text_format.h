@@ -16,7 +16,7 @@ void append_number(std::string& text, std::integral auto value) { text += std::t
 /// Appends three numbers with a separator between them.
 void append_vector(std::string& text, const Vec3& vector, const char* separator);
 
-/// The extension with its dot, capitals lowered.
+/// The extension with its dot, in lower case.
 std::string lower_case_extension(const std::filesystem::path& path);
 
 /// Throws InputError, naming `what`, unless there are faces, each of at least three corners, all in range, and all

@@ -14,13 +14,13 @@
 namespace subvol {
 namespace {
 
-/// A run of crease edges of one sharpness; closed where the last vertex is the first.
+/// A run of crease edges of one sharpness; it is closed if the last vertex is the first.
 struct Chain {
   std::vector<Index> vertices;
   double sharpness;
 };
 
-/// Joins the edges of one sharpness into chains, the smallest vertex numbers first.
+/// Joins the edges of one sharpness into chains, starting at the smallest vertex numbers.
 class ChainBuilder {
  public:
   ChainBuilder(const std::vector<CreaseEdge>& edges, double sharpness) : sharpness_(sharpness) {
@@ -36,7 +36,7 @@ class ChainBuilder {
   void append_to(std::vector<Chain>& chains) {
     for (const Index end : ends_)
       while (!neighbors_[end].empty()) chains.push_back(walk(end));
-    for (auto& [vertex, others] : neighbors_)  // what is left are loops
+    for (auto& [vertex, others] : neighbors_)  // only loops are left
       if (!others.empty()) chains.push_back(walk(vertex));
   }
 
@@ -96,7 +96,7 @@ void require_options(const UsdOptions& options) {
     throw InputError("usd: metres_per_unit: expected a positive number");
 }
 
-/// One attribute line: `    type name = [a, b, ...]`.
+/// Appends one attribute line: `    type name = [a, b, ...]`.
 template <class Range, class Append>
 void append_array(std::string& text, const char* declaration, const Range& values, Append append) {
   text += std::string("    ") + declaration + " = [";
@@ -109,8 +109,8 @@ void append_array(std::string& text, const char* declaration, const Range& value
   text += "]\n";
 }
 
-/// What is taken off the points, which USD keeps in single precision: a transform adds it again, in double. Zero where
-/// the cage is about as large as it is far from the origin.
+/// The offset subtracted from the points, which USD keeps in single precision; a transform adds it again, in double.
+/// Zero unless the cage is much farther from the origin than it is large.
 Vec3 origin_of(const Vec3& low, const Vec3& high) {
   constexpr double kFar = 8;
   const double reach = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());

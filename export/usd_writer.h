@@ -10,31 +10,32 @@
 
 namespace subvol {
 
-/// What stands in the head of a .usda file.
+/// Entries for the head of a .usda file.
 struct UsdOptions {
-  std::string name = "cage";   ///< of the prim: letters, digits, underscore; no digit first
+  std::string name = "cage";   ///< name of the prim: letters, digits, underscores; no digit first
   double metres_per_unit = 1;  ///< > 0
-  UpAxis up_axis = UpAxis::y;  ///< declared, not applied: coordinates are written as they are
+  UpAxis up_axis = UpAxis::y;  ///< declared, not applied: coordinates are written unchanged
 };
 
-/// A control cage as USD text: one Mesh with subdivisionScheme "catmullClark", whose limit surface is the fitted one.
+/// Returns a control cage as USD text: one Mesh with subdivisionScheme "catmullClark", whose limit surface is the
+/// fitted one.
 ///
-/// tags     creases and corners by the vertex numbers of `cage`; a chain of edges of one sharpness becomes one entry
-///          of creaseLengths, ended at every vertex where other than two such edges meet. Sharpnesses at or above
-///          kInfiniteSharpness are written as 10, which USD takes as infinite too.
+/// tags     creases and corners by the vertex numbers of `cage`; a chain of edges with one sharpness becomes one entry
+///          of creaseLengths and ends at every vertex at which the number of such edges is not two. Sharpnesses at or
+///          above kInfiniteSharpness are written as 10, which is infinite in USD too.
 /// returns  points, faceVertexCounts, faceVertexIndices, crease* and corner* arrays, interpolateBoundary
 ///          "edgeAndCorner", triangleSubdivisionRule "catmullClark", orientation "rightHanded", extent; metersPerUnit,
-///          upAxis and defaultPrim for the stage. Points are single precision in USD's schema; the digits of the double
-///          are written all the same. Of a cage that is far from the origin they are relative to its middle, where an
-///          xformOp:translate puts them.
+///          upAxis and defaultPrim for the stage. USD's schema has points in single precision; the digits of the double
+///          are written all the same. The points of a cage that is far from the origin are relative to its center, and
+///          an xformOp:translate moves them there.
 ///
-/// InputError: a mesh without faces or with indices out of range or coordinates that are not finite, or such as are
-/// written not in the range of float32; a tag that names no vertex or no edge of the cage, or has a sharpness that is not
-/// positive; a name that is no USD identifier; metres_per_unit not positive.
+/// InputError: a mesh without faces, with indices out of range or with coordinates that are not finite; coordinates
+/// that, as written, exceed the range of float32; a tag that names no vertex or no edge of the cage, or has a sharpness
+/// that is not positive; a name that is not a USD identifier; metres_per_unit not positive.
 std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options = {});
 
-/// Writes `usd_text` to a .usda file, all of it or nothing. InputError: another extension. IoError: the file cannot be
-/// written.
+/// Writes `usd_text` to a .usda file, the whole text or nothing. InputError: another extension. IoError: the file
+/// cannot be written.
 void write_usd(const std::filesystem::path& path, const PolygonMesh& cage, const FeatureTags& tags,
                const UsdOptions& options = {});
 

@@ -14,7 +14,7 @@ namespace subvol {
 
 static_assert(std::endian::native == std::endian::little, "the arrays of a .vtu are written as they lie in memory");
 
-/// The words a .vtu has for types of numbers.
+/// The name of a number type in a .vtu.
 template <class T>
 constexpr const char* vtu_type();
 template <>
@@ -26,12 +26,12 @@ constexpr const char* vtu_type<std::int64_t>() { return "Int64"; }
 template <>
 constexpr const char* vtu_type<std::uint8_t>() { return "UInt8"; }
 
-/// Bytes as text, four digits for three bytes.
+/// Appends bytes as base64, four digits for three bytes.
 void append_base64(std::string& text, std::string_view bytes);
-/// The bytes again, or nothing where a character or the length is not that of such a text.
+/// Returns the bytes, or nothing if a character or the length is invalid in base64.
 std::optional<std::string> decode_base64(std::string_view digits);
 
-/// A `<DataArray>` with its length in bytes and its numbers in base64. attributes: the name and what else there is.
+/// Appends a `<DataArray>` with its length in bytes and its numbers in base64. attributes: the name and any others.
 template <class T>
 void append_data_array(std::string& text, const std::string& attributes, std::span<const T> values) {
   const std::uint64_t size = values.size() * sizeof(T);

@@ -21,7 +21,8 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
   const std::size_t begin = bytes.find("<VTKFile");
   if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
     fail("expected a whole VTK XML file");
-  // Everything that subvol does not write is told in one way: nobody is to change a header until the file is read.
+  // Everything that subvol does not write is reported in the same way: nobody should edit headers one by one until the
+  // file is accepted.
   const auto refuse_foreign = [&](const std::string& found) {
     fail("another program has written this .vtu (" + found +
          "), and of those subvol reads none, only its own; save it as legacy .vtk");
@@ -38,7 +39,7 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
     add(bytes, at);
 }
 
-// No tag begins inside another: so what is looked at for all of them together is no more than the file.
+// No tag begins inside another, so searching for the ends of all tags together reads the file at most once.
 std::string_view VtuArrays::tag(std::string_view bytes, std::size_t begin) const {
   const std::size_t end = bytes.find_first_of("<>", begin + 1);
   if (end == std::string_view::npos) fail("the file ends inside a tag");

@@ -14,11 +14,12 @@
 
 namespace subvol {
 
-/// The data arrays of a .vtu as it is written here, by name, decoded when they are asked for. InputError, naming the
-/// file: it is no such file, or an array is not there, of another type or malformed. Cost: linear in the file.
+/// The data arrays of a .vtu in the form that subvol writes, by name; each is decoded on request. InputError, naming
+/// the file: it is not such a file, or an array is missing, of another type or malformed. Cost: linear in the size of
+/// the file.
 class VtuArrays {
  public:
-  /// name: of the file, for messages; bytes must outlive this.
+  /// name: of the file, for messages; `bytes` must outlive this object.
   VtuArrays(std::string name, std::string_view bytes);
 
   bool has(const std::string& array) const { return arrays_.contains(array); }

@@ -31,16 +31,18 @@ namespace subvol {
 
 namespace {
 
-/// Adaptive orders: share of all that could be gained that one raise goes for; the least gain, against E_S, that is
-/// worth one.
+/// p-adaptivity: share of the total possible gain that one raise aims at, and the least gain, relative to E_S, that
+/// justifies a raise.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-/// Places farther off than so many times the mean are far; so many times the mean counts twice at first.
+/// A place is far if its distance exceeds kFarShare times the mean. At first, a place at kFirstFarLength times the mean
+/// counts twice.
 constexpr double kFarShare = 8, kFirstFarLength = 8;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
-/// Lifting places of poor shape: their emphasis, doubled each time, as long as the least scaled Jacobian is not good.
+/// Emphasis on places of poor shape: its first value, doubled each time up to the last, until the least scaled Jacobian
+/// is good.
 constexpr double kFirstEmphasis = 4, kLastEmphasis = 512, kGoodScaledJacobian = 0.5;
 constexpr int kLiftSteps = 8;
-/// How often both are done; how much the distances may grow in all.
+/// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
 constexpr int kMostImprovements = 3;
 constexpr double kMostDistanceGrowth = 1.2;
 
@@ -63,19 +65,19 @@ VolumeMesh checked(VolumeMesh mesh) {
   return mesh;
 }
 
-/// The high-order fit, in normalised coordinates.
+/// The high-order fit, in normalized coordinates.
 class HighOrderFit : StagedFit {
  public:
   HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
   HighOrderFitResult run();
 
  private:
-  /// What a state is judged by where shape is weighed against distance.
+  /// The measures of a state when shape is weighed against distance.
   struct Outcome {
     double least_scaled_jacobian, mean_percent, max_percent;
-    std::size_t pairs;  ///< of faces that intersect
+    std::size_t pairs;  ///< number of intersecting triangle pairs
   };
-  /// What became of a stage that was run again; ended: it was not done.
+  /// Outcome of a repeated stage; ended: it was interrupted.
   enum class Again { kept, undone, ended };
 
   void look_over_template();
@@ -122,16 +124,16 @@ class HighOrderFit : StagedFit {
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
   BoundarySamples samples_;
-  int try_ = 0;              ///< number of the current try, from 1
+  int try_ = 0;              ///< number of the current attempt, from 1
   Approach approach_ = Approach::direct;
-  int order_ = 1;            ///< the highest of any entity
-  FitSnapshot start_{};      ///< of the last stage that the schedule asked for
-  std::vector<int> points_;  ///< of each cell per direction, in the last stage
-  bool stays_dense_ = false; ///< after the first orders: cells have at least so many
-  double emphasis_ = 0;      ///< of places of poor shape in E_W
-  double far_length_ = 0;    ///< distance of places that count twice in E_S; 0: all count alike
-  Outcome outcome_{};        ///< while the worst places are improved: of the state that is kept
-  double most_mean_ = 0, most_max_ = 0;  ///< what that may cost
+  int order_ = 1;            ///< highest order of any entity
+  FitSnapshot start_{};      ///< state before the last stage of the schedule
+  std::vector<int> points_;  ///< quadrature points of each cell per direction in the last stage
+  bool stays_dense_ = false; ///< set after the first orders: cells keep at least points_
+  double emphasis_ = 0;      ///< emphasis on places of poor shape in E_W
+  double far_length_ = 0;    ///< distance at which places count twice in E_S; 0: all places count alike
+  Outcome outcome_{};        ///< of the kept state, while the worst places are improved
+  double most_mean_ = 0, most_max_ = 0;  ///< largest distances that this improvement may cause
   FitReport report_;
   MemoryBudget memory_;
   StageRunner runner_;
@@ -157,8 +159,8 @@ void HighOrderFit::look_over_template() {
   schedule_ = make_high_order_schedule(options_.lambda_close, start.mean_distance / target_.surface.length());
 }
 
-/// Intervals along an edge: about as fine as the target, and as the curves need so that their chords do not matter;
-/// less for surfaces of many faces, where they matter less.
+/// Returns the number of sample intervals along an edge: about as fine as the target, and fine enough for the curves'
+/// chord errors to be negligible; fewer on surfaces of many faces, where chord errors matter less.
 int HighOrderFit::sample_intervals(int order) const {
   constexpr int kMostIntervals = 16, kLeastPerOrder = 2, kWantedPerOrder = 4;
   constexpr double kMostTriangles = 60000;
@@ -169,7 +171,7 @@ int HighOrderFit::sample_intervals(int order) const {
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
 }
 
-/// Ends the fit as it stands. std::runtime_error where nothing has been fitted yet.
+/// Ends the fit in its current state. Throws std::runtime_error if nothing has been fitted yet.
 bool HighOrderFit::end_for_memory(const std::string& why) {
   if (report_.stages.empty()) throw std::runtime_error("out of memory: " + why);
   report_.stop_reason = StopReason::memory_limit;
@@ -206,8 +208,8 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
   return volume;
 }
 
-/// Edges of cells can stand out of the surface as fins, which are too thin to count if only what is beside them is
-/// looked at.
+/// Cell edges can stick out of the surface as fins, which are too thin to count if only points beside the edges are
+/// used. So the edges themselves get points (`samples.at_edges`).
 FitProblem HighOrderFit::problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume,
                                  const BoundarySamples& samples, const Stage& stage) const {
   FitProblem problem(identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
@@ -243,7 +245,7 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   return going;
 }
 
-/// One that the schedule asks for.
+/// Runs a stage of the schedule and remembers the state before it.
 bool HighOrderFit::run_next_stage(const Stage& stage) {
   start_ = snapshot();
   return run_stage(stage);
@@ -254,15 +256,15 @@ TriangleMesh HighOrderFit::boundary(int intervals) const {
   return {fine.positions.apply(mesh_.coefficients), std::move(fine.triangles)};
 }
 
-/// Sampled more densely than what is fitted.
+/// Returns the boundary, sampled more densely than for the fit.
 TriangleMesh HighOrderFit::measured_boundary() const { return boundary(2 * sample_intervals(order_) + 1); }
 
 std::optional<std::size_t> HighOrderFit::intersecting_pairs() {
   return runner_.intersecting_pairs(measured_boundary(), report_);
 }
 
-/// Whether the boundary intersects itself, but for folds that are about as small as what is between samples. None when
-/// the fit must end.
+/// Returns true if the boundary intersects itself, apart from folds about as small as the gaps between samples. Returns
+/// nothing if the fit must end.
 std::optional<bool> HighOrderFit::is_folded() {
   const auto pairs = runner_.intersecting_pairs(boundary(sample_intervals(order_) + 1), report_);
   return pairs ? std::optional(*pairs > 0) : std::nullopt;
@@ -282,7 +284,7 @@ bool HighOrderFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
-/// From now on, cells are ideal as boxes of the size they have: graded meshes stay graded.
+/// From now on, the ideal cells are boxes of the cells' present sizes: graded meshes stay graded.
 void HighOrderFit::take_own_boxes() {
   ideal_boxes_ = ideal_boxes(template_, std::span(mesh_.coefficients).first(template_.num_vertices()),
                              target_.surface.volume(), 1);
@@ -306,8 +308,8 @@ bool HighOrderFit::run_order(Approach approach, int order) {
   return true;
 }
 
-/// The orders up to `last`, in the first way that gets near the target without folding its surface; else in the one of
-/// the tries that ended with the least energy.
+/// Runs the orders up to `last` with the first attempt that gets near the target without folding its surface, or else
+/// with the best attempt: unfolded before folded, then by the least energy.
 bool HighOrderFit::run_first_orders(int last) {
   struct Arrival {
     bool folded;
@@ -318,7 +320,7 @@ bool HighOrderFit::run_first_orders(int last) {
     Approach approach;
     std::vector<FitState> states;
     FitSnapshot start;
-    int number;  ///< of the try
+    int number;  ///< number of the attempt
     std::size_t stages_begin, stages_end;  ///< in the report
   };
   std::optional<Arrival> best;
@@ -334,7 +336,8 @@ bool HighOrderFit::run_first_orders(int last) {
     report_.undo_stages(stages_before, best->stages_begin);
     report_.undo_stages(best->stages_end, report_.stages.size());
   };
-  const auto arrive = [&](const HighOrderTry& attempt) -> std::optional<bool> {  // folded; none when the fit must end
+  // True if folded; nothing if the fit must end.
+  const auto arrive = [&](const HighOrderTry& attempt) -> std::optional<bool> {
     begin_try(attempt);
     for (int order = 1; order <= last; order = order == last ? last + 1 : std::min(2 * order, last))
       if (!run_order(attempt.approach, order)) return {};
@@ -377,7 +380,7 @@ bool HighOrderFit::run_higher_orders() {
   return true;
 }
 
-/// Raises the orders of what gains most. False where that is not worth its nodes, or they have no room.
+/// Raises the orders of the entities that gain most. Returns false if the gain is too small or memory does not suffice.
 bool HighOrderFit::raise_where_it_pays() {
   const EntityOrders next = next_orders(mesh_.space.orders(), options_.order);
   if (!has_room(next)) return false;
@@ -393,7 +396,7 @@ bool HighOrderFit::raise_where_it_pays() {
   return true;
 }
 
-/// Orders rise where it pays; where it does not any more, lambda falls for the sake of the tolerance.
+/// Raises orders as long as it pays and the tolerance is not met. The rest is left to `lower_lambda`.
 bool HighOrderFit::run_adaptive_orders() {
   stays_dense_ = true;
   while (!meets_tolerance() && raise_where_it_pays()) {
@@ -403,8 +406,9 @@ bool HighOrderFit::run_adaptive_orders() {
   return report_.stop_reason != StopReason::memory_limit;
 }
 
-/// The last stage with less and less weight on the cells' shape, while the tolerance is not met; without one, as far as
-/// unfolding has raised it. One that has the surface intersect itself in more than `pairs`, or is not done, is undone.
+/// Repeats the last stage with less and less weight on the cells' shape until the tolerance is met; without a
+/// tolerance, only undoes the rise of lambda by unfolding. A stage that is interrupted or leaves more than `pairs`
+/// self-intersections is rolled back.
 bool HighOrderFit::lower_lambda(std::size_t pairs) {
   const double least = (options_.tolerance_percent ? 1e-3 : 1) * options_.lambda_close;
   for (double lambda = lambda_ / 2; !meets_tolerance() && lambda >= 0.99 * least; lambda /= 2) {
@@ -422,8 +426,8 @@ bool HighOrderFit::lower_lambda(std::size_t pairs) {
   return true;
 }
 
-/// What is done once the orders are those of the finished mesh. Improving the worst places undoes small folds as well;
-/// only what is still folded then begins the last stage again.
+/// Runs the final stages, once the orders are those of the finished mesh. Improving the worst places also removes small
+/// folds, so the last stage is only repeated (`unfold`) if folds remain after that.
 bool HighOrderFit::finish() {
   std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs || !lower_lambda(*pairs) || !improve_worst_places()) return false;
@@ -435,7 +439,7 @@ bool HighOrderFit::finish() {
   return *pairs == pairs_before || (lower_lambda(*pairs) && improve_worst_places());
 }
 
-/// None when the fit must end.
+/// Measures the state; returns nothing if the fit must end.
 std::optional<HighOrderFit::Outcome> HighOrderFit::measured_outcome() {
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance distance = target_.distance(measured_boundary());
@@ -445,7 +449,7 @@ std::optional<HighOrderFit::Outcome> HighOrderFit::measured_outcome() {
   return Outcome{quality.min_scaled_jacobian, mean, 100 * distance.max(), *pairs};
 }
 
-/// The last stage again for the sake of few places, which matter little to the energies: both are means.
+/// Repeats the last stage to improve a few places that hardly count in the energies, since these are means.
 bool HighOrderFit::improve_worst_places() {
   if (!options_.improve_worst_places || options_.order < 2) return true;
   const std::optional<Outcome> first = measured_outcome();
@@ -458,12 +462,13 @@ bool HighOrderFit::improve_worst_places() {
     if (draw_in_far_places() == Again::ended) return false;
     const double emphasis_before = emphasis_;
     if (lift_worst_places() == Again::ended) return false;
-    if (emphasis_ == emphasis_before) break;  // else cells may bear now what they could not before
+    if (emphasis_ == emphasis_before) break;  // otherwise, cells may now tolerate what they could not before
   }
   return true;
 }
 
-/// Whether the least scaled Jacobian, as far as it is poor, the mean and the largest distance gain, taken together.
+/// Returns true if the state is within the limits and better by the least scaled Jacobian (capped if good), divided by
+/// the mean and by the largest distance.
 bool HighOrderFit::is_better(const Outcome& next) const {
   const auto shape = [](const Outcome& x) { return std::min(x.least_scaled_jacobian, kGoodScaledJacobian); };
   const double gain = outcome_.mean_percent / next.mean_percent * (outcome_.max_percent / next.max_percent);
@@ -471,7 +476,7 @@ bool HighOrderFit::is_better(const Outcome& next) const {
          next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
 }
 
-/// The last stage again with a setting changed; undone, with the setting, where that is no better.
+/// Repeats the last stage with one setting changed; if the result is not better, rolls back the stage and the setting.
 HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int steps) {
   FitSnapshot before = snapshot();
   const double setting_before = std::exchange(setting, value);
@@ -488,7 +493,7 @@ HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int s
   return next ? Again::undone : Again::ended;
 }
 
-/// With more and more emphasis on places that are much farther off than the mean, as long as there are any.
+/// Puts more and more emphasis on places much farther off than the mean, as long as there are any.
 HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   Again last = Again::kept;
   if (options_.correspondence != Correspondence::closest) return last;
@@ -500,7 +505,7 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   return last;
 }
 
-/// With more and more emphasis on places of poor shape, as long as there are any.
+/// Puts more and more emphasis on places of poor shape, as long as there are any.
 HighOrderFit::Again HighOrderFit::lift_worst_places() {
   Again last = Again::kept;
   const auto is_poor = [&] {

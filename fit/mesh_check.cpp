@@ -30,7 +30,7 @@ bool has_any(const std::vector<MeshDefect>& defects, std::initializer_list<Kind>
   });
 }
 
-/// Sets of numbers that have been joined.
+/// Disjoint sets of the numbers 0 .. n - 1 (union-find).
 class Groups {
  public:
   explicit Groups(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -87,7 +87,7 @@ double enclosed_volume(const TriangleMesh& surface) {
   return sum / 6;
 }
 
-/// How the boundary's triangles are compared with a target; empty: there is none.
+/// Compares the boundary's triangles with a target; empty if there is none.
 using Compare = std::function<void(const TriangleMesh& boundary, MeshCheck& check)>;
 
 Compare comparison(const TriangleMesh* target, const MeshCheckOptions& options) {
@@ -116,7 +116,7 @@ Compare comparison(const PointCloud* target) {
   };
 }
 
-/// Whether the next part is to be looked at.
+/// Announces the next part to the progress callback; returns false if the check must stop.
 bool begins(const char* part, double fraction, const WorkProgress& progress, MeshCheck& check) {
   check.ended_early = !goes_on(progress, part, fraction);
   return !check.ended_early;
@@ -149,7 +149,7 @@ MeshCheck count_cells(const VolumeMesh& mesh) {
   return check;
 }
 
-/// Calls certify(cell) for the first cells that are refuted, and position(cell, canonical) for where.
+/// Returns witnesses for the first refuted cells: certify(cell) finds each, position(cell, canonical) maps it to space.
 template <class Certify, class Position>
 std::vector<InversionWitness> witnesses(const QualityReport& quality, const Certify& certify,
                                         const Position& position) {
@@ -163,7 +163,7 @@ std::vector<InversionWitness> witnesses(const QualityReport& quality, const Cert
   return result;
 }
 
-/// One cell of a mesh as a mesh of its own.
+/// Returns one cell of a mesh as a mesh of its own.
 HighOrderMesh single_cell(const VolumeMesh& mesh, std::size_t c) {
   VolumeMesh single;
   std::vector<Index> corners;
@@ -175,7 +175,7 @@ HighOrderMesh single_cell(const VolumeMesh& mesh, std::size_t c) {
   return {ElementSpace(single, Basis::legendre, 1), single};
 }
 
-/// printf into the end of a string.
+/// Appends printf output to a string.
 template <class... Values>
 void append(std::string& text, const char* format, Values... values) {
   const int size = std::snprintf(nullptr, 0, format, values...);
@@ -185,7 +185,7 @@ void append(std::string& text, const char* format, Values... values) {
   text += line;
 }
 
-/// Unused vertices stand against nothing, and are told beside the defects.
+/// Unused vertices do no harm; they are listed separately from the defects.
 void append_defects(std::string& text, std::vector<MeshDefect> defects) {
   constexpr std::size_t kMaxLines = 20;
   const std::size_t num_unused =
@@ -332,7 +332,7 @@ OrderSummary order_summary(const ElementSpace& space) {
   return summary;
 }
 
-// Volumes and distances are numbers then.
+// With such extents, volumes and distances neither overflow nor underflow.
 void require_extent(std::span<const Vec3> points, const char* what) {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const Vec3& p : points) {

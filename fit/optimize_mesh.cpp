@@ -25,24 +25,25 @@ namespace subvol {
 namespace {
 
 constexpr double kTangentialWeight = 0.003;
-/// While cells are untangled, the weight of their shape against the surface.
+/// Weight of the cells' shape against the surface while cells are untangled with a sliding boundary.
 constexpr double kUntangleLambda = 0.01;
-/// Ties of this share of the diagonal count twice (`ClosestPointEnergy::emphasize_far`).
+/// Correspondences of this length, as a share of the diagonal, count twice (`ClosestPointEnergy::emphasize_far`).
 constexpr double kFarDistance = 0.002;
-/// Cells' corners only: where they are worst. What inverts between them is seen by the certificate, and sampled
-/// densely.
+/// Quadrature points at the corners only, where cells are worst. The certificate detects cells that are inverted
+/// elsewhere, and these get more points.
 constexpr int kPointsPerDirection = 2;
-/// Cells with a lower scaled Jacobian say nothing about the size they should have.
+/// Cells with a lower scaled Jacobian do not indicate their wanted size.
 constexpr double kTrustedJacobian = 0.3;
-/// Cells with a lower one may move the corners of the surface's sharp edges.
+/// Cells with a lower scaled Jacobian may move the corner vertices of the surface's sharp edges.
 constexpr double kPoorJacobian = 0.2;
 
-/// Distances are kept this much below what is asked for: they are seen at samples, which miss the farthest places.
+/// Distances are kept below these shares of the tolerances, since they are measured at samples, which miss the farthest
+/// places.
 constexpr double kMeanMargin = 0.9, kMaxMargin = 0.8;
-/// Cells' weights are not lowered further for the sake of the distance.
+/// Least factor to which the weight of a cell is lowered for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
 
-/// What a round has reached.
+/// State that a round has reached.
 struct Progress {
   double mean_jacobian = -1, least_jacobian = -1, max_percent = 0;
 
@@ -82,7 +83,7 @@ double mean_of(std::span<const double> values) {
   return sum / static_cast<double>(values.size());
 }
 
-/// One optimisation, in normalised coordinates.
+/// One optimization, in normalized coordinates.
 class MeshOptimizer {
  public:
   MeshOptimizer(const VolumeMesh& mesh, const TriangleMesh* target, const OptimizeOptions& options)
@@ -131,17 +132,17 @@ class MeshOptimizer {
   FollowedCreases creases_;
   BoundarySamples samples_;
   std::vector<Vec3> ideal_boxes_;
-  std::vector<double> weights_;     ///< of the cells; empty: equal
-  std::vector<std::uint8_t> refined_;  ///< sample triangles beside places that are too far off: seen at more points
-  std::vector<double> relief_;      ///< of the cells: share of its weight that each keeps for being beside a far place
+  std::vector<double> weights_;     ///< per cell; empty: all equal
+  std::vector<std::uint8_t> refined_;  ///< 1 for sample triangles at places that are too far off: they get more points
+  std::vector<double> relief_;      ///< per cell, the factor on its weight that is lowered beside places too far off
   std::vector<Index> uncertified_;
-  bool gains_ended_ = false;        ///< whether rounds of improvement ended since they no longer gained
-  double mean_percent_ = 0, max_percent_ = 0;  ///< distances after the last stage, at its samples
+  bool gains_ended_ = false;        ///< true if the rounds ended because they no longer gained
+  double mean_percent_ = 0, max_percent_ = 0;  ///< distances at the samples of the last stage
   FitReport report_;
   StageRunner runner_;
 };
 
-/// The mesh's own creases as edges of its boundary surface, which are sharp there whatever their angle.
+/// Returns the mesh's own creases as edges of its boundary surface, which are sharp there at any angle.
 std::vector<std::array<Index, 2>> MeshOptimizer::tagged_edges() const {
   std::vector<std::array<Index, 2>> edges;
   if (!own_boundary_) return edges;
@@ -167,7 +168,7 @@ void MeshOptimizer::sample_boundary() {
   refined_.assign(samples_.triangles.size(), 0);
 }
 
-/// Per vertex, whether one of the cells has it.
+/// Marks the vertices of these cells with 1.
 std::vector<std::uint8_t> MeshOptimizer::vertices_of(std::span<const Index> cells) const {
   std::vector<std::uint8_t> marked(mesh_.num_vertices(), 0);
   for (const Index c : cells)
@@ -175,13 +176,13 @@ std::vector<std::uint8_t> MeshOptimizer::vertices_of(std::span<const Index> cell
   return marked;
 }
 
-/// Corners of cells that do not get well beside them may move with the sharp edges that end there.
+/// Corner vertices of cells that do not improve may slide along the feature curves that end there.
 void MeshOptimizer::release_corners(std::span<const Index> cells) {
   const std::vector<std::uint8_t> marked = vertices_of(cells);
   std::erase_if(mesh_.tags.corners, [&](const CornerVertex& corner) { return marked[corner.vertex] != 0; });
 }
 
-/// Where a boundary is folded, its sharp edges are those of the folds.
+/// If a boundary is folded, its sharp edges may be those of the folds, so those at the given cells are released.
 void MeshOptimizer::release_features(std::span<const Index> cells) {
   const std::size_t before = mesh_.tags.creases.size();
   creases_.release(vertices_of(cells), mesh_);
@@ -284,7 +285,7 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   if (auto* surface = dynamic_cast<ClosestPointEnergy*>(problem.surface.get())) {
     std::vector<Vec3> samples(problem.samples.num_rows());
     problem.apply_samples(x, samples);
-    surface->forget();  // a stage from a log leaves nothing behind either
+    surface->forget();  // a stage from a log leaves no correspondences behind either
     surface->assign(samples);
     const auto [mean, max] = surface->assigned_distance();
     mean_percent_ = 100 * mean;
@@ -295,8 +296,8 @@ bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps,
   return true;
 }
 
-/// The cells beside places that are too far off count half as much from now on, and their faces are seen at more
-/// points. Lowering lambda for the sake of a few places would cost shape everywhere.
+/// From now on, the cells beside places that are too far off count half as much, and their faces get more points.
+/// Lowering lambda for the sake of a few places would cost shape everywhere.
 void MeshOptimizer::relieve_far_cells(std::span<const double> triangle_distances) {
   std::vector<std::uint8_t> far(mesh_.num_vertices(), 0);
   for (std::size_t t = 0; t < triangle_distances.size(); ++t) {
@@ -321,7 +322,7 @@ void MeshOptimizer::weigh_cells(std::span<const double> least_jacobians) {
     weights_.push_back(relief_[c] / std::max(least_jacobians[c], kLeast));
 }
 
-/// Rounds of a few steps, between which ideal boxes, weights and lambda follow what has been reached.
+/// Runs rounds of a few steps; between them, ideal boxes, weights and lambda are adapted to the state reached.
 bool MeshOptimizer::improve() {
   constexpr int kFirstSteps = 4, kSteps = 2, kMaxRounds = 14;
   constexpr double kLeastLambdaShare = 1.0 / 64;
@@ -352,7 +353,7 @@ bool MeshOptimizer::improve() {
   return true;
 }
 
-/// Nothing to measure where the target is the mesh's own boundary.
+/// There is nothing to measure if the target is the mesh's own boundary.
 void MeshOptimizer::measure_start() {
   if (own_boundary_) return;
   const SurfaceDistance start = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
@@ -360,7 +361,7 @@ void MeshOptimizer::measure_start() {
   report_.initial_distance_max_percent = 100 * start.max();
 }
 
-/// Distances of the result as `check_mesh` measures them, where the stages only looked at their own samples.
+/// Measures the distances of the result as `check_mesh` does; the stages measured only at their own samples.
 void MeshOptimizer::measure_distance() {
   if (options_.fixed_boundary) return;
   const SurfaceDistance distance = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
@@ -368,7 +369,7 @@ void MeshOptimizer::measure_distance() {
   max_percent_ = 100 * distance.max();
 }
 
-/// Whether the caller's limit of steps, not the schedule's, ended a minimisation.
+/// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
 bool MeshOptimizer::steps_ran_out() const {
   return options_.max_iterations > 0 &&
          std::any_of(report_.stages.begin(), report_.stages.end(), [](const StageRecord& stage) {
@@ -403,7 +404,7 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   find_sizes();
   uncertified_ = certify(mesh_).not_certified;
   bool going = uncertified_.empty() || untangle_all();
-  // Cells that are positive at their points though not certified may still come right.
+  // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve();
   OptimizeResult result{original, {}, {}};
   result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);

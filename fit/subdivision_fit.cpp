@@ -50,12 +50,12 @@ void check_options(const FitOptions& options) {
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
 }
 
-/// Stages in a report.
+/// A range of stages in a report.
 struct StageRange {
   std::size_t begin = 0, end = 0;
 };
 
-/// The recursive fit, in normalised coordinates.
+/// The recursive fit, in normalized coordinates.
 class SubdivisionFit : StagedFit {
  public:
   SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options);
@@ -91,23 +91,23 @@ class SubdivisionFit : StagedFit {
 
   FitOptions options_;
   FitTarget target_;               ///< sampled for the current level
-  VolumeMesh template_;            ///< normalised, with its creases
-  VolumeMesh control_;             ///< the control mesh (its last refinement, for cage-only fits)
-  VolumeMesh cage_;                ///< the mesh whose vertices are the unknowns
-  FollowedCreases template_creases_, creases_;  ///< of template_, of level_.mesh
-  SparseMap from_unknowns_;        ///< unknowns to control_'s vertices
-  SparseMap previous_nodes_;       ///< unknowns to the nodes of the last certified finite element mesh
+  VolumeMesh template_;            ///< normalized, with its creases
+  VolumeMesh control_;             ///< the control mesh (for cage-only fits, its last refinement)
+  VolumeMesh cage_;                ///< the mesh whose vertices are the degrees of freedom
+  FollowedCreases template_creases_, creases_;  ///< creases of template_ and of level_.mesh
+  SparseMap from_unknowns_;        ///< maps the degrees of freedom to control_'s vertices
+  SparseMap previous_nodes_;       ///< maps them to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
-  int try_ = 0;                    ///< tries begun, each with other ideal cells
-  double own_box_share_ = 0;       ///< of the current try
+  int try_ = 0;                    ///< number of attempts begun, each with other ideal cells
+  double own_box_share_ = 0;       ///< of the current attempt
   std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
   FitSchedule schedule_;
-  int number_ = 0;                 ///< of the level of the finite element mesh
+  int number_ = 0;                 ///< level of the finite element mesh
   FitLevel level_;
-  std::optional<BoundaryRefinement> limit_check_;  ///< of level_.mesh, made when first measured
+  std::optional<BoundaryRefinement> limit_check_;  ///< refinement of level_.mesh, made when first needed
   FitResult result_;
-  std::size_t try_begin_ = 0;      ///< stages in the report when the try began
-  StageRange result_stages_;       ///< those that led to what is stored in result_
+  std::size_t try_begin_ = 0;      ///< number of stages in the report when the attempt began
+  StageRange result_stages_;       ///< the stages that led to the state stored in result_
   std::map<std::string, double> seconds_;
   MemoryBudget memory_;
   StageRunner runner_;
@@ -129,14 +129,15 @@ SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh
     template_creases_ = FollowedCreases(target_.mesh, options.crease_angle_degrees, template_);
 }
 
-/// What the report says of the input, and what the schedule makes of it.
+/// Records the template's audit and its initial distance in the report and makes the schedule.
 void SubdivisionFit::look_over_template() {
   FitReport& report = result_.report;
   report.warnings = audit(template_).warnings;
   const StartComparison start =
       target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
   report.note_start(start);
-  schedule_ = make_schedule(options_, start.mean_distance / target_.surface.length(), template_creases_.hold_the_surface());
+  schedule_ = make_schedule(options_, start.mean_distance / target_.surface.length(),
+                            template_creases_.hold_the_surface());
 }
 
 void SubdivisionFit::prepare_level() {
@@ -165,7 +166,7 @@ std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) co
   return term;
 }
 
-/// Runs one minimisation over the current level's maps. False when the fit must end.
+/// Runs one minimization on the current level. Returns false if the fit must end.
 bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   if (!runner_.in_time(name, result_.report)) return false;
   StageRecord record;
@@ -186,7 +187,7 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
 }
 
 /// Makes the level's start valid by continuation from the linear split L of the level below:
-///   M_t = (1 - t) L + t M, a few steps of the minimiser at each t that is feasible, until t = 1.
+///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
 bool SubdivisionFit::start_level() {
   constexpr int kMaxRounds = 60;
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
@@ -206,7 +207,7 @@ bool SubdivisionFit::start_level() {
       next = t + kBackOff * (next - t);
       if (next - t <= kLeastProgress) next = t;
     }
-    // Cells that stop the way need better shapes before they can follow.
+    // Cells that block the way need better shapes before they can follow.
     const bool slow = next - t < kSlowShare * (1 - t);
     if (next > t) t = next;
     else if (stage.lambda >= options_.lambda_far) break;
@@ -223,7 +224,8 @@ bool SubdivisionFit::start_level() {
   return false;
 }
 
-/// The limit surface, refined twice beyond the finite element mesh: its chords are a sixteenth of that mesh's.
+/// Returns the limit surface, refined twice beyond the finite element mesh: its chord error is a sixteenth of that
+/// mesh's.
 TriangleMesh SubdivisionFit::limit_triangles() {
   constexpr int kRefinements = 2;
   if (!limit_check_) limit_check_ = refine_boundary(level_.mesh, kRefinements);
@@ -236,8 +238,8 @@ TriangleMesh SubdivisionFit::limit_triangles() {
   return limit;
 }
 
-/// Mean distance between the target and what is fitted, in per cent of the diagonal: the larger of those of the finite
-/// element mesh and of the limit surface.
+/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the larger one of the finite
+/// element mesh's and the limit surface's.
 double SubdivisionFit::measured_mean() {
   if (mean_) return *mean_;
   const double begin = runner_.seconds();
@@ -269,10 +271,10 @@ bool SubdivisionFit::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
-/// The finest level again with less and less weight on the cells' shape, while the accuracy wanted is not met. Without
-/// a tolerance it ends as well where a stage has cost more (share by which E_W rose) than it gained (in mean distance).
-/// A stage that makes the boundary intersect itself more than in `pairs` of faces, or without a tolerance has cost too
-/// much of the shape in all, or is not done, is undone.
+/// Repeats the finest level with less and less weight on the cells' shape, until the wanted accuracy is reached.
+/// Without a tolerance, it also ends if a stage costs more (relative rise of E_W) than it gains (relative decrease of
+/// the mean distance). A stage is rolled back if it is interrupted, if it leaves more than `pairs` self-intersections
+/// of the boundary, or, without a tolerance, if the total loss of shape is too large.
 bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   const double wanted = options_.tolerance_percent.value_or(kDefaultAccuracyPercent);
   const double least =
@@ -315,7 +317,7 @@ bool SubdivisionFit::run_stages() {
   return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs);
 }
 
-/// All or nothing: memory may run out here.
+/// Stores the whole state or nothing, since memory may run out here.
 void SubdivisionFit::store_result() {
   FitResult stored{cage_, level_.mesh, {}, states_};
   stored.cage.positions = target_.normalisation.from_unit(unknowns_);
@@ -333,7 +335,7 @@ void SubdivisionFit::store_result() {
   result_stages_ = {try_begin_, result_.report.stages.size()};
 }
 
-/// The refined mesh becomes the next control mesh (paper: section 4.3), unless the unknowns stay where they are.
+/// Makes the refined mesh the next control mesh (paper: section 4.3). In cage-only fits, the degrees of freedom stay.
 void SubdivisionFit::next_control() {
   control_ = std::move(level_.mesh);
   if (options_.cage_only) {
@@ -350,7 +352,7 @@ void SubdivisionFit::next_control() {
   previous_nodes_ = options_.surface == FittedSurface::limit ? limit_map(control_) : from_unknowns_;
 }
 
-/// Unknowns are the template's vertices.
+/// Begins an attempt: the degrees of freedom are the template's vertices.
 void SubdivisionFit::begin(double own_box_share) {
   ++try_;
   try_begin_ = result_.report.stages.size();
@@ -362,7 +364,7 @@ void SubdivisionFit::begin(double own_box_share) {
   from_unknowns_ = previous_nodes_ = identity_map(unknowns_.size());
 }
 
-/// Ends the fit with what has been stored. std::runtime_error where that is nothing.
+/// Ends the fit with the stored state. Throws std::runtime_error if there is none.
 bool SubdivisionFit::end_for_memory(const std::string& why) {
   if (result_.mesh.num_cells() == 0) throw std::runtime_error("out of memory: " + why);
   result_.report.stop_reason = StopReason::memory_limit;
@@ -383,7 +385,7 @@ bool SubdivisionFit::run_level() {
   return going;
 }
 
-/// One try at all levels, with one choice of ideal cells. False where it ended early.
+/// Runs one attempt on all levels, with one choice of ideal cells. Returns false if it ended early.
 bool SubdivisionFit::run_levels() {
   for (number_ = 1;; ++number_) {
     if (!has_room() || (number_ > 1 && !runner_.in_time(formatted("level %d", number_), result_.report))) return false;
@@ -405,7 +407,7 @@ FitResult SubdivisionFit::run() {
     FitResult result;
     StageRange stages;
   };
-  std::optional<Stalled> best;  // the try that got to the finest mesh
+  std::optional<Stalled> best;  // the stalled attempt that reached the finest mesh
   for (double share : schedule_.own_box_shares) {
     begin(share);
     done = run_levels();
@@ -417,7 +419,7 @@ FitResult SubdivisionFit::run() {
     FitReport last = std::exchange(result_, std::move(best->result)).report;
     result_stages_ = best->stages;
     result_.report.stages = std::move(last.stages);
-    if (!stalled) {  // the fit was ended in a later try
+    if (!stalled) {  // the fit was ended in a later attempt
       result_.report.stop_reason = last.stop_reason;
       result_.report.explanation = std::move(last.explanation);
     }

@@ -13,28 +13,29 @@
 namespace subvol {
 
 struct FitResult {
-  VolumeMesh cage;   ///< the last control mesh with its tags: its limit surface is the fitted surface
+  VolumeMesh cage;   ///< the last control mesh with its tags; its limit surface is the fitted surface
   VolumeMesh mesh;   ///< the finest finite element mesh (boundary at limit positions for FittedSurface::limit)
   FitReport report;
-  /// Where the cage was before each minimisation, as far as kept, from the template on; if asked for.
+  /// Positions of the cage before each minimization that was kept, starting with the template; filled if asked for.
   std::vector<FitState> states;
 };
 
 /// Fits a subdivision volume recursively (paper: section 4.3).
 ///
-/// target   triangles in any state that encloses a volume; the unit of length is the target's.
-/// template_mesh  hexes, prisms, tets; must pass `validate` but for unused vertices; should lie about where the target
-///                is.
-/// returns  the best state reached; every cell of `mesh` is certified (`certificate.h`) unless report.stop_reason is
-///          `stalled`, or the template has cells that are not: no step makes a certified cell lose its certificate.
+/// target         triangles in any state that encloses a volume; the unit of length is the target's.
+/// template_mesh  hexes, prisms and tets; must pass `validate` except for unused vertices and should lie roughly at the
+///                target's place.
+/// returns        the best state reached. Every cell of `mesh` is certified (`certificate.h`) unless report.stop_reason
+///                is `stalled` or the template has cells that are not certified: no step makes a certified cell lose
+///                its certificate.
 /// InputError: options out of range, an empty target, a template that cannot be subdivided or that has inverted cells.
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options);
 
-/// The same to points: every one of them pulls at the nearest place of the fitted surface (inverse fitting), and all
-/// distances are from the points to the surface. Where there are no points cells alone tell where the surface runs.
+/// Fits a subdivision volume to points: each point attracts the nearest place of the fitted surface (inverse fitting),
+/// and all distances are from the points to the surface. In gaps between points, only the cells determine the surface.
 ///
-/// InputError: also crease_angle_degrees, and Correspondence::voronoi, which need triangles.
+/// InputError: also for crease_angle_degrees and Correspondence::voronoi, which need triangles.
 FitResult fit_subdivision_volume(const PointCloud& target, const VolumeMesh& template_mesh, const FitOptions& options);
 
 }  // namespace subvol

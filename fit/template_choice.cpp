@@ -23,7 +23,7 @@ namespace subvol {
 namespace {
 
 constexpr double kGoodMaxPercent = 1.5, kGoodMeanPercent = 0.15, kGoodShape = 0.9, kShapeWeight = 5;
-constexpr double kLeastSeconds = 1e-3;  // of a trial where the time is over
+constexpr double kLeastSeconds = 1e-3;  // time for a trial if the limit has been reached
 
 class Chooser {
  public:
@@ -35,7 +35,7 @@ class Chooser {
   bool tell(const char* stage, double fraction) const {
     return !options_.progress || options_.progress({stage, 0, 0, 0, fraction});
   }
-  /// The surface that a template was fitted to after a few steps, and how well its cells are shaped.
+  /// The surface of a template fitted for a few steps, and the shape of its cells.
   struct ShortFit {
     TriangleMesh surface;
     double mean_scaled_jacobian;
@@ -47,7 +47,7 @@ class Chooser {
   bool try_count(std::size_t cells);
   bool try_template(VolumeMesh mesh, bool pillowed);
   double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-  /// For the next trial; 0: as long as it takes.
+  /// Returns the time for the next trial; 0: no limit.
   double time_left() const {
     const double limit = options_.time_limit_seconds;
     return limit > 0 ? std::max(kLeastSeconds, limit - seconds()) : 0;
@@ -73,14 +73,14 @@ std::vector<AutoTemplate> Chooser::candidates(std::size_t cells, bool pillow, st
   return std::move(result.templates);
 }
 
-/// Whether the cells within the pillow are several cells thick: a cube of three has two faces per cell.
+/// Returns true if the core inside the pillow is several cells thick: a cube of 3 x 3 x 3 cells has two faces per cell.
 bool has_thick_core(const VolumeMesh& pillowed) {
   constexpr double kMostFacesPerCell = 1.9;
   const std::size_t faces = MeshTopology(pillowed).boundary_faces().size();
   return static_cast<double>(faces) <= kMostFacesPerCell * static_cast<double>(pillowed.num_cells() - faces);
 }
 
-/// Tells the caller how a trial goes; ends it where they cancel or it does not go on.
+/// Returns a callback that reports a trial's progress and ends the trial if the caller cancels or goes_on() is false.
 std::function<bool(const FitProgress&)> Chooser::trial_progress(std::function<bool()> goes_on) {
   return [this, goes_on = std::move(goes_on)](const FitProgress& progress) {
     FitProgress told = progress;
@@ -91,7 +91,7 @@ std::function<bool(const FitProgress&)> Chooser::trial_progress(std::function<bo
 }
 
 Chooser::ShortFit Chooser::fit_subdivided(const VolumeMesh& mesh) {
-  constexpr int kMostSteps = 10;  // enough to tell templates apart; the fit itself begins anew
+  constexpr int kMostSteps = 10;  // enough to distinguish templates; the fit itself starts afresh
   int steps = 0;
   FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
   options.time_limit_seconds = time_left();
@@ -116,7 +116,7 @@ Chooser::ShortFit Chooser::fit_curved(const VolumeMesh& mesh) {
           measure_quality(fitted).mean_scaled_jacobian};
 }
 
-/// Fits a template a little and notes how that went. False where cancelled.
+/// Fits a template for a few steps and records the outcome. Returns false if canceled.
 bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
   const auto [surface, mean_scaled_jacobian] = options_.order > 0 ? fit_curved(mesh) : fit_subdivided(mesh);
   TemplateTrial trial{.cells = mesh.num_cells(), .pillowed = pillowed};
@@ -138,7 +138,7 @@ bool Chooser::try_template(VolumeMesh mesh, bool pillowed) {
   return true;
 }
 
-/// False where cancelled.
+/// Tries templates of about this many cells. Returns false if canceled.
 bool Chooser::try_count(std::size_t cells) {
   constexpr std::size_t kPlain = 2;
   std::vector<AutoTemplate> plain = candidates(cells, false, kPlain);

@@ -8,24 +8,25 @@
 
 namespace subvol {
 
-// An existing mesh is curved by a fit of curved elements whose template it is (`fit_high_order`).
+// To curve an existing mesh, use it as the template of a high-order fit (`fit_high_order`).
 
-/// Weight of the cells' shape for that. Lowering it step by step from what fits start with gets stuck at cells that are
-/// nearly flat; starting low gets past them.
+/// Weight of the cells' shape for that purpose. Lowering it step by step from a fit's usual start gets stuck at cells
+/// that are nearly flat; starting low gets past them.
 inline constexpr double kCurvingLambda = 0.0025;
 
 struct UntangledStart {
-  std::size_t tangled = 0;  ///< cells that were not certified
-  std::size_t left = 0;     ///< of them, those that were not when the work was ended early
-  StopReason stop_reason = StopReason::converged;  ///< cancelled or time_limit where it was: the mesh is as it was then
+  std::size_t tangled = 0;  ///< number of cells that were not certified
+  std::size_t left = 0;     ///< number of cells still not certified when the work was ended early
+  /// `cancelled` or `time_limit` if ended early; the mesh is then unchanged.
+  StopReason stop_reason = StopReason::converged;
 
   bool ended_early() const { return stop_reason != StopReason::converged; }
 };
 
-/// Makes the cells of a mesh valid over its own boundary, where they are not, before it is fitted to a target.
+/// Makes tangled cells of a mesh valid within its own boundary, before the mesh is fitted to a target.
 ///
-/// Nothing is done where none is tangled. InputError: some could not be made valid, with the first; and as
-/// `optimize_mesh`.
+/// Does nothing if no cell is tangled. InputError: as `optimize_mesh`, and if cells could not be made valid, with their
+/// number and the first of them.
 UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options);
 
 }  // namespace subvol

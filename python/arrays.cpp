@@ -17,14 +17,14 @@ std::string shape_text(const py::array& array) {
   return text + (array.ndim() == 1 ? ",)" : ")");
 }
 
-/// The object as an array of numbers: of kinds "f", "i", "u", those that are asked for.
+/// Converts the object to an array of numbers whose kind is in `kinds`: "f", "i", "u".
 py::array numbers_from(const py::object& object, const char* name, const char* kinds, const char* wanted) {
   py::array array = py::array::ensure(object);
   if (!array) {
     PyErr_Clear();
     throw py::type_error(std::string(name) + " must be an array of " + wanted);
   }
-  const bool nothing = array.size() == 0;  // [] has the type of numbers that it does not hold
+  const bool nothing = array.size() == 0;  // an empty list has a type, although it holds no numbers
   if (!nothing && std::strchr(kinds, array.dtype().kind()) == nullptr)
     throw py::type_error(std::string(name) + " must be an array of " + wanted + ", not of " +
                          py::str(array.dtype()).cast<std::string>());
@@ -48,7 +48,7 @@ Longs longs_from(const py::object& object, const char* name, std::size_t columns
   return Longs(array);
 }
 
-/// "cells[3, 2]", or "cells[3]".
+/// "cells[3, 2]", or "cells[3]" for columns 0.
 std::string place_text(const char* name, std::size_t i, std::size_t columns) {
   const std::string text = std::string(name) + '[';
   if (columns == 0) return text + std::to_string(i) + ']';

@@ -14,8 +14,8 @@ namespace subvol::python {
 
 namespace py = pybind11;
 
-/// An array that shows memory of `owner`, which it keeps alive: nothing is copied.
-/// strides  in bytes; empty: rows one after the other. Written to only where `writeable`.
+/// An array over memory of `owner`, which it keeps alive: nothing is copied.
+/// strides  in bytes; empty: consecutive rows. The array can be written only if `writeable`.
 template <class T>
 py::array shown(const T* data, std::vector<py::ssize_t> shape, py::handle owner, bool writeable = false,
                 std::vector<py::ssize_t> strides = {}) {
@@ -25,7 +25,7 @@ py::array shown(const T* data, std::vector<py::ssize_t> shape, py::handle owner,
   return array;
 }
 
-/// (n, 3) float64.
+/// Points as (n, 3) float64, which can be written.
 inline py::array shown_points(const std::vector<Vec3>& points, py::handle owner) {
   const auto rows = static_cast<py::ssize_t>(points.size());
   return shown(reinterpret_cast<const double*>(points.data()), {rows, 3}, owner, true);
@@ -38,7 +38,7 @@ inline py::array shown_offsets(const std::vector<std::size_t>& offsets, py::hand
   return shown(reinterpret_cast<const std::int64_t*>(offsets.data()), {size}, owner);
 }
 
-/// An array that owns what was in a vector: nothing is copied.
+/// An array that owns the content of a vector: nothing is copied.
 template <class T>
 py::array moved(std::vector<T> values) {
   const auto size = static_cast<py::ssize_t>(values.size());
@@ -47,19 +47,21 @@ py::array moved(std::vector<T> values) {
   return py::array(py::dtype::of<T>(), {size}, {}, kept->data(), owner);
 }
 
-/// Rows of points as an array that owns them.
+/// Points as the rows of an array that owns them.
 py::array moved_points(std::vector<Vec3> points);
 
-/// (n, 3) numbers. TypeError: not numbers; InputError: another shape. `name` is the argument's, for messages.
+/// Reads (n, 3) numbers. TypeError: not numbers; InputError: another shape. `name` is the argument's name, for
+/// messages.
 std::vector<Vec3> points_from(const py::object& object, const char* name);
 
-/// Any number of values, one dimension. Errors as above.
+/// Reads any number of values in one dimension. Errors as above.
 std::vector<double> values_from(const py::object& object, const char* name);
 
-/// (n, columns) whole numbers in [0, bound), row by row; columns 0: one dimension. None: nothing. Errors as above.
+/// Reads (n, columns) integers in [0, bound), row by row; columns 0: one dimension. None gives nothing. Errors as
+/// above.
 std::vector<Index> indices_from(const py::object& object, const char* name, std::size_t columns, std::size_t bound);
 
-/// n whole numbers of any sign. None: nothing. Errors as above, and InputError for another length.
+/// Reads n integers of any sign. None gives nothing. Errors as above, and InputError for another length.
 std::vector<int> integers_from(const py::object& object, const char* name, std::size_t size);
 
 }  // namespace subvol::python

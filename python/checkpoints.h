@@ -12,20 +12,20 @@
 
 namespace subvol::python {
 
-/// The checkpoint of one call: `checkpoint`, `every` and `resume`, which mean what they do for the program.
+/// The checkpoint of one call: `checkpoint`, `every` and `resume`, with the same meaning as in the program.
 class Checkpoints {
  public:
-  /// Takes the options.
+  /// Takes these options from the keywords.
   explicit Checkpoints(Keywords& keywords);
 
-  /// Looks at the file of an earlier run. InputError: it is none, or of another call. Before `run`.
+  /// Reads the file of an earlier run. InputError: it is not a checkpoint, or belongs to another call. Before `run`.
   ///
   /// call    the function's name.
   /// inputs  names and fingerprints of what is read.
   void begin(const std::string& call, const Keywords& keywords,
              const std::vector<std::pair<std::string, std::string>>& inputs);
 
-  /// work.run(part, [] { return function(log); }), and the checkpoint is on the disk however that ends.
+  /// Calls work.run(part, [] { return function(log); }); the checkpoint is written to the disk however that ends.
   template <class Function>
   auto run(Work& work, const char* part, std::vector<std::string>& warnings, const Function& function) {
     try {

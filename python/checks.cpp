@@ -14,7 +14,7 @@
 namespace subvol::python {
 namespace {
 
-/// What is looked at: linear or curved cells, from memory or a file.
+/// The mesh to check: linear or curved cells, from memory or a file.
 struct CheckedMesh {
   explicit CheckedMesh(const py::object& object) {
     if (py::isinstance<CurvedMesh>(object)) {
@@ -31,7 +31,7 @@ struct CheckedMesh {
 
   std::shared_ptr<const VolumeMesh> linear;
   std::shared_ptr<const CurvedMesh> curved;
-  std::optional<cli::LagrangeCheck> lagrange;  ///< of a .vtu
+  std::optional<cli::LagrangeCheck> lagrange;  ///< for a .vtu
 };
 
 py::dict check(const py::object& object, const py::object& target_object, const py::kwargs& given) {

@@ -117,7 +117,7 @@ void write_shell(Writing& writing, const Shelled& result) {
   writing.judge(output, result.curved_shell->mesh);
 }
 
-/// object as a Thing that is written by write(thing), without Python's lock.
+/// Writes the object with write(thing), without Python's lock, if it is a Thing; otherwise returns false.
 template <class Thing, class Write>
 bool written(const py::object& object, const Write& write) {
   if (!py::isinstance<Thing>(object)) return false;

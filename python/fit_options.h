@@ -15,7 +15,7 @@ namespace subvol::python {
 Choices<BoundaryRule> boundary_rules();
 Choices<Basis> bases();
 
-/// correspondence, lambda_close, solver, max_iterations, time_limit, of either kind of fit.
+/// Takes correspondence, lambda_close, solver, max_iterations, time_limit, for either kind of fit.
 template <class Options>
 void take_solver_options(Keywords& keywords, Options& options) {
   keywords.take("lambda_close", options.lambda_close);
@@ -26,10 +26,10 @@ void take_solver_options(Keywords& keywords, Options& options) {
   keywords.take("time_limit", options.time_limit_seconds);
 }
 
-/// order, basis, adaptive, tolerance, and the above.
+/// Takes order, basis, adaptive, tolerance, and the above.
 HighOrderFitOptions high_order_options(Keywords& keywords);
 
-/// InputError, naming the function, where the work was ended before all cells were valid.
+/// Throws InputError, naming the function, if the work was ended before all cells were valid.
 void require_untangled(const UntangledStart& start, const char* function);
 
 void take_chord(Keywords& keywords, cli::WritingOptions& writing);

@@ -20,7 +20,7 @@
 namespace subvol::python {
 namespace {
 
-/// What fits of either kind take, and curving does not.
+/// Takes the options that both kinds of fit have, and curving does not.
 template <class Options>
 void take_fit_options(Keywords& keywords, Options& options) {
   keywords.take("energy", options.distortion,
@@ -46,7 +46,7 @@ FitOptions subdivision_options(Keywords& keywords) {
   return options;
 }
 
-/// One fit from its arguments to its result.
+/// One call of `fit`, from its arguments to its result.
 class Fit {
  public:
   Fit(const py::object& target, const py::object& template_mesh, const py::kwargs& given)
@@ -58,14 +58,14 @@ class Fit {
     choice_options_.time_limit_seconds = kTrialsShareOfTime * time_limit;
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     untangle_template(time_limit);
-    // What is left of it: a template may have been made.
+    // Making the template may have used part of the time limit.
     time_limit = work_.time_left(time_limit);
     checkpoints_.begin("fit", keywords_,
                        {{"target", cli::fingerprint(target_)}, {"template", cli::fingerprint(*template_)}});
   }
   std::shared_ptr<Fitted> run() {
     const auto result = std::make_shared<Fitted>();
-    // The template is shown by the result, whose arrays can be written: it is to be of its own.
+    // The result exposes the template through writable arrays, so it needs its own copy.
     result->template_mesh = std::make_shared<VolumeMesh>(*template_);
     curved_ ? fit_curved(*result) : fit_subdivision(*result);
     return result;
@@ -94,7 +94,8 @@ class Fit {
     keywords_.finish();
   }
 
-  /// As the program does: a few inverted cells are made valid; a mesh that is mostly inverted is refused by the fit.
+  /// As in the program: a few inverted cells are made valid; the fit refuses a mesh in which at least half of the cells
+  /// are inverted.
   void untangle_template(double time_limit_seconds) {
     if (!cli::has_few_inverted_cells(*template_)) return;
     auto mesh = std::make_shared<VolumeMesh>(*template_);

@@ -17,22 +17,22 @@ namespace subvol::python {
 
 namespace py = pybind11;
 
-/// The words that an option takes, and what they stand for.
+/// The words that an option accepts, with their meanings.
 template <class Value>
 using Choices = std::vector<std::pair<const char*, Value>>;
 
-/// True or False of Python or NumPy; nothing for what is neither.
+/// Converts True or False of Python or NumPy; nothing for other objects.
 std::optional<bool> truth_of(const py::object& object);
 
-/// Keyword arguments of one call, taken one by one under the names of the command line ("-" being "_").
+/// Keyword arguments of one call, taken one by one under the names of the command line (with "_" for "-").
 ///
-/// What a value may be is the library's to say; here only its type is looked at. None stands for the default.
+/// The library checks the values; only their types are checked here. None stands for the default.
 class Keywords {
  public:
   /// call  the function's name, for messages.
   Keywords(std::string call, const py::kwargs& given) : call_(std::move(call)), given_(given) {}
 
-  /// Takes an option where it is given. TypeError: a value of another type; InputError: a word that is no choice.
+  /// Takes an option if it is given. TypeError: a value of another type; InputError: a word that is not a choice.
   template <class Value>
   void take(const char* name, Value& value);
   template <class Value>
@@ -40,14 +40,14 @@ class Keywords {
 
   /// The object given, or None.
   py::object object(const char* name);
-  /// Whether something else than None is given.
+  /// True if something other than None is given.
   bool has(const char* name) const { return given_.contains(name) && !given_[name].is_none(); }
-  /// InputError, saying why, where one of these is given.
+  /// Throws InputError with the reason if one of these is given.
   void refuse(std::initializer_list<const char*> names, const char* why);
-  /// TypeError, naming what there is, where an option has not been taken.
+  /// Throws TypeError, listing the available options, if an option has not been taken.
   void finish() const;
 
-  /// Options by name with the values they have: given or default.
+  /// Options by name with their values, given or default.
   const py::dict& in_force() const { return in_force_; }
 
  private:

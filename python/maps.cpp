@@ -13,7 +13,7 @@
 namespace subvol::python {
 namespace {
 
-/// What `subdivide` and `subdivision_matrix` were asked for.
+/// Arguments of `subdivide` and `subdivision_matrix`.
 struct Subdivision {
   Subdivision(const char* name, const py::object& object, const py::kwargs& given) {
     Keywords keywords(name, given);

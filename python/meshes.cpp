@@ -56,7 +56,7 @@ std::vector<double> sharpness_from(const py::object& object, const char* name, s
   return values;
 }
 
-/// creases, crease_sharpness, corners, corner_sharpness.
+/// Takes creases, crease_sharpness, corners, corner_sharpness.
 FeatureTags take_tags(Keywords& keywords, std::size_t num_points) {
   FeatureTags tags;
   const std::vector<Index> creases = indices_from(keywords.object("creases"), "creases", 2, num_points),
@@ -74,7 +74,7 @@ FeatureTags take_tags(Keywords& keywords, std::size_t num_points) {
   return merge_tags(tags, {});
 }
 
-/// The same four as properties: columns of the records themselves.
+/// Adds the same four as properties: columns of the records themselves.
 template <class Mesh, class... Extra>
 void add_tags(py::class_<Mesh, Extra...>& type) {
   constexpr py::ssize_t kCrease = sizeof(CreaseEdge), kCorner = sizeof(CornerVertex), kIndex = sizeof(Index);
@@ -124,7 +124,7 @@ std::shared_ptr<VolumeMesh> make_volume(const py::object& points, const py::kwar
   return mesh;
 }
 
-/// Corners of the cells of a kind: the mesh's own memory where they follow one another.
+/// Corners of the cells of a kind: the mesh's own memory if these cells are consecutive.
 py::array cells_of(const py::object& self, CellKind kind) {
   const auto& mesh = self.cast<const VolumeMesh&>();
   const py::ssize_t corners = cell_topology(kind).num_vertices;
@@ -328,7 +328,7 @@ std::shared_ptr<const VolumeMesh> volume_from(const py::object& object, const ch
 
 std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, const char* name) {
   std::shared_ptr<const VolumeMesh> mesh = volume_from(object, name);
-  if (is_path(object)) return mesh;  // the reader has looked
+  if (is_path(object)) return mesh;  // the reader has checked it
   for (const MeshDefect& defect : validate(*mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex && defect.kind != MeshDefect::Kind::inverted_cell)
       throw InputError(std::string(name) + ": " + defect.message);

@@ -19,20 +19,21 @@ namespace py = pybind11;
 using SurfaceMesh = cli::TaggedPolygons;
 using CurvedMesh = HighOrderFile;
 
-/// Whether something names a file: text, bytes or os.PathLike.
+/// True if the object names a file: text, bytes or os.PathLike.
 bool is_path(const py::object& object);
-/// The path itself. TypeError: `is_path` is false.
+/// Returns the path. TypeError if `is_path` is false.
 std::string path_from(const py::object& object);
 
-/// Arguments that are meshes, or paths of files that are read as the program reads them; `name` is for messages.
-/// TypeError: something else. InputError: what the readers refuse. Warnings are told.
+/// Converts an argument that is a mesh, or the path of a file, which is read as the program reads it; `name` is for
+/// messages. TypeError: something else. InputError: a file that the readers refuse. Warnings go to Python.
 std::shared_ptr<const VolumeMesh> volume_from(const py::object& object, const char* name, bool check = true);
-/// The same for functions that rely on a mesh that is sound but for inverted cells and unused points, else InputError.
+/// Does the same for functions that rely on a mesh that is valid except for inverted cells and unused points, else
+/// InputError.
 std::shared_ptr<const VolumeMesh> sound_volume_from(const py::object& object, const char* name);
-/// A surface, or the boundary of a volume mesh: as triangles; as polygons with tags. InputError: points not finite.
+/// A surface, or the boundary of a volume mesh: as triangles, or as polygons with tags. InputError: points not finite.
 TriangleMesh triangles_from(const py::object& object, const char* name);
 SurfaceMesh surface_from(const py::object& object, const char* name);
-/// The same, or points: an (n, 3) array, or the path of a file of them. InputError also as `sound_points`.
+/// A surface as above, or points: an (n, 3) array, or the path of a file of them. InputError also as `sound_points`.
 cli::Target target_from(const py::object& object, const char* name);
 
 }  // namespace subvol::python

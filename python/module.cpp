@@ -26,7 +26,7 @@ PyObject* new_error(py::module_& module, const char* name, const char* help, std
   return error;
 }
 
-// Names of files need not be UTF-8.
+// File names need not be UTF-8.
 void set_error(PyObject* error, const char* text) { PyErr_SetString(error, cli::as_utf8(text).c_str()); }
 
 void add_errors(py::module_& module) {
@@ -65,9 +65,9 @@ void add_progress(py::module_& module) {
 PYBIND11_MODULE(_subvol, module) {
   using namespace subvol::python;
   py::options options;
-  options.disable_function_signatures();  // docstrings begin with those that `inspect` understands
+  options.disable_function_signatures();  // docstrings begin with signatures that `inspect` understands
   const pybind11::object own_name = module.attr("__name__");
-  module.attr("__name__") = "subvol";  // what classes and functions say they are from
+  module.attr("__name__") = "subvol";  // the module that classes and functions report as theirs
   module.attr("__version__") = subvol::version();
   add_errors(module);
   add_progress(module);

@@ -5,7 +5,7 @@
 
 namespace subvol::python {
 
-// What each .cpp file adds to the module.
+// Each adds the content of one .cpp file to the module.
 void add_meshes(pybind11::module_& module);
 void add_high_order_mesh(pybind11::module_& module);
 void add_maps(pybind11::module_& module);

@@ -18,7 +18,7 @@
 namespace subvol::python {
 namespace {
 
-/// One optimisation from its arguments to its result.
+/// One call of `optimize`, from its arguments to its result.
 class Optimization {
  public:
   Optimization(const py::object& mesh, const py::kwargs& given)

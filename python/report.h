@@ -12,13 +12,13 @@ namespace subvol::python {
 
 using cli::Json;
 
-/// The same as dict, list, str, bool, int, float and None.
+/// Converts JSON to dict, list, str, bool, int, float and None.
 py::object to_python(const Json& json);
-/// Options in force as JSON, for files. Lists become text.
+/// Converts options in force to JSON, for files. Lists become text.
 Json to_json(const py::dict& options);
 
-/// A report as the program writes it, without what concerns files: `found` between the options and the times. Tells the
-/// warnings.
+/// Makes a report like the program's, without the entries on files: `found` stands between the options and the times.
+/// Issues the warnings.
 py::dict make_report(const char* command, const Json& found, const Keywords& keywords, const Work& work,
                      const std::vector<std::string>& warnings);
 

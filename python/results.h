@@ -12,32 +12,32 @@
 
 namespace subvol::python {
 
-/// A result with the report of how it came about.
+/// A result with the report of the call.
 struct Reported {
   py::dict report;
 };
 
-/// What `fit` returns: a cage and its finest mesh, or a mesh of curved cells and no cage.
+/// Result of `fit`: a cage and its finest mesh, or a mesh of curved cells and no cage.
 struct Fitted : Reported {
   std::shared_ptr<VolumeMesh> template_mesh, cage, mesh;
   std::shared_ptr<CurvedMesh> curved;
   std::vector<FitState> states;
 };
 
-/// What `optimize` returns: a mesh, or one of curved cells.
+/// Result of `optimize`: a mesh, or one of curved cells.
 struct Optimized : Reported {
   std::shared_ptr<VolumeMesh> mesh;
   std::shared_ptr<CurvedMesh> curved;
 };
 
-/// What `shell` returns.
+/// Result of `shell`.
 struct Shelled : Reported {
   ShellResult shell;
   std::optional<CurvedShell> curved_shell;
   std::shared_ptr<CurvedMesh> curved;
 };
 
-/// The curved mesh of a result where there is one, else the linear one.
+/// The curved mesh of a result if there is one, else the linear one.
 template <class Result>
 py::object mesh_of(const Result& result) {
   return result.curved ? py::cast(result.curved) : py::cast(result.mesh);

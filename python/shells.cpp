@@ -19,7 +19,7 @@
 namespace subvol::python {
 namespace {
 
-/// One shell from its arguments to its result.
+/// One call of `shell`, from its arguments to its result.
 class Growing {
  public:
   Growing(const py::object& surface, const py::object& thickness, const py::kwargs& given)
@@ -65,7 +65,7 @@ class Growing {
     keywords_.take("time_limit", options_.time_limit_seconds);
     take_chord(keywords_, writing_);
     keywords_.finish();
-    require_in_range("shell", "order", curved_options_.order, 1, kMaxOrder);  // before the work
+    require_in_range("shell", "order", curved_options_.order, 1, kMaxOrder);  // checked before the work
     if (straight && curved_options_.order > 1) throw InputError("shell: straight and order exclude each other");
     options_.optimize = !straight;
     curved_options_.max_iterations = options_.max_iterations;
@@ -84,7 +84,8 @@ class Growing {
     }
   }
 
-  // The time that the linear shell has left; none left, or a call to end: cells of the order asked for, but straight.
+  // Uses the time that the linear shell has left. If none is left, or the run must end, the cells get the requested
+  // order but stay straight.
   void curve(Shelled& result) {
     ShellResult& shell = result.shell;
     if (!shell.failures.none()) {
@@ -130,12 +131,12 @@ class Growing {
   std::optional<std::string> inward_warning_;
 };
 
-/// The straight cells, which keep the result they are part of.
+/// The straight cells; they keep alive the result that they are part of.
 std::shared_ptr<VolumeMesh> linear_mesh(const std::shared_ptr<Shelled>& result) {
   return {result, &result->shell.mesh};
 }
 
-/// One number per point and side: (2, n), the inside first.
+/// One number per point and side, as (2, n), the inside first.
 auto by_side(std::vector<double> ShellResult::* values) {
   return [values](const py::object& self) {
     const ShellResult& shell = self.cast<const Shelled&>().shell;

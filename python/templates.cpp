@@ -31,7 +31,7 @@ using Box = std::array<double, 6>;
 Vec3 low_corner(const Box& box) { return {box[0], box[1], box[2]}; }
 Vec3 high_corner(const Box& box) { return {box[3], box[4], box[5]}; }
 
-/// make() without Python's lock, as a mesh of its own.
+/// Calls make() without Python's lock and returns its result as a new mesh.
 template <class Make>
 MeshPointer made(const Make& make) {
   const py::gil_scoped_release unlocked;
@@ -87,7 +87,7 @@ MeshPointer make_grid(const py::object& surface, const py::kwargs& given) {
   return made([&] { return voxel_mesh(counts ? box_grid(low, high, *counts) : box_grid(low, high, *size)); });
 }
 
-/// Some cells of a mesh: in a surface, in a box, listed, or thin; one of these.
+/// Some cells of a mesh: those in a surface, in a box, on a list, or thin ones; exactly one of these.
 class CellChoice {
  public:
   /// Takes inside, share, box and list.
@@ -98,13 +98,13 @@ class CellChoice {
   /// Takes thin as well.
   void take_thin(Keywords& keywords) { keywords.take("thin", thin_); }
 
-  /// choices  what there is, for the message where not one of them is given.
+  /// choices  the available options, for the message if not exactly one is given.
   void prepare(const VolumeMesh& mesh, const char* choices) {
     if (!inside_.is_none() + box_.has_value() + !list_.is_none() + thin_ != 1) throw InputError(choices);
     cells_ = indices_from(list_, "list", 0, mesh.num_cells());
     if (!inside_.is_none()) surface_ = triangles_from(inside_, "inside");
   }
-  /// After `prepare`; needs no lock. One entry per cell, non-zero for those chosen.
+  /// To be called after `prepare`; needs no lock. One entry per cell, non-zero for the chosen cells.
   std::vector<char> chosen(const VolumeMesh& mesh) const {
     if (thin_) return thin_cells(mesh);
     if (box_) return cells_in_box(mesh, low_corner(*box_), high_corner(*box_));

@@ -18,23 +18,24 @@
 
 namespace subvol::python {
 
-/// A step of a long work, as the callback sees it.
+/// A step of long work, as the callback sees it.
 struct Progress {
   std::string stage;
   int level, iteration;
   double energy, fraction;
 };
 
-/// What one call does without Python's lock: its progress is told, Ctrl-C and errors of the callback end it.
+/// Runs the parts of one call without Python's lock, and reports their progress; Ctrl-C and errors of the callback end
+/// the work.
 ///
-/// progress  takes a `Progress`; where it returns False the work ends with the best result so far.
+/// progress  is called with a `Progress`; if it returns False, the work ends with the best result so far.
 /// threads   number of threads for this call alone; results are the same bits for any.
 class Work {
  public:
   /// Takes `progress` and `threads`.
   explicit Work(Keywords& keywords);
 
-  /// Does one part, function(), without the lock, and notes how long it took.
+  /// Does one part, function(), without the lock, and records how long it took.
   template <class Function>
   auto run(const char* part, const Function& function) {
     const Clock::time_point begin = Clock::now();
@@ -44,7 +45,7 @@ class Work {
       const ThreadCount count(threads_);
       result.emplace(function());
     } catch (...) {
-      raise_pending();  // what the library says of work that was ended is no news
+      raise_pending();  // the library's error about the ended work would only hide the cause
       throw;
     }
     raise_pending();
@@ -52,25 +53,26 @@ class Work {
     return std::move(*result);
   }
 
-  /// For the library's options. Called by whatever thread called the library.
+  /// Callback for the library's options. It is called by the thread that called the library.
   std::function<bool(const FitProgress&)> progress() {
     return [this](const FitProgress& told) { return tell(told); };
   }
-  /// Ctrl-C between what is told, within long steps: asks Python ten times a second. From the calling thread alone.
+  /// Checks for Ctrl-C between progress reports, within long steps; asks Python at most ten times a second. To be
+  /// called only from the calling thread.
   std::function<bool()> cancelled();
-  /// The same for work that tells its parts: stage and fraction, no energy.
+  /// Callback for work that reports its parts: stage and fraction, no energy.
   WorkProgress parts() {
     return [this](const char* part, double share) { return tell({part, 0, 0, 0, share}); };
   }
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  /// Of a limit in seconds, for what comes next. 0 stays 0: there is none.
+  /// Time left of a limit in seconds, for the next part; at least 1 ms. 0 stays 0: there is no limit.
   double time_left(double limit) const { return limit > 0 ? std::max(1e-3, limit - seconds()) : limit; }
   const std::vector<std::pair<std::string, double>>& seconds_by_part() const { return seconds_; }
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// OpenMP's number of threads, of the calling thread, while this lives.
+  /// Sets OpenMP's number of threads, for the calling thread, during its lifetime.
   class ThreadCount {
    public:
     explicit ThreadCount(int threads);
@@ -86,13 +88,13 @@ class Work {
   void raise_pending();
 
   py::object callback_;
-  int threads_ = 0;  ///< 0: as many as before
+  int threads_ = 0;  ///< 0: unchanged
   std::optional<py::error_already_set> error_;
   Clock::time_point start_ = Clock::now();
   std::vector<std::pair<std::string, double>> seconds_;
 };
 
-/// Tells Python's `warnings` each text. An error where the caller turned warnings into errors.
+/// Passes each text to Python's `warnings`. Throws if the caller has turned warnings into errors.
 void warn(const std::vector<std::string>& texts);
 
 }  // namespace subvol::python

@@ -36,7 +36,8 @@ void for_each_entity(const ElementSpace& space, const Visit& visit) {
     visit(space.cell_nodes(c), space.cell_nodes(c + 1) - space.cell_nodes(c), space.vertices(c));
 }
 
-/// A mode goes with the strands of all vertices of its edge, face or cell; none of them: it belongs to the surface.
+/// A mode belongs to the strands of all vertices of its edge, face or cell; if there are none, it belongs to the
+/// surface.
 NodeStrands node_strands(const ShellLayers& layers, const ElementSpace& space) {
   NodeStrands nodes;
   std::vector<Index> strands;
@@ -63,7 +64,7 @@ CurvedBoundary uniform_boundary(const HighOrderMesh& mesh) {
   return boundary;
 }
 
-/// Whether curved cells are certified and the triangles of their boundary do not meet.
+/// Checks that curved cells are certified and that the triangles of their boundary do not intersect.
 class CurvedShellCheck {
  public:
   CurvedShellCheck(const ShellLayers& layers, const ElementSpace& space, const CurvedShellOptions& options)
@@ -105,7 +106,7 @@ class CurvedShellCheck {
   std::function<CurvedBoundary(const HighOrderMesh&)> make_boundary_;
 };
 
-/// The energy with the surface's sheet fixed: what goes with no strand is no unknown.
+/// Makes the problem with the surface's sheet fixed: nodes without a strand are not degrees of freedom.
 FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, const NodeStrands& strands,
                         std::vector<Vec3>& unknowns) {
   constexpr int kLeastPoints = 5;
@@ -126,13 +127,13 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
                                 std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
   auto energy =
       std::make_unique<HighOrderEnergy>(mesh.space, shell_reference(shell.layers, shell.limited), points);
-  energy->set_most_own_emphasis(0);  // cells in creases end near inversion: they are not to outweigh all others
+  energy->set_most_own_emphasis(0);  // cells in creases end near inversion and must not outweigh all others
   FitProblem problem(std::move(nodes), select_rows(nodes, {}), std::move(energy), nullptr, 1);
   problem.fixed_nodes = std::move(fixed);
   return problem;
 }
 
-/// Minimises from the straight shell. What ends a solve early leaves a state that is as good as it got.
+/// Minimizes from the straight shell. A solve that ends early leaves the best state so far.
 void solve(const ShellResult& shell, const CurvedShellOptions& options, const NodeStrands& strands, HighOrderMesh& mesh,
            FitReport& report) {
   std::vector<Vec3> unknowns;
@@ -184,7 +185,7 @@ BoundarySamples sheet_samples(const ShellLayers& layers, const ElementSpace& spa
     edges.push_back(topology.find_edge(layers.vertex(sheet, surface.corner_vertices[h]),
                                        layers.vertex(sheet, surface.corner_vertices[surface.next(h)])));
   BoundarySamples samples = make_face_samples(space, sheet_faces(layers, topology, sheet), intervals, edges);
-  if (sheet == 0)  // its faces run as seen from below
+  if (sheet == 0)  // its faces are oriented as seen from below
     for (auto& [a, b, c] : samples.triangles) std::swap(b, c);
   return samples;
 }

@@ -14,25 +14,28 @@
 namespace subvol {
 
 struct CurvedShellOptions {
-  int order = 2;                  ///< of every edge, face and cell, 1 .. kMaxOrder
-  Basis basis = Basis::legendre;  ///< prisms of this one are certified at any order, of fourier up to order 3 or so
-  int max_iterations = 0;         ///< 0: the default
-  double time_limit_seconds = 0;  ///< 0: none
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
-  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
-  /// Triangles that stand for the boundary where it is looked at for intersections, as fine as the caller wants it
-  /// known (`curved_boundary` of export). Empty: `max(4, 2 order)` samples an edge, which overlook sharp folds.
+  int order = 2;                  ///< order of every edge, face and cell, 1 .. kMaxOrder
+  Basis basis = Basis::legendre;  ///< Legendre prisms can be certified at any order, Fourier prisms up to order 3 or so
+  int max_iterations = 0;         ///< 0: the default number
+  double time_limit_seconds = 0;  ///< 0: no limit
+  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
+  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
+  std::function<bool()> cancelled;
+  /// Makes the triangles that represent the boundary in the search for intersections, as finely as the caller requires
+  /// (`curved_boundary` in export). If empty, each edge gets `max(4, 2 order)` intervals, which miss sharp folds.
   std::function<CurvedBoundary(const HighOrderMesh&)> boundary;
 };
 
-/// A shell of curved cells, in the unit of the linear one, and what is true of it.
+/// A shell of curved cells, in the unit of the linear one, and its properties.
 struct CurvedShell {
   HighOrderMesh mesh;      ///< vertices, cells and references as in `ShellResult::mesh`
-  QualityReport quality;   ///< against `shell_reference(layers, limited)`; with the certificate
-  /// Boundary faces that meet improperly, places in `MeshTopology::boundary_faces()`, on the triangles of the options.
+  QualityReport quality;   ///< relative to `shell_reference(layers, limited)`; includes the certificate
+  /// Pairs of boundary faces whose triangles (see the options) intersect, as positions in
+  /// `MeshTopology::boundary_faces()`. A face with a degenerate triangle, or whose own triangles intersect, is paired
+  /// with itself.
   std::vector<std::array<Index, 2>> intersecting_faces;
   MeasuredThickness thickness;
-  FitReport report;        ///< of this solve alone
+  FitReport report;        ///< of this solve only
   bool valid() const { return quality.certificate.all_certified() && intersecting_faces.empty(); }
 };
 
@@ -40,21 +43,23 @@ struct CurvedShell {
 ///
 ///   E(x) = mean over cells and quadrature points of e(F),  F = dx/du A^-1
 ///
-/// is minimised over everything but the sheet that is the surface, which keeps its flat or bilinear faces: the energy
-/// and the references A of `make_shell`, at more points and with more unknowns. So cells share out among themselves
-/// what straight ones leave to the corners. Where faces meet afterwards, or cells are not certified, curves go back
-/// towards the straight shell, strand by strand (`advance`).
+/// is minimized over all nodes except those of the surface's sheet, which keeps its flat or bilinear faces. Energy and
+/// references A are those of `make_shell`, with more quadrature points and more degrees of freedom: curved cells can
+/// spread the distortion that straight cells concentrate at their corners. If faces intersect afterwards or cells are
+/// not certified, the curves are moved back toward the straight shell, strand by strand (`advance`).
 ///
-/// shell  valid (`failures.none()`), else InputError; InputError too: options out of range.
+/// shell  must be valid (`failures.none()`), else InputError.
+/// InputError: also for options out of range.
 /// Same bits for any number of threads.
 CurvedShell curve_shell(const ShellResult& shell, const CurvedShellOptions& options);
 
-/// Volume faces of one sheet, in the order of the surface's faces.
+/// Returns the volume mesh's faces on one sheet, in the order of the surface's faces.
 std::vector<Index> sheet_faces(const ShellLayers& layers, const MeshTopology& topology, int sheet);
 
-/// One sheet of the curved cells as triangles that run like the surface's faces, and its edges as polylines.
+/// Samples one sheet of the curved cells: triangles oriented like the surface's faces, and its edges as polylines.
 ///
-/// layers, space  of one shell. intervals: on every edge, >= 1, else InputError.
+/// layers, space  belong to the same shell.
+/// intervals      number along every edge, >= 1, else InputError.
 BoundarySamples sheet_samples(const ShellLayers& layers, const ElementSpace& space, int sheet, int intervals);
 
 }  // namespace subvol

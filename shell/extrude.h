@@ -12,19 +12,20 @@ namespace subvol {
 struct ExtrudeOptions {
   double thickness = 0;            ///< length of the columns, in the surface's unit, > 0
   int layers = 1;                  ///< >= 1
-  double growth = 1;               ///< thickness of a layer against that of the one below it, > 0
-  std::optional<Vec3>
-      direction;  ///< of all columns, any length; empty: along the surface's normals (`visible_normals`)
-  FeatureTags tags;                ///< of the surface; repeated on both ends
+  double growth = 1;               ///< ratio of each layer's thickness to that of the layer below, > 0
+  /// Direction of all columns, of any length; empty: along the surface's normals (`visible_normals`).
+  std::optional<Vec3> direction;
+  FeatureTags tags;                ///< tags of the surface, repeated on both ends
 };
 
-/// Stacks layers of cells on a surface: hexes on quads, prisms on triangles, in straight columns. For templates; layers
-/// that avoid each other and make good cells are grown by `make_shell`.
+/// Stacks layers of cells on a surface in straight columns: hexes on quads, prisms on triangles. This is for templates;
+/// `make_shell` grows layers that avoid each other and consist of good cells.
 ///
-/// returns  layer by layer, references numbering them from 1. Its boundary is the surface turned over, the top, and
-///          walls along the border, whose edges become creases.
-/// InputError: options out of range; what `make_layers` refuses; a vertex from which no direction sees all faces around
-/// from their front; a result with an inverted cell, as where faces look away from the direction.
+/// returns  the cells layer by layer; references number the layers from 1. The boundary consists of the surface with
+///          reversed orientation, the top, and walls along the surface's border, whose edges become creases.
+/// InputError: options out of range; whatever `make_layers` rejects; without a direction, a vertex from which no
+/// direction sees the front of all adjacent faces; an inverted cell in the result, for example because faces look away
+/// from the direction.
 VolumeMesh extrude(const PolygonMesh& surface, const ExtrudeOptions& options);
 
 }  // namespace subvol

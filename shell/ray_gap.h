@@ -8,11 +8,14 @@
 
 namespace subvol {
 
-/// How far it is from each vertex of a surface, along a direction of its own, to another part of the surface.
+/// Measures from each vertex of a surface, along the vertex's own direction, the distance to another part of the
+/// surface.
 ///
-/// directions  unit, one per vertex, else InputError. Triangles that hold the vertex do not count.
-/// returns     one distance per vertex, +infinity where the ray meets nothing.
-/// Parallel, same answer for any number of threads. Cost: some microseconds a vertex.
+/// directions  unit vectors (not checked), one per vertex, else InputError. Triangles that contain the vertex are
+///             ignored.
+/// returns     one distance per vertex; +infinity if the ray meets nothing, or if it lies in the plane of the first
+///             triangle that it meets.
+/// Parallel, same result for any number of threads. Cost: some microseconds per vertex.
 std::vector<double> ray_gaps(const TriangleMesh& surface, std::span<const Vec3> directions);
 
 }  // namespace subvol

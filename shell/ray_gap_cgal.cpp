@@ -14,7 +14,7 @@
 namespace subvol {
 namespace {
 
-// Exact predicates: a ray through an edge or a corner meets something.
+// With exact predicates, a ray through an edge or a corner does not slip between triangles.
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Triangles = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
@@ -29,7 +29,7 @@ std::vector<double> ray_gaps(const TriangleMesh& surface, std::span<const Vec3> 
     throw InputError("ray_gaps: expected one direction per vertex (" + std::to_string(surface.positions.size()) +
                      "), got " + std::to_string(directions.size()));
   std::vector<double> gaps(directions.size(), std::numeric_limits<double>::infinity());
-  if (surface.triangles.size() < 2) return gaps;  // the tree leaves out no triangle where it has but one
+  if (surface.triangles.size() < 2) return gaps;  // a tree of a single triangle ignores the filter
   Triangles triangles;
   for (const auto& [a, b, c] : surface.triangles)
     triangles.emplace_back(point(surface.positions[a]), point(surface.positions[b]), point(surface.positions[c]));

@@ -25,7 +25,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// At most this many entities are named in a message.
+/// Largest number of entities named in a message.
 constexpr std::size_t kMaxNamed = 10;
 constexpr int kMaxRounds = 12;
 constexpr int kDefaultIterations = 60;
@@ -54,10 +54,10 @@ void check_options(const PolygonMesh& surface, const ShellOptions& options) {
       throw InputError("shell: the thickness at vertex " + std::to_string(v) + " must be positive");
 }
 
-/// Moves a surface into a box of diagonal 1 around the origin, and results back.
+/// Maps a surface to a box of diagonal 1 around the origin, and results back.
 struct Normalization {
   Vec3 centre;
-  double scale;  ///< of the caller's unit
+  double scale;  ///< diagonal of the surface's bounding box, in the caller's unit
 
   explicit Normalization(const PolygonMesh& surface) {
     Eigen::AlignedBox3d box;
@@ -72,7 +72,7 @@ struct Normalization {
   }
 };
 
-/// One shell from its surface, in normalised coordinates.
+/// Makes one shell from its surface, in normalized coordinates.
 class ShellMaker {
  public:
   ShellMaker(const PolygonMesh& surface, const ShellOptions& options)
@@ -95,9 +95,9 @@ class ShellMaker {
   FitProblem make_problem(std::vector<Vec3>& unknowns) const;
   MinimizerStop solve(int round);
   void finish(const PolygonMesh& surface, ShellResult& result);
-  /// Tells the caller; false: it is to end.
+  /// Reports progress; returns false if the run must stop.
   bool tell(const char* stage, int iteration, double energy, double fraction);
-  /// The same without telling; wanted: what they said last.
+  /// Checks only for cancellation and the time limit; `wanted` is the callback's last answer.
   bool goes_on(bool wanted);
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   void timed(const char* part, void (ShellMaker::*work)());
@@ -111,9 +111,9 @@ class ShellMaker {
   std::vector<Vec3> directions_;
   std::vector<double> asked_, thickness_;
   std::vector<Vec3> start_, positions_;
-  std::optional<TargetSurface> target_;  ///< the surface as it was, where its vertices are free
+  std::optional<TargetSurface> target_;  ///< the original surface, if its vertices are free
   FitReport report_;
-  bool ended_ = false;  ///< by the caller or the clock
+  bool ended_ = false;  ///< true if the caller or the time limit ended the run
 };
 
 bool ShellMaker::tell(const char* stage, int iteration, double energy, double fraction) {
@@ -187,7 +187,7 @@ void ShellMaker::start() {
   positions_ = start_;
 }
 
-/// Vertices that are no unknowns.
+/// Returns for each vertex 1 if it is fixed, else 0.
 std::vector<std::uint8_t> ShellMaker::fixed_vertices() const {
   std::vector<std::uint8_t> fixed(positions_.size(), 0);
   const SurfaceTopology& topology = layers_.topology;
@@ -202,7 +202,7 @@ std::vector<std::uint8_t> ShellMaker::fixed_vertices() const {
   return fixed;
 }
 
-/// The energy with the surface's vertices fixed, or drawn to where the surface was.
+/// Makes the problem with the surface's vertices fixed, or drawn to the original surface.
 FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
   FreeNodes free = free_nodes(fixed_vertices(), positions_);
   unknowns = std::move(free.unknowns);
@@ -255,7 +255,8 @@ MinimizerStop ShellMaker::solve(int round) {
                 0.95 - 0.85 * std::pow(0.5, round) * (1 - 0.5 * in_round));
   };
   MinimizerResult found = minimize_newton(problem, unknowns, minimizer);
-  if (found.stop == MinimizerStop::cancelled) goes_on(true);  // within a step, where nobody was told
+  // Ended within a step, without a call of the callback: sets the stop reason.
+  if (found.stop == MinimizerStop::cancelled) goes_on(true);
   stage.ended = found.stop;
   stage.iterations = std::move(found.iterations);
   stage.stop = std::move(found.explanation);
@@ -276,7 +277,7 @@ void ShellMaker::optimize() {
       report_.explanation = report_.stages.back().stop;
       report_.stop_reason = stop_reason(stop);
     }
-    if (apart || round + 1 == kMaxRounds) break;  // no solve follows that would aim at less
+    if (apart || round + 1 == kMaxRounds) break;  // no solve follows that would use a smaller thickness
     for (const Index strand : check_.strands(failures)) thickness_[strand] *= kShrink;
     limit_slope(layers_, thickness_);
   }

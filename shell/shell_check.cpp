@@ -22,7 +22,7 @@ void sort_unique(std::vector<Index>& list) {
   list.erase(std::unique(list.begin(), list.end()), list.end());
 }
 
-/// Lowers the shares around strands that were held back, so that neighbours differ by a quarter at most.
+/// Lowers the shares around strands that were held back, so that neighbors differ by at most a quarter.
 void grade(const ShellLayers& layers, std::vector<double>& shares) {
   constexpr double kStep = 0.25;
   const SurfaceTopology& topology = layers.topology;
@@ -108,7 +108,7 @@ std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, c
       moved = moved || share > 0;
       share = kShrink * share < kLeast ? 0 : kShrink * share;
     }
-    if (!moved) break;  // valid, or the safe state was not
+    if (!moved) break;  // valid, or the safe state was not valid
     grade(layers, shares);
     for (std::size_t i = 0; i < state.size(); ++i) {
       double share = 1;

@@ -12,35 +12,36 @@
 
 namespace subvol {
 
-/// What keeps a shell from being one.
+/// Defects that make a shell invalid.
 struct ShellFailures {
   CertificateSummary certificate;
-  /// Faces that meet improperly, numbers in `ShellCheck::polygons()`, smaller first, ascending. A face without area
-  /// makes a pair with itself.
+  /// Pairs of faces that intersect, as numbers in `ShellCheck::polygons()`, smaller first, ascending. A face with a
+  /// triangle without area, or whose own triangles intersect, is paired with itself.
   std::vector<std::array<Index, 2>> intersecting;
-  bool is_complete = true;  ///< false: the search for pairs was ended, by the caller or as in `self_intersections`
+  bool is_complete = true;  ///< false: the search was canceled, or ended as in `self_intersections`
   bool none() const { return is_complete && certificate.all_certified() && intersecting.empty(); }
 };
 
-/// Which sheets are looked at for intersections. With all cells certified the two outer ones decide for all: a map that
-/// is injective on the boundary of what it maps, and near every point, is so everywhere.
+/// The sheets that are checked for intersections. If all cells are certified, checking the two outer ones suffices: a
+/// map that is injective on the boundary of its domain, and near every point, is injective everywhere.
 enum class CheckedSheets { outer, all };
 
-/// Tells whether a shell is valid: every cell certified, and no face of a sheet or of a wall along the border meeting
+/// Checks if a shell is valid: every cell is certified, and no face of a sheet or of a wall along the border intersects
 /// another.
 ///
-/// Triangles stand for themselves, quads (walls among them) for their `fan_triangles`, the same on all sheets.
+/// Quads, including walls, are represented by their `fan_triangles`, the same way on all sheets.
 class ShellCheck {
  public:
   /// layers, cells  must outlive the check.
-  /// surface_moves  whether faces of the surface itself concern the strands that stand on them.
+  /// surface_moves  true if the surface's own vertices can move: `strands` then includes both strands of their columns.
   ShellCheck(const ShellLayers& layers, const VolumeMesh& cells, CheckedSheets sheets, bool surface_moves = false);
 
-  /// positions  one per vertex of the cells. Exact but for what quads mean; same answer for any number of threads.
-  /// cancelled  ends the search for pairs: as in `self_intersections`.
+  /// positions  one per vertex of the cells.
+  /// cancelled  ends the search for pairs, as in `self_intersections`.
+  /// Exact, apart from the triangulation of quads; same result for any number of threads.
   ShellFailures failures(std::span<const Vec3> positions, const std::function<bool()>& cancelled = {}) const;
 
-  /// Strands of the cells and faces concerned, ascending.
+  /// Returns the strands of the failing cells and faces, ascending.
   std::vector<Index> strands(const ShellFailures& failures) const;
 
   const PolygonMesh& polygons() const { return polygons_; }
@@ -52,8 +53,9 @@ class ShellCheck {
   bool surface_moves_;
 };
 
-/// The strands that each node of a shell goes with. The nodes of linear cells are their vertices: a vertex goes with
-/// its own strand, one of the surface with both of its column. Nodes of curved cells: `curved_shell.h`.
+/// The strands that each node of a shell moves with. Nodes of linear cells are their vertices: a vertex belongs to its
+/// own strand, and a vertex of the surface to both strands of its column. For the nodes of curved cells, see
+/// `curved_shell.cpp`.
 struct NodeStrands {
   std::vector<std::size_t> offsets{0};
   std::vector<Index> strands;
@@ -63,19 +65,19 @@ struct NodeStrands {
 };
 NodeStrands vertex_strands(const ShellLayers& layers);
 
-/// Strands that stand in the way of a shell with the given nodes, ascending; none where it is valid.
+/// Returns the strands that make a shell with these nodes invalid, ascending; empty if it is valid.
 using FailingStrands = std::function<std::vector<Index>(std::span<const Vec3> nodes)>;
 
-/// The most of a wanted state that is valid: every strand goes its own share of the way from a valid state to the
-/// wanted one, less where strands fail, and neighbours differ by a quarter at most; a node goes the least share of its
-/// strands.
+/// Moves from a valid state as far toward a wanted state as validity allows. Every strand gets its own share of the
+/// way, reduced if the strand fails; shares of neighbors differ by at most a quarter. A node moves by the least share
+/// of its strands.
 ///
-/// safe  valid, so that this ends: there always is a failing strand that can go back farther.
-/// shares  if given: how far each strand got, 0 .. 1.
+/// safe    a valid state; otherwise the result may be invalid.
+/// shares  if not null, receives each strand's share, 0 .. 1.
 std::vector<Vec3> advance(const ShellLayers& layers, const NodeStrands& nodes, const FailingStrands& failing,
                           std::span<const Vec3> safe, std::span<const Vec3> wanted,
                           std::vector<double>* shares = nullptr);
-/// The same for linear cells.
+/// `advance` for linear cells.
 std::vector<Vec3> advance(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> safe,
                           std::span<const Vec3> wanted, std::vector<double>* shares = nullptr);
 

@@ -48,7 +48,7 @@ void require_faces(const PolygonMesh& surface) {
     throw InputError("vertex " + std::to_string(unused - used.begin()) + " belongs to no face");
 }
 
-/// The cell of a face between two sheets.
+/// Adds the cell of a face in one layer.
 void add_cell(VolumeMesh& mesh, const ShellLayers& layers, std::span<const Index> face, int layer) {
   std::array<Index, kMaxCellVertices> corners;
   for (std::size_t k = 0; k < face.size(); ++k) {
@@ -58,7 +58,7 @@ void add_cell(VolumeMesh& mesh, const ShellLayers& layers, std::span<const Index
   mesh.add_cell(face.size() == 3 ? CellKind::prism : CellKind::hex, {corners.data(), 2 * face.size()});
 }
 
-// Vertices, faces and cells are numbered with 32 bits, and layers have about three faces per cell.
+// Vertices, faces and cells have 32-bit numbers, and there are about three faces per cell.
 void require_numberable(const PolygonMesh& surface, int inside, int outside) {
   const double most = static_cast<double>(std::numeric_limits<Index>::max()) / 3.5;
   const double cells = (static_cast<double>(inside) + outside) * static_cast<double>(surface.num_faces());
@@ -108,7 +108,7 @@ VolumeMesh stack_cells(const ShellLayers& layers) {
 }
 
 FeatureTags surface_features(const PolygonMesh& surface, double angle_degrees) {
-  // One flat layer: its first sheet is the surface, and walls without area are flat.
+  // One layer of zero thickness: its first sheet is the surface, and its walls without area count as flat.
   const ShellLayers layers = make_layers(surface, 0, 1, 1);
   FeatureTags tags = features_by_angle(stack_cells(layers), angle_degrees);
   const auto num_columns = static_cast<Index>(layers.num_columns());

@@ -31,7 +31,7 @@ struct Neighbor {
   double length;
 };
 
-/// Neighbours of every vertex along edges.
+/// The neighbors of every vertex along edges.
 struct Neighbors {
   std::vector<std::size_t> offsets;
   std::vector<Neighbor> list;
@@ -48,7 +48,7 @@ struct Neighbors {
   }
 };
 
-/// As Dijkstra's: from the thinnest vertex outward.
+/// Works like Dijkstra's algorithm: a vertex that was lowered limits its neighbors, the thinnest first.
 void limit_slope(const Neighbors& neighbors, std::span<double> thickness) {
   constexpr double kSlope = 0.5;
   using Entry = std::pair<double, Index>;

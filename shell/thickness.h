@@ -10,35 +10,37 @@
 
 namespace subvol {
 
-/// Thickness per strand that leaves room for what stands opposite, smoothly:
+/// Returns a smooth thickness per strand that leaves room for opposite parts of the surface:
 ///
 ///   t <= asked,   t <= diagonal,   t <= 0.45 gap,   t(v) <= t(w) + 1/2 |v - w| along every edge
 ///
-/// diagonal  of the surface's bounding box.
-/// gap  from a surface vertex along its direction (or against it, inside) to another part of the surface (`ray_gaps`).
-/// directions  one per column. asked: per strand. Never below a ten-thousandth of what is asked.
+/// diagonal    of the surface's bounding box.
+/// gap         distance from a surface vertex along its direction (on the inside: against it) to another part of the
+///             surface (`ray_gaps`). It does not lower t below a ten-thousandth of min(asked, diagonal).
+/// directions  one per column.
+/// asked       per strand.
 std::vector<double> limited_thickness(const ShellLayers& layers, std::span<const Vec3> directions,
                                       std::span<const double> asked);
 
-/// Lowers thicknesses until they differ by half the length of an edge between its ends at most. Cost: n log n.
+/// Lowers thicknesses until those at the two ends of each edge differ by at most half its length. Cost: n log n.
 void limit_slope(const ShellLayers& layers, std::span<double> thickness);
 
-/// Straight columns so thin that they are valid: the state from which a shell grows.
+/// Returns straight columns so thin that they are valid: the state from which a shell grows.
 ///
-/// thickness  per strand: none gets thicker. InputError, naming vertices, where nothing thin enough is found.
-/// cancelled  asked within long searches, from the calling thread; true ends the work; empty: none.
-/// returns  one position per vertex; none where the work was ended.
+/// thickness  per strand: upper bounds. InputError, naming vertices, if no thickness is found to be thin enough.
+/// cancelled  polled within long searches, from the calling thread; returns true to end the work; may be empty.
+/// returns    one position per vertex; nothing if the work was ended.
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
                                  std::span<const double> thickness, const std::function<bool()>& cancelled = {});
 
-/// What the thickness of a shell came to, in the surface's unit.
+/// The actual thickness of a shell, in the surface's unit.
 struct MeasuredThickness {
-  std::vector<double> achieved;    ///< per strand: length of its column on that side, straight from end to end
+  std::vector<double> achieved;    ///< per strand: distance of its end from the surface vertex of its column
   std::vector<double> clearance;   ///< per strand: distance of its end from the surface of `layers`
-  double surface_distance_max = 0; ///< of the vertices of the sheet that is the surface, from that of `layers`
+  double surface_distance_max = 0; ///< of the vertices of sheet `inside` from the surface of `layers`
 };
 
-/// positions  one per vertex of the shell. Strands of a side without layers get 0. Quads are cut by `triangulate`.
+/// positions  one per vertex of the shell. Strands on a side without layers get 0. `triangulate` cuts the quads.
 MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const Vec3> positions);
 
 }  // namespace subvol

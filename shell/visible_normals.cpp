@@ -11,7 +11,7 @@ namespace subvol {
 namespace {
 
 constexpr double kLeastVisibility = 1e-6;
-constexpr std::size_t kFew = 64;  // normals whose cap is found in any order
+constexpr std::size_t kFew = 64;  // number of normals up to which their cap is found directly, in any order
 
 /// A cap of the unit sphere: all points p with axis . p >= cosine.
 struct Cap {
@@ -35,8 +35,8 @@ bool sees(const Vec3& direction, std::span<const Vec3> normals) {
   return std::ranges::all_of(normals, [&](const Vec3& normal) { return direction.dot(normal) > kLeastVisibility; });
 }
 
-/// The smallest cap, as Welzl finds the smallest circle: a point outside lies on the border of the next larger one.
-/// Cubic in an unlucky order, and where no half of the sphere holds the points, in any.
+/// Finds the smallest cap as Welzl finds the smallest circle: a point outside lies on the border of the next larger
+/// cap. Cubic in an unlucky order and, if no half of the sphere contains the points, in any order.
 Cap smallest_cap_of_few(std::span<const Vec3> points) {
   Cap cap{points[0], 1};
   for (std::size_t i = 1; i < points.size(); ++i) {
@@ -52,8 +52,8 @@ Cap smallest_cap_of_few(std::span<const Vec3> points) {
   return cap;
 }
 
-/// Of many points, that of a few of them: the one farthest out is added to these until their cap holds all, which takes
-/// a dozen rounds or so, or until nothing sees them.
+/// Finds the smallest cap of many points as that of a few of them: the point farthest outside is added to the few until
+/// their cap contains all points, which takes about a dozen rounds, or until no direction sees the few.
 Cap smallest_cap(std::span<const Vec3> points) {
   if (points.size() <= kFew) return smallest_cap_of_few(points);
   std::vector<Vec3> few = {points[0]};

@@ -10,29 +10,31 @@
 
 namespace subvol {
 
-/// The direction that keeps farthest from being seen edge-on: the unit n with the largest min_i n . m_i, which is the
-/// middle of the smallest cap of the sphere around the m_i.
+/// Returns the direction for which the sides with these normals are farthest from edge-on: the unit vector n with the
+/// largest min_i n . m_i, which is the center of the smallest cap of the sphere that contains all m_i.
 ///
-/// normals  unit vectors, at least one, else InputError.
-/// returns  nothing where min_i n . m_i would not be above 1e-6: no direction sees all sides from their front.
+/// normals  unit vectors m_i; at least one, else InputError.
+/// returns  nothing if min_i n . m_i would not exceed 1e-6: no direction sees the front of all sides.
 /// Cost: linear in practice, cubic at worst.
 std::optional<Vec3> most_visible_direction(std::span<const Vec3> normals);
 
 /// Directions along which a surface can be extruded.
 struct VisibleNormals {
-  std::vector<Vec3> directions;  ///< unit, one per vertex; 0 where there is none
-  std::vector<Index> hidden;     ///< vertices without one, ascending
+  std::vector<Vec3> directions;  ///< unit vectors, one per vertex; 0 if there is none
+  std::vector<Index> hidden;     ///< vertices without a direction, ascending
 };
 
-/// For every vertex of a surface the `most_visible_direction` of the faces around it.
+/// Returns for every vertex of a surface the `most_visible_direction` of the faces around it.
 ///
-/// A triangle counts with its normal. A quad counts with the normals at its four corners, so that a thin extrusion of
-/// the bilinear patch is nowhere inverted; where these leave no direction, with the one at the vertex only.
-/// surface  triangles and quads, each vertex used. Degenerate: a corner without angle has no normal; its vertex is
-/// hidden.
+/// A triangle contributes its normal. A quad contributes the normals at its four corners, so that a thin extrusion of
+/// the bilinear patch is inverted nowhere; if these leave no direction, every face contributes its normal at the vertex
+/// only.
+///
+/// surface  triangles and quads; every vertex is used. Degenerate: a corner with zero angle has no normal, and its
+///          vertex is hidden.
 VisibleNormals visible_normals(const PolygonMesh& surface);
 
-/// Normal of a polygon at one of its corners, from the two edges there; 0 where they span nothing.
+/// Returns the normal of a polygon at one of its corners, from the two edges there; 0 if they are collinear.
 Vec3 corner_normal(const PolygonMesh& surface, std::size_t face, std::size_t corner);
 
 }  // namespace subvol

@@ -10,29 +10,29 @@
 
 namespace subvol::cli {
 
-/// Where a fit's template comes from.
+/// Source of a fit's template.
 struct TemplateSource {
-  std::string path;                   ///< of a file; empty: made from the target
-  std::optional<std::size_t> cells;   ///< about how many, where it is made
+  std::string path;                   ///< template file; empty: the template is made from the target
+  std::optional<std::size_t> cells;   ///< approximate number of cells, if the template is made
 };
 
-/// A fit's template, and how it was chosen where it was made.
+/// A fit's template, and how it was chosen if it was made.
 struct LoadedTemplate {
   VolumeMesh mesh;                    ///< no cells: interrupted while it was being made
   std::optional<TemplateChoice> choice;
 };
 
-/// Reads a template, or makes one and tells how far that is.
+/// Reads a template, or makes one and reports the progress.
 ///
-/// options  how it is made, but for the count, which is the source's.
-/// UsageError: one is to be made from points.
+/// options  how the template is made; `cells` is taken from the source instead.
+/// UsageError: a template would have to be made from points.
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings);
 
-/// What a report says of the choice: the topology, every trial, and which one was taken.
+/// The report's entry about the choice: the topology, every trial, and the one that was chosen.
 Json choice_json(const TemplateChoice& choice);
 
-/// The same for people, one line.
+/// Summary of the choice in one line, for people.
 std::string to_text(const TemplateChoice& choice);
 
 }  // namespace subvol::cli

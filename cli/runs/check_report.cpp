@@ -38,7 +38,8 @@ Json quality_json(const QualityReport& quality) {
 }
 
 LagrangeCheck check_lagrange_cells(const std::filesystem::path& path, const HighOrderMesh& mesh) {
-  // Rounding of points and of the interpolation through them (`polynomials_of`), far below any distance that matters.
+  // Covers the rounding of points and of the interpolation through them (`polynomials_of`), far below any distance that
+  // matters.
   constexpr double kRoundingPercent = 1e-7;
   const HighOrderMesh cells = read_lagrange_cells(path);
   LagrangeCheck check;
@@ -104,7 +105,7 @@ Json unused_vertices_json(const MeshCheck& check) {
 Json defects_json(const MeshCheck& check) {
   Json defects = Json::array();
   for (const MeshDefect& defect : check.defects) {
-    if (defect.kind == MeshDefect::Kind::unused_vertex) continue;  // it stands against nothing
+    if (defect.kind == MeshDefect::Kind::unused_vertex) continue;  // it does not make a mesh invalid
     defects.push_back({{"kind", to_string(defect.kind)}, {"entity", defect.entity}, {"message", defect.message}});
   }
   return defects;

@@ -13,7 +13,7 @@
 namespace subvol::cli {
 namespace {
 
-/// Options of files that are written; inputs are told apart by what they hold.
+/// Options that do not affect the fit's result, and names of inputs, which are identified by their content.
 const std::set<std::string, std::less<>> kNeutralOptions{"chord", "unit",  "up",       "cut",
                                                            "seed",  "target", "template", "no-wireframe",
                                                            "quantize"};

@@ -14,32 +14,35 @@
 
 namespace subvol::cli {
 
-/// What tells one input from another: all that a fit reads of it.
+/// Identifies an input: covers everything that a fit reads of it.
 std::string fingerprint(const TriangleMesh& mesh);
 std::string fingerprint(const PointCloud& cloud);
 std::string fingerprint(const Target& target);
 std::string fingerprint(const VolumeMesh& mesh);
 
-/// A run by its version, verb, inputs (name and fingerprint), and those options that bear on the result of the fit.
+/// Identifies a run by its version, verb, inputs (name and fingerprint), and those options that affect the result of
+/// the fit.
 RunIdentity run_identity(const std::string& verb, const Json& options,
                          const std::vector<std::pair<std::string, std::string>>& inputs);
 
-/// Refuses the file of --resume before the template is made: InputError as `Checkpointing`, but for the template.
+/// Refuses an unsuitable --resume file before the template is made: InputError as `Checkpointing`, except that the
+/// template is not compared.
 void require_resumable(const RunOptions& run, const RunIdentity& identity_but_template);
 
-/// Goes on from the checkpoint of an earlier run, and keeps one of this run as its minimisations go on.
+/// Resumes from the checkpoint of an earlier run, and writes one for this run as its minimizations proceed.
 class Checkpointing {
  public:
-  /// Reads the file of --resume. InputError: it cannot be used, or is of another run.
+  /// Reads the file of --resume. InputError: it cannot be used, or belongs to another run.
   Checkpointing(const RunOptions& run, RunIdentity identity);
   Checkpointing(const Checkpointing&) = delete;
   Checkpointing& operator=(const Checkpointing&) = delete;
 
-  /// For the options of a fit; null where nothing is kept and nothing resumed.
+  /// The log to put into the options of a fit; null if nothing is written or resumed.
   StageLog* log() { return run_.checkpoint.empty() && run_.resume.empty() ? nullptr : &log_; }
-  /// Writes what is not on the disk yet. A disk that refuses does not cost the result: the report has a warning.
+  /// Writes the stages that are not on the disk yet. A disk that refuses does not cost the result: the report gets a
+  /// warning.
   void finish(std::vector<std::string>& warnings);
-  /// What a report says of it: "resumed_from" and "recalled_stages", or nothing.
+  /// Adds "resumed_from" and "recalled_stages" to a report if the run was resumed.
   void describe(Json& report) const;
 
  private:
@@ -51,7 +54,7 @@ class Checkpointing {
   StageLog log_;
   Clock::time_point written_ = Clock::now();
   bool is_written_ = false;
-  std::string failure_;  ///< of the last write; empty: none
+  std::string failure_;  ///< why the last write failed; empty: it did not
 };
 
 }  // namespace subvol::cli

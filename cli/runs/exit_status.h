@@ -6,23 +6,23 @@
 
 namespace subvol::cli {
 
-/// What the program's exit status means; scripts rely on it.
+/// Meaning of the program's exit status; scripts rely on it.
 enum ExitStatus : int {
   kDone = 0,
   kFailed = 1,         ///< something could not be done, or the mesh is not valid
-  kUsage = 2,          ///< the command line does not make sense
+  kUsage = 2,          ///< the command line makes no sense
   kRejected = 3,       ///< an input cannot be used
   kNotConverged = 4,   ///< the best result so far has been written, if there was any
   kInterrupted = 130,  ///< by Ctrl-C; the best result so far has been written, if there was any
 };
 
-/// The command line does not make sense in a way the parser cannot see. Exit status kUsage.
+/// Thrown if the command line makes no sense in a way that the parser cannot see. Exit status kUsage.
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The work was ended, by Ctrl-C or a limit, before there was anything to write.
+/// Thrown if the work was ended, by Ctrl-C or a limit, before there was anything to write.
 class EndedEarly : public std::runtime_error {
  public:
   EndedEarly(const std::string& what, ExitStatus its_status) : std::runtime_error(what), status(its_status) {}

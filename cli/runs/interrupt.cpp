@@ -15,18 +15,18 @@ namespace {
 
 constexpr long long kOneSignalNanoseconds = 200'000'000;
 
-/// When the first one came; 0: not yet.
+/// Time of the first signal; 0: none yet.
 std::atomic<long long> first{0};
 static_assert(std::atomic<long long>::is_always_lock_free);
 
-// Only what a signal handler may call.
+// Calls only functions that are allowed in a signal handler.
 void note(int) {
   timespec time{};
   clock_gettime(CLOCK_MONOTONIC, &time);
   const long long now = time.tv_sec * 1'000'000'000LL + time.tv_nsec + 1;
   long long before = 0;
   const bool is_first = first.compare_exchange_strong(before, now);
-  // Who waits for the reader of a pipe does not look at the flag.
+  // A thread that waits for the reader of a pipe does not check the flag.
   if (!waits_for_reader() && (is_first || now - before <= kOneSignalNanoseconds)) return;
   delete_temporaries();
   _exit(kInterrupted);

@@ -3,11 +3,12 @@
 
 namespace subvol::cli {
 
-/// Makes the first Ctrl-C, or SIGTERM, set a flag; the next one, or one that comes while a pipe has no reader, ends the
-/// program at once, with status kInterrupted, and deletes what it was writing. Those that come within a fifth of a
-/// second count as one: some programs send theirs to a process and to its group. May be called again.
+/// Makes the first Ctrl-C or SIGTERM set a flag. The next one, or one that arrives while the program waits for the
+/// reader of a pipe, ends the program at once with status kInterrupted and deletes the files that were being written.
+/// Signals within a fifth of a second of the first count as one, because some programs send theirs to a process and to
+/// its group. May be called again.
 void catch_interrupt();
-/// Whether one of them has come.
+/// True if one of these signals has arrived.
 bool interrupted();
 
 }  // namespace subvol::cli

@@ -103,7 +103,7 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
 
 HighOrderFile load_high_order(const std::filesystem::path& path) {
   HighOrderFile file = read_high_order(path);
-  const auto& x = file.mesh.coefficients;  // vertices, then displacements
+  const auto& x = file.mesh.coefficients;  // positions of vertices, then displacements
   const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
   if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
       std::all_of(vertices_end, x.end(), [](const Vec3& d) { return d.isZero(0); }))

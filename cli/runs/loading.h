@@ -15,25 +15,26 @@
 
 namespace subvol::cli {
 
-/// InputError: a path's extension is none of a file with geometry; it lists those there are. Where it is one that holds
-/// something else than a surface (a volume mesh has one, its boundary) or linear cells, that is said.
+/// Throws InputError if the extension is none of a file with geometry, and lists the known ones. The second also
+/// refuses files that hold no surface (a volume mesh has one, its boundary), the third those that hold no linear cells;
+/// the message says what the file holds.
 void require_known_file(const std::filesystem::path& path);
 void require_surface_file(const std::filesystem::path& path);
 void require_cell_file(const std::filesystem::path& path);
 
-/// Whether a path's extension is one of a volume mesh.
+/// True if a path has the extension of a volume mesh.
 bool is_volume_file(const std::filesystem::path& path);
 
-/// Whether it is that of a high-order mesh, for `read_high_order`.
+/// True if a path has the extension of a high-order mesh, for `read_high_order`.
 bool is_high_order_file(const std::filesystem::path& path);
 
-/// What can be fitted, and compared with: a surface, or points on one.
+/// A target to fit or to compare with: a surface, or points on one.
 using Target = std::variant<TriangleMesh, PointCloud>;
 inline bool is_cloud(const Target& target) { return std::holds_alternative<PointCloud>(target); }
 
-/// Points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
+/// Loads points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
-/// The same where only triangles will do: points are refused as well.
+/// Load a surface or the boundary of a volume mesh, as triangles or as polygons; points are refused.
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
@@ -42,26 +43,26 @@ struct TaggedPolygons {
   PolygonMesh polygons;
   FeatureTags tags;
 };
-/// The boundary of a volume mesh, with those of its tags that are on it.
+/// The boundary of a volume mesh, with those of its tags that lie on it.
 TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
-/// `load_polygons` with the tags of a volume mesh; those of a surface file are none.
+/// `load_polygons` with the tags of a volume mesh; a surface file has none.
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
-/// A volume mesh that is sound but for inverted cells and unused vertices (or, unchecked, just readable).
-/// references: name of the cell data that become them; empty: those that are meant.
+/// Loads a volume mesh that is valid except for inverted cells and unused vertices (or, unchecked, is just readable).
+/// references: name of the cell data that become the references; empty: the usual ones.
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
 
-/// `read_high_order`; InputError also where all of the mesh is in one place.
+/// `read_high_order`; InputError also if the whole mesh is at one point.
 HighOrderFile load_high_order(const std::filesystem::path& path);
 
-/// UsageError: --references was given for a file whose cell data cannot be chosen from.
+/// UsageError: --references was given for a file in which cell data cannot be chosen.
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references);
 
-/// Positive numbers, one a line; blank lines are passed over. InputError, with the line: anything else.
+/// Positive numbers, one per line; blank lines are skipped. InputError, with the line: anything else.
 std::vector<double> load_thicknesses(const std::filesystem::path& path);
 
-/// What stands under "input" in a report.
+/// Entry "input" of a report.
 Json describe(const std::string& path, const TriangleMesh& mesh);
 Json describe(const std::string& path, const PointCloud& cloud);
 Json describe(const std::string& path, const Target& target);
@@ -69,10 +70,10 @@ Json describe(const std::string& path, const PolygonMesh& mesh);
 Json describe(const std::string& path, const VolumeMesh& mesh);
 Json describe(const std::string& path, const HighOrderMesh& mesh);
 
-/// What can be read as a target, for help.
+/// Formats that can be read as a target, for help.
 std::string target_formats();
 
-/// What can be read that holds cells, for help.
+/// Formats with cells that can be read, for help.
 std::string cell_formats();
 
 }  // namespace subvol::cli

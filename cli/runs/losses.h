@@ -11,13 +11,13 @@
 
 namespace subvol::cli {
 
-/// What cells carry beside themselves: cells with a reference, creases, corners.
+/// Data of a mesh besides its cells: numbers of cells with a reference, of creases and of corners.
 struct Marks {
   std::size_t references = 0, creases = 0, corners = 0;
 };
 Marks marks_of(const VolumeMesh& mesh);
 
-/// Adds one warning of the marks that were read and are in none of the outputs, because no format among them holds them
+/// Adds one warning about marks that were read but are in none of the outputs, because none of the formats holds them
 /// or the result no longer has them.
 ///
 /// curved  the outputs hold curved cells, which have no creases and corners.

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// By Part: what stands before the file, behind a colon.
+/// Prefix of each Part; in -o it stands before the file, separated by a colon.
 constexpr std::array<std::string_view, 4> kPartNames{"", "cage", "cutaway", "animation"};
 constexpr std::array<std::string_view, 4> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh"};
 constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
@@ -36,7 +36,7 @@ bool contains(const std::array<std::string_view, N>& list, std::string_view item
   return std::find(list.begin(), list.end(), item) != list.end();
 }
 
-/// The part that a text begins with, and the file behind it. UsageError: a word and a colon that name no part.
+/// Splits a text into the part that it starts with and the file. UsageError: a word and a colon that name no part.
 std::pair<Part, std::string> part_and_file(const std::string& text) {
   const std::size_t colon = text.find(':');
   const std::string name = text.substr(0, colon);
@@ -62,7 +62,7 @@ Output parse_output(const std::string& text) {
   return output;
 }
 
-// A file is really made: access() promises root what a read-only file system will not keep.
+// Creates a file to test this: for root, access() also succeeds on a read-only file system.
 void require_writable_folder(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   std::string probe = (folder / ".subvol-probe-XXXXXX").string();
@@ -86,7 +86,8 @@ void require_free(const fs::path& file, bool force) {
     throw UsageError(file.string() + ": exists; give --force to replace it");
   }
   const fs::path target = behind_links(file);
-  const bool is_open = fs::is_symlink(target, ignored);  // by /proc/.../fd/N: written to as it is
+  const bool is_open = fs::is_symlink(target, ignored);  // a link such as /proc/.../fd/N to an open file, which is
+                                                         // written to directly
   if (!is_open && (!exists || fs::is_regular_file(file, ignored))) require_writable_folder(target);
 }
 
@@ -127,7 +128,7 @@ std::vector<Output> checked_outputs(const RunOptions& options, const std::vector
     outputs.back().is_new = !fs::exists(outputs.back().path, ignored);
   }
   if (!options.report.empty()) claim(options.report, options.force);
-  // Who goes on from a checkpoint may go on writing it.
+  // A run that resumes from a checkpoint may continue writing to it.
   if (!options.checkpoint.empty()) {
     claim(options.checkpoint, options.force || options.checkpoint == options.resume);
     std::error_code ignored;

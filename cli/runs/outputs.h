@@ -10,54 +10,54 @@
 
 namespace subvol::cli {
 
-/// What of a result goes to a file: `FILE`, or `PART:FILE`.
+/// Part of a result that goes to a file: `FILE`, or `PART:FILE`.
 enum class Part {
   result,    ///< the finest mesh, or its surface
   cage,      ///< the control mesh
-  cutaway,   ///< a scene of the cells inside
-  animation  ///< a scene of the surface as the fit went
+  cutaway,   ///< a scene that shows the cells inside
+  animation  ///< a scene of the surface in the course of the fit
 };
 
-/// One -o: what to write, and where.
+/// One -o: the part to write, and the file.
 struct Output {
   Part part = Part::result;
   std::filesystem::path path;
   std::string extension;        ///< lower case, with its dot
-  bool is_new = false;          ///< there was no such file before the work
-  bool is_volume() const;       ///< a format that holds cells
-  bool is_scene() const;        ///< a format that holds scenes
+  bool is_new = false;          ///< no such file existed before the work
+  bool is_volume() const;       ///< true for a format that holds cells
+  bool is_scene() const;        ///< true for a format that holds scenes
 };
 
-/// Whether curved cells are written to it as polynomials (.vtu, .msh).
+/// True if curved cells are written to it as polynomials (.vtu, .msh).
 bool holds_polynomial_cells(const Output& output);
 
 /// Formats that can be written, for help and messages.
 std::string output_formats();
 
-/// Reads the -o options and checks, before any work, that each, the report and the checkpoint could be written.
+/// Reads the -o options and checks, before any work, that the outputs, the report and the checkpoint can be written.
 ///
-/// parts  that there are besides the result.
-/// UsageError: an unknown extension, a file named twice (by links, too), a part that there is not or that needs another
-/// format, an existing file without --force, a checkpoint that is a pipe. IoError: a folder that is not there
-/// or cannot be written to, a name that is too long.
+/// parts  available parts besides the result.
+/// UsageError: an unknown extension, a file named twice (also by links), a part that is not available or needs another
+/// format, an existing file without --force, a checkpoint that is a pipe. IoError: a folder that does not exist or
+/// cannot be written to, a name that is too long.
 std::vector<Output> checked_outputs(const RunOptions& options, const std::vector<Part>& parts);
 
-/// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: no place to
-/// write.
+/// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: a name that is
+/// too long, a folder that cannot be written to.
 void require_free(const std::filesystem::path& file, bool force);
 
-/// write(output) for each of those that `which` names, or all. One that cannot be written (IoError, InputError) does
-/// not cost the others: it is said to stderr and in what is returned, and taken off the list. Nor is one written over a
-/// file that somebody has made since it was found that there is none.
+/// Calls write(output) for each output that `which` selects, or for all. A failure (IoError, InputError) does not
+/// prevent the other outputs: it is printed to stderr and returned, and the output is removed from the list. A file
+/// that somebody else has created since the outputs were checked is not overwritten; this counts as a failure.
 std::vector<std::string> write_each(std::vector<Output>& outputs, const std::function<void(const Output&)>& write,
                                     const std::function<bool(const Output&)>& which = {});
-/// IoError that tells of these once more; nothing where there are none.
+/// Throws an IoError that summarizes the failures; does nothing if there are none.
 void require_all_written(const std::vector<std::string>& failures);
 
-/// The warnings of a report: those of the work, and which outputs could not be written.
+/// The warnings of a report: those of the work, and the outputs that could not be written.
 Json warnings_json(const std::vector<std::string>& warnings, const std::vector<std::string>& failures);
 
-/// The file names, as the report lists them.
+/// The file names, for the list in the report.
 Json output_names(const std::vector<Output>& outputs);
 
 }  // namespace subvol::cli

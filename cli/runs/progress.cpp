@@ -22,7 +22,7 @@ constexpr std::chrono::milliseconds kBarInterval{100};
 Kind kind_of(const std::string& name, bool quiet) {
   if (name == "json") return Kind::json;
   if (quiet || name == "none") return Kind::none;
-  // A bar in a file or a pipe would be one endless line.
+  // In a file or a pipe a bar would be one endless line.
   if (name != "plain" && isatty(STDERR_FILENO)) return Kind::bar;
   return Kind::plain;
 }
@@ -33,7 +33,7 @@ std::string level_text(const FitProgress& progress) {
   return progress.level > 0 ? "level " + std::to_string(progress.level) + "  " : "";
 }
 
-/// A time that is only a guess, in few digits.
+/// An estimated time, with few digits.
 std::string left_text(double seconds) {
   if (seconds < 0) return "";
   if (seconds < 90) return formatted("  %.0f s left", seconds);

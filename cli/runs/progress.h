@@ -9,24 +9,25 @@
 
 namespace subvol::cli {
 
-/// Tells on a terminal, in a log, or to a script how far a long run is.
+/// Reports the progress of a long run on a terminal, in a log, or to a script.
 class ProgressTeller {
  public:
   enum class Kind { bar, plain, json, none };
 
-  /// name: bar, plain, json, none, or empty to choose by what stderr is; quiet: none, but for json.
+  /// name: bar, plain, json, none, or empty to choose depending on whether stderr is a terminal; quiet: reports nothing
+  /// unless the name is json.
   ProgressTeller(const std::string& name, bool quiet);
   ~ProgressTeller();
   ProgressTeller(const ProgressTeller&) = delete;
   ProgressTeller& operator=(const ProgressTeller&) = delete;
 
   void tell(const FitProgress& progress);
-  /// Work after the solve: on a bar, in a line once a second has passed, and to scripts as "part" and "share".
+  /// Reports work after the solve: on the bar, as a line at most once a second, or to scripts as "part" and "share".
   void tell_work(const char* part, double share);
   WorkProgress work() {
     return [this](const char* part, double share) { return tell_work(part, share), true; };
   }
-  /// Leaves the bar's line, before other words are said.
+  /// Ends the bar's line, before other text is printed.
   void finish();
 
  private:
@@ -35,7 +36,8 @@ class ProgressTeller {
   void write_json(const FitProgress& progress);
 
   double seconds() const;
-  /// Guessed from when the share done last rose; negative where too little is done to tell, or the guess was too low.
+  /// Estimated from the time at which the share last changed; negative if too little is done for an estimate, or if the
+  /// estimate was too low.
   double seconds_left(double share);
 
   using Clock = std::chrono::steady_clock;
@@ -43,7 +45,7 @@ class ProgressTeller {
   Clock::time_point start_, last_;
   std::string last_stage_;
   int last_level_ = -1;
-  double last_share_ = 0, total_seconds_ = 0;  ///< what the whole was guessed to take when the share was reached
+  double last_share_ = 0, total_seconds_ = 0;  ///< estimated total time when that share was reached
   bool bar_shown_ = false;
 };
 

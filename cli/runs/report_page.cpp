@@ -50,7 +50,7 @@ std::string format(const char* form, Values... values) {
 
 std::string number(double value) { return format("%.6g", value); }
 
-/// A JSON value as words.
+/// A JSON value as text for people.
 std::string words(const Json& value) {
   if (value.is_string()) return escaped(value.get<std::string>());
   if (value.is_number_float()) return number(value.get<double>());

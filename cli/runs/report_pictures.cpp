@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kWidth = 720, kHeight = 540;
-/// Edges are drawn on boundaries of at most so many faces: on finer ones they would hide everything else.
+/// Edges are drawn on boundaries of at most this many faces: on finer ones they would hide everything else.
 constexpr std::size_t kMostWiredFaces = 6000;
 
 std::string png_bytes(const Image& image) {
@@ -44,7 +44,7 @@ std::string png_bytes(const Image& image) {
   return bytes;
 }
 
-/// A boundary as it is drawn, and the least quality of the cells at each of its points.
+/// A boundary to draw, and the least quality of the cells at each of its points.
 struct Shown {
   TriangleMesh triangles;
   std::vector<double> quality;
@@ -93,7 +93,7 @@ Shown shown(const HighOrderMesh& mesh) {
   return result;
 }
 
-/// The file a report names, from where the program was run or beside the report.
+/// The file that a report names, relative to the current folder or to that of the report.
 fs::path find_file(const std::string& name, const fs::path& folder) {
   std::error_code ignored;
   return fs::exists(name, ignored) ? fs::path(name) : folder / name;
@@ -108,7 +108,7 @@ Shown load_shown(const fs::path& path) {
   return result;
 }
 
-/// The pictures of one report.
+/// Draws the pictures of one report.
 class Painter {
  public:
   Painter(const Json& report, fs::path folder, std::vector<std::string>& notes)
@@ -148,7 +148,7 @@ class Painter {
 
   std::optional<Shown> load_result() {
     const Json quality = report_.value("quality", Json::object());
-    const double num_cells = quality.value("cells", 0.0);  // a report may say anything, 1e77 as well
+    const double num_cells = quality.value("cells", 0.0);  // a report may hold any number, even 1e77
     bool any = false;
     for (const Json& output : report_.value("outputs", Json::array())) {
       const std::string name = output.is_string() ? output.get<std::string>() : std::string();

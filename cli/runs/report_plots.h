@@ -8,14 +8,14 @@
 
 namespace subvol::cli {
 
-/// Text for HTML and its attributes.
+/// Escapes text for HTML and its attributes.
 std::string escaped(std::string_view text);
 
-/// Surface, volume and total energy of every iteration of all stages, logarithmic, as SVG; empty without iterations.
-/// Energies that are not positive are drawn at the plot's lower end.
+/// Surface, volume and total energy in every iteration of all stages, logarithmic, as SVG; empty without iterations.
+/// Energies that are not positive are drawn at the lower end of the plot.
 std::string energy_plot(const Json& stages);
 
-/// Counts in equal bins as bars, as SVG; empty without any.
+/// Counts in equal bins as bars, as SVG; empty if there are none.
 std::string histogram_plot(const Json& counts);
 
 }  // namespace subvol::cli

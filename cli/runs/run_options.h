@@ -9,7 +9,7 @@
 
 namespace subvol::cli {
 
-/// Ordered as written: reports list things in the order people expect.
+/// Keeps the order of entries as written: reports list them in the order that people expect.
 using Json = nlohmann::ordered_json;
 
 /// Options that several verbs share.
@@ -20,21 +20,21 @@ struct RunOptions {
   int threads = 0;                   ///< 0: all cores
   std::size_t memory_limit = 0;      ///< bytes; 0: none
   unsigned seed = 0;
-  std::string progress;              ///< bar, plain, json, none; empty: by what stderr is
+  std::string progress;              ///< bar, plain, json, none; empty: depends on stderr
   std::string checkpoint, resume;    ///< empty: none
-  std::string references;            ///< cell data that become the cells' references; empty: those that are meant
-  double every_seconds = 60;         ///< between two writes of the checkpoint, at least
+  std::string references;            ///< cell data that become the cells' references; empty: the usual ones
+  double every_seconds = 60;         ///< least time between two writes of the checkpoint
 };
 
-/// --threads alone sets OpenMP's number of threads, here and nowhere else. --memory-limit becomes the process's own
-/// limit on data: what goes beyond it fails to be allocated (`std::bad_alloc`).
+/// Sets OpenMP's number of threads from --threads, here and nowhere else, and makes --memory-limit the process's own
+/// limit on data: allocations beyond it fail (`std::bad_alloc`).
 void apply_resources(const RunOptions& options);
 
-/// Whether a word is a number from low to high, and nothing else.
+/// True if a word is a number from low to high, and nothing else.
 bool is_number_in(const std::string& word, double low, double high);
-/// A length in the mesh's unit, or with % of a diagonal. UsageError, naming the option: neither.
+/// Parses a length in the mesh's unit, or in percent (%) of a diagonal. UsageError, naming the option: neither.
 double parse_length(const std::string& option, const std::string& text, double diagonal);
-/// A text with U+FFFD in place of what is not UTF-8, as names of files need not be.
+/// Replaces what is not UTF-8 by U+FFFD: file names need not be UTF-8.
 std::string as_utf8(const std::string& text);
 
 }  // namespace subvol::cli

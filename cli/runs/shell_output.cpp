@@ -22,7 +22,7 @@
 namespace subvol::cli {
 namespace {
 
-/// What the thicknesses of one side are, in the mesh's unit.
+/// Statistics of the thicknesses of one side, in the mesh's unit.
 struct ThicknessFigures {
   double mean = 0, least = 0, most = 0;
 
@@ -40,7 +40,7 @@ void for_each_side(const ShellLayers& layers, const Visit& visit) {
   if (layers.outside > 0) visit("outside", layers.num_columns());
 }
 
-/// Values per strand as values per vertex; those of the surface itself are the larger of both sides.
+/// Converts values per strand to values per vertex; a vertex of the surface itself gets the larger value of both sides.
 std::vector<double> by_vertex(const ShellLayers& layers, const std::vector<double>& by_strand) {
   const std::size_t n = layers.num_columns();
   std::vector<double> values;
@@ -51,7 +51,7 @@ std::vector<double> by_vertex(const ShellLayers& layers, const std::vector<doubl
   return values;
 }
 
-/// Fills mesh and wires of a sheet; returns its thickness as (achieved, asked, 0) at each of the mesh's vertices.
+/// Fills mesh and wires of a sheet; returns (achieved, asked, 0) thickness at each of the mesh's vertices.
 using MakeSheet = std::function<std::vector<Vec3>(int sheet, SceneSheet& made)>;
 
 Scene scene_of(const ShellLayers& layers, const MakeSheet& make, const SurfaceSceneOptions& options) {
@@ -71,7 +71,7 @@ Scene scene_of(const ShellLayers& layers, const MakeSheet& make, const SurfaceSc
   return sheet_scene(sheets, "viridis over achieved / asked thickness 0..1, above 1 as 1", options);
 }
 
-/// (achieved, asked, 0) at every vertex.
+/// Returns (achieved, asked, 0) thickness at every vertex.
 std::vector<Vec3> thickness_at_vertices(const ShellResult& shell) {
   const std::vector<double> achieved = by_vertex(shell.layers, shell.achieved),
                             asked = by_vertex(shell.layers, shell.asked);
@@ -90,7 +90,7 @@ Scene scene_of(const ShellResult& shell, const SurfaceSceneOptions& options) {
   return scene_of(shell.layers, make, options);
 }
 
-/// Sheets of curved cells, sampled; thickness is linear between the vertices.
+/// Sheets of curved cells, sampled; the thickness is interpolated linearly between the vertices.
 Scene scene_of(const ShellResult& shell, const CurvedShell& curved, const SurfaceSceneOptions& options) {
   const ElementSpace& space = curved.mesh.space;
   const ElementSpace linear = space.with_orders(EntityOrders::uniform(space.topology(), 1));
@@ -115,11 +115,11 @@ std::vector<VertexField> thickness_fields(const ShellResult& shell) {
 }  // namespace
 
 std::optional<std::string> inward_warning(const TriangleMesh& surface) {
-  // In front of a face the winding number is 0 outside a surface that faces outward, and -1 inside one that faces
-  // inward; of a surface that encloses nothing it is between. Small holes hardly change it.
+  // In front of a face the winding number is 0 if the surface faces outward, and -1 if it faces inward; for a surface
+  // that encloses nothing it lies in between. Small holes hardly change it.
   constexpr double kInside = -0.9;
   constexpr std::size_t kMostFaces = 2000;
-  constexpr double kOffset = 1e-3;  // of a face's size
+  constexpr double kOffset = 1e-3;  // relative to a face's size
   const std::size_t n = surface.triangles.size(), step = (n + kMostFaces - 1) / kMostFaces;
   std::vector<Vec3> points;
   std::vector<double> areas;

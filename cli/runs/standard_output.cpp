@@ -26,7 +26,7 @@ void flush() {
 
 void prepare_standard_output() {
   std::signal(SIGPIPE, SIG_IGN);
-  // Opened the wrong way round, so that what is written to a closed stdout still fails.
+  // Opened with the opposite access, so that writing to a closed stdout still fails.
   for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (fcntl(descriptor, F_GETFD) < 0) (void)!open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
 }

@@ -10,15 +10,15 @@
 
 namespace subvol::cli {
 
-/// Whether some cells of a template, but not most of them, are flat or left-handed at a corner: a mesh that can be
-/// mended, not one that is numbered the other way round.
+/// True if some cells of a template, but fewer than half of them, are flat or left-handed at a corner: such a mesh can
+/// be repaired, unlike one whose cells are all numbered the wrong way round.
 bool has_few_inverted_cells(const VolumeMesh& mesh);
 
-/// Makes a template's cells valid over its own boundary, and tells so in a warning. Nothing is done where they all are.
+/// Makes a template's cells valid over its own boundary, and reports that in a warning. Does nothing if all are valid.
 ///
-/// path     of its file, for messages.
-/// options  but for their progress.
-/// InputError: some cells cannot be made valid. EndedEarly: Ctrl-C, or the time was over, before they were.
+/// path     of the template's file, for messages.
+/// options  progress and cancelled are replaced.
+/// InputError: some cells cannot be made valid. EndedEarly: Ctrl-C or the time limit came first.
 void untangle_template(const std::string& path, const RunOptions& run, OptimizeOptions options, VolumeMesh& mesh,
                        std::vector<std::string>& warnings);
 

@@ -48,7 +48,7 @@ void write_polygons(const Output& output, const PolygonMesh& surface, const Feat
   require_written(output.path, surface);
 }
 
-/// Two triangles that follow one another are a quad again.
+/// Joins every two consecutive triangles to a quad.
 PolygonMesh polygons_of(const CurvedBoundary& boundary) {
   PolygonMesh mesh{boundary.triangles.positions, {0}, {}};
   const auto& triangles = boundary.triangles.triangles;
@@ -60,7 +60,7 @@ PolygonMesh polygons_of(const CurvedBoundary& boundary) {
   return mesh;
 }
 
-/// Points that a crease doubled, for the sake of their normals, are one again.
+/// Merges the points that were doubled at creases for the sake of their normals.
 PolygonMesh polygons_of(const TessellatedSurface& surface) {
   PolygonMesh mesh{{}, {0}, {}};
   std::map<std::array<double, 3>, Index> places;

@@ -19,65 +19,66 @@ namespace subvol::cli {
 
 /// How surfaces for DCC tools are written.
 struct WritingOptions {
-  double chord_percent = 0.005;   ///< largest chord error of a tessellation, per cent of its bounding box's diagonal
+  double chord_percent = 0.005;   ///< largest chord error of a tessellation, in percent of its bounding box's diagonal
   double metres_per_unit = 1;
   std::string up_axis = "y";
-  std::filesystem::path source;   ///< file the result was made from, kept in the file
-  Json options = Json::object();  ///< options in force, kept in the file
-  CutPlane cut{};                 ///< of cutaways
-  bool no_wireframe = false;      ///< scenes without the cells' edges
-  bool quantize = false;          ///< scenes in small whole numbers
-  double map_tolerance_percent = kMapTolerancePercent;  ///< of polynomial cells in the place of curved ones
-  int linear_intervals = 0;       ///< of a curved cell's edges in .mesh and .vtk; 0: its mesh's largest order
+  std::filesystem::path source;   ///< file that the result was made from, stored in the output
+  Json options = Json::object();  ///< options in force, stored in the output
+  CutPlane cut{};                 ///< plane of cutaways
+  bool no_wireframe = false;      ///< leaves the cells' edges out of scenes
+  bool quantize = false;          ///< writes scenes with small integers
+  double map_tolerance_percent = kMapTolerancePercent;  ///< of polynomial cells in place of curved ones
+  int linear_intervals = 0;       ///< per edge of a curved cell in .mesh and .vtk; 0: its mesh's largest order
 };
 
-/// Largest chord error of surfaces that are measured, per cent as above: coarse scenes do not make a coarse check.
+/// Largest chord error of surfaces that are measured, in percent as above; coarse scenes do not make a coarse check.
 double measured_chord_percent(const WritingOptions& options);
 
-/// Reads where a cutaway is cut: x, y or z, also with a place as "z:0.3". Returns what is wrong, or nothing.
+/// Parses the plane of a cutaway: x, y or z, optionally with a position as in "z:0.3". Returns an error message, or an
+/// empty text.
 std::string parse_cut(const std::string& text, CutPlane& cut);
 
-// Whatever is written is read back and compared with what it should be, as far as `require_written` does: IoError.
+// Every file is read back and compared with what it should hold, as far as `require_written` does: IoError.
 
-/// Writes a scene; curved cells as .vtu, .msh, .mesh or .vtk.
+/// Write a scene, or curved cells as .vtu, .msh, .mesh or .vtk.
 void write_scene(const std::filesystem::path& path, const Scene& scene);
 void write_curved_cells(const Output& output, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
 
-/// Writes a control cage and its finest mesh: cells as they are, .glb and .gltf as the tessellated limit surface
-/// coloured by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is
-/// asked for where a scene of it is to be written (`shows_surface`) and may be null elsewhere.
+/// Writes a control cage and its finest mesh: the cells unchanged, .glb and .gltf as the tessellated limit surface
+/// colored by quality, .obj and .usda as the boundary's polygons. `limit` is `tessellated_limit` of the cage; it is
+/// needed if a scene of it is written (`shows_surface`) and may otherwise be null.
 void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh& mesh, const TessellatedSurface* limit,
                   const WritingOptions& options);
-/// Whether the output is a scene of the result's surface.
+/// True if the output is a scene of the result's surface.
 bool shows_surface(const Output& output);
 
-/// Writes one mesh as it is: its cells, the flat faces of its boundary (.usda: as a subdivision cage), or a cutaway.
+/// Writes one mesh unchanged: its cells, the flat faces of its boundary (.usda: as a subdivision cage), or a cutaway.
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options);
 
-/// Writes a high-order mesh: curved cells (.vtu, .msh), many linear ones (.mesh, .vtk), its curved boundary coloured by
-/// quality (.glb, .gltf) or as quads (.obj), a cutaway. UsageError: .usda, which holds subdivision cages.
+/// Writes a high-order mesh: curved cells (.vtu, .msh), many linear ones (.mesh, .vtk), its curved boundary colored by
+/// quality (.glb, .gltf) or as quads (.obj), or a cutaway. UsageError: .usda, which holds subdivision cages.
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options);
 
-/// UsageError, before the work: curved cells are not written to such a file (.usda).
+/// UsageError, to be raised before the work: curved cells cannot be written to such a file (.usda).
 void require_for_curved_cells(const Output& output);
 
-/// Writes a limit surface's quads, as .obj or .usda.
+/// Writes a limit surface's quads as .obj or .usda.
 void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options);
 
-/// Writes a fit as it went: a scene of its surface, from the template on.
+/// Writes the course of a fit: a scene of its surface, starting with the template.
 void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
                      const WritingOptions& options);
 void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
                      const WritingOptions& options);
 bool has_animation(std::span<const Output> outputs);
 
-/// What a scene written to this output says of itself.
+/// Options of a scene written to this output.
 SurfaceSceneOptions scene_options(const Output& output, const WritingOptions& options);
 
-/// Writes polygons as they stand. UsageError: a format that holds cells.
+/// Writes polygons unchanged. UsageError: a format that holds cells.
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options);
 
-/// The limit surface of a cage as it is written to .glb.
+/// The limit surface of a cage, tessellated as for a .glb.
 TessellatedSurface tessellated_limit(const VolumeMesh& cage, const WritingOptions& options,
                                      const WorkProgress& progress = {});
 

@@ -17,7 +17,7 @@
 namespace subvol::cli {
 namespace {
 
-/// The first that is a file of this kind, and no pipe; null: none.
+/// The first output of this part and extension that is a regular file; null if there is none.
 const Output* first_file(std::span<const Output> outputs, Part part, std::string_view extension) {
   const auto found = std::find_if(outputs.begin(), outputs.end(), [&](const Output& output) {
     return output.part == part && output.extension == extension && std::filesystem::is_regular_file(output.path);

@@ -26,17 +26,17 @@ struct CheckArguments {
   bool json = false;
 };
 
-/// What is known of the mesh in a file.
+/// Results of checking the mesh in a file.
 struct Checked {
   MeshCheck check;
-  Json input;                             ///< what the mesh is
-  std::optional<SubdivisionAudit> audit;  ///< of a mesh that may be subdivided
-  std::optional<LagrangeCheck> lagrange;  ///< of curved cells
+  Json input;                             ///< description of the mesh
+  std::optional<SubdivisionAudit> audit;  ///< for a mesh that may be subdivided
+  std::optional<LagrangeCheck> lagrange;  ///< for curved cells
 
   bool valid() const { return check.valid() && (!lagrange || lagrange->valid()); }
 };
 
-/// check(geometry) with a pointer to the target's, whatever it is; null where there is none.
+/// Calls check(geometry) with a pointer to the target's geometry, whatever its type; null if there is no target.
 template <class Check>
 MeshCheck against(const std::optional<Target>& target, const Check& check) {
   if (!target) return check(static_cast<const TriangleMesh*>(nullptr));
@@ -77,7 +77,7 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Ch
   return json;
 }
 
-/// The verdict last, as in the text of the check itself.
+/// Moves the verdict to the end, as in the text of the check itself.
 std::string text_of(const Checked& checked) {
   std::string text = to_text(checked.check);
   if (!checked.lagrange) return text;

@@ -7,14 +7,14 @@
 
 namespace subvol::cli {
 
-/// What to do once the command line is understood; returns an ExitStatus. Set by the verb that was named.
+/// The work to do once the command line has been parsed; returns an ExitStatus. Set by the verb on the command line.
 using Action = std::function<int()>;
 
-/// Tells the parser all that the program understands: every verb, --version, --config. Parsing then throws CLI's
+/// Tells the parser everything that the program accepts: every verb, --version, --config. Parsing then throws CLI's
 /// ParseError or UsageError, or sets `action`.
 void describe_program(CLI::App& app, Action& action);
 
-/// One verb each: its options, its help, and its action.
+/// Each adds one verb: its options, its help, and its action.
 void add_fit_command(CLI::App& app, Action& action);
 void add_optimize_command(CLI::App& app, Action& action);
 void add_shell_command(CLI::App& app, Action& action);

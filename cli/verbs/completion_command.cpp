@@ -38,10 +38,10 @@ std::vector<std::string> options_of(const CLI::App& verb) {
   return names;
 }
 
-/// The words an option takes, where its help lists them as "one|other"; else none.
+/// The words that an option accepts if its help lists them as "one|other"; otherwise none.
 std::vector<std::string> words_of(const CLI::Option& option) {
   std::string text = option.get_type_name();
-  text.erase(std::min(text.find(':'), text.size()));  // what a check adds
+  text.erase(std::min(text.find(':'), text.size()));  // the part that a validator adds
   const bool is_list = text.find('|') != std::string::npos &&
                        std::all_of(text.begin(), text.end(), [](char c) {
                          return (c >= 'a' && c <= 'z') || c == '|' || c == '_' || c == '-';
@@ -52,7 +52,7 @@ std::vector<std::string> words_of(const CLI::Option& option) {
   return words;
 }
 
-/// The lines of a case that offer what a verb takes: its options, the words of some, and the verbs below it.
+/// Appends the lines of a case that offer what a verb accepts: its options, the words of some, and the verbs below it.
 void append_case(std::ostream& out, const CLI::App& verb, const std::string& pattern) {
   out << "    '" << pattern << "')\n      options='" << joined(options_of(verb)) << "'\n      case \"$before\" in\n";
   for (const CLI::Option* option : verb.get_options())
@@ -61,7 +61,7 @@ void append_case(std::ostream& out, const CLI::App& verb, const std::string& pat
   out << "      esac ;;\n";
 }
 
-/// A completion for bash; zsh runs it as well.
+/// A completion script for bash; zsh runs it as well.
 std::string bash_completion(const CLI::App& app) {
   std::ostringstream out;
   out << "_subvol() {\n"

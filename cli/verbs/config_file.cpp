@@ -13,7 +13,7 @@ namespace subvol::cli {
 
 namespace {
 
-/// Some editors begin a file with one.
+/// Skips a byte order mark: some editors begin a file with one.
 void pass_byte_order_mark(std::istream& input) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   const std::istream::pos_type begin = input.tellg();
@@ -36,7 +36,7 @@ CLI::Validator regular_file() {
 }
 
 std::vector<CLI::ConfigItem> VerbConfig::from_config(std::istream& input) const {
-  std::vector<std::string> path;  // the verb, and the verb under it where it is a group
+  std::vector<std::string> path;  // the verb, and the verb below it if it is a group
   const CLI::App* verb = &app_;
   for (auto verbs = app_.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands()) {
     verb = verbs.front();

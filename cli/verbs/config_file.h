@@ -8,13 +8,13 @@
 
 namespace subvol::cli {
 
-/// Accepts what is no device and no pipe, which may have no end; and names of nothing, which are refused elsewhere.
+/// Accepts anything but devices and pipes, which may have no end; missing files are refused elsewhere.
 CLI::Validator regular_file();
 
-/// Reads --config files: keys are the long options of the verb in use, without a section or in one named after the
+/// Reads --config files: keys are the long options of the current verb, without a section or in one named after the
 /// verb.
 ///
-/// Sections of other verbs are passed over, so that one file can serve several. The command line wins over the file.
+/// Sections of other verbs are skipped, so that one file can serve several. The command line overrides the file.
 class VerbConfig : public CLI::ConfigTOML {
  public:
   explicit VerbConfig(const CLI::App& app) : app_(app) {}

@@ -35,7 +35,7 @@ struct FitArguments {
   TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
   std::string point_weights = "equal", energy = "hencky";
-  int order = 0;  ///< of curved elements; 0: a subdivision volume is fitted
+  int order = 0;  ///< order of curved elements; 0: a subdivision volume is fitted
   std::string basis = to_string(HighOrderFitOptions{}.basis);
   bool adaptive = false;
 };
@@ -58,7 +58,7 @@ Distortion distortion(const FitArguments& arguments) {
   return Distortion::hencky;
 }
 
-/// One fit from its files to its files.
+/// One run of `fit`, from its input files to its output files.
 class FitRun : public LongRun {
  public:
   FitRun(const FitArguments& arguments, const CLI::App& verb)
@@ -77,7 +77,7 @@ class FitRun : public LongRun {
   const FitArguments& arguments_;
   Target target_;
   VolumeMesh template_mesh_;
-  std::optional<TemplateChoice> choice_;  ///< where the template was made
+  std::optional<TemplateChoice> choice_;  ///< if the template was made
   std::optional<Checkpointing> checkpointing_;
   FitResult result_;
   MeshCheck mesh_check_;
@@ -88,7 +88,7 @@ class FitRun : public LongRun {
 void FitRun::load() {
   target_ = load_target(arguments_.target, warnings_);
   require_fitting_options(verb_, is_cloud(target_));
-  if (arguments_.template_mesh.path.empty())  // before minutes go into one
+  if (arguments_.template_mesh.path.empty())  // checked before minutes are spent on making one
     require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
   tell_warnings();
 }
@@ -120,7 +120,7 @@ void FitRun::fit() {
   options.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
-  // What is left of it: a template may have been made.
+  // Making the template may have used part of the time limit.
   if (options.time_limit_seconds > 0)
     options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds());
   options.point_weights = point_weights(arguments_);
@@ -149,7 +149,7 @@ void FitRun::write() {
         },
         [&](const Output& output) { return shows_surface(output) == with_limit; });
   };
-  write(false);  // where little memory is left the limit surface may be what does not fit
+  write(false);  // written first: if memory is short, it is the limit surface that may not fit
   limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, writing, progress); });
   write(true);
 }
@@ -269,7 +269,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
     order->excludes(verb.get_option(other));
 }
 
-/// The same run with curved elements: lambda has another default there.
+/// Arguments of the same run with curved elements, for which lambda has another default.
 HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
   HighOrderFitOptions& fit = result.fit;

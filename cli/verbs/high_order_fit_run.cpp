@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Refuses before the work what no curved mesh can be written to: the cells of the template stand for the result.
+/// Refuses, before the work, outputs to which no curved mesh can be written; the template's cells represent the result.
 void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
                        const VolumeMesh& cells) {
   for (const Output& output : outputs) {
@@ -41,7 +41,7 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
   }
 }
 
-/// seconds: that have been used of the time limit.
+/// seconds: the part of the time limit that has been used.
 HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bool keep_states, double seconds,
                        const Target& target, const VolumeMesh& template_mesh) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
@@ -68,7 +68,7 @@ MeshCheck check(const HighOrderMesh& mesh, const Target& target, const WritingOp
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
 
-/// Of linear cells that were written in the place of the curved ones; none: there is no such file.
+/// Check of the linear cells that were written in place of the curved ones; none if there is no such file.
 std::optional<MeshCheck> check_linear(const std::vector<Output>& outputs, const Target& target, const RunOptions& run) {
   const std::optional<VolumeMesh> written = written_cells(outputs);
   if (!written) return {};
@@ -77,7 +77,7 @@ std::optional<MeshCheck> check_linear(const std::vector<Output>& outputs, const 
   return std::visit([&](const auto& geometry) { return check_mesh(*written, &geometry, options); }, target);
 }
 
-/// With lambda, whose default depends on the order.
+/// Adds lambda, whose default depends on the order.
 Json options_used(const HighOrderFitArguments& arguments, Json options) {
   options[arguments.untangles ? "lambda" : "lambda-close"] = arguments.fit.lambda_close;
   return options;
@@ -118,7 +118,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Target target = arguments.takes_points ? load_target(arguments.target, warnings)
                                                : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
-  if (arguments.template_mesh.path.empty()) {  // what is made are hexes; it takes minutes
+  if (arguments.template_mesh.path.empty()) {  // made templates consist of hexes, and making one takes minutes
     refuse_impossible(outputs, arguments, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})));
     require_resumable(arguments.run, run_identity(verb, {{"target", fingerprint(target)}}));
   }

@@ -12,7 +12,7 @@
 
 namespace subvol::cli {
 
-/// What `fit --order`, or `optimize --order`, was asked to do.
+/// Arguments of `fit --order` or `optimize --order`.
 struct HighOrderFitArguments {
   RunOptions run;
   WritingOptions writing;
@@ -20,7 +20,7 @@ struct HighOrderFitArguments {
   std::string target;
   TemplateSource template_mesh;
   const char* command = "fit";  ///< the verb, for messages and the report
-  /// All cells of the template that are not proved valid are untangled before, not only where a few are inverted.
+  /// True: all invalid cells of the template are untangled first. False: only if the template has few inverted cells.
   bool untangles = false;
   bool takes_points = true;     ///< the target may be points
 };

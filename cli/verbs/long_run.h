@@ -16,26 +16,27 @@
 
 namespace subvol::cli {
 
-/// What the verbs that run long have in common: outputs looked at before the work, warnings told once, parts timed, a
-/// progress that Ctrl-C ends, the end of the report, and the exit status.
+/// Common parts of the verbs that run long: outputs checked before the work, warnings printed once, parts timed,
+/// progress that Ctrl-C interrupts, the last entries of the report, and the exit status.
 class LongRun {
  protected:
   LongRun(const RunOptions& run, const CLI::App& verb) : run_(run), verb_(verb) {}
 
-  /// UsageError where there is nothing to write, and as `checked_outputs`. Sets the number of threads.
+  /// UsageError if there is nothing to write, and as `checked_outputs`. Sets the number of threads and the memory
+  /// limit.
   void prepare(const std::vector<Part>& parts);
-  /// Tells the warnings that have not been told yet.
+  /// Prints the warnings that have not been printed yet.
   void tell_warnings();
   void add_warnings(const std::vector<std::string>& warnings);
 
-  /// Does one part and notes how long it took.
+  /// Does one part and records how long it took.
   template <class Run>
   void timed(const char* part, void (Run::*work)()) {
     const Clock::time_point begin = Clock::now();
     (static_cast<Run*>(this)->*work)();
     seconds_[part] = seconds_since(begin);
   }
-  /// work(progress), the progress told as the options say and ended by Ctrl-C.
+  /// Calls work(progress), which reports progress as the options say and is interrupted by Ctrl-C.
   template <class Work>
   auto followed(const Work& work) const {
     ProgressTeller teller(run_.progress, run_.quiet);
@@ -48,7 +49,8 @@ class LongRun {
     return result;
   }
 
-  /// work(progress) of a part after the solve: told as the options say, never ended.
+  /// Calls work(progress) for a part after the solve, which reports progress as the options say and is never
+  /// interrupted.
   template <class Work>
   auto watched(const Work& work) const {
     ProgressTeller teller(run_.progress, run_.quiet);
@@ -56,15 +58,17 @@ class LongRun {
   }
 
   double seconds() const { return seconds_since(start_); }
-  /// Adds what every report ends with, and writes it if one was asked for. parts: seconds of parts of the work.
+  /// Adds the last entries of every report, and writes the report if one was requested. parts: seconds of parts of the
+  /// work.
   void write_report(Json json, const Json& parts = Json::object()) const;
-  /// As the function of that name, with what could not be written in the report's warnings.
+  /// As the function of the same name; outputs that could not be written are added to the report's warnings.
   void write_each(const std::function<void(const Output&)>& write,
                   const std::function<bool(const Output&)>& which = {});
   void tell_outputs() const;
-  /// At the end of a run, when all else is told: IoError if an output could not be written.
+  /// IoError if an output could not be written. To be called at the end of a run, when everything else has been
+  /// reported.
   void require_outputs() const { require_all_written(failures_); }
-  /// An ExitStatus.
+  /// Returns an ExitStatus.
   static int status(const FitReport& report, bool valid);
 
   const RunOptions& run_;
@@ -80,7 +84,7 @@ class LongRun {
 
   Clock::time_point start_ = Clock::now();
   std::size_t told_ = 0;
-  std::vector<std::string> failures_;  ///< of outputs
+  std::vector<std::string> failures_;  ///< outputs that could not be written
   Json seconds_ = Json::object();
 };
 

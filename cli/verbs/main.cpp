@@ -34,7 +34,7 @@ int complain(const char* what, int status) {
   return status;
 }
 
-// The parser would only say that a verb is missing.
+// Names the unknown verb: the parser would only say that a verb is missing.
 void require_known_verb(const CLI::App& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-' || std::string_view(argv[1]) == "help") return;
   std::string verbs;
@@ -103,7 +103,7 @@ std::vector<std::string> arguments_of(int argc, char** argv) {
   return words;
 }
 
-/// Whether an allocation has failed.
+/// True if an allocation has failed.
 std::atomic<bool> has_run_out{false};
 
 [[noreturn]] void run_out() {
@@ -111,17 +111,17 @@ std::atomic<bool> has_run_out{false};
   throw std::bad_alloc();
 }
 
-/// An exception that leaves a parallel loop ends the program here: in order, and with nothing half-written. In the
-/// program's first thread the language does not say which one it was.
+/// Ends the program in order if an exception leaves a parallel loop, so that nothing is left half-written. In the
+/// program's first thread the language does not say which exception it was.
 [[noreturn]] void end_in_order() {
   const char* what = has_run_out ? kOutOfMemory : "an error in a parallel loop";
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
-  } catch (const std::bad_alloc&) {  // of Eigen's, which asks elsewhere
+  } catch (const std::bad_alloc&) {  // thrown by Eigen, which allocates in another way
     what = kOutOfMemory;
   } catch (...) {
   }
-  // Nothing is allocated any more, nothing unwound: other threads still run.
+  // Nothing is allocated any more and nothing is unwound: other threads are still running.
   delete_temporaries();
   (void)!write(STDERR_FILENO, "subvol: ", 8);
   (void)!write(STDERR_FILENO, what, std::strlen(what));
@@ -129,8 +129,8 @@ std::atomic<bool> has_run_out{false};
   std::_Exit(kFailed);
 }
 
-/// Arrays of one step are asked for again in the next: they are not handed back to the system each time, which would
-/// have to clear their pages anew (a tenth of the time of `optimize`).
+/// Keeps freed memory in the process: a step allocates the arrays of the previous one again, and the system would have
+/// to clear their pages each time (a tenth of the time of `optimize`).
 void keep_freed_memory() {
 #ifdef __GLIBC__
   constexpr int kMegabyte = 1 << 20;
@@ -139,7 +139,7 @@ void keep_freed_memory() {
 #endif
 }
 
-/// `--report=` would take the next word for its value.
+/// Refuses `--report=`, which would take the next word as its value.
 void require_value_behind_sign(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
@@ -148,7 +148,8 @@ void require_value_behind_sign(int argc, char** argv) {
   }
 }
 
-/// An unset variable of a script is no file name: without this, its option would count as not given.
+/// Refuses empty values: an unset variable of a script is not a file name, and its option would otherwise count as not
+/// given.
 void require_values(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     for (const std::string& value : option->results())
@@ -175,7 +176,7 @@ int run(int argc, char** argv) {
   return action();
 }
 
-/// What `run` returns, or the status of the error that it ends with.
+/// Returns the result of `run`, or the status of the error that it ends with.
 int run_to_status(int argc, char** argv) {
   try {
     return run(argc, argv);
@@ -200,7 +201,7 @@ int main(int argc, char** argv) {
   keep_freed_memory();
   std::set_new_handler(run_out);
   std::set_terminate(end_in_order);
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+  std::signal(SIGXFSZ, SIG_IGN);  // reaching the limit on file sizes becomes a write error, like a full disk
   prepare_standard_output();
   return finished_standard_output(run_to_status(argc, argv));
 }

@@ -35,7 +35,7 @@ struct OptimizeArguments {
   int order = 1;
 };
 
-/// One optimisation from its files to its files.
+/// One run of `optimize`, from its input files to its output files.
 class OptimizeRun : public LongRun {
  public:
   OptimizeRun(const OptimizeArguments& arguments, const CLI::App& verb)
@@ -53,7 +53,7 @@ class OptimizeRun : public LongRun {
   const OptimizeArguments& arguments_;
   VolumeMesh mesh_;
   std::optional<TriangleMesh> target_;
-  TriangleMesh surface_;  ///< what the boundary is compared with: the target, or the boundary as it was
+  TriangleMesh surface_;  ///< compared with the boundary: the target, or the original boundary
   QualityReport before_;
   std::optional<Checkpointing> checkpointing_;
   OptimizeResult result_;
@@ -138,7 +138,7 @@ int OptimizeRun::run() {
   return status(result_.report, mesh_check_.valid());
 }
 
-/// Curving is a fit of curved elements whose template is the mesh.
+/// Curves a mesh by fitting curved elements with the mesh as the template.
 HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{
       arguments.run, arguments.writing, {}, arguments.target, {arguments.mesh, std::nullopt}, "optimize", true, false};

@@ -39,7 +39,7 @@ struct ShellArguments {
   bool straight = false;
 };
 
-/// One shell from its file to its files.
+/// One run of `shell`, from its input file to its output files.
 class ShellRun : public LongRun {
  public:
   ShellRun(const ShellArguments& arguments, const CLI::App& verb)
@@ -66,7 +66,7 @@ class ShellRun : public LongRun {
   std::optional<CurvedShell> curved_;
   ShellFailures failures_;
   std::vector<PolynomialCells> polynomials_;
-  std::optional<MeshCheck> linear_;  ///< of linear cells that were written in the place of the curved ones
+  std::optional<MeshCheck> linear_;  ///< of linear cells that were written in place of the curved ones
   std::optional<CertificateSummary> subdivided_;  ///< of the layers as a control mesh, refined once
 };
 
@@ -124,7 +124,8 @@ void ShellRun::grow() {
   add_warnings(result_.report.warnings);
 }
 
-// The time that the linear shell has left; none left, or a call to end: cells of the order asked for, but straight.
+// Uses the time that the linear shell has left. If none is left, or the run must end, the cells get the requested order
+// but stay straight.
 void ShellRun::curve() {
   if (arguments_.order == 1) return;
   if (!result_.failures.none()) {
@@ -156,7 +157,7 @@ void ShellRun::write() {
   });
 }
 
-// All numbers of cells in a report are those of the layers, whatever order the cells have in the file.
+// Every cell number in a report refers to the layers, in whatever order a file lists the cells.
 void ShellRun::check() {
   failures_ = result_.failures;
   if (curved_) {
@@ -182,7 +183,7 @@ void ShellRun::check() {
   failures_ = ShellCheck(result_.layers, result_.mesh, CheckedSheets::all).failures(written->positions);
 }
 
-// Who asks for a control mesh will subdivide it: valid cells may turn inverted then.
+// A control mesh will be subdivided by its user, which may invert valid cells.
 void ShellRun::check_subdivided() {
   const auto is_cage = [](const Output& output) { return output.part == Part::cage; };
   if (std::none_of(outputs_.begin(), outputs_.end(), is_cage)) return;

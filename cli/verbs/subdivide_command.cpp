@@ -47,7 +47,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.source = arguments.mesh;
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
-  const bool has_limit = rule == BoundaryRule::catmull_clark;  // averaging ends in another surface
+  const bool has_limit = rule == BoundaryRule::catmull_clark;  // averaging converges to another surface
   if (has_limit && std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
   return write_checked(
       arguments.run, std::move(outputs), fine,

@@ -11,24 +11,24 @@
 
 namespace subvol::cli {
 
-/// What all verbs under `template` share.
+/// State shared by all verbs under `template`.
 struct TemplateRun {
   RunOptions run;
   WritingOptions writing;
   std::vector<std::string> warnings;
 };
 
-/// -o and the other options of outputs, --report.
+/// -o and the other output options, --report.
 void add_template_options(CLI::App& verb, TemplateRun& run);
 
-/// The outputs of a verb under `template`, checked before any work. UsageError: none.
+/// The outputs of a verb under `template`, checked before any work. UsageError: none are given.
 std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& verb);
 
-/// Writes a template, its report (`details` and what all have) and a summary, as `write_checked`.
+/// Writes a template, its report (`details` and the common entries) and a summary, as `write_checked`.
 int write_template(const TemplateRun& run, const CLI::App& verb, std::vector<Output> outputs,
                    const VolumeMesh& mesh, const Json& details);
 
-/// One group of verbs each.
+/// Each adds one group of verbs.
 void add_template_auto(CLI::App& group, Action& action);
 void add_template_edits(CLI::App& group, Action& action);
 

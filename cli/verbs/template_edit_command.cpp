@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The verbs under `template` that make a mesh by hand: grid, carve, extrude, pillow, refine, collapse, merge,
+// The verbs under `template` that make or edit a mesh by hand: grid, carve, extrude, pillow, refine, collapse, merge,
 // split.
 
 #include "cli/runs/exit_status.h"
@@ -30,7 +30,7 @@
 namespace subvol::cli {
 namespace {
 
-/// Options of all edits; each verb offers those it reads.
+/// Options of all edits; each verb offers those that it reads.
 struct EditArguments : TemplateRun {
   std::string mesh, other, inside;
   std::vector<double> box, direction;
@@ -74,7 +74,7 @@ VolumeMesh make_grid(EditArguments& arguments) {
                         : box_grid(low, high, {arguments.counts[0], arguments.counts[1], arguments.counts[2]}));
 }
 
-/// The cells that --inside, --box, --list or --thin name: one of them.
+/// The cells selected by --inside, --box, --list or --thin, of which exactly one must be given.
 std::vector<char> chosen_cells(EditArguments& arguments, const VolumeMesh& mesh, const std::string& choices) {
   const int given = !arguments.inside.empty() + !arguments.box.empty() + !arguments.cells.empty() + arguments.thin;
   if (given != 1) throw UsageError("template " + choices);
@@ -147,7 +147,7 @@ int run_edit(EditArguments arguments, const CLI::App& verb, Maker make) {
   return write_template(arguments, verb, outputs, mesh, {{"input", arguments.mesh}});
 }
 
-/// A verb with what all of them have; its own options follow.
+/// Adds a verb with the options common to all edits; its own options follow.
 CLI::App* add_edit(CLI::App& group, Action& action, const std::shared_ptr<EditArguments>& arguments, const char* name,
                    const char* help, Maker make) {
   CLI::App* verb = group.add_subcommand(name, help);
@@ -196,7 +196,7 @@ void add_grid(CLI::App& group, Action& action) {
       ->check(number_in(0.0, 1000.0))->type_name("PERCENT")->capture_default_str();
 }
 
-/// --inside with --share, --box and --list.
+/// Adds --inside with --share, --box and --list.
 void add_choice(CLI::App& verb, EditArguments& arguments) {
   verb.add_option("--inside", arguments.inside, "Cells that lie in this surface, by winding number")
       ->type_name("SURFACE");

@@ -9,7 +9,7 @@
 namespace subvol::cli {
 namespace {
 
-// Numbers and booleans as such, all else as text.
+// Numbers and booleans keep their type; everything else becomes text.
 Json typed(const std::string& text) {
   const Json value = Json::parse(text, nullptr, false);
   return value.is_number() || value.is_boolean() ? value : Json(text);
@@ -23,7 +23,7 @@ Json typed(const std::vector<std::string>& texts) {
 
 constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimit = std::size_t{1} << 50;
 
-/// Whether one was given that this one does not go with.
+/// True if an option that excludes this one was given.
 bool is_excluded(const CLI::Option& option) {
   const auto& others = option.get_excludes();
   return std::any_of(others.begin(), others.end(), [](const CLI::Option* other) { return other->count() > 0; });

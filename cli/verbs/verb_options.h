@@ -13,15 +13,15 @@
 
 namespace subvol::cli {
 
-// The options that several verbs share, as the parser is told of them.
+// Declares to the parser the options that several verbs share.
 
 /// --threads, --memory-limit.
 void add_resource_options(CLI::App& verb, RunOptions& options);
 /// -o, --force, --quiet, and the above.
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help);
-/// --references: for what reads volume meshes.
+/// --references, for verbs that read volume meshes.
 CLI::Option* add_references_option(CLI::App& verb, RunOptions& options);
-/// --report, --progress, --seed: for what runs long.
+/// --report, --progress, --seed, for verbs that run long.
 void add_long_run_options(CLI::App& verb, RunOptions& options);
 
 /// --checkpoint, --every, --resume.
@@ -32,17 +32,18 @@ void add_writing_options(CLI::App& verb, WritingOptions& options);
 /// --map-tolerance.
 CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);
 
-/// UsageError: an option was given that means nothing for the target that there is, points or a surface.
+/// UsageError: an option was given that has no meaning for the kind of target, points or a surface.
 void require_fitting_options(const CLI::App& verb, bool points);
-/// Accepts numbers from low to high, and nothing else (NaN passes CLI::Range).
+/// Accepts numbers from low to high, and nothing else (CLI::Range accepts NaN).
 CLI::Validator number_in(double low, double high);
-/// The options of a verb that have a value, by long name: given or default; a list where there are several.
+/// The options of a verb that have a value, given or default, by long name; a list for several values.
 Json options_in_force(const CLI::App& verb);
-/// Those of them that bear on what is written: not how a run is told, limited, or kept. What files other than reports
-/// say of a run, so that they are the same bytes for any number of threads, and for a run that was resumed.
+/// Those of them that affect the result: not those on how a run is reported, limited, or stored. Files other than
+/// reports record these, so that their bytes are the same for any number of threads and for a resumed run.
 Json options_of_result(const CLI::App& verb);
 
-/// A run by its version, verb, inputs (name and fingerprint), and those options that bear on the result of the fit.
+/// Identifies a run by its version, verb, inputs (name and fingerprint), and those options that affect the result of
+/// the fit.
 RunIdentity run_identity(const CLI::App& verb, const std::vector<std::pair<std::string, std::string>>& inputs);
 
 }  // namespace subvol::cli

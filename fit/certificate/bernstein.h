@@ -30,22 +30,22 @@ template <class T>
 Vector<T> mean(const Vector<T>& p, const Vector<T>& q) {
   return {T(0.5 * (p[0] + q[0])), T(0.5 * (p[1] + q[1])), T(0.5 * (p[2] + q[2]))};
 }
-/// Squared edge lengths per reference direction: what the rounding margin is measured by.
+/// Squared edge lengths per reference direction, from which the rounding margin is computed.
 template <class T>
 struct EdgeLengths {
-  std::array<T, 3> squared_max;  ///< longest edge along u, v, w
-  T squared_sum;                 ///< of all edges; NaN or infinite as soon as one coordinate is
+  std::array<T, 3> squared_max;  ///< of the longest edge along u, v, w
+  T squared_sum;                 ///< over all these edges; NaN or infinite if any coordinate is
 };
 
 /// Local number of the hex corner at (i, j, k) in {0, 1}^3.
 inline constexpr int hex_corner(int i, int j, int k) { return 4 * k + (j == 0 ? i : 3 - i); }
 
-/// The 27 coefficients of a trilinear hex; degree 2 in each of u, v, w.
+/// Computes the 27 coefficients of det J of a trilinear hex; the degree is 2 in each of u, v, w.
 ///
 ///   d_IJK = mean over i+i'=I, j+j'=J, k+k'=K of det[a_jk, b_ik', c_i'j']      a, b, c: the edges along u, v, w
 ///
 /// x        the 8 corners in the kind's order.
-/// d        coefficient (I, J, K) at 9 I + 3 J + K; corner values of det J have even indices only.
+/// d        coefficient (I, J, K) is at 9 I + 3 J + K; those with even I, J and K are the corner values of det J.
 /// Cost: 16 cross products and 48 dot products.
 template <class T>
 void hex_coefficients(const std::array<Vector<T>, 8>& x, std::array<T, 27>& d, EdgeLengths<T>& lengths) {
@@ -84,9 +84,9 @@ void hex_coefficients(const std::array<Vector<T>, 8>& x, std::array<T, 27>& d, E
   }
 }
 
-/// The 9 coefficients of a prism; degree 1 over the triangle, 2 along w, so coefficient (i, K) at 3 i + K:
-/// d_iK = mean over k+k'=K of det[p_k, q_k', c_i] with p, q the bottom and top triangles' edges and c_i the uprights.
-/// For every w, det J is linear over the triangle: three quadratics in w decide the cell.
+/// Computes the 9 coefficients of det J of a prism, of degree 1 over the triangle and 2 along w; (i, K) is at 3 i + K:
+/// d_iK = mean over k+k'=K of det[p_k, q_k', c_i] with p, q the bottom and top triangles' edges and c_i the upright
+/// edges. For every w, det J is linear over the triangle, so three quadratics in w decide the cell.
 template <class T>
 void prism_coefficients(const std::array<Vector<T>, 6>& x, std::array<T, 9>& d, EdgeLengths<T>& lengths) {
   const std::array<Vector<T>, 2> p = {difference(x[1], x[0]), difference(x[4], x[3])};
@@ -105,7 +105,7 @@ void prism_coefficients(const std::array<Vector<T>, 6>& x, std::array<T, 9>& d, 
   }
 }
 
-/// The one coefficient of a tet: det[x1 - x0, x2 - x0, x3 - x0], six times its volume.
+/// Computes the one coefficient of a tet: det[x1 - x0, x2 - x0, x3 - x0], six times its volume.
 template <class T>
 void tet_coefficients(const std::array<Vector<T>, 4>& x, std::array<T, 1>& d, EdgeLengths<T>& lengths) {
   const Vector<T> a = difference(x[1], x[0]), b = difference(x[2], x[0]), c = difference(x[3], x[0]);
@@ -114,25 +114,26 @@ void tet_coefficients(const std::array<Vector<T>, 4>& x, std::array<T, 1>& d, Ed
   d[0] = dot(a, cross(b, c));
 }
 
-/// Largest possible product |a||b||c| of a cell's edges, the unit of all rounding margins.
+/// Largest possible product |a||b||c| of a cell's edges along the three directions: the unit of all rounding margins.
 ///
-/// Infinite (nothing can be certified) where a length is NaN, or outside [1e-50, 1e50] so that products might underflow
-/// or overflow.
+/// Infinite (nothing can be certified) if a length is NaN, or outside [1e-50, 1e50] so that products might underflow or
+/// overflow.
 inline double length_scale(const EdgeLengths<double>& lengths) {
   const auto& m = lengths.squared_max;
   const bool in_range = m[0] >= 1e-100 && m[1] >= 1e-100 && m[2] >= 1e-100 && lengths.squared_sum <= 1e100;
   return in_range ? std::sqrt(m[0] * m[1] * m[2]) : std::numeric_limits<double>::infinity();
 }
 
-/// Bound on the error of a computed coefficient, after `level` halvings.
+/// Bound on the error of a computed coefficient after `level` bisections.
 ///
 /// Each of the products summed in a coefficient carries at most 12 roundings (three edge differences, cross product,
 /// two means, dot product), so with u = 2^-53
 ///
 ///   |error| <= 12u/(1 - 12u) perm(|a|,|b|,|c|) <= 12.1 u (6/3^1.5) |a||b||c| < 14 u |a||b||c|
 ///
-/// (the permanent's bound is Carlen, Lieb and Loss's). A halving averages six times in a row at most, and averages do
-/// not enlarge errors: 6 u |a||b||c| more per level. `scale` itself is good to 10 u, which the factors cover.
+/// (the permanent's bound is that of Carlen, Lieb and Loss). A bisection takes at most six averages in a row, and
+/// averages do not enlarge errors: 6 u |a||b||c| more per level. `scale` is itself accurate to 10 u, which the factors
+/// cover.
 inline double rounding_margin(double scale, int level) {
   constexpr double u = std::numeric_limits<double>::epsilon() / 2;
   return (16 + 6.5 * level) * u * scale;

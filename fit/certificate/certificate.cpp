@@ -15,7 +15,7 @@ namespace {
 using bernstein::EdgeLengths;
 using bernstein::Vector;
 
-/// What the first coefficients say of a cell.
+/// Bounds on det J from a cell's own coefficients.
 struct Bounds {
   double coefficient, corner, scale;  // least coefficient, least corner value, unit of the rounding margin
 
@@ -33,7 +33,7 @@ std::array<Vector<double>, N> gather(std::span<const Vec3> corners) {
   return x;
 }
 
-/// Coefficients of any kind; `count` of the array are used.
+/// Coefficients of a cell of any kind; the first `count` entries of the array are used.
 struct Coefficients {
   std::array<double, 27> d;
   int count;
@@ -79,7 +79,7 @@ Bounds bounds(CellKind kind, std::span<const Vec3> corners) {
   return result;
 }
 
-/// `bounds` of kLanes hexes at once; the same operations in each lane.
+/// Computes `bounds` of kLanes hexes at once, with the same operations in each lane.
 void bounds_of_hexes(std::span<const Vec3> positions, const Index* vertices, Bounds* out) {
   std::array<Lanes, 27> d;
   EdgeLengths<Lanes> lengths;
@@ -110,7 +110,7 @@ void for_each_cell_bounds(std::span<const Vec3> positions, const VolumeMesh& mes
   });
 }
 
-/// det J in extended precision, and a bound of its error relative to the length scale.
+/// det J in extended precision, and a bound on its error.
 struct Evaluated {
   long double value, margin;
 };
@@ -139,13 +139,14 @@ Evaluated evaluate(CellKind kind, std::span<const Vec3> x, const Vec3& at, doubl
   } else {
     for (int d = 0; d < 3; ++d) add(d, 1, d + 1, 0);
   }
-  // Interpolated columns take 9 roundings at most, their determinant 5: under 35 of the type's u per product, as in
-  // rounding_margin. Where long double is double this still holds.
+  // An interpolated column has at most 9 roundings and the determinant 5 more: fewer than 35 units of roundoff of the
+  // type per product, as in rounding_margin. This also holds if long double is double.
   constexpr long double u_wide = std::numeric_limits<long double>::epsilon() / 2;
   return {bernstein::dot(column[0], bernstein::cross(column[1], column[2])), 48 * u_wide * scale};
 }
 
-/// One dyadic part of a cell that is still open. Hexes: a cube of coefficients; prisms: the quadratics of three edges.
+/// One dyadic box of a cell that is not decided yet. Hexes: a cube of coefficients; prisms: the quadratics of three
+/// edges.
 template <std::size_t N>
 struct Box {
   std::array<double, N> d;
@@ -153,7 +154,7 @@ struct Box {
   int level;
 };
 
-/// Halves a quadratic with the given stride in place: `low` keeps [0, 1/2], `high` becomes [1/2, 1].
+/// Bisects a quadratic with the given stride in place: `low` keeps [0, 1/2], `high` becomes [1/2, 1].
 void halve(double* low, double* high, int stride) {
   const double d0 = low[0], d1 = low[stride], d2 = low[2 * stride];
   const double left = 0.5 * (d0 + d1), right = 0.5 * (d1 + d2), middle = 0.5 * (left + right);
@@ -197,7 +198,7 @@ Vec3 corner_point(const Box<9>& box, int index) {
   return {i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0, box.origin[2] + std::ldexp(1.0, -box.level) * (index % 3 / 2)};
 }
 
-/// Breadth-first search for the sign of det J over one cell: a witness is met at its coarsest level.
+/// Breadth-first search for the sign of det J over one cell: a witness is found at the coarsest level that has one.
 template <std::size_t N, std::size_t NumChildren>
 class Search {
  public:
@@ -229,7 +230,7 @@ class Search {
   }
 
  private:
-  /// Lower bound of det J over the box; remembers the lowest corner met, and whether it refutes the cell.
+  /// Returns a lower bound of det J over the box; records the lowest corner met, and whether it refutes the cell.
   double look_at(const Box<N>& box) {
     int lowest = 0;
     double least = box.d[0];

@@ -9,12 +9,12 @@
 
 namespace subvol {
 
-/// Expansions in Chebyshev polynomials with proved errors, in extended precision where there is one.
+/// Expansions in Chebyshev polynomials with proved error bounds, in extended precision if the platform has it.
 ///
 ///   f(mid + radius t) = sum_{k < count} c_k T_k(t) + error,   |error| <= remainder,   -1 <= t <= 1
 ///
-/// The c_k are those of the interpolant at the num_nodes zeros of a T_K. Its own error is at most
-/// sup|f^(K)| radius^K / (2^(K-1) K!); what is cut off it is at most the sum of its |c_k|.
+/// The c_k are those of the interpolant at the K = num_nodes zeros of T_K. Its own error is at most
+/// sup|f^(K)| radius^K / (2^(K-1) K!); truncating it adds at most the sum of the |c_k| that are dropped.
 class ChebyshevExpansion {
  public:
   explicit ChebyshevExpansion(int num_nodes) : num_nodes_(num_nodes) {
@@ -24,9 +24,10 @@ class ChebyshevExpansion {
 
   int num_nodes() const { return num_nodes_; }
 
-  /// coefficients  `count` <= num_nodes entries, written.
-  /// log_derivative_bound  logarithm of a bound of |f^(num_nodes)| on the interval; -infinity for polynomials below.
-  /// returns  the remainder, with 1e-15 of the largest value for rounding.
+  /// coefficients  output, `count` <= num_nodes entries.
+  /// log_derivative_bound  logarithm of a bound on |f^(num_nodes)| on the interval; -infinity if f is a polynomial of
+  /// lower degree.
+  /// returns  the remainder, including 1e-15 of the largest value for rounding.
   template <class Function>
   double expand(const Function& f, long double mid, long double radius, double log_derivative_bound, int count,
                 long double* coefficients) const {
@@ -39,7 +40,7 @@ class ChebyshevExpansion {
     long double cut = 0;
     for (int k = 0; k < num_nodes_; ++k) {
       long double sum = 0;
-      std::size_t at = k;  // k (2m + 1), of a cosine's period
+      std::size_t at = k;  // k (2m + 1), modulo the period of the cosine
       for (int m = 0; m < num_nodes_; ++m) {
         sum += values[m] * cosines_[at];
         at += 2 * k;
@@ -61,7 +62,8 @@ class ChebyshevExpansion {
   std::vector<long double> cosines_;  // of j pi / (2 num_nodes)
 };
 
-/// Coefficients of T_k, k <= degree, in the Bernstein polynomials of `degree` over [-1, 1]: row k, degree + 1 entries.
+/// Coefficients of T_k, k <= degree, in the Bernstein polynomials of `degree` over [-1, 1]: row k has degree + 1
+/// entries.
 std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree);
 
 }  // namespace subvol

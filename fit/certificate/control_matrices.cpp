@@ -17,11 +17,11 @@ namespace subvol {
 
 namespace {
 
-/// Vectors of matrices between two looks at what they are.
+/// Number of vectors of matrices taken in between two tests for positive definiteness.
 constexpr std::size_t kBlock = 4;
 
-/// About the transposed rotation of m's polar decomposition, by Newton's iteration, scaled while far from it (Higham).
-/// As m comes closer to a singular matrix, better and better; and times m symmetric.
+/// Approximates the transposed rotation of m's polar decomposition by Newton's iteration, scaled while far from it
+/// (Higham). The closer m is to a singular matrix, the smaller the error. The result times m is symmetric.
 Mat3 unrotate(const Mat3& m) {
   const auto inverse_transposed = [](const Mat3& x) {
     Mat3 result;
@@ -46,11 +46,11 @@ Mat3 unrotate(const Mat3& m) {
   return rotation.transpose() - 0.5 * (product - product.transpose()) * first_inverse.transpose();
 }
 
-/// Mean square of the entries of rotation (J_b - mean) frame, over some of the matrices that are spread over all.
+/// Mean square of the entries of rotation (J_b - mean) frame, over a sample of the matrices that is spread over all.
 /// frame: null for none.
 template <class Matrices>
 Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation, const Mat3* frame) {
-  constexpr std::size_t kMost = 4;  // vectors of them; more make little difference (measured)
+  constexpr std::size_t kMost = 4;  // vectors in the sample; more make little difference (measured)
   const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
   using Vector = typename Matrices::Vector;
   using Number = NumberOf<Vector>;
@@ -79,9 +79,9 @@ Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation,
   return result / static_cast<double>(kWide * sampled);
 }
 
-/// c, whose product is 1. lengths: of the columns of M frame.
+/// Returns c, with product 1. lengths: those of the columns of M frame.
 Vec3 scales_by_variation(const Mat3& variation, const Vec3& lengths) {
-  constexpr double kLeast = 0.01;  // squared share of the lengths, beside which less variation does not count
+  constexpr double kLeast = 0.01;  // squared share of the lengths; smaller variation does not count
   const Mat3 v = variation + kLeast * Vec3::Ones() * lengths.cwiseAbs2().transpose();
   const double by_01 = v(0, 1) / v(1, 0), by_02 = v(0, 2) / v(2, 0), by_12 = v(1, 2) / v(2, 1);
   const double first = std::cbrt(std::sqrt(by_01 * by_02)), second = std::cbrt(std::sqrt(by_12 / by_01));
@@ -91,9 +91,9 @@ Vec3 scales_by_variation(const Mat3& variation, const Vec3& lengths) {
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
 struct Bound {
-  double value;                    ///< of det J, 0: none
-  bool is_final;                   ///< no other L finds one
-  std::size_t in_the_way = kNone;  ///< b of an S_b that is not positive definite, if one is known
+  double value;                    ///< lower bound of det J; 0: none
+  bool is_final;                   ///< true if no other L needs to be tried: a bound was found, or none exists
+  std::size_t in_the_way = kNone;  ///< number b of an S_b that is not positive definite, if one is known
 };
 
 template <class Vector>
@@ -104,13 +104,13 @@ int lowest_place(const Vector& x) {
   return result;
 }
 
-/// A vector near the eigenvector of a symmetric matrix's least eigenvalue: a column of the adjugate of s + m, where m
-/// makes all eigenvalues positive. Closer ones serve no better (measured).
+/// Returns a vector near the eigenvector of a symmetric matrix's least eigenvalue: a column of the adjugate of s + m,
+/// where m, a multiple of the identity, makes all eigenvalues positive. Closer vectors bring no benefit (measured).
 Vec3 near_least_eigenvector(const Mat3& s) {
   const double third = s.trace() / 3;
   Mat3 shifted = s;
   shifted.diagonal().array() -= third;
-  const double half_size = std::sqrt(shifted.squaredNorm() / 6);  // eigenvalues of that are within twice as much
+  const double half_size = std::sqrt(shifted.squaredNorm() / 6);  // the eigenvalues of `shifted` are within twice this
   if (!(half_size > 0)) return Vec3::UnitX();
   shifted.diagonal().array() += 2 * half_size;
   Mat3 adjugate;
@@ -120,11 +120,11 @@ Vec3 near_least_eigenvector(const Mat3& s) {
   return adjugate.col(largest);
 }
 
-/// L + (margin - e) v (J_b D v)^T / |J_b D v|^2, where e <= 0 is the least eigenvalue of sym(L J_b D) and v its
-/// eigenvector, of any length: then v^T L J_b D v = margin v^T v. A step of the perceptron algorithm for an L that
-/// suits all b.
+/// Returns L + (margin - e) v (J_b D v)^T / |J_b D v|^2, where e <= 0 is the least eigenvalue of sym(L J_b D) and v its
+/// eigenvector, of any length: then v^T L J_b D v = margin v^T v. This is one step of the perceptron algorithm for an L
+/// that suits all b.
 Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
-  constexpr double kMargin = 0.06;  // against L's largest entry
+  constexpr double kMargin = 0.06;  // relative to L's largest entry
   l *= 1 / l.cwiseAbs().maxCoeff();
   const Mat3 product = l * scaled_matrix;
   const Vec3 v = near_least_eigenvector(0.5 * (product + product.transpose()));
@@ -133,7 +133,7 @@ Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
   return l + (kMargin - least) / w.squaredNorm() * v * w.transpose();
 }
 
-/// The lowest of the leading minors and largest entries of many symmetric matrices 2 T_b, T_b = sym(m_b) - diag(shift).
+/// Lowest leading minors and largest entries of many symmetric matrices 2 T_b, T_b = sym(m_b) - diag(shift).
 template <class Vector>
 struct Extremes {
   explicit Extremes(const Vec3& shift)
@@ -161,14 +161,14 @@ struct Extremes {
     take_lower(result, third);
     return result;
   }
-  /// A lower bound of det S_b, S_b = D T_b D, if all are positive definite for certain; else 0. scale: D.
+  /// Returns a lower bound of det S_b, S_b = D T_b D, if all are certainly positive definite; else 0. scale: D.
   double determinant(const Vec3& scale) const {
     constexpr double kRoundoff = std::numeric_limits<Number>::epsilon() / 2;
     const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes[e]) * scale[i] * scale[k]; };
     const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
                                      scaled_size(3, 0, 2), scaled_size(4, 1, 2)});
     const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
-    // Products of two entries with at most 3 roundings each in a second minor, six of three with 5 to 6 in a third.
+    // A second minor has products of two entries with at most 3 roundings each, a third minor six of three with 5 or 6.
     const double least = to_third * lowest_lane(third) - 100 * kRoundoff * largest * largest * largest;
     return largest < 1e30 && lowest_lane(first) > 0 &&
                    to_second * lowest_lane(second) > 9 * kRoundoff * largest * largest && least > 0
@@ -182,25 +182,26 @@ struct Extremes {
 
   Number start0, start1, start2;
   Vector first, second, third;
-  Vector sizes[5] = {};  // without t01, which is less than t00 or t11 where the second minor is positive
+  Vector sizes[5] = {};  // without t01, which is less than t00 or t11 if the second minor is positive
 };
 
-/// What is known of a box when some of these T_b are not positive definite. begin: number of the first one.
+/// Result for a box if T_b is not positive definite for some of these matrices. begin: number of the first matrix.
 template <class Vector>
 Bound failed_at(std::size_t begin, const MatrixOf<Vector>& m, const Extremes<Vector>& own) {
   const Vector det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
                    m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                    m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-  return {0, lanes_within(det, 0) != 0, begin + lowest_place(own.lowest_minor())};  // S_b > 0 has det J_b > 0
+  return {0, lanes_within(det, 0) != 0, begin + lowest_place(own.lowest_minor())};  // S_b > 0 implies det J_b > 0
 }
 
-/// Takes the T_b of `count` matrices in. The number of one that is not positive definite, at which it ends, or kNone.
+/// Takes in the T_b of `count` matrices. Stops at, and returns, the number of one that is not positive definite; else
+/// kNone.
 template <class Vector, class Product>
 std::size_t take_until_failure(const Product& product, std::size_t count, const Vec3& shift,
                                Extremes<Vector>& extremes) {
   constexpr std::size_t kLanes = sizeof(Vector) / sizeof(Vector{}[0]);
   MatrixOf<Vector> m;
-  const auto place = [&](std::size_t b) { return std::min(b, count - kLanes); };  // the last lanes overlap
+  const auto place = [&](std::size_t b) { return std::min(b, count - kLanes); };  // the last vector may overlap
   for (std::size_t block = 0; block < count; block += kBlock * kLanes) {
     const std::size_t end = std::min(count, block + kBlock * kLanes);
     for (std::size_t b = block; b < end; b += kLanes) {
@@ -218,12 +219,12 @@ std::size_t take_until_failure(const Product& product, std::size_t count, const 
   return kNone;
 }
 
-/// Twice what must be taken from the diagonal of S_b, where |error of L J D| <= g.
+/// Twice the amount to subtract from the diagonal of S_b if |error of L J D| <= g.
 Vec3 sums_of_both(const Mat3& g) { return g.rowwise().sum() + g.colwise().sum().transpose(); }
 
-/// What bounds by any L have in common.
+/// Data shared by the bounds with all L.
 ///
-/// D is taken times the longest column of the mean: no entry of T_b below is much above 1.
+/// D is multiplied by the length of the mean's longest column, so that no entry of T_b below is much above 1.
 struct Scaling {
   Scaling(const Mat3& mean_matrix, const Vec3& mean_lengths, const Mat3& remainder)
       : mean(mean_matrix), lengths(mean_lengths), longest(lengths.maxCoeff()),
@@ -232,17 +233,17 @@ struct Scaling {
         scaled_remainder(remainder * (scale / longest).asDiagonal()) {}
 
   Mat3 mean;
-  Vec3 lengths;            ///< of its columns
+  Vec3 lengths;            ///< of the columns of `mean`
   double longest;
-  Vec3 scale;              ///< D
-  Vec3 unscaling;          ///< 1 over D, and over `longest`
-  Vec3 squared_unscaling;  ///< 1 over D^2
-  Mat3 scaled_remainder;   ///< by `longest`, times D
+  Vec3 scale;              ///< D times `longest`
+  Vec3 unscaling;          ///< 1 over `scale` and over `longest`
+  Vec3 squared_unscaling;  ///< 1 over `scale`, squared
+  Mat3 scaled_remainder;   ///< the remainder over `longest`, times `scale`
 };
 
-/// The bound of det S_b in single precision, or 0; in_the_way: where it failed, if so.
+/// Returns the bound of det S_b in single precision, or 0; in_the_way: the number of the matrix where it failed, if so.
 ///
-/// S_b = D T_b D, T_b = sym(unscaled J_b) - ..., where T_b is about 1 at the most.
+/// S_b = D T_b D, T_b = sym(unscaled J_b) - ..., where the entries of T_b are about 1 at most.
 template <class Matrices>
 double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift, const Scaling& scaling,
                     std::size_t& in_the_way) {
@@ -262,13 +263,13 @@ double narrow_bound(Matrices& matrices, const Mat3& unscaled, const Vec3& shift,
   }
 }
 
-/// The bound by one L.
+/// Computes the bound with one L.
 ///
-/// in_the_way  number of the matrix to begin with: one that another L failed at is likely to be in the way again
+/// in_the_way  number of the matrix to examine first: one at which another L failed is likely to fail again
 template <class Matrices>
 Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOptions& options,
                std::size_t in_the_way) {
-  constexpr double kLeastDeterminant = 1e-3;  // of L, by its largest entry cubed: so it is good to 1e-11
+  constexpr double kLeastDeterminant = 1e-3;  // of L, relative to its largest entry cubed: then it is accurate to 1e-11
   l *= 1 / l.cwiseAbs().maxCoeff();
   const double l_determinant = l.determinant();
   if (!(l_determinant > kLeastDeterminant)) return {0, false};
@@ -276,7 +277,7 @@ Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOp
   for (int i = 0; i < 3; ++i)
     if (!(l.row(i).dot(scaling.mean.col(i)) > shift[i] * scaling.lengths[i])) return {0, false};
 
-  // T_b = D^-1 S_b D^-1 = sym(D^-1 L J_b) - ...: what is scaled are the extremes over all b.
+  // T_b = D^-1 S_b D^-1 = sym(D^-1 L J_b) - ...: only the extremes over all b are scaled.
   const Mat3 unscaled = scaling.unscaling.asDiagonal() * l;
   const Vec3 unscaled_shift = shift.cwiseProduct(scaling.squared_unscaling);
   const std::size_t count = matrices.size();
@@ -336,10 +337,10 @@ Mat3 ControlMatrices::mean() const {
 template <class Matrices>
 double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame, const BoundOptions& options,
                          Mat3* near_l) {
-  constexpr int kMostTurns = 3;  // more cost what they save, and so does an end as soon as e is low (measured)
+  constexpr int kMostTurns = 3;  // more turns cost as much as they save, and so does stopping at a low e (measured)
   const Mat3 mean = matrices.mean();
   const Vec3 lengths = mean.colwise().norm().transpose(), inverse_lengths = lengths.cwiseInverse();
-  // Also where a column is 0 or not finite.
+  // This also rejects a column that is 0 or not finite.
   if (!((mean * inverse_lengths.asDiagonal()).determinant() > 1e-12)) return 0;
   const Scaling scaling(mean, lengths, remainder);
   const auto bound = [&](const Mat3& l, std::size_t in_the_way = kNone) {
@@ -356,7 +357,7 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
   const Mat3 framed = is_framed ? Mat3(mean * frame) : mean;
   const Vec3 framed_lengths = is_framed ? Vec3(framed.colwise().norm().transpose()) : lengths;
   const Vec3 framed_scale = is_framed ? Vec3(framed_lengths.cwiseInverse()) : inverse_lengths;
-  // D frame^-T diag(c)^-1 rotation.
+  // L = D frame^-T diag(c)^-1 rotation.
   const auto from_frame = [&](const Vec3& c, const Mat3& rotation) -> Mat3 {
     const Mat3 in_frame = c.cwiseInverse().asDiagonal() * rotation;
     return inverse_lengths.asDiagonal() * (is_framed ? Mat3(frame.inverse().transpose() * in_frame) : in_frame);
@@ -374,7 +375,7 @@ double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& 
     l = turned(l, matrices[result.in_the_way] * inverse_lengths.asDiagonal());
     result = bound(l, result.in_the_way);
   }
-  // The remainder is smallest by the box's own coordinates.
+  // The remainder is smallest in the box's own coordinates.
   if (!result.is_final && is_framed) result = bound(unrotate(mean * inverse_lengths.asDiagonal()), result.in_the_way);
   return result.value;
 }

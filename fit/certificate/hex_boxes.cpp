@@ -9,19 +9,19 @@ namespace subvol {
 
 namespace {
 
-/// Share of the mean edges up to which errors of models are small as long as nothing is known of det J.
+/// Model errors up to this share of the mean edges count as small as long as nothing is known about det J.
 constexpr double kSmallError = 0.15;
-/// Beyond this sum it does not pay to look: the shifts of `determinant_bound` sum up to about that much, if the mean
-/// edges tell the mean matrix, and what they leave must be more than the variation of J (measured).
+/// Sum of relative model errors above which examining a box does not pay: the shifts of `determinant_bound` add up to
+/// about that much if the mean edges represent the mean matrix, and the rest must exceed the variation of J (measured).
 constexpr double kHopelessError = 0.55;
 
-/// Boxes of each precision that keep their coefficients (15 KB, 8 KB) until they are halved.
+/// Largest number of boxes, per precision, that keep their coefficients (15 KB, 8 KB) until they are bisected.
 constexpr int kMostKept = 64;
 
-// Of the lowest det J, by the mean edges, up to `kGood` of it: what errors may come to.
+// Model errors may be at most kShare * min(lowest det J, kGood), with det J relative to the cell's mean determinant.
 constexpr double kShare = 0.1, kGood = 0.5;
 
-/// Which of the first kWide entries of a matrix, by columns, are of that column.
+/// 1 for those of the first kWide entries of a matrix, stored by columns, that belong to the column.
 constexpr Wide kIsColumn[] = {{1, 1, 1, 0, 0, 0, 0, 0}, {0, 0, 0, 1, 1, 1, 0, 0}, {0, 0, 0, 0, 0, 0, 1, 1}};
 
 }  // namespace
@@ -75,14 +75,14 @@ void HexBoxes::set_cell(std::span<const LocalMode> modes, std::span<const Vec3> 
   fits_single_ = total < kMost && total > 1 / kMost;
 }
 
-/// |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i|, |sum_i x_i N_i'| <= |x_1 - x_0| + ...: that for
-/// two directions, one after the other. Numbers i are in lanes.
+/// Bounds |sum_i x_i N_i| <= max(|x_0|, |x_1|) + sum_{i >= 2} |x_i| sup|N_i| and |sum_i x_i N_i'| <= |x_1 - x_0| + ...
+/// for two directions, one after the other. The indices i are in lanes.
 void HexBoxes::make_weights() {
   const auto larger = [](Wide x, const Wide& y) {
     take_higher(x, y);
     return x;
   };
-  // Of the numbers in lanes.
+  // Sum over the indices in lanes.
   const auto modes_along = [&](const double* x, const AlignedDoubles& bounds) {
     Wide sum{};
     for (int i = 0; i < lanes_; i += kWide) sum += load_wide(x + i) * load_wide(bounds.data() + i);
@@ -127,7 +127,7 @@ void HexBoxes::make_weights() {
       }
     }
 
-    // |a_1jk - a_0jk|, by k and j, and these numbers' sum over k.
+    // |a_1jk - a_0jk|, indexed by k and j, and the bound of their sum over k.
     for (int k = 0; k < n_; ++k)
       for (int j = 0; j < n_; ++j) {
         const double* x = modes + k * layer + j * n_;
@@ -157,7 +157,7 @@ void HexBoxes::make_weights() {
 void HexBoxes::find_line_error(const LineModels::Level& line, int zone, int direction, LineError& result) {
   result.cell = cell_;
   const LineModels::Errors& errors = line.errors[zone];
-  // Entries, by columns: of the column along the direction, and of the others.
+  // Entries, by columns: those of the column along the direction, and those of the others.
   const Wide is_along = kIsColumn[direction], is_across = 1 - is_along;
   Wide entries{};
   double last = 0;
@@ -199,8 +199,8 @@ double HexBoxes::choose_models(Box& box) {
 }
 
 void HexBoxes::choose_split(Box& box) {
-  // Contractions along u cost least, and boxes next to one another share those along w, and v: what must be halved
-  // anyway along w comes first.
+  // Contractions along u cost least, and neighboring boxes share those along w, and along w and v. So a bisection along
+  // w that is needed anyway comes first.
   constexpr double kNeeded = 0.3;
   constexpr double kCost[3] = {0.9, 1, 1.1};
   const bool is_looked_at = has_coefficients(box);
@@ -223,7 +223,7 @@ void HexBoxes::choose_split(Box& box) {
     if (box.levels[d] < LineModels::kMaxLevel &&
         (box.split < 0 || variation[d] * kCost[box.split] > variation[box.split] * kCost[d]))
       box.split = d;
-  if (box.split < 0) box.split = 0;  // the deepest box there is
+  if (box.split < 0) box.split = 0;  // no direction can be bisected further
   if (pool_.num_taken() > kMostKept) box.coefficients.reset();
   if (narrow_pool_.num_taken() > kMostKept) box.narrow.reset();
 }
@@ -237,7 +237,7 @@ bool HexBoxes::improve(Box& box, double lowest, bool is_last) {
   if (is_looked_at && !is_last && narrow_error_size(box) <= allowed) return false;
   box.is_precise = true;
   box.narrow.reset();
-  choose_models(box);  // what comes next is contracted, with models of the box itself
+  choose_models(box);  // the next coefficients are contracted with models of the box itself
   return true;
 }
 
@@ -301,7 +301,7 @@ void HexBoxes::find_coefficients(Box& box) {
 }
 
 /// With P the models: N_i N_j N_k - P_i P_j P_k = (N_i - P_i) N_j N_k + P_i (N_j - P_j) N_k + P_i P_j (N_k - P_k), and
-/// so with one of each three differentiated; |P| is at most `growth` times what bounds |N|.
+/// likewise with one function of each triple differentiated; |P| is at most `growth` times the bound of |N|.
 Mat3 HexBoxes::remainder(const Box& box) {
   Mat3 result = Mat3::Zero();
   double growth = 1, inflation = 1;
@@ -311,8 +311,9 @@ Mat3 HexBoxes::remainder(const Box& box) {
     growth *= error.growth;
     inflation *= error.inflation;
   }
-  // Three contractions of n_ terms, tables good to 4 roundings each, the shift, the steps, halvings, L, differences, and
-  // the 16 asked for. Steps of steps have the roundings of those that they are made of: all in all kSteps of the total.
+  // Roundings: three contractions of n_ terms, tables accurate to 4 roundings each, the shift, the steps, bisections,
+  // L, differences, and the 16 that `determinant_bound` requires. Steps of steps inherit the roundings of the steps
+  // they are computed from: kSteps of the total in all.
   constexpr int kSteps = 13;
   const double roundings = 3 * (n_ + 4) + 1 + kSteps + kWide * box.halved + 3 + 8 + 16;
   const double rounding = roundings * (std::numeric_limits<double>::epsilon() / 2) * inflation;

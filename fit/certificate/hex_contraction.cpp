@@ -13,20 +13,21 @@ namespace {
 
 constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
 
-/// Columns that are contracted at a time where lanes are of the result's direction.
+/// Number of columns contracted at a time if lanes run along the result's direction.
 constexpr int kSome = 5;
 
-/// Of the functions along u and w, ascending: those that take the least time (measured).
+/// Degrees of the models along u and w, ascending: those that take the least time (measured).
 std::vector<int> model_degrees(Basis basis, int order) {
   if (order == 1 || (basis == Basis::legendre && order < kWide)) return {order};
   return {5, basis == Basis::legendre ? 6 : kWide - 1};
 }
 
-/// What tables hold, for each function of a direction, kStride apart: coefficients of all outputs, where 1, which has
-/// none of its own, counts 1; or deviations, where it counts 0, and for the last output middles, where it counts 1.
+/// Content of the tables, for each function of a direction, kStride apart: either the coefficients of all outputs, with
+/// a weight of 1 for the function 1, which has no coefficients of its own; or the deviations, with a weight of 0 for
+/// it, and the middles as the last output, with a weight of 1 for it.
 enum class Of { values, deviations };
 
-/// Lines of numbers, each `stride` after the one before; of every kRow numbers, those lines are 0 from `used` on.
+/// Lines of numbers, each `stride` after the one before. In every group of kRow numbers, lines from `used` on are 0.
 template <class Number>
 struct Lines {
   const Number* begin;
@@ -34,8 +35,8 @@ struct Lines {
   const int* used;
 };
 
-/// out[o out_stride + m] = more[o] + [1 counts 1] in[0][m] + sum_{k > 0} table[k][o] in[k][m], o < num_out, for all
-/// m < length, and some behind them, to whole vectors. by_size: of |in| instead.
+/// out[o out_stride + m] = more[o] + c in[0][m] + sum_{k > 0} table[k][o] in[k][m], o < num_out, for all m < length,
+/// and for some beyond it, up to whole vectors; c is the weight of the function 1 (`Of`). by_size: uses |in|.
 template <int num_out, Of of, bool by_size, class Number>
 void contract_to(const Number* table, const Lines<Number>& in, const Number* more, Number* out, int out_stride) {
   const auto contract = [&]<class Vector>(int m, const Vector&) {
@@ -65,7 +66,7 @@ void contract_to(const Number* table, const Lines<Number>& in, const Number* mor
   }
 }
 
-/// For a number of outputs known at run time, deviations' middle among them.
+/// Calls `contract_to` for a number of outputs known at run time, the deviations' middle included.
 template <Of of, class Number>
 void contract(int num_out, const Number* table, const Lines<Number>& in, const Number* more, Number* out,
               int out_stride) {
@@ -83,8 +84,8 @@ void contract(int num_out, const Number* table, const Lines<Number>& in, const N
   kAll[num_out](table, in, more, out, out_stride);
 }
 
-/// out[i out_stride], lane p, = more[i] + [1 counts 1] in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n. Runs
-/// over the end: reads up to kSome numbers, and writes as many vectors, behind it.
+/// out[i out_stride], lane p, = more[i] + c in[0][i] + sum_{0 < j < n} table[j][p] in[j][i], for i < n; c is the weight
+/// of the function 1 (`Of`). Reads up to kSome numbers, and writes as many vectors, beyond the end.
 template <Of of, class Vector>
 void contract_to_lanes(const NumberOf<Vector>* table, const NumberOf<Vector>* in, int n, const Vector* more,
                        Vector* out, int out_stride) {
@@ -123,7 +124,7 @@ HexContraction::HexContraction(Basis basis, int order)
   lane_bounds_.assign(lanes_, 0);
   std::copy_n(bounds_.begin(), n_, lane_bounds_.begin());
 
-  // With room for what is read, or written, behind the end.
+  // With room for what is read or written beyond the end.
   const std::size_t most = tiers_[0].back()->degree() + 1, row = row_ + kRow, lines = n_ + kSome;
   modes_.assign(n_ * row, 0);
   after_w_.assign(most * row, 0);
@@ -151,7 +152,7 @@ void HexContraction::set_modes(std::span<const LocalMode> modes) {
     places_.push_back(mode.k * row_ + mode.j * n_ + mode.i);
     const int last_i = std::max<int>(mode.i, 1), last_j = std::max<int>(mode.j, 1), last_k = std::max<int>(mode.k, 1);
     for (int d = 0; d < 3; ++d)
-      for (int j = mode.j; j <= last_j; ++j)  // and where its steps go
+      for (int j = mode.j; j <= last_j; ++j)  // also where take_steps writes
         for (int i = mode.i; i <= last_i; ++i) {
           int& used = used_[(d * face_ + j * n_ + i) / kRow];
           used = std::max(used, last_k + 1);
@@ -255,9 +256,9 @@ void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result
     const Lines<float> in{numbers(narrow_v_[d].data()), row, row, all_used_.data()};
     subvol::contract<Of::values>(num_u, coefficients, in, numbers(&more), numbers(result.coordinate(d)), row);
 
-    // Rounded are both factors of each product, the product and the sums: n + 2 times a direction. In 1e-5 are the
-    // roundings of these bounds themselves, and products of roundings: about 100; in 1e-33 is underflow, of up to 17^3
-    // terms with coefficients up to 60.
+    // The two factors of each product, the product and the sums are rounded: n + 2 roundings per direction. 1e-5 covers
+    // the roundings of these bounds themselves and products of roundings, about 100; 1e-33 covers underflow of up to
+    // 17^3 terms with coefficients up to 60.
     result.precision.sizes[d] = (1 + 1e-5) * size;
     result.precision.errors[d] = 3 * (n_ + 2) * kNarrowRoundoff * result.precision.sizes[d] + 1e-33;
   }

@@ -11,32 +11,32 @@
 
 namespace subvol {
 
-/// A dyadic part of [0, 1]^3, and which models of N_i(u), N_j(v), N_k(w) stand for them there.
+/// A dyadic box of [0, 1]^3, and the models that replace N_i(u), N_j(v), N_k(w) on it.
 struct HexPart {
-  std::array<int, 3> levels{}, index{};  ///< per direction: side 2^-level, and place
-  std::array<int, 3> tiers{};            ///< of the models, by ascending degree
+  std::array<int, 3> levels{}, index{};  ///< per direction: side length 2^-level, and position
+  std::array<int, 3> tiers{};            ///< per direction: number of the models, by ascending degree
 };
 
-/// Bernstein coefficients of the map of one high-order hex on its parts: with N_k = sum_q b_kq B_q there,
+/// Computes the Bernstein coefficients of the map of one high-order hex on its boxes: with N_k = sum_q b_kq B_q there,
 ///
 ///   X_opq = sum_i b_io sum_j b_jp sum_k b_kq a_ijk
 ///
-/// Parts of one place along w, or along w and v, share the first contractions. Along u and w models are of the least
-/// degree asked for; along v always of degree kWide - 1, so that a row of coefficients is one vector.
+/// Boxes at one place along w, or along w and v, share the first contractions. Along u and w, models have the lowest
+/// degree requested; along v always degree kWide - 1, so that a row of coefficients is one vector.
 ///
-/// In single precision, with b_kq = c_k + d_kq, c_k in the middle between the least b_kq and the largest:
+/// In single precision, with b_kq = c_k + d_kq and c_k midway between the smallest and the largest b_kq:
 ///
 ///   W_q   = sum_k d_kq a_k                  M  = sum_k c_k a_k
 ///   V_pq  = sum_j (d_jp M_j + b_jp W_jq)    M' = sum_j c_j M_j
 ///   X_opq = sum_i (d_io M'_i + b_io V_ipq) + sum_i c_i M'_i
 ///
-/// without the last sum, which is a point that the coefficients are relative to. Every term of the others has a
-/// deviation d: so all that is rounded is small beside the part. What bounds it are the same sums over sizes, with
-/// max_q |d_kq|, max_q |b_kq| and |c_k|.
+/// without the last sum, which is the point that the coefficients are relative to. Every term of the other sums
+/// contains a deviation d, so everything that is rounded is small relative to the box. The rounding errors are bounded
+/// by the same sums of absolute values, with max_q |d_kq|, max_q |b_kq| and |c_k|.
 class HexContraction {
  public:
   static constexpr int kMostTiers = 2;
-  static constexpr int kRow = kWideFloats;  ///< rows are rounded up to so many numbers
+  static constexpr int kRow = kWideFloats;  ///< rows are padded to a multiple of this
 
   HexContraction(Basis basis, int order);
 
@@ -46,32 +46,32 @@ class HexContraction {
     return models(direction, part.tiers[direction]);
   }
 
-  /// Takes a cell by its modes and their coefficients, relative to a point nearby. Modes must stay where, and what,
-  /// they are until others come.
+  /// Sets the cell: its modes and their coefficients, relative to a nearby point. The array of modes must stay in place
+  /// and unchanged until other modes are set.
   void set_cell(std::span<const LocalMode> modes, std::span<const Vec3> coefficients);
-  /// By 1, x, N_2, ... in all directions, instead of N_0, N_1, N_2, ...: for 1 nothing must be multiplied. Comes before
-  /// all contractions.
+  /// Changes to the functions 1, x, N_2, ... in all directions, instead of N_0, N_1, N_2, ...: the function 1 needs no
+  /// multiplication. Must be called before any contraction.
   void take_steps();
-  /// x, y or z of a_ijk, at k row() + j (order + 1) + i.
+  /// Coordinate x, y or z of the a_ijk, each at k row() + j (order + 1) + i.
   const double* modes(int coordinate) const { return modes_.data() + coordinate * face_; }
   int row() const { return row_; }
-  /// After `take_steps`: sum of |a_ijk| times the bounds of 1, x, N_2, ...
+  /// After `take_steps`: the sum of |a_ijk| times the bounds of 1, x, N_2, ...
   const Vec3& total() const { return total_; }
 
-  /// In double precision; levels of the part up to LineModels::kMaxLevel.
+  /// Contracts in double precision; levels of the box are at most LineModels::kMaxLevel.
   void contract(const HexPart& part, HexCoefficients& result);
-  /// In single precision, with `result.precision`; for a cell whose `total` is within 1e-10 to 1e10.
+  /// Contracts in single precision and sets `result.precision`; for a cell whose `total` is within 1e-10 to 1e10.
   void contract(const HexPart& part, NarrowHexCoefficients& result);
 
  private:
   template <class Vector>
   using Vectors = std::vector<Vector, AlignedAllocator<Vector>>;
 
-  /// What buffers hold: how many directions are contracted, from w on, and for which part.
+  /// State of the buffers: how many directions are contracted, from w on, and for which box.
   struct Contracted {
     int directions = 0;
     HexPart part;
-    /// Forgets what is not of that part.
+    /// Discards what does not belong to the box `wanted`.
     void keep(const HexPart& wanted);
   };
 
@@ -83,18 +83,18 @@ class HexContraction {
   void contract_narrow_v(const HexPart& part);
 
   int n_, face_;                                         // functions per direction, and their square
-  int lanes_, row_;                                      // n_ to a multiple of kWide, 3 face_ to one of kRow
+  int lanes_, row_;                                      // n_ padded to a multiple of kWide, 3 face_ to one of kRow
   std::array<std::vector<const LineModels*>, 3> tiers_;  // per direction, by ascending degree; along v there is one
   LineModels::PerFunction bounds_;                       // of N_i
   AlignedDoubles lane_bounds_;
 
-  // x, y and z are one after the other, so far as nothing else is said.
+  // x, y and z are stored one after the other unless stated otherwise.
   AlignedDoubles modes_;                 // a_ijk at k row_ + j n + i
-  const LocalMode* of_modes_ = nullptr;  // and for which modes,
+  const LocalMode* of_modes_ = nullptr;  // the modes that places_ and used_ are made for
   std::size_t num_modes_ = 0;
-  std::vector<int> places_;              // where each of them is
-  std::vector<int> used_;                // of every kRow numbers of a row: first k from where on all are 0
-  std::vector<int> all_used_;            // the same where all are used
+  std::vector<int> places_;              // position of each mode
+  std::vector<int> used_;                // for each kRow numbers of a row: the first k from which on all are 0
+  std::vector<int> all_used_;            // the same if all are used
   Vec3 total_;
 
   Contracted contracted_;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
 
-/// Of n coefficients, `stride` vectors apart.
+/// Bisects a line of n coefficients, `stride` vectors apart.
 template <int n, class Vector>
 void halve_line(Vector* low, Vector* high, int stride) {
   Vector x[n];
@@ -37,7 +37,7 @@ constexpr HalveLine<Vector> kHalveLine[] = {nullptr,
                                             halve_line<7, Vector>,
                                             halve_line<8, Vector>};
 
-/// What coefficient k of a line of kWide counts in those of the halves: C(o, k) / 2^o in number o of the lower one.
+/// Weight of coefficient k of a line of kWide in those of its halves: C(o, k) / 2^o in number o of the lower half.
 template <class Vector>
 struct HalvingWeights {
   constexpr HalvingWeights() {
@@ -139,7 +139,7 @@ Mat3 HexMatricesOf<Vector>::mean() const {
 
 template <class Vector>
 Mat3 HexMatricesOf<Vector>::variation() const {
-  constexpr Vector kInside{1, 1, 1, 1, 1, 1, 0, 0};  // where there are two more
+  constexpr Vector kInside{1, 1, 1, 1, 1, 1, 0, 0};  // lanes with two more after them
   const int degree_u = num_u_ - 1, degree_v = kWide - 1, degree_w = num_w_ - 1;
   Vector uu{}, vv{}, ww{}, uv{}, uw{}, vw{};
   for (int row = 0; row < 3; ++row)
@@ -182,8 +182,8 @@ HexMatrices::Product HexMatrices::times(const Mat3& l) {
 }
 
 Vec3 NarrowHexMatrices::entry_errors(const NarrowHexCoefficients::Precision& precision) {
-  // q differences of two numbers, with their own errors and 4 roundings each (L's and those of the product), one for
-  // each of three operations with them, and two more for what is made of entries.
+  // An entry sums q differences of two numbers, with their own errors and 4 roundings each (those of L and the
+  // product), one rounding for each of three operations with them, and two more for what is computed from entries.
   constexpr double kDegree = kWide - 1, kRoundings = 18 * kDegree;
   return 2 * kDegree * precision.errors + kRoundings * kNarrowRoundoff * precision.sizes;
 }
@@ -197,7 +197,7 @@ NarrowHexMatrices::NarrowProduct NarrowHexMatrices::narrow_product(const Mat3& l
   const float *x = numbers(of_->coordinate(0)), *y = numbers(of_->coordinate(1)), *z = numbers(of_->coordinate(2));
   for (int row = 0; row < 3; ++row) {
     float* out = numbers(product_.coordinate(row));
-    for (int n = 0; n < count; n += kWideFloats)  // what is behind the end counts 0 times
+    for (int n = 0; n < count; n += kWideFloats)  // values beyond the end have weight 0
       store_wide(factors(row, 0) * load_wide(x + n) + factors(row, 1) * load_wide(y + n) +
                      factors(row, 2) * load_wide(z + n),
                  out + n);

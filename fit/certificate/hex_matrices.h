@@ -16,26 +16,26 @@ namespace subvol {
 template <class Vector>
 class HexCoefficientsOf {
  public:
-  static constexpr int kMost = kWide;  ///< num_u and num_w; at least 2
+  static constexpr int kMost = kWide;  ///< largest num_u and num_w; the smallest is 2
   static constexpr int kMargin = kWide;
 
   void resize(int num_u, int num_w) { num_u_ = num_u, num_w_ = num_w; }
   int num_u() const { return num_u_; }
   int num_w() const { return num_w_; }
   int num_vectors() const { return num_u_ * num_w_; }
-  /// x, y or z; kMargin vectors on either side are there to be read, and finite.
+  /// Coefficients of x, y or z. The kMargin vectors on either side can be read and are finite.
   Vector* coordinate(int row) { return x_[row].data() + kMargin; }
   const Vector* coordinate(int row) const { return x_[row].data() + kMargin; }
 
-  /// Of what is in single precision, by rows: bounds of its errors, which come from that, and of its size when it was
-  /// made. Halves are as large but for their roundings.
+  /// For single precision, by rows: bounds on the coefficients' errors due to it, and on their size when they were
+  /// computed. Bisected coefficients are no larger, apart from rounding.
   struct Precision {
     Vec3 errors = Vec3::Zero(), sizes = Vec3::Zero();
   };
   Precision precision;
 
-  /// What was of the whole is of the lower half of a direction from here on, and `high` of the other one (de
-  /// Casteljau): a mean of up to kWide coefficients, by exact weights.
+  /// Bisects along a direction (de Casteljau): this object becomes the lower half, `high` the upper one. Each
+  /// coefficient becomes a mean of up to kWide coefficients, with exact weights.
   void halve(int direction, HexCoefficientsOf& high);
 
  private:
@@ -43,39 +43,39 @@ class HexCoefficientsOf {
   alignas(WideFloats) std::array<std::array<Vector, kMost * kMost + 2 * kMargin>, 3> x_{};
 };
 using HexCoefficients = HexCoefficientsOf<Wide>;
-/// In single precision, relative to a point nearby.
+/// Coefficients in single precision, relative to a nearby point.
 using NarrowHexCoefficients = HexCoefficientsOf<Narrow>;
 
-/// The `ControlMatrices` J_b of such a map, made as they are asked for.
+/// The `ControlMatrices` J_b of such a map, computed on demand.
 ///
-/// Matrix (u, v, w) is number (u num_w + w) kWide + v. Its columns are differences of coefficients, raised to the
-/// map's degree q again:
+/// Matrix (u, v, w) is number (u num_w + w) kWide + v. Its columns are differences of coefficients, with the degree
+/// raised to the map's degree q again:
 ///
-///   J_b = o (X_b - X_below) + (q - o) (X_above - X_b),   o the place of b along the column's direction
+///   J_b = o (X_b - X_below) + (q - o) (X_above - X_b),   o the index of b along the column's direction
 ///
-/// L J_b are those of L X_b: so L costs three products per coefficient instead of nine.
+/// The L J_b are the matrices of L X_b, so L costs three products per coordinate instead of nine.
 template <class Lanes>
 class HexMatricesOf {
  public:
   using Vector = Lanes;
   using Coefficients = HexCoefficientsOf<Vector>;
 
-  /// Of these coefficients, which must stay, from here on.
+  /// Sets the coefficients, which must stay valid and in place.
   void set(const Coefficients& coefficients);
 
   std::size_t size() const { return static_cast<std::size_t>(of_->num_vectors() * kWide); }
-  /// Numbers of the first matrices along v at the sides along u and w: where J is often furthest from its mean.
+  /// Numbers of the first matrices along v at the four corners in u and w, where J is often furthest from its mean.
   std::array<std::size_t, 4> corners() const {
     const std::size_t row = static_cast<std::size_t>(num_w_ * kWide);
     return {0, row - kWide, size() - row, size() - kWide};
   }
   Mat3 operator[](std::size_t b) const;
-  /// Entries of kWide matrices from number `first`, a multiple of that, on.
+  /// Loads the entries of kWide matrices from number `first`, a multiple of kWide, on.
   void load(std::size_t first, MatrixOf<Vector>& result) const { load(*of_, first, result); }
-  /// About the mean: of columns u and w their means, of column v that over the sides along u and w.
+  /// Approximate mean: over the box for columns u and w, over the sides along u and w for column v.
   Mat3 mean() const;
-  /// (direction, column): about the mean over the box of how much the entries of that column vary along the direction,
-  /// summed over rows: by second differences, of some coefficients.
+  /// (direction, column): approximate mean over the box of how much the entries of that column vary along the
+  /// direction, summed over rows; computed from second differences of some coefficients.
   Mat3 variation() const;
 
  protected:
@@ -83,15 +83,15 @@ class HexMatricesOf {
 
   using Number = NumberOf<Vector>;
   static constexpr int kMostVectors = Coefficients::kMost * Coefficients::kMost;
-  /// What differences count.
+  /// Weights of the differences.
   struct Weights {
-    /// Each vector: o and q - o along u, and along w.
+    /// For each vector: o and q - o along u, and along w.
     std::array<std::array<Number, 4>, kMostVectors> of;
-    alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide>, 4> narrow;  ///< each coefficient
+    alignas(WideFloats) std::array<std::array<float, kMostVectors * kWide>, 4> narrow;  ///< for each coefficient
   };
   const Coefficients* of_ = nullptr;
-  int num_u_ = 0, num_w_ = 0;         // of of_
-  const Weights* weights_ = nullptr;  // for these
+  int num_u_ = 0, num_w_ = 0;         // those of of_
+  const Weights* weights_ = nullptr;  // for these sizes
 
  private:
   std::array<std::array<std::unique_ptr<const Weights>, Coefficients::kMost + 1>, Coefficients::kMost + 1>
@@ -113,10 +113,10 @@ void HexMatricesOf<Vector>::load(const Coefficients& of, std::size_t first, Matr
   }
 }
 
-/// In double precision.
+/// The matrices in double precision.
 class HexMatrices : public HexMatricesOf<Wide> {
  public:
-  /// Lets the matrices L J_b be loaded.
+  /// Loads the matrices L J_b.
   class Product {
    public:
     explicit Product(const HexMatrices& matrices) : matrices_(&matrices) {}
@@ -127,32 +127,33 @@ class HexMatrices : public HexMatricesOf<Wide> {
    private:
     const HexMatrices* matrices_;
   };
-  /// Valid until the next call.
+  /// The result is valid until the next call.
   Product times(const Mat3& l);
 
  private:
   HexCoefficients product_;
 };
 
-/// In single precision.
+/// The matrices in single precision.
 class NarrowHexMatrices : public HexMatricesOf<Narrow> {
  public:
-  /// Lets the matrices L J_b be loaded.
+  /// Loads the matrices L J_b.
   class NarrowProduct {
    public:
     using Vector = WideFloats;
     explicit NarrowProduct(const NarrowHexMatrices& matrices) : matrices_(&matrices) {}
-    /// Entries of kWideFloats matrices from number `first`, a multiple of kWide, on.
+    /// Loads the entries of kWideFloats matrices from number `first`, a multiple of kWide, on.
     void load(std::size_t first, MatrixOf<WideFloats>& result) const;
-    /// Bounds of the errors of entries, by rows. Where these are above kMostError, nothing can be loaded.
+    /// Bounds on the errors of the entries, by rows. If one exceeds kMostError, nothing may be loaded.
     const Vec3& errors() const { return matrices_->errors_; }
 
    private:
     const NarrowHexMatrices* matrices_;
   };
-  /// For at least 2 vectors of coefficients; valid until the next call.
+  /// Requires at least 2 vectors of coefficients. The result is valid until the next call.
   NarrowProduct narrow_product(const Mat3& l);
-  /// By rows, bounds of the errors of J's entries: that times |L| bounds those of L J's, and of what is made of them.
+  /// Returns, by rows, bounds on the errors of J's entries. Multiplied by |L|, they bound the errors of L J_b and of
+  /// what is computed from it.
   static Vec3 entry_errors(const NarrowHexCoefficients::Precision& precision);
 
  private:

@@ -23,7 +23,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
 
-/// One cell: its functions, and its coefficients with signs, relative to its first vertex.
+/// One cell: its functions, and its coefficients with signs applied, relative to its first vertex.
 struct Cell {
   ShapeFunctions* shapes;
   int order;
@@ -31,7 +31,7 @@ struct Cell {
   std::span<const Vec3> coefficients;
 };
 
-/// det J from the shape functions, and a bound of its rounding error.
+/// det J from the shape functions, and a bound on its rounding error.
 struct Evaluated {
   double value, margin;
 };
@@ -45,7 +45,7 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
     jacobian += cell.coefficients[a] * gradient.transpose();
     total += cell.coefficients[a].cwiseAbs();
   }
-  // What gradients are made of is below `size`, good to 500 roundings (the sine of 16 pi x), their sum to one per mode.
+  // Gradient terms are below `size`, accurate to 500 roundings (the sine of 16 pi x); their sum adds one per mode.
   const double size = cell.shapes->kind() == CellKind::hex ? 8 : 8 * cell.order * cell.order;
   const Vec3 error = size * (static_cast<double>(cell.modes.size()) + 500) * kRoundoff * total;
   const Vec3 rows = jacobian.cwiseAbs().rowwise().sum() + 3 * error;
@@ -54,8 +54,8 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
   return {jacobian.determinant(), 2 * margin};
 }
 
-/// Search for the sign of det J over one cell: the box with the lowest corner comes next, where that is low; else the
-/// last one seen, which shares most with its halves. A box is halved in one direction at a time.
+/// Search for the sign of det J over one cell. The box with the lowest corner comes next if that is low; otherwise the
+/// box kept last, which shares most work with its halves. A box is bisected in one direction at a time.
 template <class Boxes>
 class Search {
  public:
@@ -111,14 +111,14 @@ class Search {
     }
   };
 
-  /// Decides a box, or keeps it for later; looks for a witness at its corners.
+  /// Decides a box or keeps it for later; looks for a witness at its corners.
   void look_at(Box box, double parent_lowest) {
     ++result_.boxes;
     if (boxes_.is_hopeless(box)) return keep(std::move(box), parent_lowest);
     double lowest;
     do {
       const double scale = boxes_.determinant_scale(box);
-      // A bound by a whole prism may be very close to det J, those by parts are not by far.
+      // Bounds on a whole prism may be very close to det J; those on sub-boxes are far from it.
       const BoundOptions bounding{.single_first = box.level > 0, .corners_first = parent_lowest != -kInfinity};
       double bound = 0;
       int lowest_corner = 0;
@@ -145,7 +145,7 @@ class Search {
     keep(std::move(box), lowest);
   }
 
-  /// The model's word does not count against a cell, its own functions' does.
+  /// Returns det J there. The model alone cannot refute a cell; the cell's own functions can.
   double try_witness(const Vec3& point) {
     const Evaluated exact = evaluate(cell_, point);
     if (exact.value < result_.witness_determinant) {
@@ -158,7 +158,7 @@ class Search {
 
   void keep(Box box, double lowest) {
     boxes_.choose_split(box);
-    constexpr double kCalm = 0.1;  // share of what det J is in the mean
+    constexpr double kCalm = 0.1;  // share of the mean det J below which the lowest box comes first
     open_.push_back({lowest, -std::min(lowest, kCalm * boxes_.mean_determinant()), num_kept_++, std::move(box)});
     std::push_heap(open_.begin(), open_.end());
   }

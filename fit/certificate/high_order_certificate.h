@@ -9,31 +9,32 @@
 
 namespace subvol {
 
-/// Proves or disproves, cell by cell, that a high-order map is nowhere inverted.
+/// Proves or refutes, cell by cell, that a high-order map is nowhere inverted.
 ///
-/// Boxes of a cell are looked at through polynomial models of the map in Bernstein form, with bounds of what the models
-/// leave out; `determinant_bound` decides them, or they are halved. Models of hexes are products of `LineModels`: exact
-/// for legendre up to order 7, close for all others, and better with every halving. So are `SimplexModels`, of tets and
-/// of the triangles of prisms. Rounding is bounded a priori, about 1e-13 of the product of the lengths of a hex of
-/// order 4, 1e-11 of a tet of order 8: cells that are closer to inversion end undecided, never wrong. A witness is a
-/// point where det J, computed from the shape functions themselves, is negative beyond its own rounding.
-/// Paper: left open there for the Fourier basis (section 5).
+/// Boxes of a cell are examined through polynomial models of the map in Bernstein form, with bounds on the models'
+/// errors. `determinant_bound` decides a box, or the box is bisected. Models of hexes are products of `LineModels`:
+/// exact for Legendre up to order 7, accurate for all others, and more so with every bisection. `SimplexModels` are
+/// likewise, for tets and for the triangles of prisms. Rounding is bounded a priori, by about 1e-13 of the product of
+/// the lengths of a hex of order 4 and 1e-11 for a tet of order 8: cells closer to inversion end undecided, never
+/// wrong. A witness is a point where det J, computed from the shape functions themselves, is negative beyond its own
+/// rounding error. The paper leaves this open for the Fourier basis (section 5).
 ///
-/// Holds buffers: one object per thread.
+/// Holds buffers: use one object per thread.
 class HighOrderCertifier {
  public:
-  /// `space` must outlive it, and stay as it is. InputError: options out of range. max_depth above 12 (hexes) or 20
-  /// counts as that.
+  /// `space` must outlive this object, and stay unchanged. InputError: options out of range. A max_depth above 12
+  /// (hexes) or 20 (tets, prisms) is reduced to that.
   explicit HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options = {});
   ~HighOrderCertifier();
   HighOrderCertifier(HighOrderCertifier&&) noexcept;
 
-  /// coefficients  one per node of the space (asserted), any values: cells with one that is not finite, or so large or
-  ///               small (beyond 1e+-50) that products overflow, end undecided.
-  /// returns       as for linear cells: lower_bound > 0 exactly when valid, else -infinity; never a wrong `valid` or
-  ///               `invalid`. Found by the whole cell it is close to the least det J, as double precision goes; by
-  ///               parts, lower by a few per cent. Cost of a well-shaped hex at orders 1, 2, 4, 8: about 0.8, 1.7, 2.6,
-  ///               20 us, of a tet 0.6, 0.9, 3, 40 us (fourier) or 0.6, 0.7, 1.5, 9 us; models first (`SimplexModels`).
+  /// coefficients  one per node of the space (asserted), with any values: cells with a non-finite one, or so large or
+  ///               small (beyond 1e+-50) that products might overflow or underflow, end undecided.
+  /// returns       as for linear cells, but lower_bound is -infinity unless valid; `valid` and `invalid` are never
+  ///               wrong. A bound found on the whole cell is close to the least det J, within double precision; one
+  ///               found on sub-boxes is lower by a few percent. Cost for a well-shaped hex at orders 1, 2, 4, 8: about
+  ///               0.8, 1.7, 2.6, 20 us; for a tet 0.6, 0.9, 3, 40 us (Fourier) or 0.6, 0.7, 1.5, 9 us; plus making the
+  ///               models once (`SimplexModels`).
   CellCertificate certify(std::span<const Vec3> coefficients, std::size_t cell);
 
  private:
@@ -43,8 +44,8 @@ class HighOrderCertifier {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// Certifies all cells. Parallel; the answer does not depend on the number of threads. InputError: options out of
-/// range, or other than one coefficient per node.
+/// Certifies all cells. Parallel; the result does not depend on the number of threads. InputError: options out of
+/// range; the number of coefficients is not that of the nodes.
 CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,
                            const CertificateOptions& options = {});
 

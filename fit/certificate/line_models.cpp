@@ -34,14 +34,14 @@ long double mode_slope(Basis basis, int i, long double x) {
   return std::sqrt(2 * i + 1.0L) * legendre(i, 1 - 2 * x)[i];
 }
 
-/// Logarithm of a bound of the k-th derivative of phi_i'; for legendre only k > i is asked for.
+/// Logarithm of a bound on the k-th derivative of phi_i'; Legendre requires k > i, so that it is zero.
 double log_slope_derivative(Basis basis, int i, int k) {
   if (basis == Basis::legendre) return -std::numeric_limits<double>::infinity();
   return 0.5 * std::numbers::ln2 + k * std::log(i * std::numbers::pi);
 }
 
-/// About the largest |phi_i|, and not less: between samples next to one another a function is above the larger one by
-/// at most (distance^2 / 8) max |phi_i''|, and |P_i'| <= i (i + 1) / 2.
+/// Returns a close upper bound of |phi_i|: between neighboring samples a function exceeds the larger one by at most
+/// (distance^2 / 8) max |phi_i''|, and |P_i'| <= i (i + 1) / 2.
 double largest_integrated_legendre(int i) {
   constexpr int kSamples = 2000;
   long double largest = 0;
@@ -95,7 +95,7 @@ LineModels::Level LineModels::make_level(int l) const {
       row(part, 1)[o] = static_cast<double>(x);
     }
 
-  // Radius times frequency decides how many nodes there must be until the interpolant is exact for all purposes.
+  // Radius times frequency decides how many nodes make the interpolant exact for all purposes.
   const double widest = order_ * std::numbers::pi * static_cast<double>(size) / 2;
   const int num_nodes = basis_ == Basis::legendre ? std::max(order_, q) : q + 10 + static_cast<int>(2.2 * widest);
   const ChebyshevExpansion expansion(num_nodes);
@@ -110,7 +110,7 @@ LineModels::Level LineModels::make_level(int l) const {
       double remainder = expansion.expand([&](long double x) { return mode_slope(basis_, i, x); }, mid, size / 2,
                                           log_slope_derivative(basis_, i, num_nodes), q, expanded.data());
       if (basis_ == Basis::legendre && i < q) remainder = 0;
-      const bool constant = remainder >= slope_bounds_[i + 1];  // better none than that one
+      const bool constant = remainder >= slope_bounds_[i + 1];  // a zero slope is no worse than that model
       if (constant) remainder = slope_bounds_[i + 1];
       slope_error = std::max(slope_error, remainder);
       level.exact = level.exact && remainder == 0;

@@ -9,7 +9,7 @@
 namespace subvol {
 
 struct PrismMatrices::Triangle {
-  /// Numbers of alpha - e_c + e_i: next to alpha itself, and to one another, for c = 0, 1, 2.
+  /// Numbers of alpha - e_c + e_i for c = 0, 1, 2: neighbors of alpha, and of one another.
   struct Neighbours {
     int u0, v0;  ///< alpha - e_0 + e_1, + e_2
     int o1, v1;  ///< alpha - e_1 + e_0, + e_2
@@ -18,8 +18,8 @@ struct PrismMatrices::Triangle {
   };
   explicit Triangle(int degree);
 
-  std::vector<Neighbours> neighbours;        ///< by alpha; alpha itself where there is none, and the exponent is 0
-  std::array<std::vector<int>, 3> edges;     ///< where alpha_c = 0
+  std::vector<Neighbours> neighbours;        ///< by alpha; alpha itself if there is none, and the exponent is 0
+  std::array<std::vector<int>, 3> edges;     ///< the alpha with alpha_c = 0
   std::array<std::size_t, 3> corners;
   int middle;
 };
@@ -102,7 +102,7 @@ std::array<std::size_t, 3> PrismMatrices::corners() const {
   return result;
 }
 
-/// The integral of dX/du over the triangle is that of X along the edge u + v = 1 less that along u = 0.
+/// The integral of dX/du over the triangle is that of X along the edge u + v = 1 minus that along u = 0.
 Mat3 PrismMatrices::mean() const {
   Mat3 result;
   for (int row = 0; row < 3; ++row) {
@@ -135,7 +135,7 @@ void PrismMatrices::make_narrow() {
       narrow_[row][n] = narrow(relative);
     }
     narrow_sizes_[row] = highest_lane(size);
-    if (!(narrow_sizes_[row] < kMostNarrow)) {  // no number must be infinite, even if it counts 0 times
+    if (!(narrow_sizes_[row] < kMostNarrow)) {  // no number may be infinite, even with weight 0
       std::fill(narrow_[row].begin(), narrow_[row].end(), Narrow{});
       narrow_sizes_[row] = std::numeric_limits<double>::max();
     }
@@ -145,8 +145,8 @@ void PrismMatrices::make_narrow() {
 
 PrismMatrices::NarrowProduct PrismMatrices::narrow_product(const Mat3& l) {
   if (!is_narrowed_) make_narrow();
-  // d differences of two numbers with 5 roundings each, one for each of five operations with them, and two more for
-  // what is made of entries.
+  // An entry sums d differences of two numbers with 5 roundings each, one rounding for each of five operations with
+  // them, and two more for what is computed from entries.
   const double roundings = 24.0 * std::max(degree_, kWide - 1);
   narrow_errors_ = roundings * (std::numeric_limits<float>::epsilon() / 2) * l.cwiseAbs() * narrow_sizes_;
   if (!(l.cwiseAbs().maxCoeff() < kMostNarrow)) narrow_errors_.setConstant(std::numeric_limits<double>::max());

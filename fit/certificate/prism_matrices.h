@@ -11,10 +11,10 @@
 namespace subvol {
 
 /// The `ControlMatrices` J_b of a map from a triangle times [0, 1], given by Bernstein coefficients: of any degree over
-/// the triangle (by `SimplexIndex`), of degree kWide - 1 along w.
+/// the triangle (numbered by `SimplexIndex`), of degree kWide - 1 along w.
 ///
-/// Coefficient (alpha, w) is lane w of vector number alpha, matrix (alpha, w) number alpha kWide + w. Columns are
-/// differences, raised to the map's degree again; with e_c the unit exponents,
+/// Coefficient (alpha, w) is lane w of vector number alpha; matrix (alpha, w) is number alpha kWide + w. Columns are
+/// differences of coefficients, with the degree raised to that of the map again; with e_c the unit exponents,
 ///
 ///   J_b = sum_c alpha_c (X_{alpha - e_c + e_i} - X_{alpha - e_c + e_0}),  i = 1, 2;   w as in `HexMatrices`
 class PrismMatrices {
@@ -24,20 +24,20 @@ class PrismMatrices {
   ~PrismMatrices();
   PrismMatrices(PrismMatrices&&) noexcept;
 
-  /// For coefficients to be given. degree: of the triangle, 1 .. SimplexTables::kMaxDegree.
+  /// Makes room for coefficients, to be written next. degree: over the triangle, 1 .. SimplexTables::kMaxDegree.
   void resize(int degree);
   Wide* coordinate(int row) { return x_[row].data(); }
 
   std::size_t size() const { return static_cast<std::size_t>(count_) * kWide; }
   Mat3 operator[](std::size_t b) const;
-  /// Numbers of the first matrices along the edges upright.
+  /// Numbers of the first matrices along the upright edges.
   std::array<std::size_t, 3> corners() const;
-  /// Entries of kWide matrices from number `first`, a multiple of that, on.
+  /// Loads the entries of kWide matrices from number `first`, a multiple of kWide, on.
   void load(std::size_t first, WideMatrix& result) const { load(x_, first, result); }
-  /// The mean of columns u and v; of column w that over the sides.
+  /// Mean over the box for columns u and v, over the upright sides for column w.
   Mat3 mean() const;
 
-  /// Lets the matrices L J_b be loaded.
+  /// Loads the matrices L J_b.
   class Product {
    public:
     explicit Product(const PrismMatrices& matrices) : matrices_(&matrices) {}
@@ -46,10 +46,10 @@ class PrismMatrices {
    private:
     const PrismMatrices* matrices_;
   };
-  /// Valid until the next call.
+  /// The result is valid until the next call.
   Product times(const Mat3& l);
 
-  /// The same in single precision: of L (X_b - the one in the middle).
+  /// Loads the L J_b in single precision, computed from L (X_b - X_m), where X_m is the middle coefficient.
   class NarrowProduct {
    public:
     using Vector = Narrow;
@@ -57,17 +57,17 @@ class PrismMatrices {
     void load(std::size_t first, MatrixOf<Narrow>& result) const {
       matrices_->load(matrices_->narrow_product_, first, result);
     }
-    /// Bounds of the errors of entries, by rows. Where these are above kMostError, nothing can be loaded.
+    /// Bounds on the errors of the entries, by rows. If one exceeds kMostError, nothing may be loaded.
     const Vec3& errors() const { return matrices_->narrow_errors_; }
 
    private:
     const PrismMatrices* matrices_;
   };
-  /// Valid until the next call.
+  /// The result is valid until the next call.
   NarrowProduct narrow_product(const Mat3& l);
 
  private:
-  /// Of the coefficients over a triangle of one degree.
+  /// Tables for the coefficients over a triangle of one degree.
   struct Triangle;
 
   template <class Lanes>

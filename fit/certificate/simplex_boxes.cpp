@@ -24,7 +24,7 @@ Lanes load_lanes(const double* from) {
 }
 void store_lanes(const Lanes& value, double* to) { std::memcpy(to, &value, sizeof value); }
 
-/// Rows become columns.
+/// Turns rows into columns.
 void transpose(Lanes (&x)[kLanes]) {
   const Lanes a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
   const Lanes b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
@@ -38,17 +38,18 @@ void transpose(Lanes (&x)[kLanes]) {
 
 std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
 
-/// Share of the mean edges up to which errors of models are small as long as nothing is known of det J. At high orders
-/// low degrees cost more in boxes than they save (measured).
+/// Model errors up to this share of the mean edges count as small as long as nothing is known about det J. At high
+/// orders, low degrees cost more in boxes than they save (measured).
 double small_error(int order) { return order <= 4 ? 0.08 : 0.004; }
-/// Beyond this one nothing can be hoped for: the shifts of `determinant_bound` (see `HexBoxes`).
+/// No bound is expected beyond this relative model error, because of the shifts of `determinant_bound` (see
+/// `HexBoxes`).
 constexpr double kHopelessError = 1;
-/// New models need not be closer than by this factor: the ones after them will be.
+/// New models need not reduce the error by more than this factor: the next ones will.
 constexpr double kFall = 0.05;
 
 }  // namespace
 
-/// Along a prism's w models are of the degree whose coefficients are one `Wide`.
+/// Along a prism's w, models have the degree whose coefficients are one `Wide`.
 SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
     : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order, kWide - 1)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1),
@@ -122,7 +123,7 @@ SimplexBoxes::Box SimplexBoxes::root() {
 
 int SimplexBoxes::choose_tier(const Box& box, const SimplexModels::Part& part, double wanted, int least_tier) const {
   const int last = simplex_.num_tiers() - 1;
-  if (simplex_.is_exact()) {  // a degree more than needed brings control points much closer to the map
+  if (simplex_.is_exact()) {  // one degree more than needed brings control points much closer to the map
     int tier = 0;
     while (tier < last && simplex_.tables(tier).index.degree() < highest_ + 2) ++tier;
     return tier;
@@ -183,7 +184,7 @@ void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
 
   const std::size_t stride = tables(box).stride;
   box.control.assign(stride * lanes_, 0);
-  constexpr int kAtOnce = 4;  // the sums of one vector alone wait for each other
+  constexpr int kAtOnce = 4;  // the sums of a single vector would wait for each other
   for (int k = 0; k < num_layers_; ++k) {
     used_.clear();
     for (const Term& term : layer_terms_[k]) {
@@ -236,13 +237,13 @@ bool SimplexBoxes::improve(Box& box, double lowest, bool) {
   return true;
 }
 
-/// Errors are measured by the mean edges, as is det J.
+/// Errors are relative to the mean edges, and det J to their product.
 bool SimplexBoxes::models_matter(const Box& box, double lowest) const {
   const double error = by_mean_edges(lasting_error(box));
   return error > 0 && !(error <= wanted_error(lowest / mean_edges_.prod()));
 }
 
-/// What errors may be where det J is so low, or (-infinity) where that is not known.
+/// Largest error allowed if the lowest relative det J is this; -infinity: it is unknown.
 double SimplexBoxes::wanted_error(double lowest) const {
   constexpr double kShare = 0.1, kGood = 0.3, kLeast = 1e-9;
   if (lowest == -std::numeric_limits<double>::infinity()) return small_error_;
@@ -401,8 +402,8 @@ Mat3 SimplexBoxes::rounding_error(const Box& box) const {
     size += along * layer.largest_coefficient;
     rounding += along * layer.rounding;
   }
-  // Sums over modes and along w, tables, the shift, halvings of `degree` averages each, L, differences, the 16 asked
-  // for.
+  // Roundings: sums over modes and along w, tables, the shift, bisections of `degree` averages each, L, differences,
+  // and the 16 that `determinant_bound` requires.
   const int degree = tables(box).index.degree();
   const double roundings = num_modes_ + num_layers_ + 4 + 1 + degree * box.level + 3 + degree + 8 + 16;
   const Vec3 control = rounding + roundings * (std::numeric_limits<double>::epsilon() / 2) * size;

@@ -29,7 +29,7 @@ void sinc(long double z, long double& value, long double& slope) {
   }
 }
 
-/// psi_i and its derivative in [0, 1/2].
+/// psi_i and its derivative for x in [0, 1/2].
 void kernel_below_half(Basis basis, int i, long double x, long double& value, long double& slope) {
   if (basis == Basis::fourier) {  // sqrt2 sinc(i pi x) / (1 - x)
     sinc(i * kPi * x, value, slope);
@@ -37,7 +37,7 @@ void kernel_below_half(Basis basis, int i, long double x, long double& value, lo
     value *= kSqrt2 / (1 - x);
     return;
   }
-  // psi_i = 2 sqrt(2i+1) / (i (i+1)) P_i'(1 - 2x); P_{n+1}' = P_{n-1}' + (2n+1) P_n, and so for P''.
+  // psi_i = 2 sqrt(2i+1) / (i (i+1)) P_i'(1 - 2x); P_{n+1}' = P_{n-1}' + (2n+1) P_n, and likewise for P''.
   const long double t = 1 - 2 * x;
   long double p0 = 1, p1 = t, d0 = 0, d1 = 1, s0 = 0, s1 = 0;
   for (int n = 1; n < i; ++n) {
@@ -55,10 +55,10 @@ void kernel(Basis basis, int i, long double x, long double& value, long double& 
   if (x > 0.5L) value *= mode_parity(i), slope *= -mode_parity(i);
 }
 
-/// What the terms of a sum of products of Chebyshev polynomials add to value and gradient at most, by their total
-/// degree. What no polynomial stands for counts as of a degree beyond all that are kept.
+/// Bounds on what the terms of a sum of products of Chebyshev polynomials contribute to value and gradient, by their
+/// total degree. Errors, which no polynomial represents, count as a degree beyond all that are kept.
 ///
-/// |T_k'(t)| <= k^2 for the gradient, and |T_k'(t)| sqrt(1 - t^2) <= k for the damped one.
+/// |T_k'(t)| <= k^2 for the gradient, and |T_k'(t)| sqrt(1 - t^2) <= k for the damped gradient.
 struct Sizes {
   std::vector<double> value{1}, gradient{0}, damped{0};
 
@@ -102,7 +102,7 @@ KernelExpansion expand_kernel(Basis basis, int i, long double low, long double h
     return slope;
   };
   const double remainder = expansion.expand(slope_at, middle, radius, log_bound, num_slopes, slopes.data());
-  // The integral of sum s_k T_k: terms radius (s_{k-1} - s_{k+1}) / 2k, of which s_0 counts twice.
+  // The integral of sum s_k T_k has the terms radius (s_{k-1} - s_{k+1}) / 2k, where s_0 counts twice.
   slopes[0] *= 2;
   const int last = exact ? i - 1 : num_slopes;
   long double at_middle, slope, model_at_middle = 0;
@@ -129,7 +129,7 @@ KernelExpansion expand_kernel(Basis basis, int i, long double low, long double h
   return result;
 }
 
-/// Bounds of |psi_i| and |psi_i'| over [0, 1].
+/// Bounds on |psi_i| and |psi_i'| over [0, 1].
 double kernel_bound(Basis basis, int i) {
   return (1 + 1e-14) * (basis == Basis::legendre ? std::sqrt(2 * i + 1.0) : 2 * std::numbers::sqrt2);
 }
@@ -147,7 +147,7 @@ Interval range(const Ends& ends, int dimension) {
   return {*std::min_element(ends.begin(), last), *std::max_element(ends.begin(), last)};
 }
 
-/// What E_edge,i is the kernel of, from the barycentric coordinates of the edge's ends.
+/// Argument of the kernel of E_edge,i, from the barycentric coordinates of the edge's ends.
 Ends along_edge(const Ends& a, const Ends& b) {
   Ends along{};
   for (std::size_t c = 0; c < 4; ++c) along[c] = 0.5 * (1 + b[c] - a[c]);
@@ -165,7 +165,7 @@ std::array<Ends, 4> barycentric_at(std::span<const Vec3> vertices, int dimension
   return result;
 }
 
-/// A product of kernels: the sizes of its terms, and bounds of itself.
+/// Sizes of the terms of a product of kernels, and bounds on the product itself.
 struct ProductSizes {
   Sizes sizes;
   double bound = 1, slope_bound = 0;
@@ -173,11 +173,11 @@ struct ProductSizes {
 
 constexpr std::size_t kMostStoredBytes = 200'000'000;  // per kind, basis and order
 
-/// Times that all sides are halved before the last models are made, at most: parts are numbered in 32 bits.
+/// Number of times that all sides are bisected before the last models are made, at most: part numbers have 32 bits.
 int most_depth(Basis basis, int order) { return basis == Basis::legendre || order == 1 ? 0 : 10; }
 
-/// The highest degree. One more than needed brings control points much closer to the map. Fourier: errors of the
-/// highest functions up to order 8 are small over the whole simplex.
+/// Highest degree of the tiers. One degree more than needed brings control points much closer to the map. Fourier:
+/// errors of the highest functions up to order 8 are small over the whole simplex.
 int highest_degree(Basis basis, int order) {
   return basis == Basis::legendre || order == 1 ? std::max(order + 1, 3)
                                                 : std::min({(5 * order + 2) / 2, order + 13, 21});
@@ -199,7 +199,7 @@ int num_nodes(Basis basis, int order) {
 
 }  // namespace
 
-/// The kernels' expansions over the intervals of one part.
+/// The kernels' expansions over the intervals of one part, computed once each.
 class SimplexModels::Expansions {
  public:
   explicit Expansions(const SimplexModels& models) : models_(models) {}
@@ -217,7 +217,7 @@ class SimplexModels::Expansions {
 /// Products of the kernels' expansions over one part, for models of one degree.
 class SimplexModels::Kernels {
  public:
-  /// barycentric: of the whole simplex, at the part's vertices.
+  /// barycentric: coordinates in the whole simplex, at the part's vertices.
   Kernels(const SimplexModels& models, int degree, const std::array<Ends, 4>& barycentric)
       : expansions_(models), dimension_(models.dimension()), most_(std::max(0, degree - 2)) {
     for (int v = 0; v <= dimension_; ++v) at_vertices_.push_back(argument(barycentric[v]));
@@ -229,7 +229,7 @@ class SimplexModels::Kernels {
     for (int n = 1; n <= most_; ++n) one_.push_back(one_.back().raised());
   }
 
-  /// The kernels of a mode, cut behind one total degree.
+  /// Returns the product of a mode's kernels, truncated at a total degree.
   SimplexPolynomial product(const LocalMode& mode, int degree) {
     const Cut* rest = &one_;
     if (mode.k > 0) rest = &at_vertex(3, mode.k, one_, last_[mode.k]);
@@ -238,10 +238,10 @@ class SimplexModels::Kernels {
   }
 
  private:
-  using Cut = std::vector<SimplexPolynomial>;  // behind all total degrees from 0 on; at degree n, of that degree
+  using Cut = std::vector<SimplexPolynomial>;  // truncated at all total degrees from 0 on; entry n has degree n
   struct Argument {
     Interval interval;
-    Cut chebyshev;  // T_k of it
+    Cut chebyshev;  // T_k of the argument
   };
 
   Argument argument(const Ends& ends) const {
@@ -329,7 +329,7 @@ std::size_t SimplexModels::slot_address(const LocalMode& mode) const {
   return ((((mode.edge + 1) * 5 + mode.vertex + 1) * n + mode.i) * n + mode.j) * n + k;
 }
 
-/// Vertices of the barycentric coordinates that a mode has as factors.
+/// Vertices whose barycentric coordinates are factors of a mode.
 std::vector<int> SimplexModels::bubble(const LocalMode& mode) const {
   std::vector<int> vertices;
   if (mode.edge >= 0) {
@@ -341,7 +341,7 @@ std::vector<int> SimplexModels::bubble(const LocalMode& mode) const {
   return vertices;
 }
 
-/// What is kept and what is new; the lock is held.
+/// Counts newly stored bytes, and drops what is stored if it is too much. The lock must be held.
 void SimplexModels::count(std::size_t bytes) const {
   stored_bytes_ += bytes;
   if (stored_bytes_ <= kMostStoredBytes) return;
@@ -394,8 +394,8 @@ void SimplexModels::add_models(std::uint32_t number, std::span<const Vec3> verti
 
 SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<const Vec3> vertices) const {
   const std::array<Ends, 4> barycentric = barycentric_at(vertices, dimension());
-  // Over the whole simplex, products of two, three, four coordinates are at most so many times sqrt(1 - t^2), with t
-  // in [-1, 1] what T_k is taken of: twice a coordinate less 1, or the difference of two.
+  // Over the whole simplex, a product of two, three or four coordinates is at most this times sqrt(1 - t^2), where t in
+  // [-1, 1] is the argument of T_k: twice a coordinate minus 1, or the difference of two.
   constexpr double kDamping[] = {0, 0, 1.0 / 4, 1.0 / 16, 1.0 / 108};
   const bool whole = number == 1;
   Expansions expansions(*this);
@@ -422,7 +422,7 @@ SimplexModels::Part SimplexModels::make_part(std::uint32_t number, std::span<con
         if (mode.j > 0) rest = times(barycentric[mode.vertex], mode.j, rest);
       }
       const ProductSizes product = times(along_edge(barycentric[a], barycentric[b]), mode.i, rest);
-      // The product of n coordinates is at most (1/n)^n, what is left of it when one is taken away bounds its gradient.
+      // The product of n coordinates is at most (1/n)^n; the product without one of them bounds its gradient.
       const double largest = std::min(alone.bound(), (1 + 1e-12) * std::pow(1.0 / size, size));
       const double steepest = (1 + 1e-12) * std::pow(1.0 / (size - 1), size - 1);
       f.value_bound = largest * product.bound;

@@ -102,7 +102,7 @@ SimplexPolynomial SimplexPolynomial::times_affine(const std::array<double, 4>& v
       add(e2, e3, length, result.row(e2 + 1, e3), values[2]);
       if (dimension_ == 3) add(e2, e3, length, result.row(e2, e3 + 1), values[3]);
     }
-  // In each b_alpha a mean of four values times b's: an error of 4 units in the value, a product, three sums.
+  // Each b_alpha is a mean of four values times b's: with an error of 4 units in the value, a product, three sums.
   result.rounding_ = 1.0001 * (rounding_ + 9 * kRoundoff * bound_);
   result.find_bound();
   return result;
@@ -127,7 +127,7 @@ SimplexPolynomial SimplexPolynomial::convolved(std::span<const double> weights, 
   SimplexPolynomial result = zero(dimension, n);
   double sizes = 0;
   for (int k = 0; k <= last; ++k) {
-    // The shorter one term by term, the longer one by rows.
+    // The factor of lower degree is taken term by term, the other one by rows.
     const bool swap = k > n - k;
     const SimplexPolynomial &p = swap ? b[n - k] : a[k], &q = swap ? a[k] : b[n - k];
     const double size = std::abs(weights[k]);
@@ -138,7 +138,7 @@ SimplexPolynomial SimplexPolynomial::convolved(std::span<const double> weights, 
         for (int e1 = 0; e1 + e2 + e3 <= p.degree_; ++e1)
           result.add_shifted(weights[k] * p.at(e1, e2, e3), q, e1, e2, e3);
   }
-  // Each b_alpha is a sum of means of products; alpha is a sum of two exponents in at most so many ways.
+  // Each b_alpha is a sum of means of products; alpha is a sum of two exponents in at most num_terms ways.
   const double num_terms = std::pow(1 + n / (dimension + 1.0), dimension + 1);
   result.rounding_ = 1.0001 * (result.rounding_ + (num_terms + 5) * kRoundoff * sizes);
   result.find_bound();
@@ -152,7 +152,7 @@ void SimplexPolynomial::add_shifted(double weight, const SimplexPolynomial& q, i
     const double* in = q.terms_.data() + q.row(0, f3);
     double* out = terms_.data() + row(e2, e3 + f3) + e1;
     for (int last = q.degree_ - f3; last >= 0; --last, in += q.stride_, out += stride_)
-      for (int m = 0; m <= last; m += kWide)  // what rows are filled up with adds zeros to the next one
+      for (int m = 0; m <= last; m += kWide)  // the padding of a row adds zeros to the next one
         store_wide(load_wide(out + m) + weight * load_wide(in + m), out + m);
   }
 }

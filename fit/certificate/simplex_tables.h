@@ -7,20 +7,20 @@
 
 namespace subvol {
 
-/// Neighbours among the Bernstein coefficients of one degree over a triangle or tetrahedron.
+/// Neighbors among the Bernstein coefficients of one degree over a triangle or tetrahedron.
 class SimplexTables {
  public:
   static constexpr int kMaxDegree = 24;
-  static constexpr std::size_t kLanes = 4;  ///< control points are worked on so many numbers at a time
+  static constexpr std::size_t kLanes = 4;  ///< control points are processed this many numbers at a time
 
-  /// dimension: 2 or 3; degree: 1 .. kMaxDegree. Shared by all threads, made when first asked for.
+  /// dimension: 2 or 3; degree: 1 .. kMaxDegree. Shared by all threads and made when first requested.
   static const SimplexTables& get(int dimension, int degree);
 
-  SimplexIndex index, lower;                      ///< of the degree, and of the one below
+  SimplexIndex index, lower;                      ///< of the degree, and of one less
   std::size_t stride;                             ///< a multiple of kWide, at least index.size()
-  std::array<std::vector<int>, 4> raised;         ///< per index of lower: with one exponent more; filled up to kLanes
+  std::array<std::vector<int>, 4> raised;         ///< per index of `lower`: with one exponent more; padded to kLanes
 
-  /// Of the side from vertex a to b > a. Made when first asked for.
+  /// Bisection of the side from vertex a to b > a. Made when first requested.
   const SimplexHalving& halving(int a, int b) const;
 
  private:

@@ -28,10 +28,10 @@ void sinc(double z, double& value, double& derivative) {
   }
 }
 
-/// Legendre polynomials at t with two derivatives, raised one by one.
+/// Legendre polynomials at t with two derivatives, raised degree by degree.
 struct LegendreRecurrence {
   explicit LegendreRecurrence(double at) : t(at), value(at) {}
-  double t, value, first = 1, second = 0;  // P_i, P_i', P_i'' of i = 1
+  double t, value, first = 1, second = 0;  // P_i, P_i', P_i'' for i = 1
 
   void raise() {
     const double next_value = ((2 * i + 1) * t * value - i * old_value) / (i + 1);
@@ -47,7 +47,7 @@ struct LegendreRecurrence {
   double old_value = 1, old_first = 0, old_second = 0;
 };
 
-/// Both families at x <= 1/2, where nothing cancels; the other half follows by parity.
+/// Both families at x <= 1/2, where there is no cancellation; the other half follows by parity.
 void fourier_modes(int count, double x, double* values, double* derivatives) {
   for (int i = 1; i <= count; ++i) {
     values[i - 1] = kSqrt2 * std::sin(i * kPi * x) / (i * kPi);
@@ -82,7 +82,7 @@ void legendre_kernels(int count, double x, double* values, double* derivatives) 
   }
 }
 
-/// f(count, x, ..) with x <= 1/2, and the parity of the modes beyond it.
+/// Calls f(count, x, ..) for x <= 1/2; beyond that, uses the parity of the modes.
 template <class Function>
 void by_parity(const Function& f, int count, double x, double* values, double* derivatives) {
   if (x <= 0.5) return f(count, x, values, derivatives);

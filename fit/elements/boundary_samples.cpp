@@ -10,7 +10,7 @@ namespace subvol {
 
 namespace {
 
-/// Numbers samples as faces ask for them.
+/// Numbers samples when a face first asks for them.
 class BoundarySampler {
  public:
   BoundarySampler(const ElementSpace& space, int intervals)
@@ -27,7 +27,7 @@ class BoundarySampler {
     }
   }
 
-  /// False: the edge belongs to no face added.
+  /// Returns false if the edge belongs to no face that was added.
   bool add_edge(Index e, bool forward = true) {
     const auto& [low, high] = space_.topology().edge(e);
     if (vertex_samples_[low] == kNoIndex || vertex_samples_[high] == kNoIndex ||
@@ -59,7 +59,7 @@ class BoundarySampler {
     return static_cast<Index>(samples_.points.size() - 1);
   }
 
-  /// A point of the face, s steps from corner 0 towards corner 1 and t towards the last one.
+  /// A point of the face, s steps from corner 0 toward corner 1 and t steps toward the last corner.
   Vec3 point(int s, int t) const {
     const Vec3& origin = corner_points_[0];
     return origin + (static_cast<double>(s) / n_) * (corner_points_[1] - origin) +
@@ -137,7 +137,7 @@ class BoundarySampler {
 
   const ElementSpace& space_;
   int n_;
-  std::vector<Index> vertex_samples_, edge_samples_;  // of an edge, the first inside
+  std::vector<Index> vertex_samples_, edge_samples_;  // per edge, the first inside
   BoundarySamples samples_;
   Index cell_ = kNoIndex;
   std::span<const Index> corners_;

@@ -12,7 +12,7 @@ namespace subvol {
 
 namespace {
 
-/// Canonical gradients of all shape functions at a point.
+/// Gradients of all shape functions at a point, in canonical coordinates.
 std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
   const double u = p[0], v = p[1], w = p[2];
   switch (kind) {

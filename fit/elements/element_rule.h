@@ -19,7 +19,7 @@ namespace subvol {
 /// its counterparts on triangle and tetrahedron: the corners of the regular split into (n-1)^2 triangles, with the
 /// weights of the vertex rule on each. A tet's Jacobian is constant: one point. Weights sum to 1.
 ///
-/// Only the vertices whose shape function has a non-zero gradient at a point are listed: at a hex's corner 4 of 8.
+/// Only the vertices whose shape function has a nonzero gradient at a point are listed: 4 of 8 at a hex's corner.
 struct ElementRule {
   struct Entry {
     std::int8_t vertex;          ///< local vertex number
@@ -37,7 +37,7 @@ struct ElementRule {
   }
 };
 
-/// The rule of a kind. points_per_direction >= 2, else InputError. Nested when n - 1 divides n' - 1.
+/// The rule of a kind. points_per_direction >= 2, else InputError. Rules are nested if n - 1 divides n' - 1.
 ElementRule make_element_rule(CellKind kind, int points_per_direction);
 
 /// A of the ideal cell of edge length 1 (paper: section 3.2), its inverse, and that cell's volume.

@@ -26,7 +26,7 @@ void check_orders(const char* what, const std::vector<int>& orders, std::size_t 
                        std::to_string(orders[i]) + ", expected 1 to " + std::to_string(kMaxOrder));
 }
 
-/// Calls f(face, edge) for every edge of every face, once from each cell.
+/// Calls f(face, edge) for every edge of every face.
 template <class Function>
 void for_each_face_edge(const MeshTopology& topology, const Function& f) {
   for (std::size_t face = 0; face < topology.num_faces(); ++face) {
@@ -49,7 +49,7 @@ void check_rule(const EntityOrders& orders, const MeshTopology& topology) {
                          ", above the order " + std::to_string(orders.faces[f]) + " of its face " + std::to_string(f));
 }
 
-/// A triangle's corners ascending; a quad's from the smallest on, towards its smaller neighbour.
+/// A triangle's corners in ascending order; a quad's from the smallest on, toward its smaller neighbor.
 std::array<Index, 4> frame_of_face(std::span<const Index> corners) {
   std::array<Index, 4> frame = {corners[0], corners[1], corners[2], kNoIndex};
   if (corners.size() == 3) {
@@ -62,7 +62,7 @@ std::array<Index, 4> frame_of_face(std::span<const Index> corners) {
   return frame;
 }
 
-/// Node numbers of the entities of one dimension: offsets that start at `first`.
+/// First node numbers of the entities of one dimension: offsets that start at `first`.
 template <class Count>
 std::vector<std::size_t> number_entities(std::size_t first, std::size_t count, const Count& num_entity_modes) {
   std::vector<std::size_t> offsets(count + 1, first);
@@ -70,7 +70,7 @@ std::vector<std::size_t> number_entities(std::size_t first, std::size_t count, c
   return offsets;
 }
 
-/// A cell's list in the making.
+/// Entry of a cell's list of modes.
 struct CellEntry {
   LocalMode mode;
   Index node;
@@ -231,7 +231,7 @@ std::vector<Index> node_numbers_in(const ElementSpace& to, const ElementSpace& f
 
   std::vector<Index> numbers(from.num_nodes(), kNoIndex);
   for (std::size_t v = 0; v < from.num_vertices(); ++v) numbers[v] = static_cast<Index>(v);
-  std::array<std::array<std::array<Index, kMaxOrder>, kMaxOrder>, kMaxOrder> place;  // in `to`, of a mode (k, j, i)
+  std::array<std::array<std::array<Index, kMaxOrder>, kMaxOrder>, kMaxOrder> place;  // number in `to` of mode (k, j, i)
   const auto match = [&](EntityShape shape, int to_order, std::size_t to_node, int from_order, std::size_t from_node) {
     for_each_mode(shape, from_order, [&](ModeIndex m) { place[m.k][m.j][m.i] = kNoIndex; });
     for_each_mode(shape, to_order, [&](ModeIndex m) { place[m.k][m.j][m.i] = static_cast<Index>(to_node++); });

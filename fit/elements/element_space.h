@@ -15,47 +15,47 @@ namespace subvol {
 
 /// An order for every edge, face and cell, 1 .. kMaxOrder.
 ///
-/// The rule that couples them: a face has no higher order than any of its edges, a cell no higher order than any of its
-/// faces. What lies inside only carries on what happens on its border, so detail is paid for on the boundary alone.
+/// Orders must follow a rule: a face has no higher order than any of its edges, a cell no higher order than any of its
+/// faces. The interior only continues what happens on its boundary, so detail is paid for on the boundary alone.
 struct EntityOrders {
   std::vector<int> edges, faces, cells;
 
   static EntityOrders uniform(const MeshTopology& topology, int order);
-  /// Raises edges to their faces and faces to their cells until the rule holds.
+  /// Raises edges to the orders of their faces and faces to those of their cells until the rule holds.
   void raise_borders(const MeshTopology& topology);
-  /// Lowers faces to their edges and cells to their faces until the rule holds.
+  /// Lowers faces to the orders of their edges and cells to those of their faces until the rule holds.
   void lower_interiors(const MeshTopology& topology);
 
   bool operator==(const EntityOrders&) const = default;
 };
 
-/// Nodes of a high-order mesh: which exist, how they are numbered, and how every cell sees them.
+/// Nodes of a high-order mesh: which nodes exist, how they are numbered, and how each cell refers to them.
 ///
 ///   x(u) = sum_a sign_a N_a(u) coefficient[node_a]       over a cell's functions N_a                 Paper: Eq. 5
 ///
-/// Vertices come first, with the numbers of the mesh and their positions as coefficients; then the modes of edges,
-/// faces and cells, whose coefficients are displacements. Each mode exists once, in a frame that global vertex numbers
-/// fix:
+/// Vertices come first: they keep the numbers of the mesh, and their coefficients are positions. The modes of edges,
+/// faces and cells follow, and their coefficients are displacements. Each mode exists once, in a frame that global
+/// vertex numbers determine:
 ///
 ///   edge      from the smaller vertex to the larger
-///   quad      origin at the smallest vertex, i towards the smaller of its two neighbours, j towards the other
+///   quad      origin at the smallest vertex, i toward the smaller of its two neighbors, j toward the other
 ///   triangle  a < b < c by number: the mode E_ab,i V_c,j
 ///   cell      the kind's own
 ///
-/// Neighbours of any kind and orientation therefore agree on what they share, up to rounding.
+/// Neighboring cells of any kind and orientation therefore agree on what they share, up to rounding.
 ///
-/// Cells whose functions are the same have the same *pattern*: its modes, ascending. A hex whose entities all have
-/// order p has one pattern, with all (p + 1)^3 modes in tensor order, i fastest; prisms of one order have at most 9,
-/// tets 12.
+/// Cells with the same functions have the same *pattern*: the list of their modes, ascending. A hex whose entities all
+/// have order p has one pattern, with all (p + 1)^3 modes in tensor order, i fastest; prisms of one order have at most
+/// 9 patterns, tets 12.
 ///
-/// Immutable; copies share what they can. Positions of the mesh are not kept.
+/// Immutable; copies share what they can. The positions of the mesh are not kept.
 class ElementSpace {
  public:
-  /// mesh: as MeshTopology expects it. InputError: an order outside 1 .. kMaxOrder.
+  /// mesh: as MeshTopology requires it. InputError: an order outside 1 .. kMaxOrder.
   ElementSpace(const VolumeMesh& mesh, Basis basis, int order);
-  /// InputError: sizes other than the mesh's, an order out of range, or orders against the rule.
+  /// InputError: sizes that differ from the mesh's, an order out of range, or orders that break the rule.
   ElementSpace(const VolumeMesh& mesh, Basis basis, const EntityOrders& orders);
-  /// The same cells with other orders; `node_numbers_in` tells where the nodes went. InputError as above.
+  /// Returns a space of the same cells with other orders; `node_numbers_in` maps the nodes. InputError as above.
   ElementSpace with_orders(const EntityOrders& orders) const;
 
   Basis basis() const { return basis_; }
@@ -75,8 +75,8 @@ class ElementSpace {
   std::size_t face_nodes(std::size_t f) const { return face_nodes_[f]; }
   std::size_t cell_nodes(std::size_t c) const { return cell_nodes_[c]; }
   EntityShape face_shape(std::size_t f) const;
-  /// Corners of a face in its own frame: a, b, c of a triangle (then kNoIndex); of a quad the origin, the corner that i
-  /// runs to, the opposite one, the corner that j runs to.
+  /// Corners of a face in its own frame. Triangle: a, b, c, then kNoIndex. Quad: the origin, the corner that i runs to,
+  /// the opposite corner, the corner that j runs to.
   const std::array<Index, 4>& face_frame(std::size_t f) const { return cells_->face_frames[f]; }
 
   /// All nodes of a cell and their signs, in the order of its pattern's modes.
@@ -94,12 +94,12 @@ class ElementSpace {
   std::span<const LocalMode> pattern_modes(std::size_t p) const {
     return {pattern_modes_.data() + pattern_offsets_[p], pattern_offsets_[p + 1] - pattern_offsets_[p]};
   }
-  /// Largest order of a pattern's edges, faces and cell; of all patterns.
+  /// Largest order among a pattern's edges, faces and cell; among all patterns.
   int pattern_order(std::size_t p) const { return pattern_orders_[p]; }
   int max_order() const;
 
  private:
-  /// What does not depend on the orders.
+  /// Data that do not depend on the orders.
   struct Cells {
     explicit Cells(const VolumeMesh& mesh);
     MeshTopology topology;
@@ -116,7 +116,7 @@ class ElementSpace {
   Basis basis_;
   EntityOrders orders_;
   std::vector<std::size_t> edge_nodes_, face_nodes_, cell_nodes_;  // one more entry than entities
-  std::vector<std::size_t> offsets_;                               // per cell into nodes_ and signs_
+  std::vector<std::size_t> offsets_;                               // per cell, into nodes_ and signs_
   std::vector<Index> nodes_;
   std::vector<std::int8_t> signs_;
   std::vector<Index> patterns_;
@@ -126,10 +126,11 @@ class ElementSpace {
   std::vector<LocalMode> pattern_modes_;
 };
 
-/// For every node of `from` its number in `to`, a space of the same cells, or kNoIndex where `to` has no such mode.
+/// Returns, for every node of `from`, its number in `to`, a space of the same cells, or kNoIndex if `to` has no such
+/// mode.
 ///
-/// A map keeps its shape when coefficients go along these numbers and new modes start at zero. InputError: the spaces
-/// differ in basis or cells.
+/// A map keeps its shape if its coefficients are moved to these numbers, none is lost, and new modes are zero.
+/// InputError: the spaces differ in basis or cells.
 std::vector<Index> node_numbers_in(const ElementSpace& to, const ElementSpace& from);
 
 }  // namespace subvol

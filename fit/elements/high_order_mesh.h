@@ -9,24 +9,25 @@
 
 namespace subvol {
 
-/// A volume mesh of curved cells: a space and one coefficient per node, vertices' positions and modes' displacements.
+/// A volume mesh of curved cells: a space and one coefficient per node, a vertex's position or a mode's displacement.
 struct HighOrderMesh {
   ElementSpace space;
   std::vector<Vec3> coefficients;
 
-  /// InputError: other than one coefficient per node.
+  /// InputError: the number of coefficients differs from that of the nodes.
   HighOrderMesh(ElementSpace space, std::vector<Vec3> coefficients);
-  /// The straight-sided mesh in a space of any orders: modes are zero. InputError: other than the space's vertices.
+  /// The straight-sided mesh in a space of any orders: modes are zero. InputError: the space has another number of
+  /// vertices.
   HighOrderMesh(ElementSpace space, const VolumeMesh& mesh);
 
-  /// x(u), and dx/du (columns are derivatives by u, v, w), at a point of a cell in canonical coordinates.
-  /// Slow: makes its tables anew; for many points use `point_map` or ShapeFunctions.
+  /// x(u), or dx/du (columns are derivatives with respect to u, v, w), at a point of a cell in canonical coordinates.
+  /// Slow: every call makes its tables anew; for many points use `point_map` or ShapeFunctions.
   Vec3 position(std::size_t c, const Vec3& point) const;
   Mat3 jacobian(std::size_t c, const Vec3& point) const;
 
-  /// The same mesh in a space of other orders: the same shape where no order falls, else without what is gone.
+  /// The same mesh in a space of other orders: it keeps its shape if no order falls, otherwise modes are dropped.
   HighOrderMesh with_orders(const EntityOrders& orders) const;
-  /// The vertices with linear cells between them.
+  /// The linear cells on the same vertices.
   VolumeMesh straight_sided() const;
 };
 
@@ -36,11 +37,11 @@ struct CellPoint {
   Vec3 point;
 };
 
-/// InputError, in the name of `function`: a cell out of range, a point that is not finite or further than 1e-9 outside
+/// Throws InputError, naming `function`, if a cell is out of range, or a point is not finite or more than 1e-9 outside
 /// its cell.
 void require_inside(const char* function, const ElementSpace& space, std::span<const CellPoint> points);
 
-/// Nodes -> positions at points, one row per point. Weights within rounding of zero (1e-15) are left out.
+/// Map from nodes to positions at points, one row per point. Weights within rounding of zero (1e-15) are left out.
 ///
 /// InputError: as `require_inside`. Parallel. For many products: `PointTables`.
 SparseMap point_map(const ElementSpace& space, std::span<const CellPoint> points);

@@ -16,8 +16,8 @@ namespace {
 constexpr int kMaxSweeps = 200;
 constexpr double kSmallChange = 1e-3;
 
-/// Mean lengths of a cell's edges: along the three directions of a hex, around the triangles of a prism (twice) and
-/// across, of all edges of a tet (three times).
+/// Mean lengths of a cell's edges. Hex: along the three directions; prism: of the triangles' edges (twice) and of the
+/// upright edges; tet: of all edges (three times).
 Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes) {
   const CellTopology& topology = cell_topology(kind);
   Vec3 sums = Vec3::Zero(), counts = Vec3::Zero();
@@ -36,7 +36,7 @@ Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec
   return sums.cwiseQuotient(counts);
 }
 
-/// ln of the mean length of a face's edges.
+/// Logarithm of the mean length of a face's edges.
 double log_size(std::span<const Index> face, std::span<const Vec3> nodes) {
   double sum = 0;
   for (std::size_t i = 0; i < face.size(); ++i) sum += (nodes[face[(i + 1) % face.size()]] - nodes[face[i]]).norm();
@@ -72,7 +72,7 @@ std::vector<Vec3> interpolated_boxes(const VolumeMesh& mesh, std::span<const Vec
   std::vector<double> size(mesh.num_cells(), common);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
     if (trusted[c]) size[c] = std::log(boxes[c].prod()) / 3;
-  // Gauss-Seidel: a sweep there and back carries sizes through the whole mesh.
+  // Gauss-Seidel: one forward and one backward sweep carry sizes through the whole mesh.
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     double change = 0;
     for (std::size_t k = 0; k < mesh.num_cells(); ++k) {

@@ -16,17 +16,17 @@ namespace subvol {
 
 namespace {
 
-/// Least squares on a simplex, weighted by quadrature: `solver` takes values at `points` times `root_weights` to the
-/// coefficients of its modes.
+/// Least squares on a simplex, weighted by quadrature: `solver` maps the values at `points`, times `root_weights`, to
+/// the coefficients of the modes.
 struct SimplexFit {
   std::vector<Vec3> points;
   Eigen::VectorXd root_weights;
-  Eigen::HouseholderQR<Eigen::MatrixXd> solver;  // keeps residuals small where the modes are nearly dependent
+  Eigen::HouseholderQR<Eigen::MatrixXd> solver;  // keeps residuals small if the modes are nearly dependent
 
   Eigen::Index num_modes() const { return solver.cols(); }
 };
 
-/// dimension 1: phi_i; 2: E_01,i V_2,j; 3: the modes of a tet.
+/// Modes for dimension 1: phi_i; 2: E_01,i V_2,j; 3: the modes of a tet.
 SimplexFit make_simplex_fit(Basis basis, int dimension, int order) {
   Quadrature rule;
   const int n = order + 2;
@@ -58,7 +58,7 @@ SimplexFit make_simplex_fit(Basis basis, int dimension, int order) {
   return {std::move(rule.points), root, Eigen::HouseholderQR<Eigen::MatrixXd>(values)};
 }
 
-/// Fills the coefficients of one entity after another.
+/// Fits the coefficients of one entity after another.
 class Projector {
  public:
   Projector(const ElementSpace& space, const std::function<Vec3(std::size_t, const Vec3&)>& map)
@@ -113,7 +113,7 @@ class Projector {
     fit(shape, mesh_.space.orders().faces[f], mesh_.space.face_nodes(f), c, corner(c, frame[0]), axes);
   }
 
-  /// One entity as a product of simplices, with its frame (origin, axes) in the coordinates of a cell.
+  /// Fits one entity as a product of simplices; its frame (origin, axes) is in the coordinates of a cell.
   void fit(EntityShape shape, int order, std::size_t first_node, std::size_t c, const Vec3& origin, const Mat3& axes) {
     if (num_modes(shape, order) == 0) return;
     std::vector<int> dimensions;
@@ -125,7 +125,7 @@ class Projector {
       case EntityShape::prism: dimensions = {2, 1}; break;
       case EntityShape::hex: dimensions = {1, 1, 1}; break;
     }
-    std::vector<Vec3> points = {Vec3::Zero()};  // the first simplex fastest
+    std::vector<Vec3> points = {Vec3::Zero()};  // the first simplex varies fastest
     int axis = 0;
     for (const int dimension : dimensions) {
       std::vector<Vec3> longer;

@@ -7,15 +7,15 @@
 
 namespace subvol {
 
-/// The mesh that follows a given map, entity by entity: vertices are met, then the modes of edges, of faces and of
-/// cells take what is left there, by least squares weighted as the integral (Gauss points in the entity's frame, order
-/// + 2 in each direction).
+/// Projects a given map onto a space, entity by entity: vertices are interpolated, then the modes of edges, of faces
+/// and of cells fit the remainder by least squares, weighted as the integral (order + 2 Gauss points in each direction
+/// of the entity's frame).
 ///
-/// map    (cell, canonical point) -> position, finite (else InputError). Every edge and face is asked about from one of
+/// map    (cell, canonical point) -> position, finite (else InputError). Each edge and face is evaluated from one of
 ///        its cells.
 ///
 /// Maps inside the space are reproduced up to rounding. Deterministic; `map` is called from one thread.
-/// Cost: for every cell, its points times its modes.
+/// Cost: for every cell, the number of its points times that of its modes.
 HighOrderMesh project_map(const ElementSpace& space, const std::function<Vec3(std::size_t, const Vec3&)>& map);
 
 }  // namespace subvol

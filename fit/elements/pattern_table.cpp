@@ -51,7 +51,7 @@ Eigen::MatrixX3d PatternTable::gathered(const HighOrderMesh& mesh, std::size_t c
   return result;
 }
 
-// Products are lazy: a sum for each entry in one order, whatever the number of threads.
+// Lazy products compute every entry as a sum in one order, whatever the number of threads.
 void PatternTable::positions(const HighOrderMesh& mesh, std::size_t c, std::span<Vec3> out) const {
   assert(out.size() == num_points());
   Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>> x(out.data()->data(), values_.rows(), 3);

@@ -9,19 +9,20 @@
 
 namespace subvol {
 
-/// The shape functions of one pattern at fixed points: cells of that pattern are evaluated there by one small product.
+/// The shape functions of one pattern at fixed points: one small product evaluates a cell of that pattern there.
 class PatternTable {
  public:
   enum class Derivatives { none, first };
 
-  /// points: canonical coordinates inside the cell. InputError: no such pattern.
+  /// points: canonical coordinates inside the cell. InputError: the pattern does not exist.
   PatternTable(const ElementSpace& space, std::size_t pattern, std::span<const Vec3> points,
                Derivatives derivatives = Derivatives::none);
 
   std::size_t num_points() const { return static_cast<std::size_t>(values_.rows()); }
 
-  /// Positions of a cell of this pattern at the points, num_points() entries; and dx/du (columns are derivatives by
-  /// u, v, w), which need Derivatives::first. The cell's pattern and the sizes are asserted. Safe from several threads.
+  /// Computes the positions of a cell of this pattern at the points, or dx/du (columns are derivatives with respect to
+  /// u, v, w; requires Derivatives::first): num_points() entries. The cell's pattern and the sizes are asserted. Safe
+  /// to call from several threads.
   void positions(const HighOrderMesh& mesh, std::size_t c, std::span<Vec3> out) const;
   void jacobians(const HighOrderMesh& mesh, std::size_t c, std::span<Mat3> out) const;
 
@@ -31,7 +32,7 @@ class PatternTable {
 
   std::size_t pattern_;
   Table values_;                      // points x modes
-  std::array<Table, 3> derivatives_;  // by u, v, w; or empty
+  std::array<Table, 3> derivatives_;  // with respect to u, v, w; or empty
 };
 
 /// The cells of every pattern, ascending.

@@ -13,13 +13,14 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kMostRows = 256;  // of a block
+constexpr std::size_t kMostRows = 256;  // per block
 constexpr std::size_t kMostWide = kMostRows / kWide;
-/// How many times eight points, and how many modes, are summed at once: enough for sums not to wait for one another.
+/// Numbers of groups of eight points, and of modes, that are summed at once: enough that sums do not wait for one
+/// another.
 constexpr int kWideAtOnce = 4, kModesAtOnce = 4;
 
-/// The sides of a cell: l_0 .. l_3 = 0 of a tet; l_0 .. l_2 = 0, w = 0, w = 1 of a prism; u = 0, u = 1, v = 0, .. of a
-/// hex. Bit s tells whether a point lies on side s.
+/// Returns the sides that a point lies on, as bits. Side s is: l_s = 0 for a tet; l_0 .. l_2 = 0, w = 0, w = 1 for a
+/// prism; u = 0, u = 1, v = 0, .. for a hex.
 unsigned sides_at(CellKind kind, const Vec3& p) {
   constexpr double kOn = 1e-15;
   unsigned sides = 0;
@@ -36,10 +37,10 @@ unsigned sides_at(CellKind kind, const Vec3& p) {
   return sides;
 }
 
-/// Whether N_i is zero at the lower (upper) end of its axis.
+/// True if N_i is zero at the lower (upper) end of its axis.
 bool vanishes_at_end(int i, bool upper) { return i != (upper ? 1 : 0); }
 
-/// Whether E_edge,i V_vertex,j (V_3,k) has the factor l_c.
+/// True if E_edge,i V_vertex,j (V_3,k) has the factor l_c.
 bool has_factor(CellKind kind, const LocalMode& mode, int c) {
   if (mode.vertex == c || (kind == CellKind::tet && c == 3 && mode.k > 0)) return true;
   if (mode.edge < 0) return false;
@@ -60,7 +61,7 @@ bool vanishes(CellKind kind, const LocalMode& mode, unsigned sides) {
   return false;
 }
 
-/// What a table is of: blocks that agree in it share theirs.
+/// Key of a table: blocks with the same key share one.
 using TableKey = std::tuple<CellKind, std::vector<LocalMode>, std::vector<std::array<double, 3>>>;
 
 std::vector<Wide> table_values(const TableKey& key, Basis basis, int order) {
@@ -74,7 +75,7 @@ std::vector<Wide> table_values(const TableKey& key, Basis basis, int order) {
   return values;
 }
 
-/// Positions at kCount times eight points, of which `active` exist, by their rows of the table.
+/// Computes the positions at kCount groups of eight points, of which `active` exist, from their rows of the table.
 template <int kCount>
 void evaluate(const Wide* table, std::span<const Vec3> coefficients, std::size_t active, Vec3* out) {
   const std::size_t num_modes = coefficients.size();
@@ -87,7 +88,7 @@ void evaluate(const Wide* table, std::span<const Vec3> coefficients, std::size_t
       out[n * kWide + l] = Vec3(sum[n][0][l], sum[n][1][l], sum[n][2][l]);
 }
 
-/// What kCount modes get from the points: parts[3 r + d] is coordinate d of the r-th eight.
+/// Sums over the points, for kCount modes: parts[3 r + d] is coordinate d of the r-th group of eight points.
 template <int kCount>
 void gather_modes(const Wide* table, std::size_t num_modes, const Wide* parts, std::size_t num_wide, Vec3* out) {
   Wide sum[kCount][3] = {};

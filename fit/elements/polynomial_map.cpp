@@ -48,7 +48,7 @@ Eigen::MatrixXd series_matrix(Basis basis, int count) {
   return matrix;
 }
 
-/// Upper bounds of |phi^L_j| on [0, 1], and of |phi^L_j(x) / (1 - x)|, which is what V_c,j is made of.
+/// Upper bounds of |phi^L_j| on [0, 1], and of |phi^L_j(x) / (1 - x)|, which is V_c,j at l_c = x.
 double largest_mode(int j) { return 1 / std::sqrt(2 * j + 1.0); }
 double largest_vertex_factor(int j) { return std::sqrt(2 * j + 1.0); }
 
@@ -56,7 +56,7 @@ int num_dimensions(EntityShape shape) {
   return shape == EntityShape::edge ? 1 : shape == EntityShape::triangle || shape == EntityShape::quad ? 2 : 3;
 }
 
-/// The least order of an entity that has the mode (`ModeIndex`).
+/// The lowest order of an entity that has the mode (`ModeIndex`).
 int order_of_mode(EntityShape shape, const ModeIndex& m) {
   switch (shape) {
     case EntityShape::edge: return m.i + 1;
@@ -82,7 +82,7 @@ double largest_value(EntityShape shape, const ModeIndex& m) {
   return largest_mode(m.i) * largest_vertex_factor(m.j) * largest_vertex_factor(m.k);
 }
 
-/// `series_matrix` of every order up to that of a space.
+/// `series_matrix` for every order up to that of a space.
 class SeriesMatrices {
  public:
   explicit SeriesMatrices(const ElementSpace& space) {
@@ -98,7 +98,7 @@ class SeriesMatrices {
 /// The displacement of one edge, face or cell as a series of Legendre modes.
 class EntitySeries {
  public:
-  /// matrix: of the entity's order. coefficients: of the entity's modes, in the order of `for_each_mode`.
+  /// matrix: that of the entity's order. coefficients: those of the entity's modes, in the order of `for_each_mode`.
   EntitySeries(EntityShape shape, int order, const Eigen::MatrixXd& matrix, std::span<const Vec3> coefficients)
       : shape_(shape) {
     const int count = order - 1;
@@ -113,7 +113,7 @@ class EntitySeries {
     sizes_ = sizes;
   }
 
-  /// Coefficients at an order, in the order of `for_each_mode`.
+  /// Writes the coefficients for an order, in the order of `for_each_mode`.
   void write(int order, std::span<Vec3> coefficients) const {
     std::size_t n = 0;
     for_each_mode(shape_, order, [&](const ModeIndex& m) {
@@ -141,7 +141,7 @@ class EntitySeries {
     return static_cast<std::size_t>((std::max(m.k, 1) - 1) * sizes[1] + std::max(m.j, 1) - 1) * sizes[0] + m.i - 1;
   }
 
-  /// Replaces the modes along one axis with their series.
+  /// Replaces the modes along one axis by their series.
   void transform(const Eigen::MatrixXd& matrix, int axis, std::array<int, 3>& sizes) {
     std::array<int, 3> to = sizes;
     to[axis] = length_;
@@ -171,7 +171,7 @@ class EntitySeries {
 /// The lists of entities of a space.
 enum class Which { edge, face, cell };
 
-/// visit(which, number in its list, shape, order, first node) for every edge, then face, then cell.
+/// Calls visit(which, number in its list, shape, order, first node) for every edge, then face, then cell.
 template <class Visit>
 void for_each_entity(const ElementSpace& space, const Visit& visit) {
   const MeshTopology& topology = space.topology();
@@ -212,7 +212,7 @@ EntityOrders raised(const ElementSpace& space, const EntityOrders& limits, int r
   return result;
 }
 
-/// The parts of the map that orders drop, entity by entity.
+/// Bounds on the parts of the map that orders drop, entity by entity.
 class DroppedParts {
  public:
   DroppedParts(const HighOrderMesh& mesh, const SeriesMatrices& matrices) : space_(mesh.space) {
@@ -223,7 +223,7 @@ class DroppedParts {
     });
   }
 
-  /// The largest sum over the entities of a cell.
+  /// The largest sum over the entities of one cell.
   double bound(const EntityOrders& orders) const {
     const MeshTopology& topology = space_.topology();
     double largest = 0;
@@ -256,7 +256,7 @@ double sampled_distance(const HighOrderMesh& x, const HighOrderMesh& y, int samp
     groups[{x.space.pattern(c), y.space.pattern(c)}].push_back(static_cast<Index>(c));
   std::vector<double> largest(num_cells, 0);
   for (const auto& [patterns, members] : groups) {
-    const std::vector<Index>& cells = members;  // Clang before 16 takes no structured binding into a parallel region
+    const std::vector<Index>& cells = members;  // Clang before 16 cannot use a structured binding in a parallel region
     const Quadrature rule =
         make_quadrature(x.space.pattern_kind(patterns.first), QuadratureRule::trapezoidal, samples_per_direction);
     const PatternTable of_x(x.space, patterns.first, rule.points), of_y(y.space, patterns.second, rule.points);

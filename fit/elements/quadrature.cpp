@@ -29,7 +29,7 @@ std::array<double, 2> legendre(int n, double t) {
   return {value, old};
 }
 
-/// Newton's method from x0; the functions here are simple at their zeros and the starts good.
+/// Newton's method from x0; the functions here have simple zeros, and the initial values are good.
 template <class Step>
 double refine(double x, const Step& step) {
   for (int i = 0; i < 50; ++i) {
@@ -40,7 +40,7 @@ double refine(double x, const Step& step) {
   return x;
 }
 
-/// Makes rules on [0, 1] symmetric bit by bit from their upper half.
+/// Makes a rule on [0, 1] symmetric bit by bit, from its upper half.
 void mirror(LineRule& rule) {
   const std::size_t n = rule.points.size();
   for (std::size_t i = 0; i < n / 2; ++i) {
@@ -62,7 +62,7 @@ Quadrature regular_triangle(int n) {
   return rule;
 }
 
-/// u = s (1 - v): the Jacobian 1 - v costs one degree, so n Gauss points are good up to 2n - 2.
+/// u = s (1 - v): the Jacobian 1 - v costs one degree, so n Gauss points are exact up to 2n - 2.
 Quadrature collapsed_triangle(int n) {
   const LineRule line = gauss_rule(n);
   Quadrature rule;
@@ -75,8 +75,8 @@ Quadrature collapsed_triangle(int n) {
   return rule;
 }
 
-/// Cubes of the grid fall into an upright tet, an octahedron of four times its volume, and a hanging tet, as far as
-/// they lie inside.
+/// Each cube of the grid splits into an upright tet, an octahedron of four times its volume, and an inverted tet, as
+/// far as these lie inside.
 Quadrature regular_tet(int n) {
   const int last = n - 1;
   std::vector<double> sums(n * n * n, 0.0);  // in volumes of a small tet
@@ -100,7 +100,7 @@ Quadrature regular_tet(int n) {
   return rule;
 }
 
-/// The triangle shrunk by 1 - w: its Jacobian (1 - w)^2 costs two degrees, so n Gauss points are good up to 2n - 3.
+/// The triangle shrunk by 1 - w: its Jacobian (1 - w)^2 costs two degrees, so n Gauss points are exact up to 2n - 3.
 Quadrature collapsed_tet(int n) {
   const LineRule line = gauss_rule(n);
   const Quadrature triangle = collapsed_triangle(n);

@@ -8,7 +8,7 @@
 
 namespace subvol {
 
-/// What a quadrature takes along a line.
+/// The rule of a quadrature along a line.
 ///
 ///   trapezoidal    equal steps, both ends included; exact for linear functions and, with n points, for cosines
 ///                  cos(k pi x) up to k = 2n - 3                                Paper: Eq. 6
@@ -21,26 +21,27 @@ struct Quadrature {
   std::vector<double> weights;
 };
 
-/// n points a direction: u fastest, then v, then w (prism: the triangle's points, then w).
+/// n points per direction: u varies fastest, then v, then w (prism: the triangle's points, then w).
 ///
-/// Triangle and tetrahedron, trapezoidal: the regular grid of n points a side, with the vertex rule on every piece of
-/// the regular split (the octahedra among a tet's pieces have equal weights); exact for linear functions. Gauss-Lobatto
-/// has no such grid: they take Gauss points in collapsed coordinates instead, all inside, exact up to degree 2n - 3
-/// too. InputError: n < 2. Trapezoidal grids are nested where n - 1 divides n' - 1.
+/// Triangle and tetrahedron, trapezoidal: the regular grid of n points per side, with the vertex rule on every piece of
+/// the regular split (an octahedron among a tet's pieces has equal weights at its vertices); exact for linear
+/// functions. Gauss-Lobatto has no such grid: Gauss points in collapsed coordinates are used instead, all in the
+/// interior, also exact up to degree 2n - 3.
+/// InputError: n < 2. Trapezoidal grids are nested if n - 1 divides n' - 1.
 Quadrature make_quadrature(CellKind kind, QuadratureRule rule, int n);
-/// The same for the triangle {u + v <= 1}, w = 0.
+/// Makes the quadrature of the triangle {u + v <= 1}, w = 0, by the same rules.
 Quadrature make_triangle_quadrature(QuadratureRule rule, int n);
 
-/// Points a direction for an order >= 1: 2, 3, 5, 7, .. = 2p - 1, but 2 for order 1 (paper: section 3.2).
+/// Points per direction for an order >= 1: 2, 3, 5, 7, .. = 2p - 1, but 2 for order 1 (paper: section 3.2).
 int points_for_order(int order);
-/// The least 2^k + 1 (or 2) not below that: 2, 3, 5, 9, 9, 17, .. so that grids of all orders are nested.
+/// The smallest 2^k + 1 (or 2) not below that: 2, 3, 5, 9, 9, 17, .. so that grids of all orders are nested.
 int nested_points_for_order(int order);
 
 /// Points in (0, 1) or [0, 1], ascending, with weights that sum to 1.
 struct LineRule {
   std::vector<double> points, weights;
 };
-/// n >= 1, 2, 2 points, exact up to degree 2n - 1, 2n - 3, 1; else InputError.
+/// At least 1, 2, 2 points, else InputError; exact up to degree 2n - 1, 2n - 3, 1.
 LineRule gauss_rule(int n);
 LineRule gauss_lobatto_rule(int n);
 LineRule trapezoidal_rule(int n);

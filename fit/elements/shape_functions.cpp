@@ -7,13 +7,13 @@ namespace subvol {
 
 namespace {
 
-/// Gradients of the barycentric coordinates of tet and triangle by (u, v, w): l_0 = 1 - u - v (- w), l_1 = u, ..
+/// Gradients of the barycentric coordinates of tet and triangle in (u, v, w): l_0 = 1 - u - v (- w), l_1 = u, ..
 Vec3 barycentric_gradient(CellKind kind, int vertex) {
   if (vertex > 0) return Vec3::Unit(vertex - 1);
   return kind == CellKind::tet ? Vec3(-1, -1, -1) : Vec3(-1, -1, 0);
 }
 
-/// The edge of a kind between two local vertices (prism: of its triangle); `forward` tells whether it runs from a to b.
+/// The edge of a kind between two local vertices (prism: of its triangle); `forward` is true if it runs from a to b.
 int find_edge(CellKind kind, int a, int b, bool& forward) {
   const CellTopology& topology = cell_topology(kind);
   for (int e = 0; e < topology.num_edges; ++e) {
@@ -26,7 +26,7 @@ int find_edge(CellKind kind, int a, int b, bool& forward) {
 
 int sign_of(bool forward, int i) { return forward ? 1 : mode_parity(i); }
 
-/// The axis along which two vertices of a hex differ; `forward` tells whether it grows from a to b.
+/// The axis along which two vertices of a hex differ; `forward` is true if it grows from a to b.
 int axis_between(const Vec3& a, const Vec3& b, bool& forward) {
   int axis = 0;
   while (a[axis] == b[axis]) ++axis;
@@ -43,7 +43,7 @@ void set_axis_mode(SignedMode& signed_mode, const Vec3& a, const Vec3& b, int i)
   signed_mode.sign *= sign_of(forward, i);
 }
 
-/// The mode of a prism that runs as phi_i from local vertex a to b (up or along its triangle), times what is there.
+/// Puts phi_i from local vertex a to b (upright or along the triangle) into a prism's mode; its other factor stays.
 void set_prism_mode(SignedMode& signed_mode, int a, int b, int i) {
   bool forward = b > a;
   if (a % 3 == b % 3) {

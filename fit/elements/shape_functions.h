@@ -19,15 +19,15 @@ std::span<const Vec3> canonical_vertices(CellKind kind);
 ///
 ///   hex     N_i(u) N_j(v) N_k(w)                                     N: `line_functions`          Paper: Eq. 5
 ///   prism   E_edge,i  V_vertex,j  N_k(w)                             edge, vertex: those of triangle 0 1 2
-///   tet     E_edge,i  V_vertex,j  V_3,k                              the last factor only where k > 0
+///   tet     E_edge,i  V_vertex,j  V_3,k                              the last factor only if k > 0
 ///
-///   E_ab,i = l_a l_b psi_i((1 + l_b - l_a) / 2)                      a factor only where edge >= 0; i >= 1
-///   V_c,j  = l_c psi_j(l_c), V_c,0 = l_c                             a factor only where vertex >= 0
+///   E_ab,i = l_a l_b psi_i((1 + l_b - l_a) / 2)                      a factor only if edge >= 0; i >= 1
+///   V_c,j  = l_c psi_j(l_c), V_c,0 = l_c                             a factor only if vertex >= 0
 ///
-/// with l the barycentric coordinates and psi the `mode_kernels`. On its own edge, E_ab,i is phi_i(l_b); everywhere, it
-/// changes by phi_i's parity where a and b change places. So edges carry phi_i and quad faces phi_i phi_j on every
-/// kind, and triangle faces E_ab,i V_c,j on both kinds that have them. With legendre, prism functions are polynomials
-/// of degree i + 1, i + j + 1 over the triangle, tet functions of degree i + j + k + 1.
+/// with l the barycentric coordinates and psi the `mode_kernels`. On its own edge, E_ab,i is phi_i(l_b); everywhere,
+/// swapping a and b multiplies it by phi_i's parity. So edges carry phi_i and quad faces phi_i phi_j on every kind, and
+/// triangle faces E_ab,i V_c,j on both kinds that have them. With Legendre, prism functions are polynomials over the
+/// triangle, of degree i + 1 or i + j + 1, and tet functions are polynomials of degree i + j + k + 1.
 struct LocalMode {
   std::int8_t edge = -1;    ///< of a prism or tet, in the kind's order (prism: 0 .. 2); or -1
   std::int8_t vertex = -1;  ///< of a prism (0 .. 2) or tet; or -1
@@ -36,17 +36,17 @@ struct LocalMode {
   auto operator<=>(const LocalMode&) const = default;
 };
 
-/// A mode of an edge, face or cell, seen from a cell: its sign times that cell's shape function.
+/// A mode of an edge, face or cell as seen from a cell: its sign times that cell's shape function.
 struct SignedMode {
   LocalMode mode;
   int sign = 1;
 };
 
-/// The parts of a cell that carry modes, by shape.
+/// The entities of a cell that carry modes, by shape.
 enum class EntityShape : std::uint8_t { edge, triangle, quad, tet, prism, hex };
 EntityShape entity_shape(CellKind kind);
 
-/// The modes (i, j, k) of an entity, all from 1 where the entity has them, else 0. With n = order - 1:
+/// Indices (i, j, k) of an entity's mode, from 1 on; those that the entity does not have are 0. With n = order - 1:
 ///
 ///   edge      i <= n                     tet       i + j + k <= n
 ///   triangle  i + j <= n                 prism     i + j <= n, k <= n
@@ -64,22 +64,22 @@ void for_each_mode(EntityShape shape, int order, const Function& f);
 
 /// The shape function of a local vertex.
 LocalMode vertex_mode(CellKind kind, int vertex);
-/// Modes phi_i of an edge that runs from local vertex a to b, phi_i phi_j of a quad with its origin at a, i running to
-/// b and j to d, and E_ab,i V_c,j of the triangle a b c.
+/// Modes phi_i of the edge from local vertex a to b, phi_i phi_j of the quad with origin a, i running to b and j to d,
+/// and E_ab,i V_c,j of the triangle a b c.
 SignedMode edge_mode(CellKind kind, int a, int b, int i);
 SignedMode quad_mode(CellKind kind, int a, int b, int d, int i, int j);
 SignedMode triangle_mode(CellKind kind, int a, int b, int c, int i, int j);
-/// A mode of the cell itself. Hex phi_i phi_j phi_k, prism E_01,i V_2,j phi_k, tet E_01,i V_2,j V_3,k.
+/// A mode of the cell itself: hex phi_i phi_j phi_k, prism E_01,i V_2,j phi_k, tet E_01,i V_2,j V_3,k.
 LocalMode cell_mode(CellKind kind, ModeIndex index);
 
-/// Values and gradients of shape functions at points of one kind of cell. Never allocates; one per thread.
+/// Values and gradients of shape functions at points of one kind of cell. Never allocates; use one object per thread.
 class ShapeFunctions {
  public:
-  /// max_order: 1 .. kMaxOrder, at least that of any mode asked for.
+  /// max_order: 1 .. kMaxOrder, at least that of any mode to evaluate.
   ShapeFunctions(CellKind kind, Basis basis, int max_order);
 
   CellKind kind() const { return kind_; }
-  /// Prepares a point, in canonical coordinates inside the cell.
+  /// Sets the point, in canonical coordinates inside the cell.
   void set_point(const Vec3& point);
   double value(const LocalMode& mode) const {
     if (kind_ == CellKind::hex)
@@ -89,7 +89,7 @@ class ShapeFunctions {
     if (kind_ == CellKind::prism) return result * axes_[2][mode.k].value;
     return mode.k > 0 ? result * vertices_[3][mode.k].value : result;
   }
-  /// Value, and gradient by the canonical coordinates.
+  /// Returns the value, and the gradient with respect to the canonical coordinates.
   double value(const LocalMode& mode, Vec3& gradient) const {
     const Factor f = evaluate(mode);
     gradient = f.gradient;
@@ -111,7 +111,7 @@ class ShapeFunctions {
   CellKind kind_;
   Basis basis_;
   int max_order_;
-  std::array<LineTable, 3> axes_;      // N along u, v, w; a prism has w alone
+  std::array<LineTable, 3> axes_;      // N along u, v, w; a prism uses w alone
   std::array<LineTable, 6> edges_;     // E_edge,i at i
   std::array<LineTable, 4> vertices_;  // V_vertex,j at j
 };

@@ -78,7 +78,7 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
 
 void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
                          std::span<Mat3> diagonal) {
-  // Of each thread, column j of M, scattered. Made here, where a lack of memory can be told.
+  // Per thread: column j of M, scattered. Allocated outside the parallel region, so that a failure can be reported.
   std::vector<std::vector<double>> weights(omp_get_max_threads(), std::vector<double>(map.num_rows(), 0.0));
 #pragma omp parallel
   {

@@ -10,10 +10,10 @@
 
 namespace subvol {
 
-/// A square sparse matrix of 3x3 blocks over points, by rows (CSR): y_i = sum_j B_ij x_j.
+/// A square sparse matrix of 3x3 blocks over points, stored by rows (CSR): y_i = sum_j B_ij x_j.
 ///
-/// Holds the Hessians of the energies. Columns of a row are ascending and unique. Blocks are single precision (a Newton
-/// matrix needs no more, and its product is bound by memory); products are summed in double.
+/// Holds the Hessians of the energies. The columns of a row are ascending and unique. Blocks are single precision (a
+/// Newton matrix needs no more, and its product is bound by memory bandwidth); products are summed in double.
 struct BlockSparse {
   std::vector<std::size_t> offsets{0};  ///< num_rows() + 1 entries
   std::vector<Index> columns;
@@ -24,24 +24,25 @@ struct BlockSparse {
   const float* block(std::size_t entry) const { return blocks.data() + 9 * entry; }
   float* block(std::size_t entry) { return blocks.data() + 9 * entry; }
 
-  /// Entry number of block (row, column); num_entries() where the pattern has none. Cost: a binary search in the row.
+  /// Returns the entry number of block (row, column), or num_entries() if the pattern has none. Cost: a binary search
+  /// in the row.
   std::size_t find(Index row, Index column) const;
 
-  /// out = B in; sizes num_rows(), must not overlap. Rows run in parallel, same bits for any number of threads.
+  /// out = B in. Both have num_rows() entries and must not overlap. Rows run in parallel; the result has the same bits
+  /// for any number of threads.
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const;
-  /// The diagonal blocks, as 3x3 matrices; zero where the pattern has none.
+  /// Returns the diagonal blocks as 3x3 matrices; zero if the pattern has none.
   std::vector<Mat3> diagonal() const;
   void set_zero();
 };
 
-/// The pattern in which the nodes of every element are coupled with one another, and every node with itself; zero
-/// blocks.
+/// Returns a zero matrix whose pattern couples the nodes of every element with one another, and every node with itself.
 ///
-/// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], each in [0, num_rows), else InputError.
+/// Element e has the nodes nodes[offsets[e]] .. nodes[offsets[e+1] - 1], all in [0, num_rows), else InputError.
 BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> offsets, std::span<const Index> nodes);
 
-/// Adds the 3x3 diagonal blocks of M^T H M: D_j += sum_ik M_ij H_ik M_kj. Parallel, same bits for any number of
-/// threads.
+/// Adds the 3x3 diagonal blocks of M^T H M: D_j += sum_ik M_ij H_ik M_kj. Runs in parallel; the result has the same
+/// bits for any number of threads.
 void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
                          std::span<Mat3> diagonal);
 

@@ -3,7 +3,7 @@
 
 namespace subvol {
 
-/// Rules, and the functions' values and gradients there.
+/// Fills the quadrature points and weights, and the values and gradients of the functions there.
 void CellGroup::make_tables(Basis basis, QuadratureRule rule) {
   const int n = points_per_direction, m = order + 1;
   Quadrature quadrature = make_quadrature(kind, rule, n);

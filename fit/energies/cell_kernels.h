@@ -8,10 +8,10 @@
 
 #include <span>
 
-/// What `VolumeEnergy` does at one quadrature point of kLanes cells; private to it.
+/// Kernels of `VolumeEnergy` at one quadrature point of kLanes cells; private to it.
 namespace subvol {
 
-/// J_q of all lanes: J = sum_a x_a g_a^T diag(1/h).
+/// Computes J_q of all lanes: J = sum_a x_a g_a^T diag(1/h).
 inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes],
                       const double (*inverse_h)[kLanes], double (*jacobian)[kLanes]) {
   for (int r = 0; r < 3; ++r)
@@ -24,7 +24,7 @@ inline void jacobians(std::span<const ElementRule::Entry> entries, const double 
     }
 }
 
-/// m = m b, lane by lane: from the ideal to the reference shape.
+/// m = m b, lane by lane: changes from the ideal to the reference shape.
 inline void multiply_lanes(double (*m)[kLanes], const double (*b)[kLanes]) {
   for (int r = 0; r < 3; ++r)
 #pragma omp simd
@@ -34,7 +34,7 @@ inline void multiply_lanes(double (*m)[kLanes], const double (*b)[kLanes]) {
     }
 }
 
-/// m = m b^T: the stress against the ideal shape.
+/// m = m b^T, lane by lane: changes the stress back to the ideal shape.
 inline void multiply_lanes_transposed(double (*m)[kLanes], const double (*b)[kLanes]) {
   for (int r = 0; r < 3; ++r)
 #pragma omp simd
@@ -45,7 +45,7 @@ inline void multiply_lanes_transposed(double (*m)[kLanes], const double (*b)[kLa
     }
 }
 
-/// v = b v: right singular vectors, so that V^T grad N becomes V^T b^T grad N.
+/// v = b v, lane by lane: changes the right singular vectors so that V^T grad N becomes V^T b^T grad N.
 inline void premultiply(const double (*b)[kLanes], double (*v)[kLanes]) {
   for (int c = 0; c < 3; ++c)
 #pragma omp simd
@@ -103,7 +103,7 @@ void add_point_hessian(std::span<const ElementRule::Entry> entries, const Distor
     }
 }
 
-/// Adds the stresses of one point to the gradients of its active vertices.
+/// Adds the stress at one point to the gradients of its active vertices.
 inline void add_point_gradient(std::span<const ElementRule::Entry> entries, const double (*stress)[kLanes],
                                const double (*factor)[kLanes], double (*g)[3][kLanes]) {
   for (const ElementRule::Entry& entry : entries)
@@ -116,7 +116,7 @@ inline void add_point_gradient(std::span<const ElementRule::Entry> entries, cons
             factor[2][l] * stress[3 * r + 2][l] * entry.gradient[2];
 }
 
-/// One of the distortions, at kAtOnce points.
+/// Evaluates one of the distortions at kAtOnce points.
 struct DistortionKernel {
   static constexpr int kAtOnce = 2;
   using Batch = DistortionBatch;
@@ -137,7 +137,7 @@ struct DistortionKernel {
   }
 };
 
-/// The regularised barrier at one point.
+/// Evaluates the regularized barrier at one point.
 struct RegularisedKernel {
   static constexpr int kAtOnce = 1;
   using Batch = RegularisedBatch;
@@ -150,7 +150,7 @@ struct RegularisedKernel {
   void evaluate_hessian(int /*count*/) { regularised_barrier(batches[0], epsilon); }
 
   /// K_ab = alpha w_a.w_b I + beta (J w_a (C w_b)^T + C w_a (J w_b)^T) + gamma C w_a (C w_b)^T for a <= b, with
-  /// w_a = B^T diag(1/h) grad N_a, B the reference.
+  /// w_a = B^T diag(1/h) grad N_a, where B is `reference`.
   void add_hessian(Batch& batch, std::span<const ElementRule::Entry> entries, const double (*reference)[kLanes],
                    const double (*inverse_h)[kLanes], const double* weight, double (*k)[9][kLanes]) {
     alignas(64) double w[kMaxCellVertices][3][kLanes], jw[kMaxCellVertices][3][kLanes], cw[kMaxCellVertices][3][kLanes];

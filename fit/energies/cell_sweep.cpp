@@ -7,7 +7,7 @@ namespace subvol {
 
 namespace {
 
-/// One by one, so that sums need not be in memory before.
+/// Stores the sums one by one, so that they can stay in registers until then.
 template <int kCount>
 [[gnu::always_inline]] inline void put(const Wide (&sums)[kCount], Wide* to) {
   for (int i = 0; i < kCount; ++i) to[i] = sums[i];
@@ -40,7 +40,7 @@ void CellSweep::to_dense(std::size_t first, Wide (*j)[9]) const {
 template <int kCount>
 void CellSweep::from_dense(std::size_t first, const Wide (*j)[9]) {
   const Vec3* gradients = group_.gradients.data() + first * group_.num_modes;
-  Wide own[kCount][9];  // in registers: j might be among the sums, for all that is known
+  Wide own[kCount][9];  // in registers: for all the compiler knows, j may alias the sums
   for (int n = 0; n < kCount; ++n)
     for (int e = 0; e < 9; ++e) own[n][e] = j[n][e];
   for (std::size_t a = 0; a < group_.num_modes; ++a) {

@@ -10,7 +10,7 @@
 
 namespace subvol {
 
-/// Takes the coefficients of one batch to the Jacobians at its points, and back: the work space of one thread.
+/// Maps the coefficients of one batch to the Jacobians at its points, and back. Holds the work space of one thread.
 class CellSweep {
  public:
   explicit CellSweep(const CellGroup& group)
@@ -28,8 +28,8 @@ class CellSweep {
 
   void load(std::size_t batch, std::span<const Vec3> nodes);
 
-  /// Calls op(first, count, J) for all points, some at a time: first, first + 1, ... with the 9 entries of J = dx/du
-  /// for each. With kBack, op leaves there what is summed into the coefficients: out_a = sum_q J_q grad N_a(q).
+  /// Calls op(first, count, J) for all points in chunks, where J[n] holds the 9 entries of dx/du at point first + n.
+  /// With kBack, op overwrites J, and the result is summed into the coefficients: out_a = sum_q J_q grad N_a(q).
   template <bool kBack, class Op>
   void run(Op&& op) {
     if (group_.kind == CellKind::hex)
@@ -41,7 +41,7 @@ class CellSweep {
   const std::vector<Wide>& coefficients() const { return coefficients_; }
 
  private:
-  /// Columns of a hex, and points of other cells, at once: two, so that kernels find pairs.
+  /// Number of columns of a hex, or of points of another cell, per chunk: two, so that kernels can work on pairs.
   static constexpr int kColumns = 2, kPoints = 2;
 
   std::size_t num_columns() const { return static_cast<std::size_t>(n_) * n_; }
@@ -61,8 +61,8 @@ class CellSweep {
     if constexpr (kBack) coefficients_.swap(dense_sums_);
   }
 
-  /// One direction at a time: coefficients (k, j, i) -> lines (k, j, q1) -> planes (k, q2, q1) -> points, column by
-  /// column: what a column needs stays in the fastest cache.
+  /// Works on one direction at a time: coefficients (k, j, i) -> lines (k, j, q1) -> planes (k, q2, q1) -> points. The
+  /// points are made column by column, so that the data of a column stays in the fastest cache.
   template <bool kBack, class Op>
   void run_tensor(Op&& op) {
     to_lines();
@@ -80,19 +80,19 @@ class CellSweep {
     }
   }
 
-  /// J at some points of a cell that is no hex; and back into the sums of its modes.
+  /// `to_dense` computes J at kCount points of a prism or tet; `from_dense` sums back into its modes.
   template <int kCount>
   void to_dense(std::size_t first, Wide (*j)[9]) const;
   template <int kCount>
   void from_dense(std::size_t first, const Wide (*j)[9]);
 
-  /// lines: values along u, then derivatives.
+  /// Fills lines_: values, then derivatives along u.
   void to_lines();
 
-  /// planes: derivatives along u, along v, values.
+  /// Fills planes_: derivatives along u, derivatives along v, values.
   void to_planes();
 
-  /// J at the points of a column; and back into the sums of its planes.
+  /// `to_points` computes J at the points of a column; `from_points` sums back into its planes.
   void to_points(std::size_t column, Wide (*j)[9]) const;
   void from_points(std::size_t column, const Wide (*j)[9]);
 
@@ -103,7 +103,7 @@ class CellSweep {
   const CellGroup& group_;
   int m_, n_;
   std::vector<Wide> coefficients_, dense_sums_;
-  std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not filled with zeros first
+  std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not initialized with zeros
   std::unique_ptr<Wide[][9]> points_;
 };
 

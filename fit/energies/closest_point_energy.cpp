@@ -11,7 +11,7 @@ namespace subvol {
 
 namespace {
 
-/// Barycentric coordinates of a point in a triangle's plane, clamped to the triangle; (1, 0, 0) where it has no area.
+/// Barycentric coordinates of a point in a triangle's plane, clamped to the triangle; (1, 0, 0) if it has no area.
 std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = b - a, v = c - a, w = p - a, n = u.cross(v);
   const double area = n.squaredNorm();
@@ -23,8 +23,8 @@ std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, c
 
 constexpr std::size_t kMostPoints = 6;
 
-/// The points of a triangle that are tied to the target, by their number: the centroid; three inside; these and the
-/// corners, as good as the edges, where surfaces are farthest apart.
+/// The points of a triangle that correspond to the target, by their number: the centroid; three inside; these and the
+/// corners, which serve as points of the edges, where the surfaces are farthest apart.
 std::span<const std::array<double, 3>> triangle_points(std::size_t number) {
   constexpr double kThird = 1.0 / 3, kSixth = 1.0 / 6, kTwoThirds = 2.0 / 3;
   static constexpr std::array<std::array<double, 3>, 1> kOne = {{{kThird, kThird, kThird}}};
@@ -113,7 +113,7 @@ double ClosestPointEnergy::share_over_rim(const Link& link, const ClosestPoint::
 }
 
 void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
-  constexpr double kLeastOffset = 1e-6;  // below, what rounding leaves of x - t(x) may point anywhere
+  constexpr double kLeastOffset = 1e-6;  // below it, rounding makes the direction of x - t(x) arbitrary
   if (!target_tree_) return;
   surface_links_.resize(surface_offsets_.back());
   surface_hints_.resize(surface_links_.size(), kNoIndex);

@@ -9,13 +9,13 @@
 
 namespace subvol {
 
-/// How places of the fitted surface are drawn to the target: n of the second sum below.
+/// Direction n in which points of the fitted surface are drawn to the target, in the second sum below.
 ///
-///   along_normals  the normal of the triangle that t(x_q) lies on. Where t(x_q) is on an edge or a corner, the way
-///                  back may be square to it: only tau pulls, and what sticks out there stays out.
-///   straight       (x_q - t(x_q)) / |x_q - t(x_q)|, which is the normal where t(x_q) lies within a smooth face. Curved
-///                  cells get nearer with it: the largest distance of a bust of 7 cells fell from 1.1 to 0.7 % of the
-///                  diagonal, while that of a tangled mesh of 2,832 straight hexes rose from 0.49 to 0.50 %.
+///   along_normals  the normal of the triangle that t(x_q) lies on. If t(x_q) is on an edge or a corner, x_q - t(x_q)
+///                  may be perpendicular to it: then only tau pulls, and what sticks out there stays out.
+///   straight       (x_q - t(x_q)) / |x_q - t(x_q)|, which is the normal up to sign if t(x_q) lies inside a smooth
+///                  face. Curved cells get closer with it: the largest distance of a bust of 7 cells fell from 1.1 to
+///                  0.7 % of the diagonal; that of a tangled mesh of 2,832 straight hexes rose from 0.49 to 0.50 %.
 enum class SurfacePull { along_normals, straight };
 
 /// The surface energy of Eq. 9 with exact closest points in place of Voronoi cells.
@@ -23,59 +23,61 @@ enum class SurfacePull { along_normals, straight };
 ///   E_S = 1/(2 A L^2) (sum_j a_j (y_j - s(y_j))^T M (y_j - s(y_j)) + sum_q b_q (x_q - t(x_q))^T M (x_q - t(x_q)))
 ///   M = n n^T + tau (I - n n^T),  n: unit normal of the target at y_j or t(x_q) (`SurfacePull`)
 ///
-/// y_j, a_j   samples of the target and the area each stands for;  s(y): closest point of the triangulated surface S~
+/// y_j, a_j   samples of the target and the area of each;  s(y): closest point of the triangulated surface S~
 /// x_q, b_q   quadrature points of S~'s triangles with their areas;  t(x): closest point of the target
 ///
-/// Of a point cloud nothing is known between its points, so the second sum is left out: they pull at S~, and what no
-/// point is nearest to is held by the cells alone. Where t(x_q) lies on an open edge of the target, x_q may be over a
-/// hole: it is not drawn to the rim, but only to the plane that continues the target there, with M = n n^T times
+/// Nothing is known about a point cloud between its points, so the second sum is left out: the points attract S~, and
+/// parts of S~ that are closest to no point are held by the cells alone. If t(x_q) lies on the boundary of the target,
+/// x_q may be over a hole: it is not drawn to the boundary, but only to the plane that continues the target there, with
+/// M = n n^T times
 ///
 ///   max(0, 1 - (d / 2L)^2)^2 (n . n_S)^2,   d = |x_q - t(x_q)|,  n_S: unit normal of S~
 ///
-/// so that places that are far from the rim, or where S~ runs another way, are free.
+/// so that points of S~ are free if they are far from the boundary or S~ is perpendicular to the target there.
 ///
-/// Where Voronoi cells hand every point of the target to one *sample*, here it pulls at the place of S~ that is
-/// closest, between the samples: the pull is spread over the corners, and cells are left better shaped at the same
-/// distance. Frozen: the barycentric coordinates of s(y_j), the points t(x_q), normals and areas. Same bits for any
-/// thread count.
+/// Voronoi cells assign every point of the target to one *sample*. Here it pulls at the closest point of S~, between
+/// the samples: the pull is spread over the corners, and cells keep better shapes at the same distance. Frozen are the
+/// barycentric coordinates of s(y_j), the points t(x_q), the normals and the areas. Results have the same bits for any
+/// number of threads.
 class ClosestPointEnergy final : public SurfaceTerm {
  public:
-  /// target must outlive the energy. points_per_triangle: 1 or 3. InputError: as `SurfaceEnergy`.
+  /// target must outlive the energy. points_per_triangle: 1 or 3. InputError: as for `SurfaceEnergy`.
   ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                      std::size_t num_samples, double tangential_weight, int points_per_triangle,
                      SurfacePull pull = SurfacePull::along_normals);
 
-  /// From the next `assign` on a tie of length d counts 1 + (d / length)^2 times: places that are far off are drawn
-  /// more than the mean asks for, which keeps the largest distance down. length > 0 in the target's unit, else
+  /// From the next `assign` on, a correspondence of length d counts 1 + (d / length)^2 times: distant points are drawn
+  /// more strongly than the mean requires, which keeps the largest distance down. length > 0 in the target's unit, else
   /// InputError.
   void emphasize_far(double length);
 
-  /// Six points, the corners among them, on each sample triangle with a 1, whatever `points_per_triangle` says: where
-  /// S~ is farthest off is on edges. One entry per sample triangle, else InputError; to be called before `assign`.
+  /// Uses six points, including the corners, on each sample triangle with a nonzero entry, instead of
+  /// `points_per_triangle`: S~ is farthest from the target on its edges. One entry per sample triangle, else
+  /// InputError; must be called before `assign`.
   void refine(std::span<const std::uint8_t> triangles);
 
-  /// Cost: one closest-point query per target sample and per quadrature point. The answers of the call before are where
-  /// the search starts, and the tree over S~ moves along.
+  /// Cost: one closest-point query per target sample and per quadrature point. Each search starts from the answer of
+  /// the previous call, and the tree over S~ is refitted.
   void assign(std::span<const Vec3> samples) override;
   void forget() override;
 
-  /// Distances between the surfaces as the last `assign` saw them: the larger of both ways, each over its points by
-  /// area; what lies over a rim of the target does not count.
+  /// Distances between the surfaces at the last `assign`, each the larger of both directions; means are weighted by
+  /// area. Points over a boundary of the target count as distance 0.
   struct Distance {
     double mean, max;
   };
   Distance assigned_distance() const;
-  /// The largest of them at each sample triangle.
+  /// Returns the largest of these distances at each sample triangle.
   std::vector<double> triangle_distances() const;
 
  private:
-  /// A point of the target tied to a point of one sample triangle.
+  /// A correspondence between a point of the target and a point of one sample triangle.
   struct Link {
     Index triangle;
     std::array<double, 3> barycentric;
     Vec3 point, normal;
-    double weight;      ///< area, and emphasis
-    double tangential;  ///< tau, or less
+    double weight;      ///< area times emphasis
+    double tangential;  ///< tau; 0 over a boundary
   };
 
   void link_target(std::span<const Vec3> samples);
@@ -85,17 +87,17 @@ class ClosestPointEnergy final : public SurfaceTerm {
   void add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const;
 
   const TargetSurface* target_;
-  std::optional<ClosestPoint> target_tree_;        ///< none for a cloud
-  std::optional<ClosestPoint> surface_tree_;       ///< of S~
+  std::optional<ClosestPoint> target_tree_;        ///< empty for a cloud
+  std::optional<ClosestPoint> surface_tree_;       ///< tree over S~
   std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 
   double tau_, scale_, inverse_far_ = 0;
   SurfacePull pull_;
-  std::vector<Link> target_links_;           ///< by sample triangle
-  std::vector<std::size_t> target_offsets_;  ///< of each sample triangle in target_links_
-  std::vector<Link> surface_links_;          ///< by sample triangle
-  std::vector<std::size_t> surface_offsets_; ///< of each sample triangle in surface_links_
+  std::vector<Link> target_links_;           ///< ordered by sample triangle
+  std::vector<std::size_t> target_offsets_;  ///< where each sample triangle begins in target_links_
+  std::vector<Link> surface_links_;          ///< ordered by sample triangle
+  std::vector<std::size_t> surface_offsets_; ///< where each sample triangle begins in surface_links_
   std::vector<Index> surface_hints_;         ///< target triangles of t(x_q)
   std::vector<double> surface_distances_;    ///< |x_q - t(x_q)|
 };

@@ -3,9 +3,9 @@
 
 namespace subvol {
 
-/// What pulls at what in the surface energy.
+/// How correspondences between the surfaces are chosen in the surface energy.
 enum class Correspondence {
-  closest,  ///< exact closest points, both ways (`ClosestPointEnergy`): better cells at the same distance (default)
+  closest,  ///< exact closest points, both ways (`ClosestPointEnergy`): better cells at equal distance (default)
   voronoi   ///< the paper's restricted Voronoi cells (`SurfaceEnergy`)
 };
 

@@ -76,8 +76,8 @@ enum class Order { energy, gradient, hessian };
   return result;
 }
 
-/// A distortion f as a function of x_i = ln s_i: its value, first derivatives, second ones of one x_i, and of x_i and
-/// x_j for (i, j) = (0,1), (1,2), (2,0).
+/// A distortion f as a function of x_i = ln s_i: its value, its first derivatives, and its second derivatives with
+/// respect to x_i twice (`second`) and to x_i and x_j for (i, j) = (0,1), (1,2), (2,0) (`mixed`).
 struct LogModel {
   Wide value, first[3], second[3], mixed[3];
 };
@@ -120,13 +120,14 @@ template <Distortion kDistortion>
   return f;
 }
 
-/// Second derivatives by singular values, clamped. e_i = f_i / s_i,  e_ij = (f_ij - delta_ij f_i) / (s_i s_j).
+/// Stores the clamped second derivatives with respect to singular values: e_i = f_i / s_i,
+/// e_ij = (f_ij - delta_ij f_i) / (s_i s_j).
 template <Distortion kDistortion>
 [[gnu::always_inline]] inline void store_second(const LogModel& f, const Wide* lambda, const Wide* inverse_s,
                                                 const Wide& on, DistortionBatch& batch) {
   const Wide floor = wide(batch.floor);
   Wide s[3], g[3];
-  Symmetric stretch;  // coupled: how those couple
+  Symmetric stretch;  // coupled: the mixed derivatives
   for (int i = 0; i < 3; ++i) {
     s[i] = lambda[i] * inverse_s[i];
     g[i] = f.first[i] * inverse_s[i];
@@ -160,14 +161,14 @@ template <Distortion kDistortion>
   }
 }
 
-/// Energy and derivatives from the singular values and vectors of J.
+/// Computes the energy and its derivatives from the singular values and vectors of J.
 template <Distortion kDistortion, Order kOrder>
 [[gnu::always_inline]] inline void evaluate_at(const Singular& singular, const WideBits& feasible,
                                                DistortionBatch& batch) {
   Wide lambda[3], log_s[3];
   const auto &v = singular.v, &jv = singular.jv;
   for (int i = 0; i < 3; ++i) {
-    // Rounding may leave nothing of a small singular value.
+    // Rounding may make a small singular value 0.
     lambda[i] = singular.square[i] > 1e-280 ? singular.square[i] : wide(1e-280);
     log_s[i] = 0.5 * log_positive(lambda[i]);
   }

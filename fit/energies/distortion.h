@@ -6,20 +6,20 @@
 
 namespace subvol {
 
-/// How distorted a cell is at a point: functions of the singular values s of the Jacobian J, 0 where it is ideal.
+/// Measures of a cell's distortion at a point: functions of the singular values s of the Jacobian J, 0 if it is ideal.
 ///
-///   hencky               1/2 sum (ln s_i)^2        rigid: 0 for rotations; keeps sizes      Paper: section 3.1
+///   hencky               1/2 sum (ln s_i)^2          rigid: 0 for rotations; keeps sizes      Paper: section 3.1
 ///   inverse_mean_ratio   |J|^2 / (3 det^(2/3)) - 1   conformal: 0 for similarities            Paper: figure 2
 ///   condition_number     |J| |J^-1| / 3 - 1          conformal; grows faster towards inversion
 ///
-/// Norms are Frobenius'. With x_i = ln s_i the two latter agree to second order: 2/3 sum (x_i - mean x)^2.
+/// Norms are Frobenius norms. With x_i = ln s_i the last two agree to second order: 2/3 sum (x_i - mean x)^2.
 enum class Distortion { hencky, inverse_mean_ratio, condition_number };
 const char* to_string(Distortion distortion);
 
-/// Smallest eigenvalue that the clamped second derivative of a distortion is given (dimensionless).
+/// Default floor to which the eigenvalues of a distortion's second derivative are raised (dimensionless).
 inline constexpr double kHessianFloor = 0.01;
 
-/// Distortion energy of kLanes Jacobians, lane by lane, with its derivatives.
+/// Distortion energies of kLanes Jacobians, lane by lane, with their derivatives.
 ///
 ///   e(J) = 1/2 |H|^2,  H = 1/2 ln(J^T J),  de/dJ = J^-T H                      Paper: section 3.1, appendix A
 ///
@@ -29,11 +29,10 @@ inline constexpr double kHessianFloor = 0.01;
 ///   stretch_i = (1 - ln s_i)/s_i^2,  twist_ij = (g_i + g_j)/(s_i + s_j),  flip_ij = (g_i - g_j)/(s_i - s_j),
 ///   g_i = ln s_i / s_i;
 ///
-/// each is raised to at least the floor, so that the Hessian is positive definite. Of the other distortions e_i =
-/// de/ds_i stands for g_i, and the stretches are coupled: the matrix of d2e/ds_i ds_j has its eigenvalues raised as a
-/// whole.
+/// each is raised to at least the floor, so that the Hessian is positive definite. For the other distortions
+/// g_i = de/ds_i, and the stretches are coupled: their matrix d2e/ds_i ds_j is clamped as a whole, by its eigenvalues.
 ///
-/// Infeasible: det J <= 0 gives energy +infinity and zero derivatives. Never NaN for finite J.
+/// If det J <= 0 (infeasible), the energy is +infinity and the derivatives are zero. Never NaN for finite J.
 struct DistortionBatch {
   alignas(64) double jacobian[9][kLanes];    ///< in: J row by row; rows are world x, y, z, columns reference directions
   alignas(64) double energy[kLanes];         ///< e(J), dimensionless, >= 0
@@ -43,29 +42,29 @@ struct DistortionBatch {
   alignas(64) double stretch[3][kLanes];     ///< clamped stretch_i
   alignas(64) double pair_same[3][kLanes];   ///< (flip + twist)/2 for (0,1), (1,2), (2,0): weight of (u_i v_j^T)^2
   alignas(64) double pair_cross[3][kLanes];  ///< (flip - twist)/2: weight of u_i v_j^T times u_j v_i^T
-  /// Of u_i v_i^T with u_j v_j^T, clamped; Hencky's has none and leaves it as it is.
+  /// Clamped coupling of u_i v_i^T and u_j v_j^T for (0,1), (1,2), (2,0). Not written for Hencky, which has none.
   alignas(64) double coupling[3][kLanes];
-  double floor = kHessianFloor;              ///< in: least eigenvalue of the second derivative; -infinity: as it is
+  double floor = kHessianFloor;              ///< in: floor of the eigenvalues of the second derivative; -infinity: none
 };
 
-/// What is done at points for one distortion. Each fills what comes before it, too. Of several batches two are worked
-/// on side by side, which takes less time than one after the other; what comes out is the same but for rounding.
+/// The kernels of one distortion. Each also fills what the ones before it fill. Several batches are worked on in pairs,
+/// side by side, which is faster than one after the other; the results agree up to rounding.
 struct DistortionKernels {
   void (*energy)(DistortionBatch* batches, int count);    ///< `energy`
-  void (*gradient)(DistortionBatch* batches, int count);  ///< and `stress`
+  void (*gradient)(DistortionBatch* batches, int count);  ///< also `stress`
   void (*hessian)(DistortionBatch* batches, int count);   ///< everything
-  bool coupled;                    ///< whether stretches are coupled
+  bool coupled;                    ///< true if stretches are coupled
 };
 const DistortionKernels& kernels_of(Distortion distortion);
 
-/// Hencky's. Fills `energy`. Cost: the singular values of one 3x3 matrix per lane.
+/// Hencky distortion. Fills `energy`. Cost: the singular values of one 3x3 matrix per lane.
 void hencky_energy(DistortionBatch& batch);
-/// Fills `energy` and `stress`.
+/// Hencky distortion. Fills `energy` and `stress`.
 void hencky_gradient(DistortionBatch& batch);
-/// Fills everything.
+/// Hencky distortion. Fills everything.
 void hencky_hessian(DistortionBatch& batch);
 
-/// The same for one Jacobian: e(J), +infinity where det J <= 0; `stress` (may be null) receives de/dJ.
+/// Returns the Hencky distortion e(J) of one Jacobian, +infinity if det J <= 0; `stress` (may be null) receives de/dJ.
 double hencky(const Mat3& jacobian, Mat3* stress = nullptr);
 
 }  // namespace subvol

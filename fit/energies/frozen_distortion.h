@@ -6,17 +6,18 @@
 
 namespace subvol {
 
-/// The second derivative of a distortion at points of eight cells, as numbers that are kept while conjugate gradients
-/// multiply with it. Per point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3), and where stretches are
-/// coupled coupling (3), as in `distortion.h`, R being A^-1 and all after it multiplied by the point's weight. Kept in
-/// single precision (`keep_frozen`): a product is as fast as they are read. Inlined everywhere: in memory between its
-/// steps, a product takes several times as long.
+/// The second derivative of a distortion at points of eight cells, stored for the products of conjugate gradients.
+///
+/// The numbers of a point: U (9), R V (9), stretch (3), pair_same (3), pair_cross (3) and, if stretches are coupled,
+/// coupling (3). They are those of `distortion.h`; R is A^-1, and all numbers after R V are multiplied by the point's
+/// weight. They are kept in single precision (`keep_frozen`), because the time of a product is that of reading them.
+/// Everything is inlined: with its intermediate results in memory, a product takes several times as long.
 inline constexpr int frozen_size(bool coupled) { return coupled ? 30 : 27; }
 inline constexpr int kMostFrozen = frozen_size(true);
-/// Symmetric 3x3 blocks of a second derivative by pairs (0,0) (1,1) (2,2) (0,1) (1,2) (2,0) of directions.
+/// Pairs of directions in the order of symmetric 3x3 blocks: (0,0) (1,1) (2,2) (0,1) (1,2) (2,0).
 inline constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
 
-/// Writes a point's numbers. `weight` multiplies the second derivative.
+/// Writes a point's numbers to `frozen`. `weight` multiplies the second derivative.
 template <bool kCoupled>
 [[gnu::always_inline]] inline void freeze(const DistortionBatch& batch, const Wide* reference, const Wide& weight,
                                           Wide* frozen) {
@@ -32,7 +33,7 @@ template <bool kCoupled>
   }
 }
 
-/// Keeps a point's numbers; those that single precision has no room for as the largest.
+/// Stores a point's numbers in single precision, clamped to the range that it can hold.
 inline void keep_frozen(const Wide* frozen, int size, Narrow* kept) {
   constexpr double kMost = 1e30;
   for (int k = 0; k < size; ++k) {
@@ -43,7 +44,7 @@ inline void keep_frozen(const Wide* frozen, int size, Narrow* kept) {
   }
 }
 
-/// Makes the second derivative of one lane `factor` times as large; `more` receives the numbers of what was added.
+/// Multiplies the second derivative of one lane by `factor`; `more` receives the numbers of the increase.
 inline void scale_frozen(Narrow* kept, int size, int lane, double factor, Wide* more) {
   for (int k = 0; k < 18; ++k) more[k] = widen(kept[k]);
   for (int k = 18; k < size; ++k) {
@@ -53,7 +54,7 @@ inline void scale_frozen(Narrow* kept, int size, int lane, double factor, Wide* 
   }
 }
 
-/// A change G of the Jacobian, by canonical coordinates, becomes the change U P (R V)^T of the stress:
+/// Replaces a change G of the Jacobian (in canonical coordinates) by the change U P (R V)^T of the stress:
 ///   W = U^T G R V,  P_ii = stretch_i W_ii + sum_{j != i} coupling_ij W_jj,  P_ij = same_ij W_ij + cross_ij W_ji.
 template <bool kCoupled>
 [[gnu::always_inline]] inline void apply_frozen(const Narrow* kept, Wide* g) {
@@ -79,8 +80,8 @@ template <bool kCoupled>
   product_with_transpose(t, rv, g);
 }
 
-/// Adds, for every pair (c, d) of canonical directions, the symmetric part of the block that couples gradients e_c,
-/// e_d.
+/// Adds, for every pair (c, d) of canonical directions, the block that couples the gradients e_c and e_d, made
+/// symmetric. For c != d this is the sum of both orders, (c, d) and (d, c).
 template <bool kCoupled>
 [[gnu::always_inline]] inline void add_blocks(const Wide* frozen, Wide* blocks) {
   const Wide *u = frozen, *rv = frozen + 9, *stretch = frozen + 18, *same = frozen + 21, *cross = frozen + 24;

@@ -119,7 +119,7 @@ void HighOrderEnergy::fill_references(CellGroup& group) const {
     throw InputError("HighOrderEnergy: the reference of cell " + std::to_string(bad_cell) + " has no positive volume");
 }
 
-/// Signed places: that of a part which counts negative is stored as its complement.
+/// Signed places: the place of a contribution that counts negative is stored as its complement.
 void HighOrderEnergy::find_incidences() {
   std::vector<std::size_t>& offsets = incidence_offsets_;
   offsets.assign(space_->num_nodes() + 1, 0);
@@ -153,7 +153,7 @@ std::size_t HighOrderEnergy::num_points() const {
   return total;
 }
 
-/// Runs per_batch(group number, batch, sweep) over all batches and sums what it returns in batch order.
+/// Runs per_batch(group number, batch, sweep) over all batches and sums the returned values in batch order.
 template <class PerBatch>
 double HighOrderEnergy::sum_batches(PerBatch&& per_batch) const {
   double total = 0;
@@ -175,7 +175,7 @@ double HighOrderEnergy::sum_batches(PerBatch&& per_batch) const {
   return total;
 }
 
-/// Adds scale times what the batches left in local_ to the nodes.
+/// Adds scale times the contributions in local_ to the nodes.
 void HighOrderEnergy::gather_nodes(double scale, std::span<Vec3> out) const {
 #pragma omp parallel for schedule(static)
   for (std::size_t node = 0; node < out.size(); ++node) {
@@ -194,8 +194,8 @@ void HighOrderEnergy::keep(const CellGroup& group, std::size_t batch, const std:
               local_.data() + group.local_begin + 3 * batch * group.num_modes * kLanes);
 }
 
-/// The energy at the nodes, by kernel(batches, count) at all points. With kBack, what the batches add to their modes
-/// stays in local_. Calls per_point(group number, batch, q, point) when a point is done.
+/// Returns the energy at the nodes, using kernel(batches, count) at all points. With kBack, the contributions of the
+/// batches to their modes are left in local_. Calls per_point(group number, batch, q, point) after each point.
 template <bool kBack, class Kernel, class PerPoint>
 double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const {
   constexpr int kAtOnce = 2;
@@ -313,7 +313,8 @@ void HighOrderEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap&
     }
 }
 
-/// Calls per_point(group, batch, q, lane, J, D) with the Jacobians of two fields at every point, batches in parallel.
+/// Calls per_point(group number, batch, q, lane, J, D) at every point, where J and D are the Jacobians of `nodes` and
+/// `direction`. Batches run in parallel.
 template <class PerPoint>
 void HighOrderEnergy::for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction,
                                     const PerPoint& per_point) const {
@@ -351,7 +352,7 @@ double HighOrderEnergy::max_step(std::span<const Vec3> nodes, std::span<const Ve
   return steps.step();
 }
 
-/// Ten times as stiff: P of the stress (`apply_frozen`), and the sum of blocks that it is part of.
+/// Makes a point of one lane ten times as stiff: both its frozen numbers and their part of `mean_blocks`.
 void HighOrderEnergy::stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane) {
   constexpr double kStiffer = 10;
   const int size = frozen_size(kernels_->coupled);
@@ -391,7 +392,7 @@ void HighOrderEnergy::emphasize_poor(std::span<const Vec3> nodes, double emphasi
   weigh_points(nodes);
 }
 
-/// What the points weigh, by the shape of their cells at these nodes; 1 in the mean over all.
+/// Weighs the points by the shape of their cells at these nodes; the mean of all weights is 1.
 void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
   constexpr double kFairShape = 0.6;
   for (CellGroup& group : groups_) group.point_weights.clear();
@@ -404,7 +405,7 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
       Mat3 f;
       for (int e = 0; e < 9; ++e) f(e / 3, e % 3) = batch.jacobian[e][l];
       const double shape = f.determinant() / (f.col(0).norm() * f.col(1).norm() * f.col(2).norm());
-      const double lack = shape > 0 ? std::max(0.0, 1 - shape / kFairShape) : 1;  // 1 where it is not a number, too
+      const double lack = shape > 0 ? std::max(0.0, 1 - shape / kFairShape) : 1;  // 1 also for NaN
       weight[l] = 1 + std::max(emphasis_, own_emphasis_[groups_[g].batches[b][l]]) * lack * lack;
     }
   };
@@ -422,7 +423,7 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
 }
 
 void HighOrderEnergy::densify(std::span<const Index> cells, std::span<const Vec3> nodes) {
-  constexpr int kMostPoints = 25;  // more cost more than they are worth (measured)
+  constexpr int kMostPoints = 25;  // more points cost more than they gain (measured)
   constexpr double kFirstEmphasis = 4;
   for (Index c : cells) {
     if (c < 0 || static_cast<std::size_t>(c) >= points_.size())

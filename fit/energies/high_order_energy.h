@@ -21,29 +21,30 @@ struct CellGroup;
 ///
 ///   E_W(x) = 1/n sum_c sum_q w_cq e(J_cq(x)),   J_cq = dx/du(u_q) A_cq^-1       Paper: Eqs. 2-7
 ///
-/// e is a distortion (`distortion.h`; Hencky's unless another is set), A_cq the derivative of the ideal cell's map:
-/// edge length 1, stretched by h_c along its three coordinates, or a reference of its own. Nodes are those of an
-/// `ElementSpace`: vertex positions and the coefficients of edge, face and cell modes. w_cq is the quadrature's weight.
-/// E_W is a mean, and e grows slowly towards inversion: few places that are much worse than they need be matter little
-/// to it. With an emphasis k > 0 points of poor shape weigh more, the mean of all weights staying what it was:
+/// e is a distortion (`distortion.h`; Hencky unless another is set). A_cq is the derivative of the ideal cell's map
+/// (edge length 1, stretched by h_c along its three coordinates) or a given reference. Nodes are those of an
+/// `ElementSpace`: vertex positions and the coefficients of edge, face and cell modes. w_cq is the quadrature weight.
+///
+/// E_W is a mean, and e grows slowly towards inversion: a few places that are much worse than necessary hardly change
+/// it. With an emphasis k > 0 points of poor shape weigh more, while the mean of all weights stays the same:
 ///
 ///   w_cq ~ w_q (1 + k_c max(0, 1 - s_cq / 0.6)^2),   s_cq = det J / (|J e1| |J e2| |J e3|) (at least 0)
 ///
-/// with s_cq of the nodes when k was set, or cells were densified last; k_c is k, but in cells that were densified at
-/// least 4, and twice as much each time, up to 256.
+/// s_cq is that of the nodes when k was set or the quadrature was last refined. k_c is k; in cells with refined
+/// quadrature it is at least 4, doubled with each further refinement, up to 256.
 ///
-/// Eight cells of one kind and order are worked on side by side. Hexes are sum-factorised: O(n^4) instead of O(n^6) for
+/// Eight cells of one kind and order are processed side by side. Hexes are sum-factorized: O(n^4) instead of O(n^6) for
 /// n modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept
-/// as 27 numbers per point (30 where stretches are coupled) and never assembled. Same bits for any number of threads;
-/// one caller at a time, const functions included, for they share a buffer.
+/// as 27 numbers per point (30 if stretches are coupled) and never assembled. The results have the same bits for any
+/// number of threads. Only one caller at a time may use an object, const functions included: they share a buffer.
 class HighOrderEnergy final : public VolumeTerm {
  public:
   /// space  must outlive the energy.
   /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError.
-  /// points_per_direction  of each cell; at least 2, else InputError.
+  /// points_per_direction  one number per cell, at least 2, else InputError.
   HighOrderEnergy(const ElementSpace& space, std::span<const Vec3> ideal_lengths,
                   std::span<const int> points_per_direction, QuadratureRule rule = QuadratureRule::trapezoidal);
-  /// reference  kept and asked again by `densify`. InputError: a reference whose determinant is not positive.
+  /// reference  kept and evaluated again by `densify`. InputError: a reference whose determinant is not positive.
   HighOrderEnergy(const ElementSpace& space, CellReference reference, std::span<const int> points_per_direction,
                   QuadratureRule rule = QuadratureRule::trapezoidal);
   ~HighOrderEnergy() override;
@@ -51,33 +52,33 @@ class HighOrderEnergy final : public VolumeTerm {
   double value(std::span<const Vec3> nodes) const override;
   double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
   double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
-  /// H is kept in single precision: entries are good to 1e-6 of the largest.
+  /// H is kept in single precision: entries are accurate to 1e-6 of the largest.
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override;
-  /// Of the diagonal that the mean of the second derivative over every cell's points gives. Every column of the map
-  /// must have at most one entry for it to be that of M^T H M; else what couples several nodes is left out.
+  /// Approximation: H is built from the mean of the second derivative over each cell's points, and blocks between
+  /// different nodes are left out. The latter changes nothing if every column of the map has at most one entry.
   void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                            std::span<Mat3> diagonal) const override;
   double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const override;
   bool stiffen(std::span<const Vec3> nodes, std::span<const Vec3> direction, double t) override;
   bool stiffen(std::span<const Index> cells) override;
-  /// Number of quadrature points of all cells.
+  /// Total number of quadrature points of all cells.
   std::size_t num_points() const;
-  /// Of each cell; more than it was made with where it was densified.
+  /// Quadrature points per direction of each cell, including refinements by `densify`.
   std::span<const int> points_per_direction() const { return points_; }
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
-  /// A curved cell that is certified at one length of a step, but not at twice it, may be all but inverted between its
-  /// points, and then no direction goes on from there. With half of it, its least determinant is at least about half of
-  /// what it was.
+  /// True: a curved cell that is certified after a step, but not after twice that step, may be nearly inverted between
+  /// its points, and then no direction leads on from there. After half the step, its least determinant is still at
+  /// least about half of what it was.
   bool keeps_off_inversion() const override { return true; }
-  /// Cells that are in the way twice as dense, up to 25 points a direction, their points of poor shape heavier.
+  /// Refines these cells (n -> 2 n - 1 points per direction, up to 25) and emphasizes points of poor shape in them.
   void densify(std::span<const Index> cells, std::span<const Vec3> nodes) override;
-  /// e, Hencky's to begin with.
+  /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
   static constexpr double kMostEmphasis = 1024;
-  /// k, by the shape that cells have at these nodes. InputError: not in [0, kMostEmphasis].
+  /// Sets k and weighs points by their shapes at these nodes. InputError: k is not in [0, kMostEmphasis].
   void emphasize_poor(std::span<const Vec3> nodes, double emphasis);
-  /// What cells that are densified reach, 256 at first; 0: nothing.
+  /// Sets the largest k_c that repeated quadrature refinement leads to, initially 256; 0: refinement adds no emphasis.
   void set_most_own_emphasis(double most) { most_own_emphasis_ = most; }
 
  private:
@@ -102,15 +103,15 @@ class HighOrderEnergy final : public VolumeTerm {
 
   const ElementSpace* space_;
   QuadratureRule rule_;
-  std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell, where cells have one for all their points
+  std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell; empty with a `reference_`
   CellReference reference_;
   std::vector<int> points_;
   const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
   double floor_ = kHessianFloor;
   double emphasis_ = 0, most_own_emphasis_ = 256;
-  std::vector<double> own_emphasis_;  ///< of each cell that was densified
+  std::vector<double> own_emphasis_;  ///< per cell: emphasis by quadrature refinement; 0: not refined
   std::vector<CellGroup> groups_;
-  /// What every batch adds to its cells' modes, and where each node finds its parts: signed places, by node.
+  /// Contributions of every batch to the modes of its cells. `incidences_` lists, node by node, their signed places.
   mutable std::vector<double> local_;
   std::vector<std::size_t> incidence_offsets_;
   std::vector<std::int64_t> incidences_;

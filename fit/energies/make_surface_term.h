@@ -15,11 +15,12 @@
 
 namespace subvol {
 
-/// E_S between samples of the fitted surface and a target, which must outlive it.
+/// Makes E_S between samples of the fitted surface and a target, which must outlive it.
 ///
-/// Voronoi cells have neither of these:
-/// far_length  of `ClosestPointEnergy::emphasize_far`; 0: none
-/// refined     of `ClosestPointEnergy::refine`; empty: none
+/// The last three parameters apply to closest points only:
+/// pull        direction of the correspondences of `ClosestPointEnergy`
+/// far_length  argument of `ClosestPointEnergy::emphasize_far`; 0: not called
+/// refined     argument of `ClosestPointEnergy::refine`; empty: not called
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
                                                std::size_t num_samples, double tangential_weight,
@@ -28,7 +29,7 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                double far_length = 0,
                                                std::span<const std::uint8_t> refined = {});
 
-/// InputError unless closest points are what pulls: Voronoi cells of points have no area.
+/// Throws InputError unless correspondences are closest points: Voronoi cells of a point cloud have no area.
 void require_closest(Correspondence correspondence);
 
 }  // namespace subvol

@@ -34,7 +34,7 @@ void regularised_barrier(RegularisedBatch& batch, double epsilon) {
   }
   for (int l = 0; l < kLanes; ++l) {
     const double root = std::hypot(epsilon, determinant[l]);
-    // Far on the wrong side chi vanishes in doubles; the energy is huge there all the same.
+    // Far on the inverted side chi underflows; the energy is huge there with this bound, too.
     chi[l] = std::max(chi_of(determinant[l], root, epsilon), 1e-60);
     slope[l] = chi[l] / root;
     const double cube_root = std::cbrt(chi[l]);

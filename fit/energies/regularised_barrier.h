@@ -6,17 +6,18 @@
 
 namespace subvol {
 
-/// Distortion energy that is finite for every Jacobian, also inverted ones, and tends to a barrier; kLanes at once.
+/// Distortion energy that is finite for every Jacobian, including inverted ones, and tends to a barrier as eps tends to
+/// 0; kLanes at once.
 ///
 ///   e_eps(J) = 1/4 |J|^2 / chi^(2/3) + 1/6 (D^2 + 1) / chi,  D = det J
 ///   chi(D, eps) = (D + sqrt(eps^2 + D^2)) / 2
 ///
 /// Source: Garanzha, Kaporin, Kudryavtseva, Protais, Ray, Sokolov: Foldover-free maps in 50 lines of code (2021), with
-/// other weights: without regularisation (chi = D) it is 13/12 at rotations and agrees there with Hencky's energy
+/// other weights: without regularization (chi = D) it is 13/12 at rotations and agrees there with the Hencky energy
 /// (`distortion.h`) up to second order, so that one turns into the other as cells become positive and well shaped.
 ///
-/// The second derivative is that of a function of J and D that is convex once chi is replaced by its tangent; what is
-/// left out is the curvature of D and chi:
+/// The second derivative is that of the energy as a function of J and D, with chi replaced by its tangent, which is
+/// convex. The curvatures of D(J) and chi(D) are left out:
 ///
 ///   H = alpha I + beta (J (x) C + C (x) J) + gamma C (x) C >= 0,  C = dD/dJ (cofactors)
 ///

@@ -5,13 +5,13 @@
 
 namespace subvol {
 
-// Eight 3x3 matrices at once, in registers: all of it is inlined everywhere.
+// Eight 3x3 matrices at once, in registers: everything is inlined everywhere.
 
 [[gnu::always_inline]] inline Wide wide(double x) { return Wide{} + x; }
 [[gnu::always_inline]] inline Wide absolute(const Wide& x) { return x < 0 ? -x : x; }
 
-/// The 2x2 rotation that makes a symmetric matrix [[p, o], [o, q]] with entries of at most 1 diagonal, by the half
-/// angle: cos 2t = |d| / sqrt(d^2 + b^2), d = q - p, b = 2 o.
+/// The 2x2 rotation that diagonalizes a symmetric matrix [[p, o], [o, q]] with entries of at most 1, by the half angle:
+/// cos 2t = |d| / sqrt(d^2 + b^2), d = q - p, b = 2 o.
 struct Rotation {
   Wide c, s;
 
@@ -42,8 +42,8 @@ struct Symmetric {
   return d[0] * (d[1] * d[2] - o[1] * o[1]) - o[0] * (o[0] * d[2] - o[1] * o[2]) + o[2] * (o[0] * o[1] - d[1] * o[2]);
 }
 
-/// cos(acos(r) / 3) for r in [0, 1], the largest root c of 4 c^3 - 3 c = r: interpolated to 1.3e-8 (at the zeros of a
-/// Chebyshev polynomial), then one step of Newton's method, to rounding.
+/// cos(acos(r) / 3) for r in [0, 1], the largest root c of 4 c^3 - 3 c = r. A polynomial that interpolates it at
+/// Chebyshev nodes is accurate to 1.3e-8; one Newton step then makes it accurate to rounding.
 [[gnu::always_inline]] inline Wide cosine_of_third(const Wide& r) {
   const Wide c =
       0.866025416 +
@@ -55,12 +55,12 @@ struct Symmetric {
   return c - (c * (4 * c2 - 3) - r) * reciprocal(12 * c2 - 3);
 }
 
-/// The eigenvector of a symmetric matrix whose eigenvalue is the farthest from both others, of length 1. Entries are at
-/// most 1; where they are all but those of a multiple of the identity, any vector.
+/// The unit eigenvector of a symmetric matrix whose eigenvalue is the farthest from both others. Entries must be at
+/// most 1 in size. If the matrix is nearly a multiple of the identity, the result may be any vector.
 ///
 /// With q = tr A / 3, 6 p^2 = |A - q I|^2, C = (A - q I)/p: C has the eigenvalues 2 cos(t + 2 pi k/3), cos 3t = r =
-/// det C / 2. With the sign that makes r >= 0 the first of them is apart from the others by p sqrt 3 at least, so that
-/// it is well-conditioned, and the adjugate of C - 2 cos t I is v v^T times 6 to 9.
+/// det C / 2. With the sign of p that makes r >= 0 the first of them differs from the others by at least sqrt 3, so
+/// that its eigenvector is well-conditioned, and the adjugate of C - 2 cos t I is v v^T times 6 to 9.
 [[gnu::always_inline]] inline void isolated_eigenvector(const Symmetric& a, Wide* vector) {
   constexpr double kLeast = 1e-60;
   Symmetric m = a;
@@ -84,7 +84,7 @@ struct Symmetric {
     adjugate.diagonal[i] = m.diagonal[j] * m.diagonal[k] - m.coupled[j] * m.coupled[j];
     adjugate.coupled[i] = m.coupled[j] * m.coupled[k] - m.coupled[i] * m.diagonal[k];
   }
-  // Its column with the largest entry on the diagonal.
+  // The column with the largest diagonal entry.
   const Wide *d = adjugate.diagonal, *o = adjugate.coupled;
   const auto second = d[1] > d[0];
   const Wide larger = second ? d[1] : d[0];
@@ -97,7 +97,7 @@ struct Symmetric {
   for (int k = 0; k < 3; ++k) vector[k] *= normalise;
 }
 
-/// Two vectors that make an orthonormal basis with n, |n| = 1.                  Duff et al., JCGT 6(1), 2017
+/// Finds two vectors that complete n, |n| = 1, to an orthonormal basis.         Duff et al., JCGT 6(1), 2017
 [[gnu::always_inline]] inline void complete_basis(const Wide* n, Wide* u, Wide* v) {
   const Wide sign = n[2] < 0 ? wide(-1) : wide(1), a = -reciprocal(sign + n[2]), b = n[0] * n[1] * a;
   u[0] = 1 + sign * n[0] * n[0] * a;
@@ -112,7 +112,7 @@ struct Symmetric {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// J^T J by its trace.
+/// Returns J^T J divided by its trace; `inverse_trace` receives 1 / trace.
 [[gnu::always_inline]] inline Symmetric right_gram(const Wide* j, Wide& inverse_trace) {
   Symmetric a;
   for (int i = 0; i < 3; ++i) {
@@ -125,13 +125,13 @@ struct Symmetric {
   return a;
 }
 
-/// Right singular vectors v_i of J, J v_i, and the squares of the singular values.
+/// The right singular vectors v_i of J, the vectors J v_i, and the squares of the singular values.
 struct Singular {
   Wide v[3][3], jv[3][3], square[3];
 };
 
-/// One v_i is the eigenvector of J^T J that stands apart; the others are found from J's action across it, not from
-/// J^T J: small singular values are as accurate as J.
+/// v_0 is the isolated eigenvector of J^T J. The others are found from the images under J of the plane perpendicular to
+/// it, not from J^T J, so that small singular values are as accurate as J.
 [[gnu::always_inline]] inline void decompose(const Wide* j, Singular& result) {
   Wide inverse_trace;
   auto& [v, jv, square] = result;

@@ -11,9 +11,8 @@
 
 namespace subvol {
 
-/// The largest t of a geometric sequence that starts at `limit` so that every det(J + s D), 0 <= s <= t, keeps at least
-/// a tenth of det J, over all pairs (J, D) that were admitted. Pairs may come from many threads at once; same t for
-/// any.
+/// Finds the largest t = limit * 0.8^n, n <= 200, such that every det(J + s D), 0 <= s <= t, keeps at least a tenth of
+/// det J, over all admitted pairs (J, D). Several threads may admit pairs at once; t does not depend on their order.
 class StepLimit {
  public:
   explicit StepLimit(double limit) {
@@ -31,12 +30,12 @@ class StepLimit {
 
   double step() const { return step_[steps_.load()]; }
 
-  /// Whether det(J + s D) keeps that much for all s up to t.
+  /// True if det(J + s D) is shown to keep at least a tenth of det J for all s in [0, t].
   static bool safe(const Mat3& j, const Mat3& d, double t) { return Path(j, d).safe(t); }
 
  private:
-  /// det(J + t D) - kKept det J = c0 + c1 t + c2 t^2 + c3 t^3; positive on [0, t] if its four Bernstein coefficients
-  /// there are.
+  /// det(J + t D) - kKept det J = c0 + c1 t + c2 t^2 + c3 t^3. It is positive on [0, t] if its four Bernstein
+  /// coefficients there are; the first of them is c0, positive because det J > 0.
   struct Path {
     double c0, c1, c2, c3;
     Path(const Mat3& j, const Mat3& d) {
@@ -54,7 +53,7 @@ class StepLimit {
   };
   static constexpr double kShrink = 0.8, kKept = 0.1;
   static constexpr int kMaxSteps = 200;
-  std::array<double, kMaxSteps + 1> step_;  // a table, so that a step has the same bits for every thread
+  std::array<double, kMaxSteps + 1> step_;  // a table, so that all threads use the same bits of a step
   std::atomic<int> steps_{0};               // step_[steps_] is safe for every pair seen so far
 };
 

@@ -39,7 +39,7 @@ void SurfaceEnergy::index_pieces() {
   site_pieces_.resize(target_pieces_.size());
   for (std::size_t p = target_pieces_.size(); p-- > 0;)
     site_pieces_[--site_offsets_[target_pieces_[p].site + 1]] = static_cast<Index>(p);
-  // Filling from behind has moved every end to its beginning.
+  // Filling from behind has moved the end of every range to its beginning.
   site_offsets_.erase(site_offsets_.begin());
   site_offsets_.push_back(target_pieces_.size());
 
@@ -78,7 +78,7 @@ void SurfaceEnergy::add_target_pieces(std::size_t sample, Row& row) const {
       squares += d[p].dot(weighted);
       mean += weighted;
     }
-    // The whole triangle is equally far along its normal.
+    // All points of the triangle have the same distance along its normal.
     const double height = n.dot(d[0]);
     row.target_to_surface += area * (tau_ * squares + (1 - tau_) * share * height * height);
     row.gradient -= 2 * area * (tau_ * mean + ((1 - tau_) * share * height) * n);

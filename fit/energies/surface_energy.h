@@ -14,7 +14,7 @@
 
 namespace subvol {
 
-/// Squared distance between the fitted surface S, known by samples z, and the target T; both ways, with frozen cells.
+/// Squared distance between the fitted surface S, given by samples z, and the target T, both ways, with frozen cells.
 ///
 ///   E_S = 1/(2 A L^2) (F_TS + F_ST),  L = V/A                                        Paper: Eq. 9
 ///   F_TS = sum_i integral over Vor(z_i) cut with T   of (y - z_i)^T M(y) (y - z_i) dy
@@ -23,20 +23,21 @@ namespace subvol {
 ///
 /// A, V, y_j   area, enclosed volume and samples of the target.
 /// S~          triangles between samples; x moves linearly with their corners.
-/// tau         tangential weight in [0, 1]: small where the surfaces are close, so that samples slide along T.
+/// tau         tangential weight in [0, 1]: small if the surfaces are close, so that samples slide along T.
 ///
-/// `assign` finds the cells and freezes them: which site every point belongs to, by its barycentric coordinates in its
-/// triangle, and dx. E_S is then a quadratic in z. Its gradient is that of moving cells for F_TS with tau = 1;
-/// otherwise it leaves out how cells and dx move, which is considerable for small tau. Dimensionless, >= 0, invariant
-/// under similarities of both surfaces. Results have the same bits for any number of threads.
+/// `assign` finds the cells and freezes them: the site that every point belongs to, given by its barycentric
+/// coordinates in its triangle, and dx. E_S is then quadratic in z. Its gradient is exact for moving cells only for
+/// F_TS with tau = 1; otherwise it neglects the motion of the cells and of dx, which is considerable for small tau.
+/// E_S is dimensionless, >= 0, and invariant if both surfaces undergo the same similarity. Results have the same bits
+/// for any number of threads.
 class SurfaceEnergy final : public SurfaceTerm {
  public:
-  /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1], a
-  /// target of points.
+  /// target must outlive the energy. InputError: no samples, a corner outside [0, num_samples), tau outside [0, 1], or
+  /// a target that is a point cloud.
   SurfaceEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                 std::size_t num_samples, double tangential_weight);
 
-  /// Cost: nearly all of a fit's surface part; see `RestrictedVoronoi::compute`.
+  /// Cost: nearly all of the time that a fit spends on its surface term; see `RestrictedVoronoi::compute`.
   void assign(std::span<const Vec3> samples) override;
 
   double tangential_weight() const { return tau_; }
@@ -50,9 +51,9 @@ class SurfaceEnergy final : public SurfaceTerm {
   double tau_, scale_;
   RestrictedVoronoi target_sites_;
   std::optional<RestrictedVoronoi> sample_sites_;
-  std::vector<VoronoiPiece> target_pieces_, sample_pieces_;  ///< of T's triangles; of S~'s
+  std::vector<VoronoiPiece> target_pieces_, sample_pieces_;  ///< pieces of T's triangles; of S~'s
   std::vector<std::size_t> site_offsets_, triangle_offsets_;
-  std::vector<Index> site_pieces_;  ///< numbers of `target_pieces_`, by site
+  std::vector<Index> site_pieces_;  ///< indices into `target_pieces_`, ordered by site
 };
 
 }  // namespace subvol

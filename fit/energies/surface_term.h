@@ -15,31 +15,32 @@
 
 namespace subvol {
 
-/// A surface energy with frozen correspondences: once assigned, an exact quadratic in the samples z,
+/// A surface energy with frozen correspondences. Once assigned, it is an exact quadratic in the samples z,
 ///
 ///   E(z) = E(z0) + g . (z - z0) + 1/2 (z - z0) . H (z - z0)
 ///
-/// that couples the corners of a sample triangle. What corresponds to what is the derived class's matter.
+/// that couples the corners of each sample triangle. The derived class determines the correspondences.
 class SurfaceTerm {
  public:
   virtual ~SurfaceTerm() = default;
 
-  /// Takes the samples' positions (num_samples, finite, else InputError), finds what corresponds to them, freezes it.
-  /// Must come before the functions below.
+  /// Takes the samples' positions (num_samples, finite, else InputError), finds their correspondences and freezes them.
+  /// Must be called before the functions below.
   virtual void assign(std::span<const Vec3> samples) = 0;
 
-  /// Drops what earlier assignments have left for the next one to be quicker by, where its result may depend on that
-  /// (ties): it is then a function of the samples alone.
+  /// Drops the state of earlier assignments that speeds up the next one, if the choice between equally close points may
+  /// depend on it. The next assignment is then a function of the samples alone.
   virtual void forget() {}
 
   /// Adds creases whose segments are edges of sample triangles (else InputError); to be called before `assign`.
   void add_creases(CreaseEnergy creases);
 
-  /// E(z) with what is frozen. Taken relative to the assigned samples, so differences of close-by values are good.
+  /// E(z) with frozen correspondences. It is computed relative to the assigned samples, so that differences of nearby
+  /// values are accurate.
   double value(std::span<const Vec3> z) const;
-  /// g += dE/dz, with what is frozen: per sample, in 1/length. One product with the Hessian.
+  /// g += dE/dz with frozen correspondences: one entry per sample, in 1/length. Cost: one product with the Hessian.
   void add_gradient(std::span<const Vec3> z, std::span<Vec3> g) const;
-  /// d2E/dz2, constant between assignments; positive semidefinite but for single precision. Every row has its diagonal
+  /// d2E/dz2, constant between assignments; positive semidefinite up to single precision. Every row has its diagonal
   /// block.
   const BlockSparse& hessian() const { return hessian_; }
 
@@ -50,13 +51,14 @@ class SurfaceTerm {
   std::span<const std::array<Index, 3>> triangles() const { return triangles_; }
 
  protected:
-  /// One corner of a sample triangle, seen from the sample there: where its blocks go in the sample's row.
+  /// One corner of a sample triangle, as seen from its sample: `entries` are the places of its blocks in that sample's
+  /// row.
   struct Incidence {
     Index triangle;
     int corner;
     std::array<Index, 3> entries;
   };
-  /// Sums of one sample: its part of the value, its gradient, its row of the Hessian.
+  /// Sums of one sample: its part of the value, its gradient, and its row of the Hessian.
   struct Row {
     double target_to_surface, surface_to_target;
     Vec3 gradient;
@@ -65,7 +67,7 @@ class SurfaceTerm {
     Vec3 position;
   };
 
-  /// InputError: no samples, a corner outside [0, num_samples).
+  /// InputError: no samples, or a corner outside [0, num_samples).
   SurfaceTerm(std::vector<std::array<Index, 3>> sample_triangles, std::size_t num_samples);
 
   std::span<const Incidence> incidences(std::size_t sample) const {
@@ -75,9 +77,9 @@ class SurfaceTerm {
   const std::vector<Vec3>& assigned() const { return assigned_; }
   double triangle_area(std::size_t t) const { return triangle_areas_[t]; }
 
-  /// Remembers the samples and their triangles' areas. To be called first in `assign`.
+  /// Remembers the samples and the areas of their triangles. Must be called first in `assign`.
   void begin_assign(std::span<const Vec3> samples);
-  /// Adds up every sample's row by add_row(sample, row), all of it times `scale`. To be called last in `assign`.
+  /// Sums every sample's row with add_row(sample, row) and multiplies all by `scale`. Must be called last in `assign`.
   template <class AddRow>
   void assemble(double scale, const AddRow& add_row);
 
@@ -96,7 +98,7 @@ class SurfaceTerm {
   std::optional<CreaseEnergy> creases_;
 };
 
-/// Sum of f(i) over [0, n) in slices of fixed size: the same bits for any number of threads.
+/// Returns the sum of f(i) over [0, n), in slices of fixed size: the same bits for any number of threads.
 template <class Function>
 double sliced_sum(std::size_t n, const Function& f) {
   constexpr std::size_t kSlice = 1024;
@@ -115,7 +117,7 @@ void SurfaceTerm::assemble(double scale, const AddRow& add_row) {
   std::vector<double> to_surface(n), to_target(n);
   std::size_t longest = 0;
   for (std::size_t i = 0; i < n; ++i) longest = std::max(longest, hessian_.offsets[i + 1] - hessian_.offsets[i]);
-  std::vector<Row> rows(omp_get_max_threads());  // made here, where a lack of memory can be told
+  std::vector<Row> rows(omp_get_max_threads());  // allocated here, so that a failure can be reported
   for (Row& row : rows) row.blocks.reserve(longest);
 #pragma omp parallel
   {

@@ -21,9 +21,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Greedy colouring: cells of one colour share no vertex.
+/// Colors the cells greedily, so that cells of one color share no vertex.
 std::vector<int> color_cells(const VolumeMesh& mesh) {
-  std::vector<std::vector<std::uint64_t>> used;  // one bit mask per vertex for every 64 colours
+  std::vector<std::vector<std::uint64_t>> used;  // one bit mask per vertex for every 64 colors
   std::vector<int> colors(mesh.num_cells());
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     std::size_t word = 0;
@@ -101,7 +101,7 @@ void VolumeEnergy::densify(std::span<const Index> cells, std::span<const Vec3>) 
 }
 
 void VolumeEnergy::rebuild_groups() {
-  // Cells by (kind, points, colour), each list in ascending order.
+  // Cells by (kind, points, color), each list in ascending order.
   std::map<std::pair<int, int>, std::vector<std::vector<Index>>> lists;
   for (std::size_t c = 0; c < mesh_->num_cells(); ++c) {
     auto& by_color = lists[{static_cast<int>(mesh_->kinds[c]), points_[c]}];
@@ -156,7 +156,7 @@ void VolumeEnergy::gather(const Group& group, std::size_t batch, std::span<const
   }
 }
 
-/// Runs per_batch(group, batch number) over all batches, colour by colour, and sums what it returns in batch order.
+/// Runs per_batch(group, batch number) over all batches, color by color, and sums the returned values in batch order.
 template <class PerBatch>
 double VolumeEnergy::sum_batches(PerBatch&& per_batch) const {
   double total = 0;
@@ -184,7 +184,7 @@ struct VolumeEnergy::BatchState {
   }
 };
 
-/// Has a kernel evaluated at all points of a batch, some at a time, and calls per_point(q, kernel batch) with the
+/// Evaluates a kernel at all points of a batch, kAtOnce at a time, and calls per_point(q, kernel batch) with the
 /// results.
 template <class Kernel, class PerPoint>
 void VolumeEnergy::for_points(const Group& group, std::size_t b, const BatchState& state, Kernel& kernel,
@@ -219,7 +219,7 @@ double VolumeEnergy::value_of(std::span<const Vec3> nodes) const {
 template <class Kernel>
 double VolumeEnergy::gradient_of(std::span<const Vec3> nodes, double scale,
                                  std::span<Vec3> gradient) const {
-  // Feasibility is known only at the end: gather into a copy, so that an infeasible state adds nothing.
+  // Feasibility is known only at the end: the gradient is gathered in a copy, so that an infeasible state adds nothing.
   std::vector<Vec3> local(num_nodes_, Vec3::Zero());
   const double energy = sum_batches([&](const Group& group, std::size_t b) {
     const BatchState state(*this, group, b, nodes);

@@ -18,24 +18,27 @@ namespace subvol {
 ///
 ///   E_W(x) = sum_c w_c sum_q w_q e(J_cq(x)),   sum_c w_c = sum_q w_q = 1       Paper: Eqs. 2, 3, 7
 ///
-/// e is a distortion (`distortion.h`; Hencky's unless another is set), J_cq the Jacobian of cell c at quadrature point
-/// q against its ideal cell: that of edge length 1 (`element_rule.h`), stretched by h_c along its three coordinates (a
-/// hex's is the box of edges h_c), or a reference of its own. Dimensionless, >= 0, +infinity where a determinant is not
-/// positive at a point.
+/// e is a distortion (`distortion.h`; Hencky unless another is set). J_cq is the Jacobian of cell c at quadrature point
+/// q with respect to its ideal cell, which is that of edge length 1 (`element_rule.h`) stretched by h_c along its three
+/// coordinates (for a hex, the box of edges h_c), or with respect to a given reference. E_W is dimensionless, >= 0, and
+/// +infinity if a determinant is not positive at a point.
 ///
-/// Cells run in parallel by colours (no two cells of one colour share a vertex), each in a fixed order: same bits for
-/// any number of threads. No allocation in the evaluations but for one partial sum per 8 cells.
+/// Cells run in parallel color by color (no two cells of one color share a vertex), those of a color in fixed order:
+/// the results have the same bits for any number of threads. The evaluations allocate only one partial sum per 8 cells,
+/// and `add_gradient` a copy of the gradient.
 ///
-/// With a regularisation epsilon > 0 the density is that of `regularised_barrier.h`: finite also where cells are
-/// inverted, so that minimising it untangles them. No step is limited then, and no cell counts as uncertified.
+/// With a regularization epsilon > 0 the density is that of `regularised_barrier.h`, which is finite even if cells are
+/// inverted, so that minimizing it untangles them. Steps are then not limited, and no cell counts as uncertified.
 class VolumeEnergy final : public VolumeTerm {
  public:
-  /// mesh  must outlive the energy; its positions are not read. InputError: more pairs of vertices of one cell than an
-  ///       Index numbers (some 8e7 vertices of hexes).
-  /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError. Cells weigh equally.
+  /// mesh  must outlive the energy; its positions are not read. InputError: more pairs of vertices that share a cell
+  ///       than an Index can number (a hex mesh of about 8e7 vertices).
+  /// ideal_lengths  h_c of each cell: three positive lengths in the mesh's unit, else InputError. All cells weigh the
+  ///                same.
   /// points_per_direction  >= 2; 2: corners only.
   VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction);
-  /// reference  kept and asked again by `densify`. Cells weigh equally, so that small ones keep their shape too.
+  /// reference  kept and evaluated again by `densify`. All cells weigh the same, so that small ones keep their shape
+  ///            too.
   /// InputError: a reference whose determinant is not positive.
   VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int points_per_direction);
 
@@ -49,32 +52,35 @@ class VolumeEnergy final : public VolumeTerm {
   std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
   void densify(std::span<const Index> cells, std::span<const Vec3> nodes = {}) override;
 
-  /// e, Hencky's to begin with.
+  /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
-  /// epsilon  0 (the start): the distortion's own barrier; > 0: the regularised one. InputError: negative, not finite.
+  /// epsilon  0 (initially): the distortion's own barrier; > 0: the regularized one. InputError: negative or not
+  ///          finite.
   void set_regularisation(double epsilon);
-  /// w_c by one positive weight per cell, of any common scale. InputError: another number, or not positive and finite.
+  /// Sets w_c from one positive weight per cell; only ratios matter. InputError: another number of weights, or a weight
+  /// that is not positive and finite.
   void set_weights(std::span<const double> weights);
-  /// The least det J_cq of each cell, into one place per cell (else InputError).
+  /// Writes the least det J_cq of each cell to `least`, which must have one entry per cell (else InputError).
   void least_determinants(std::span<const Vec3> nodes, std::span<double> least) const;
 
   /// Adds scale * dE/dx to `gradient` and scale times the positive definite Hessian (clamped, see `distortion.h`) to
-  /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible (else +infinity is returned and both
-  /// arguments are spoilt).
+  /// `hessian`, a matrix of this mesh's `pattern()`. The nodes must be feasible; otherwise it returns +infinity and
+  /// leaves both arguments unspecified.
   double add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;
 
-  /// Zero matrix with one block per pair of nodes that share a cell.
+  /// Returns a zero matrix with one block per pair of nodes that share a cell.
   BlockSparse pattern() const;
 
  private:
-  /// Cells of one kind and rule; `batches` hold kLanes of them, the last one padded with repeats.
+  /// Cells of one kind and rule; `batches` hold kLanes of them, the last one of each color padded with repeats.
   struct Group {
     ElementRule rule;
     std::vector<std::array<Index, kLanes>> batches;
-    std::vector<int> active;                 ///< real cells of each batch
-    std::vector<std::size_t> color_offsets;  ///< batches of each colour
-    /// Ideal to reference shape, A_ideal A^-1, per batch and point, row by row and lane by lane; empty: ideal cells.
+    std::vector<int> active;                 ///< number of cells in each batch without padding
+    std::vector<std::size_t> color_offsets;  ///< first batch of each color, and the number of batches
+    /// Change from the ideal to the reference shape, A_ideal A^-1, per batch and point, row by row, each entry in
+    /// kLanes lanes; empty: ideal cells.
     std::vector<double> to_reference;
     const double (*reference(std::size_t batch, std::size_t q) const)[kLanes] {
       return reinterpret_cast<const double(*)[kLanes]>(to_reference.data() +
@@ -112,7 +118,7 @@ class VolumeEnergy final : public VolumeTerm {
   std::vector<int> colors_;
   std::vector<Group> groups_;
   BlockSparse pattern_, hessian_;
-  std::vector<std::size_t> block_offsets_;  ///< of each cell in block_slots_
+  std::vector<std::size_t> block_offsets_;  ///< where each cell begins in block_slots_
   std::vector<Index> block_slots_;          ///< block number of (a, b), a-major, in the pattern
 };
 

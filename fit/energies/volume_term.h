@@ -11,45 +11,46 @@ namespace subvol {
 
 /// The distortion E_W of the cells of a finite element mesh, as a function of its nodes y. Paper: Eqs. 2, 3, 7.
 ///
-/// Dimensionless, >= 0, +infinity where a determinant is not positive at a quadrature point; never NaN for finite
-/// nodes.
+/// Dimensionless, >= 0; +infinity if a determinant is not positive at a quadrature point; never NaN for finite nodes.
 class VolumeTerm {
  public:
   virtual ~VolumeTerm() = default;
 
   virtual double value(std::span<const Vec3> nodes) const = 0;
 
-  /// Adds scale * dE/dy to `gradient`; returns the value. Infeasible: nothing is added.
+  /// Adds scale * dE/dy to `gradient` and returns the value. If the nodes are infeasible, nothing is added.
   virtual double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const = 0;
 
-  /// The same, and keeps scale times a positive definite approximation H of the second derivative for the two functions
-  /// below. The nodes must be feasible (else +infinity is returned and nothing may be made of the rest).
+  /// Like `add_gradient`, and keeps scale times a positive definite approximation H of the second derivative for the
+  /// two functions below. The nodes must be feasible; otherwise it returns +infinity and leaves gradient and H
+  /// unspecified.
   virtual double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) = 0;
   /// out = H in.
   virtual void multiply(std::span<const Vec3> in, std::span<Vec3> out) const = 0;
-  /// Adds the 3x3 diagonal blocks of M^T H M, or of an approximation that serves as preconditioner.
+  /// Adds the 3x3 diagonal blocks of M^T H M, or an approximation that serves as a preconditioner.
   virtual void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                                    std::span<Mat3> diagonal) const = 0;
 
-  /// The largest t in (0, limit] of a geometric sequence so that every determinant keeps at least a tenth of its value
-  /// on the way from y to y + t d at the quadrature points. The nodes must be feasible.
+  /// Returns the largest t in (0, limit] of a geometric sequence such that every determinant at the quadrature points
+  /// keeps at least a tenth of its value on the way from y to y + t d. The nodes must be feasible.
   virtual double max_step(std::span<const Vec3> nodes, std::span<const Vec3> direction, double limit = 1) const = 0;
 
-  /// Makes H stiffer where the way from y to y + t d would be too long for `max_step`, so that the next direction
-  /// leaves those points nearly as they are and the rest may move on. False where nothing was changed, or cannot be.
+  /// Makes H stiffer at the points that do not admit the step from y to y + t d (see `max_step`), so that the next
+  /// direction leaves these points nearly as they are and the rest may move on. Returns false if nothing was changed.
   virtual bool stiffen(std::span<const Vec3> /*nodes*/, std::span<const Vec3> /*direction*/, double /*t*/) {
     return false;
   }
 
-  /// The same for all points of these cells (ascending), with which a step would not be certified.
+  /// Makes H stiffer at all points of these cells (ascending), which a step would leave uncertified. Returns false if
+  /// nothing was changed.
   virtual bool stiffen(std::span<const Index> /*cells*/) { return false; }
 
-  /// Cells that are not proved to be nowhere inverted, ascending.
+  /// Returns the cells that are not certified, i.e. not proved to have det J > 0 everywhere, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
-  /// Whether a step that was cut back until all cells are certified again is to be half of that.
+  /// If true, a step that had to be shortened to keep all cells certified is halved once more.
   virtual bool keeps_off_inversion() const { return false; }
-  /// Gives these cells more quadrature points from now on, for they invert between those they have. Points may weigh
-  /// otherwise from then on, by the shape of the cells at these nodes.
+  /// Refines the quadrature of these cells, because they are inverted between their points. From then on the weights of
+  /// points may depend on the shape of the cells at these nodes.
   /// InputError: there is no such cell.
   virtual void densify(std::span<const Index> cells, std::span<const Vec3> nodes) = 0;
 };

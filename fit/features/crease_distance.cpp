@@ -11,7 +11,7 @@ namespace subvol {
 
 namespace {
 
-/// A place between the first point (0) and the last (1) of a straight piece, with the length it stands for.
+/// Divides a segment into at most 1e5 equal parts, no longer than `spacing` otherwise; calls visit(midpoint, length).
 template <class Visit>
 void sample_segment(const Vec3& a, const Vec3& b, double spacing, const Visit& visit) {
   constexpr double kMostParts = 1e5;
@@ -20,7 +20,7 @@ void sample_segment(const Vec3& a, const Vec3& b, double spacing, const Visit& v
   for (int k = 0; k < parts; ++k) visit(Vec3(a + (b - a) * ((k + 0.5) / parts)), length / parts);
 }
 
-/// Mean and maximum of distances over length.
+/// Mean over length and maximum of distances.
 struct Sum {
   double length = 0, total = 0, max = 0;
   Vec3 farthest = Vec3::Zero();

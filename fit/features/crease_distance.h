@@ -8,17 +8,17 @@
 
 namespace subvol {
 
-/// How far sharp edges of a target and fitted creases are from one another. Lengths and distances in per cent of a
-/// diagonal. Followed: there are segments that name the curve. Distances are those of followed curves to their own
-/// segments and back; means are over length.
+/// Distances between sharp edges of a target and fitted creases, both ways. Lengths and distances are in percent of a
+/// diagonal. A curve is followed if segments name it. Distances are those between followed curves and their own
+/// segments; means are over length.
 struct CreaseDistance {
   std::size_t num_curves = 0, num_followed = 0;
   double target_length_percent = 0, followed_length_percent = 0;
   double mean_from_target_percent = 0, max_from_target_percent = 0;
   double mean_to_target_percent = 0, max_to_target_percent = 0;
-  Vec3 farthest{0, 0, 0};           ///< point of the target or of a crease where the larger maximum is reached
-  double within_length_percent = 0; ///< length of all curves no farther than kSharpPercent from a crease, any crease
-  double crease_length_percent = 0; ///< of all segments, also those that follow nothing
+  Vec3 farthest{0, 0, 0};           ///< point of a curve or of a crease where the larger maximum is reached
+  double within_length_percent = 0; ///< length of all curves within kSharpPercent of any crease
+  double crease_length_percent = 0; ///< length of all segments, including those that follow nothing
 
   double mean_percent() const { return std::max(mean_from_target_percent, mean_to_target_percent); }
   double max_percent() const { return std::max(max_from_target_percent, max_to_target_percent); }
@@ -29,13 +29,13 @@ struct CreaseDistance {
   double share(double length) const { return target_length_percent > 0 ? length / target_length_percent : 1; }
 };
 
-/// A sharp edge counts as met where a crease is this close, in per cent of the diagonal.
+/// A sharp edge counts as met where a crease is this close, in percent of the diagonal.
 inline constexpr double kSharpPercent = 0.1;
 
-/// Samples both sides at most a thousandth of the diagonal apart.
+/// Measures these distances with samples at most a thousandth of the diagonal apart on both sides.
 ///
-/// points    ends of the segments: finite positions. Segments name points and curves in range, else InputError.
-/// diagonal  100 per cent, > 0. Deterministic. Cost: about 1 us a sample.
+/// points    ends of the segments: finite positions. Points and curves that segments name must exist, else InputError.
+/// diagonal  100 percent, > 0, else InputError. Deterministic. Cost: about 1 us a sample.
 CreaseDistance crease_distance(const FeatureCurves& curves, std::span<const Vec3> points,
                                std::span<const CreaseSegment> segments, double diagonal);
 

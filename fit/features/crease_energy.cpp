@@ -11,10 +11,10 @@ namespace subvol {
 
 namespace {
 
-/// Parts of a segment of T or of S, each carrying a point at its middle.
+/// Number of parts of a segment of T or S, each represented by its midpoint.
 constexpr int kPointsPerSegment = 2;
 
-/// Between a (0) and b (1), where p is nearest.
+/// Returns the position, from a (0) to b (1), of the point of the segment closest to p.
 double place_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const double squared = (b - a).squaredNorm();
   return squared > 0 ? std::clamp((p - a).dot(b - a) / squared, 0.0, 1.0) : 0.0;
@@ -47,7 +47,7 @@ CreaseEnergy::CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegmen
   }
 }
 
-/// Along the curve all but nothing counts, at its ends everything.
+/// Displacements along the curve count with tau only, those at the ends of an open curve fully.
 Mat3 CreaseEnergy::metric(const Curve& curve, Index segment, const Vec3& closest) const {
   const Vec3 &a = curve.points[segment], &b = curve.points[segment + 1];
   const bool at_end = !curve.closed && (closest == curve.points.front() || closest == curve.points.back());

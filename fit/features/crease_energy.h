@@ -13,22 +13,22 @@
 namespace subvol {
 
 /// Squared distance between crease curves of the fitted surface S and the feature curves of the target T that they
-/// follow; both ways, with frozen correspondences. An addition to a `SurfaceTerm`, which scales it as the rest of E_S.
+/// follow, both ways, with frozen correspondences. It is added to a `SurfaceTerm`, which scales it like its own terms.
 ///
 ///   E_C = width (sum_k b_k (y_k - s(y_k))^T M (y_k - s(y_k)) + sum_q c_q (x_q - t(x_q))^T M (x_q - t(x_q)))
-///   M = I - (1 - tau) d d^T,  d: direction of T's curve; M = I where the closest point is an end of it
+///   M = I - (1 - tau) d d^T,  d: direction of T's curve; M = I if t(x_q) is an end of an open curve
 ///
-/// y_k, b_k   points of T's curves and the length each stands for;  s(y): closest point of S's curve
+/// y_k, b_k   points of T's curves and the length that each represents;  s(y): closest point of S's curve
 /// x_q, c_q   points of S's curves with their lengths;  t(x): closest point of T's curve
-/// width      a crease counts as much as a strip of the surface so wide
+/// width      a crease counts as much as a strip of the surface of this width
 ///
-/// An open curve's ends are also tied to each other with M = I and the length of S's last segment, so that creases end
-/// where T's do.
+/// The ends of an open curve also correspond to each other, with M = I and the length of S's last segment, so that
+/// creases end where T's do.
 ///
-/// Each curve of S knows its curve of T: nothing is drawn to a neighbouring edge, however close.
+/// Each curve of S knows its curve of T: nothing is drawn to a neighboring edge, however close.
 class CreaseEnergy {
  public:
-  /// A point of T tied to a point of one segment of S: (1 - at) z_0 + at z_1.
+  /// A correspondence between a point of T and a point of one segment of S: (1 - at) z_0 + at z_1.
   struct Link {
     std::array<Index, 2> ends;
     double at, weight;
@@ -36,16 +36,16 @@ class CreaseEnergy {
     Mat3 metric;
   };
 
-  /// curves    of the target, those without a segment allowed.
+  /// curves    of the target; some may have no segment.
   /// segments  between samples, each following a curve. InputError: one that names no sample or no curve, width < 0,
   ///           tau outside [0, 1].
   CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegment> segments, std::size_t num_samples, double width,
                double tangential_weight);
 
-  /// Finds what corresponds to the samples, and freezes it.
+  /// Finds the correspondences for these samples and freezes them.
   void assign(std::span<const Vec3> samples);
 
-  /// Links that pull at a sample; each stands at both of its ends.
+  /// Returns the links of a sample; each link is listed at both of its ends.
   std::span<const Index> links_at(std::size_t sample) const {
     return {link_numbers_.data() + offsets_[sample], offsets_[sample + 1] - offsets_[sample]};
   }
@@ -54,11 +54,11 @@ class CreaseEnergy {
 
  private:
   struct Curve {
-    std::vector<Vec3> points;     ///< of T's polyline
-    ClosestPoint tree;            ///< of its segments
+    std::vector<Vec3> points;     ///< vertices of T's polyline
+    ClosestPoint tree;            ///< tree over its segments
     bool closed;
-    std::vector<Index> segments;  ///< of S
-    std::vector<Index> ends;      ///< samples that end one of these segments only: two where the curve is open
+    std::vector<Index> segments;  ///< segments of S
+    std::vector<Index> ends;      ///< samples at which exactly one of these segments ends: two if the curve is open
   };
 
   void link_target(const Curve& curve, std::span<const Vec3> samples);
@@ -70,7 +70,7 @@ class CreaseEnergy {
   std::vector<CreaseSegment> segments_;
   double width_, tau_;
   std::vector<Link> links_;
-  std::vector<std::size_t> offsets_;  ///< of each sample in link_numbers_
+  std::vector<std::size_t> offsets_;  ///< where each sample begins in link_numbers_
   std::vector<Index> link_numbers_;
 };
 

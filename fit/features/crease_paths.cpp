@@ -16,16 +16,16 @@ namespace subvol {
 
 namespace {
 
-/// By the mean edge length: how much a path's length counts against its distance, how far a corner may be from its
-/// vertex, how far a path and its curve may be from one another, and how short a curve is passed over.
+/// As shares of a mean edge length: epsilon of a path's integral; largest distance of a corner from its vertex; largest
+/// distance between a path and its curve; length below which a curve is skipped.
 constexpr double kLengthShare = 0.05, kCornerShare = 1.0, kFollowShare = 0.75, kLeastLength = 0.25;
-/// Vertices that are tried for an end where a feature runs out.
+/// Number of vertices that are tried for an end at which a feature runs out.
 constexpr std::size_t kNumTried = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct BoundaryGraph {
   std::vector<std::array<Index, 2>> edges;
-  std::vector<std::vector<Index>> vertex_edges;  ///< by mesh vertex
+  std::vector<std::vector<Index>> vertex_edges;  ///< per mesh vertex
   std::vector<Index> vertices;
   double mean_length = 0;
 
@@ -48,7 +48,7 @@ struct BoundaryGraph {
   Index other_end(Index e, Index v) const { return edges[e][0] == v ? edges[e][1] : edges[e][0]; }
 };
 
-/// Points along a polyline, at most `spacing` apart, its vertices among them.
+/// Returns points along a polyline, including its vertices, at most `spacing` apart.
 std::vector<Vec3> sampled(std::span<const Vec3> points, double spacing) {
   std::vector<Vec3> samples = {points[0]};
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
@@ -103,10 +103,10 @@ class PathFinder {
  private:
   struct Found {
     std::vector<Index> vertices;
-    double gap;  ///< largest distance between path and curve by the path's mean edge length
+    double gap;  ///< largest distance between path and curve / the path's mean edge length
   };
 
-  /// Corners to vertices, one to one.
+  /// Assigns corners to vertices, one to one.
   void give_corners() {
     struct Pair {
       double distance;
@@ -128,7 +128,7 @@ class PathFinder {
     for (std::size_t i = 0; i < curves.corners.size(); ++i) {
       if (curves.corner_edges[i] == 1) continue;
       const Index corner = curves.corners[i];
-      const SiteTree::Ball ball{positions[corner], 1.01 * reach * reach};  // a bit more: the tree rounds otherwise
+      const SiteTree::Ball ball{positions[corner], 1.01 * reach * reach};  // larger: the tree rounds differently
       near.clear();
       tree.gather({&ball, 1}, sites.size(), near);
       for (Index place : near) {
@@ -154,7 +154,7 @@ class PathFinder {
     if (curve.length() < kLeastLength * graph_.mean_length) return std::nullopt;
     if (curve.closed()) return around(curve);
     std::optional<Found> best;
-    std::optional<std::vector<MiddlePlace>> middles;  // most curves need none
+    std::optional<std::vector<MiddlePlace>> middles;  // computed only if needed: most curves need none
     for (Index from : end_vertices(curve.vertices.front(), curve.points.front()))
       for (Index to : end_vertices(curve.vertices.back(), curve.points.back())) {
         if (from == to) continue;
@@ -168,7 +168,7 @@ class PathFinder {
     return best;
   }
 
-  /// The vertex given to a corner; where a feature runs out, any of those near by will do.
+  /// Returns the vertex assigned to a corner or, if a feature runs out there, the vertices nearby.
   std::vector<Index> end_vertices(Index corner, const Vec3& position) const {
     const auto at = std::lower_bound(curves_.corners.begin(), curves_.corners.end(), corner);
     if (curves_.corner_edges[at - curves_.corners.begin()] > 1) {
@@ -185,7 +185,7 @@ class PathFinder {
     return vertices;
   }
 
-  /// The path with its gap, if it follows the curve.
+  /// Returns the path with its gap if it follows the curve.
   std::optional<Found> judged(std::vector<Index> path, std::span<const Vec3> curve) const {
     if (path.size() < 2) return std::nullopt;
     std::vector<Vec3> points;
@@ -198,7 +198,7 @@ class PathFinder {
     return Found{std::move(path), gap};
   }
 
-  /// Around a closed curve, from the vertex of its corner or the one nearest to it.
+  /// Returns a path around a closed curve, from the vertex of its corner or the vertex nearest to it.
   std::optional<Found> around(const FeatureCurve& curve) const {
     const ClosestPoint tree = polyline_tree(curve.points);
     Index start = vertex_at(curve.vertices.front());
@@ -210,7 +210,7 @@ class PathFinder {
       if (d < distance) distance = d, start = v;
     }
     if (start == kNoIndex) return std::nullopt;
-    // The curve, begun anew where the start is nearest to it.
+    // The curve, starting at its point nearest to `start`.
     const ClosestPoint::Hit first = tree.closest(mesh_.positions[start]);
     std::vector<Vec3> points = {first.point};
     points.insert(points.end(), curve.points.begin() + first.triangle + 1, curve.points.end());
@@ -219,13 +219,13 @@ class PathFinder {
     return judged(path_by_middle(points, start, start, middle_places(points)), points);
   }
 
-  /// A vertex, and where a curve is nearest to it.
+  /// A vertex and the point of a curve nearest to it.
   struct MiddlePlace {
     Index vertex;
     ClosestPoint::Hit hit;
   };
 
-  /// The vertices nearest to the curve's middle part, so many that one is left without any two.
+  /// Returns the vertices nearest to the middle half of the curve: enough that one is left if any two are excluded.
   std::vector<MiddlePlace> middle_places(std::span<const Vec3> points) const {
     constexpr std::size_t kEnough = 3;
     std::vector<double> along = {0};
@@ -246,7 +246,7 @@ class PathFinder {
     return nearest;
   }
 
-  /// By way of the vertex nearest to the curve's middle part: closed curves, and curves whose ends are close together.
+  /// Returns a path through the vertex nearest to the curve's middle: for curves that are closed, or nearly so.
   std::vector<Index> path_by_middle(std::span<const Vec3> points, Index from, Index to,
                                     std::span<const MiddlePlace> places) const {
     const auto place =
@@ -265,12 +265,13 @@ class PathFinder {
     return path;
   }
 
-  /// Dijkstra from one vertex to another, through vertices that are neither taken nor in `avoid`. Empty: no way.
+  /// Dijkstra's algorithm from one vertex to another, through vertices that are neither taken nor in `avoid`. Empty if
+  /// there is no path.
   std::vector<Index> shortest_path(std::span<const Vec3> points, Index from, Index to,
                                    std::span<const Index> avoid) const {
     const ClosestPoint tree = polyline_tree(points);
     const double epsilon = kLengthShare * graph_.mean_length;
-    std::map<Index, double> squared;  // distances of the vertices met
+    std::map<Index, double> squared;  // squared distances of the vertices visited
     const auto squared_distance = [&](const Vec3& p) { return std::pow(tree.closest(p).distance, 2); };
     const auto vertex_distance = [&](Index v) {
       const auto [at, added] = squared.try_emplace(v, 0.0);
@@ -290,7 +291,7 @@ class PathFinder {
       for (Index e : graph_.vertex_edges[v]) {
         const Index w = graph_.other_end(e, v);
         if (w != to && (taken_[w] || std::find(avoid.begin(), avoid.end(), w) != avoid.end())) continue;
-        // There and back along one edge is no cycle.
+        // Going back along the edge of the way out makes no cycle.
         if (w == to && avoid.size() == 2 && avoid.front() == w && v == from) continue;
         const Vec3 &a = mesh_.positions[v], &b = mesh_.positions[w];
         const double mean = (vertex_distance(v) + vertex_distance(w) + 2 * squared_distance(0.5 * (a + b))) / 4;
@@ -325,7 +326,7 @@ std::vector<CreasePath> follow_curves(const VolumeMesh& mesh, const FeatureCurve
 
 FeatureTags tags_of_paths(const std::vector<CreasePath>& paths, const FeatureCurves& curves) {
   FeatureTags tags;
-  std::map<Index, int> ends;  // paths that end at a vertex which stands for a corner of more than one sharp edge
+  std::map<Index, int> ends;  // number of paths that end at the vertex of a corner of several sharp edges
   const auto is_corner = [&](Index v) {
     const auto at = std::lower_bound(curves.corners.begin(), curves.corners.end(), v);
     return at != curves.corners.end() && *at == v && curves.corner_edges[at - curves.corners.begin()] > 1;

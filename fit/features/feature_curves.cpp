@@ -117,7 +117,7 @@ class EdgeWalk {
   const TriangleMesh& mesh_;
   std::vector<std::array<Index, 2>> edges_;
   std::vector<char> used_, corner_;
-  std::vector<std::size_t> offsets_;  // of each vertex in around_
+  std::vector<std::size_t> offsets_;  // where each vertex begins in around_
   std::vector<Index> around_;
 };
 

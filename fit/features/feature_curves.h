@@ -10,42 +10,42 @@
 
 namespace subvol {
 
-/// A polyline along sharp edges of a surface. Closed where the first vertex is repeated at the end.
+/// A polyline along sharp edges of a surface. It is closed if the first vertex is repeated at the end.
 struct FeatureCurve {
-  std::vector<Index> vertices;  ///< of the surface, at least 2
+  std::vector<Index> vertices;  ///< vertices of the surface, at least 2
   std::vector<Vec3> points;     ///< their positions
   bool closed() const { return vertices.front() == vertices.back(); }
   double length() const;
 };
 
-/// The sharp edges of a surface as curves between the places where they meet, bend or end.
+/// The sharp edges of a surface, as curves between the places where they meet, bend or end.
 struct FeatureCurves {
   std::vector<FeatureCurve> curves;
-  /// Vertices where other than two sharp edges meet, or two whose directions differ by more than the angle; ascending.
-  /// Those of one sharp edge, where a feature runs out, are among them. Curves end at them; closed ones may have none.
+  /// Vertices where one sharp edge ends, two meet whose directions differ by more than the angle, or three or more
+  /// meet; ascending. Curves end at them; closed ones may have none.
   std::vector<Index> corners;
   std::vector<int> corner_edges;  ///< number of sharp edges at each corner
   bool empty() const { return curves.empty(); }
 };
 
-/// A straight piece of a fitted crease, from point to point, and the curve it follows: a place in
+/// A straight piece of a fitted crease between two points, and the curve it follows: an index into
 /// `FeatureCurves::curves`, or kNoIndex.
 struct CreaseSegment {
   std::array<Index, 2> ends;
   Index curve;
 };
 
-/// Joins the edges between exactly two triangles whose normals differ by more than an angle.
+/// Finds the edges between exactly two triangles whose normals differ by more than an angle, and joins them to curves.
 ///
-/// mesh           connected by common vertices; triangles need not be oriented alike. Those without area make no edge
-///                sharp.
-/// angle_degrees  deviation from flat, in [0, 180]; outside or NaN: InputError, as a corner out of range.
+/// mesh           connected by common vertices; triangles may be oriented inconsistently. Triangles without area make
+///                no edge sharp.
+/// angle_degrees  deviation from flat, in [0, 180]; outside or NaN: InputError, as for a corner out of range.
 /// tagged         edges of the mesh that are sharp whatever their angle.
-/// Each sharp edge is in exactly one curve. Cost: linear but for one sort of the edges.
+/// Each sharp edge is in exactly one curve. Cost: linear except for one sort of the edges.
 FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
                              std::span<const std::array<Index, 2>> tagged = {});
 
-/// Tree over the segments of a polyline, numbered in its order. points: at least 2, finite.
+/// Returns a tree over the segments of a polyline, numbered in its order. points: at least 2, finite.
 ClosestPoint polyline_tree(std::span<const Vec3> points);
 
 }  // namespace subvol

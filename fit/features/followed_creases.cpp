@@ -34,7 +34,7 @@ FollowedCreases::FollowedCreases(const TriangleMesh& target, std::optional<doubl
 
 void FollowedCreases::tag(VolumeMesh& template_mesh) const {
   template_mesh.tags = merge_tags(template_mesh.tags, tags_of_paths(paths_, curves_));
-  // A crease added at one corner can leave a wide span at another.
+  // A crease added at one corner may leave a span of more than 180 degrees at another.
   for (int round = 0; round < kMaxUnfoldings; ++round) {
     const SubdivisionAudit found = audit(template_mesh);
     if (found.folding_edges.empty()) break;

@@ -16,39 +16,39 @@
 
 namespace subvol {
 
-/// Edges sharper than this, in degrees, are features where nobody says otherwise.
+/// Default angle in degrees: sharper edges are features.
 inline constexpr double kUsualCreaseAngle = 40;
-/// A crease counts as much as a strip of surface so wide, by the target's length V/A.
+/// Width of the strip of surface that counts as much as a crease, in units of the target's length V/A.
 inline constexpr double kCreaseWidth = 1;
 
-/// The creases of a fit from level to level, and which feature curve of the target each of them follows.
+/// The creases of a fit from level to level, and the feature curve of the target that each of them follows.
 class FollowedCreases {
  public:
-  /// No creases that follow anything.
+  /// Creases none of which follows a curve.
   FollowedCreases() = default;
 
-  /// With an angle: tags a template by the target's edges that are sharper, with creases along the paths that follow
-  /// them (`follow_curves`) and what keeps the boundary from folding at their corners (`unfolding_tags`); tags it has
-  /// already stay. Without: finds out which of the template's own creases follow edges sharper than kUsualCreaseAngle.
-  /// tagged: edges of the target that are sharp whatever their angle.
+  /// With an angle: finds the target's edges that are sharper, and tags a template with creases along the paths that
+  /// follow them (`follow_curves`) and with tags that keep the boundary from folding at their corners
+  /// (`unfolding_tags`); existing tags are kept. Without: finds the template's own creases that follow edges sharper
+  /// than kUsualCreaseAngle. tagged: edges of the target that are sharp whatever their angle.
   FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees, VolumeMesh& template_mesh,
                   std::span<const std::array<Index, 2>> tagged = {});
 
   const FeatureCurves& curves() const { return curves_; }
-  /// Whether most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
+  /// True if most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
   bool hold_the_surface() const;
 
-  /// Gives up the curves that have a crease at one of the vertices marked, with their tags and the corners marked.
+  /// Removes all creases of curves that have a crease at a marked vertex, all other creases there, and marked corners.
   void release(std::span<const std::uint8_t> vertices, VolumeMesh& mesh);
 
-  /// Goes over to the creases of a mesh refined from the present one; parents: for each, the crease that it came from.
+  /// Switches to the creases of a refinement of the present mesh; parents: for each of them, the crease it came from.
   void refine(std::span<const Index> parents);
 
-  /// Draws the samples on the creases to their curves: `edges` between samples run along the mesh's creases in their
-  /// order, equally many for each.
+  /// Returns the energy that draws the samples on creases to their curves. `edges` between samples run along the mesh's
+  /// creases in the order of the creases, equally many for each.
   CreaseEnergy energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,
                       double tangential_weight) const;
-  /// limit  refinement of the present level's mesh, at `points`.
+  /// Measures the distances of the creases. limit  refinement of the present level's mesh, at `points`.
   CreaseDistance distance(const BoundaryRefinement& limit, std::span<const Vec3> points, double diagonal) const;
 
  private:

@@ -14,12 +14,12 @@ namespace subvol {
 namespace {
 
 constexpr int kMaxSampleRefinements = 3;
-/// How far the finest level's samples lie from the limit surface (0) towards the mesh (1), and up to which mean gap
-/// between the two (in the mesh's unit; the fit's is the target's diagonal). A coarser mesh cannot follow the target
-/// anyway, and would only draw the limit surface away from it.
+/// kMeshShare: position of the finest level's samples between the limit surface (0) and the mesh (1). kMostGap: largest
+/// mean gap between the two for which the mesh is considered (in the mesh's unit; in a fit, shares of the target's
+/// diagonal). A coarser mesh cannot follow the target anyway and would only draw the limit surface away from it.
 constexpr double kMeshShare = 0.3, kMostGap = 5e-4;
 
-/// The boundary of a hex mesh as samples: its own vertices, without the limit.
+/// Takes the boundary vertices of a hex mesh as samples, without the limit map.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
   const MeshTopology topology(mesh);
   std::vector<Index> sample_of(mesh.num_vertices(), kNoIndex), rows;
@@ -42,7 +42,8 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
     level.crease_edges.push_back({sample_of[crease.v0], sample_of[crease.v1]});
 }
 
-/// Both children of a crease end at its middle, which is a vertex of no other crease.
+/// Returns for each crease of the refined mesh its parent's position in control.creases. Both children of a crease end
+/// at its midpoint, which no other crease contains.
 std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags& control) {
   std::map<Index, std::array<Index, 2>> ends_of_middle;
   for (const CreaseEdge& crease : fine.creases) {
@@ -60,10 +61,10 @@ std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags
   return parents;
 }
 
-/// Boundary nodes -> vertices of the boundary refined once, by bilinear interpolation in its quads.
+/// Maps boundary nodes to the vertices of the boundary refined once, by bilinear interpolation in its quads.
 SparseMap bilinear_refinement(const BoundaryRefinement& once, std::size_t num_nodes) {
   // A child quad has one old vertex, then the midpoint of the edge that leaves it, the face point, and the midpoint of
-  // the edge that arrives. So each edge point meets its two ends, and each face point its four corners.
+  // the edge that arrives. So each edge point sees its two ends, and each face point its four corners.
   std::vector<std::vector<Index>> parents(once.positions.num_rows());
   const auto num_old = static_cast<Index>(once.vertices.size());
   for (const auto& quad : once.quads) {
@@ -121,7 +122,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     const std::vector<Vec3> on_limit = boundary.positions.apply(fine), on_mesh = bilinear.apply(limit.apply(fine));
     double gap = 0;
     for (std::size_t i = 0; i < on_limit.size(); ++i) gap += (on_limit[i] - on_mesh[i]).norm();
-    // A tolerance is meant for both.
+    // A tolerance applies to both surfaces.
     if (options.tolerance_percent || gap <= kMostGap * static_cast<double>(on_limit.size()))
       towards_mesh = compose(bilinear, level.nodes);
   }

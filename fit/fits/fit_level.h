@@ -16,29 +16,32 @@ namespace subvol {
 ///   nodes y = M x,   samples z = N x,   M = P S
 ///
 /// S refines (`subdivide`), P moves boundary vertices to their limit positions (`limit_map`; the identity for
-/// FittedSurface::mesh). N goes further refinements down on the boundary alone, to as many points of the limit surface
-/// as the target's detail asks for. On the finest level, where the mesh itself is a result as well, N lies
-/// between the limit surface and the mesh's bilinear quads, which shares the gap between the two; but on
-/// the limit surface alone where that gap is too wide for the mesh to follow the target, unless a tolerance is asked
-/// for.
+/// FittedSurface::mesh). N refines the boundary further, to as many points of the limit surface as the detail of the
+/// target requires. On the finest level the mesh itself is a result too, so N lies between the limit surface and the
+/// bilinear quads of the mesh, which shares the gap between the two. If that gap is too wide for the mesh to follow the
+/// target and no tolerance is given, N lies on the limit surface alone. For FittedSurface::mesh, the samples are the
+/// boundary vertices of the mesh.
 struct FitLevel {
   VolumeMesh mesh;               ///< the finite element mesh: hexes
-  SparseMap refine;              ///< S alone: control vertices to the vertices of the next control mesh
+  SparseMap refine;              ///< S alone: maps control vertices to the vertices of the next control mesh
   SparseMap nodes;               ///< M
-  SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid whenever that mesh is certified
+  SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid if that mesh is certified
   SparseMap samples;             ///< N
   std::vector<std::array<Index, 3>> sample_triangles;
-  /// Edges between samples along the mesh's creases, in the order of its tags and equally many for each.
+  /// Edges between samples along the creases of the mesh, in the order of its tags, with the same number for each
+  /// crease.
   std::vector<std::array<Index, 2>> crease_edges;
-  std::vector<Index> parent_creases;  ///< for each crease of the mesh, the place in control.tags.creases it came from
+  std::vector<Index> parent_creases;  ///< for each crease of the mesh, its parent's position in control.tags.creases
 };
 
 /// Builds the level above a control mesh.
 ///
-/// control            the last refined mesh with its tags; `from_unknowns` takes the unknowns to its vertices (the
-///                    identity but for cage-only fits) and `previous_nodes` to the nodes of its finite element mesh.
-/// min_samples        how many boundary samples are wanted at least (reached by refining, at most three times).
-/// finest             whether this is the last level.
+/// control            the last refined mesh with its tags. `from_unknowns` maps the degrees of freedom to its vertices
+///                    (the identity except in cage-only fits), and `previous_nodes` maps them to the nodes of its
+///                    finite element mesh.
+/// min_samples        wanted number of boundary samples. At most three refinements are made to reach it, and exactly
+///                    one if the samples lie between the limit surface and the mesh.
+/// finest             true for the last level.
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);
 

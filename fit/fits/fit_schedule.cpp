@@ -8,10 +8,12 @@ namespace subvol {
 
 namespace {
 
-/// Up to which distance a template's own cells tell what the fitted ones should look like (measured on real templates).
+/// Initial distance (in V/A) below which the template's own cells indicate the shape of the fitted cells (measured on
+/// real templates).
 constexpr double kCloseDistance = 0.4;
 constexpr double kCoarseLambda = 0.05;
-/// With creases tied from the start, stiffer cells swell beside them, and folds made then do not go away.
+/// Lambda if creases are drawn to the target from the start: stiffer cells swell beside the creases, and the folds that
+/// this makes do not disappear later.
 constexpr double kHeldLambda = 0.01;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
 

@@ -8,46 +8,51 @@
 
 namespace subvol {
 
-/// Mean distance, in per cent of the diagonal, down to which a fit without a tolerance lowers lambda further.
+/// A fit without a tolerance lowers lambda further until the mean distance is below this, in per cent of the diagonal.
 inline constexpr double kDefaultAccuracyPercent = 0.015;
-/// How far below `FitOptions::lambda_close` lambda may go for that, and for a tolerance that was asked for.
+/// Least lambda, as a share of `FitOptions::lambda_close`, without and with a tolerance.
 inline constexpr double kLeastDefaultLambdaShare = 1.0 / 16, kLeastLambdaShare = 1e-3;
-/// Where a fit's boundary intersects itself, lambda is raised up to this.
+/// Largest lambda that is tried if the boundary of a fit intersects itself.
 inline constexpr double kMostUnfoldingLambda = 0.1;
-/// Lowering lambda ends when a stage takes less than this share off the mean distance.
+/// Lambda is not lowered any further if a stage reduces the mean distance by less than this share.
 inline constexpr double kLeastGain = 0.01;
-/// Without a tolerance, halvings of lambda may cost so much of the mean scaled Jacobian in all.
+/// Without a tolerance, the largest total decrease of the mean scaled Jacobian that lowering lambda may cause.
 inline constexpr double kMostShapeLoss = 0.0075;
-/// The same where only the template's vertices move: few unknowns have to reach the whole surface.
+/// The corresponding limit for cage-only fits, in which few degrees of freedom have to reach the whole surface.
 inline constexpr double kMostCageShapeLoss = 0.015;
 
-/// Which minimisations a recursive fit runs, decided from the template's initial distance.
+/// The minimizations of a recursive fit.
 ///
-/// A stiff start (lambda > 0.05) shrinks and rounds the template and loses features that never come back, so it is kept
-/// for templates that are really far.
+/// Lambda is low from the start: a stiff start (lambda > 0.05) shrinks and rounds the template and loses features that
+/// never come back. The template's initial distance only decides which ideal cells are tried first.
 struct FitSchedule {
-  /// How much level 1 takes the template cells' own boxes for ideal (`ideal_boxes`); each further entry is another try,
-  /// for templates that cannot be refined without inverting a cell with those before.
+  /// For each attempt, the `own_share` of the ideal cells on level 1 (`ideal_boxes`). A later attempt is made if a
+  /// level cannot be started without inverting a cell.
   std::vector<double> own_box_shares;
   int levels = 0;
-  std::vector<Stage> first, middle, last;  ///< of level 1, of the levels between, of the finest
+  std::vector<Stage> first, middle, last;  ///< stages of level 1, of the levels between, and of the finest level
   Stage continuation;
 
+  /// Returns the stages of a level; if there is only one level, those of `first` and `last`.
   std::vector<Stage> stages(int number) const;
-  /// The last stage with another lambda.
+  /// Returns the last stage with another lambda.
   Stage final_stage(double lambda) const;
-  /// Quadrature points per direction: nested from level to level, so that no child starts inverted at one of its
-  /// points.
+  /// Returns the number of quadrature points per direction. Points are nested from level to level, so that no child
+  /// starts inverted at one of its points.
   int quadrature_points(int number) const { return number == 1 ? 5 : number == 2 ? 3 : 2; }
-  /// Rough share of the work that is done when a level begins.
+  /// Returns a rough estimate of the share of the work that is done when a level begins.
   double fraction(int number) const;
 };
 
-/// How much the cells' own boxes are taken for ideal at first, by the template's distance: first choice first.
+/// Returns the `own_share` values (`ideal_boxes`) to be tried on level 1, first choice first.
+///
+/// distance  as in `make_schedule`.
 std::vector<double> own_box_shares(double distance);
 
-/// distance      mean distance of template and target by the target's length V/A.
-/// creases_hold  whether creases are tied to most of the target's sharp edges.
+/// Makes the schedule of a fit.
+///
+/// distance      mean distance between template and target, divided by the target's length V/A.
+/// creases_hold  true if creases are drawn to most of the target's sharp edges.
 FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold = false);
 
 }  // namespace subvol

@@ -10,9 +10,9 @@ namespace {
 constexpr double kCoarseLambda = 0.05, kStiffLambda = 1;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
 constexpr int kMaxIterations = 40;
-/// Stiff stages only lead the way: what is left after so many steps, the next stage does faster.
+/// Stiff stages only lead the way: after this many steps, the next stage makes faster progress.
 constexpr int kStiffIterations = 10;
-/// From this order on, a stiff approach lowers lambda.
+/// Order from which on a stiff approach lowers lambda.
 constexpr int kStiffOrder = 4;
 
 }  // namespace

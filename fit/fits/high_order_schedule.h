@@ -7,45 +7,47 @@
 
 namespace subvol {
 
-/// How curved elements come near the target.
+/// How curved elements approach the target.
 ///
 ///   direct  lambda 0.05 from order 1 on: no feature of the target is lost
-///   stiff   lambda 1 while the orders are raised, then lowered: cells stay well shaped on the way, which carries
-///   templates
-///           of few cells over distances where direct fits end among flattened cells
+///   stiff   lambda 1 while the orders are raised, then lowered: cells stay well shaped on the way, so templates of few
+///           cells can cross distances at which direct fits end with flattened cells
 enum class Approach { direct, stiff };
 
 /// One attempt at the first orders.
 struct HighOrderTry {
   Approach approach;
-  double own_box_share;  ///< of the ideal cells at order 1 (`ideal_boxes`)
+  double own_box_share;  ///< `own_share` of the ideal cells at order 1 (`ideal_boxes`)
 };
 
-/// Which minimisations a high-order fit runs, decided from the template's initial distance.
+/// The minimizations of a high-order fit, chosen by the template's initial distance.
 struct HighOrderSchedule {
-  std::vector<HighOrderTry> tries;  ///< a later one is made where those before went wrong (`kFairDistancePercent`)
-  double lambda_close = 0;          ///< of the last stage of all
+  std::vector<HighOrderTry> tries;  ///< in this order; a later one is made if those before went wrong (see below)
+  double lambda_close = 0;          ///< lambda of the very last stage
 
-  bool far = false;  ///< the template's cells do not tell what is wanted
-  /// Up to this order (at most `order`) tries are made, and all entities have the same order.
+  bool far = false;  ///< true if the template is so far away that its cells do not indicate the wanted shapes
+  /// Returns the order up to which attempts are compared and all entities have the same order; the fit's `order` caps
+  /// it.
   int first_orders(bool adaptive) const { return far || !adaptive ? 4 : 2; }
-  /// Up to this order ideal cells are those of order 1; from then on, those of the state before.
+  /// Returns the highest order that uses the ideal cells of order 1. Later orders use the cells of the state before.
   int last_common_order() const { return far ? 2 : 1; }
+  /// Returns the stages of one order; last_order is the fit's final order.
   std::vector<Stage> stages(Approach approach, int order, int last_order) const;
+  /// Returns the last stage with another lambda.
   Stage final_stage(double lambda) const;
 };
 
-/// The first orders of a far template are tried in another way where the mean distance, in per cent of the diagonal, is
-/// above the one and E_W above the other: far from the target for what cells suffer, not for what they cannot
-/// represent.
+/// For a far template, another attempt is made at the first orders if the boundary is folded, or if the mean distance,
+/// in per cent of the diagonal, exceeds kFairDistancePercent and E_W exceeds kFairDistortion: the cells are distorted
+/// and still far from the target, so their resolution is not the cause.
 inline constexpr double kFairDistancePercent = 0.12, kFairDistortion = 0.3;
-/// Below this order the distance does not tell whether an approach went wrong.
+/// Below this order, the distance does not show if an approach went wrong.
 inline constexpr int kTellingOrder = 4;
 
-/// Where a fit's boundary intersects itself, lambda is raised up to this.
+/// Largest lambda that is tried if the boundary of a fit intersects itself.
 inline constexpr double kMostUnfoldingLambdaOfOrders = 1;
 
-/// distance  mean distance of template and target by the target's length V/A.
+/// distance  mean distance between template and target, divided by the target's length V/A.
 HighOrderSchedule make_high_order_schedule(double lambda_close, double distance);
 
 }  // namespace subvol

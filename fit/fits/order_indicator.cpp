@@ -32,7 +32,7 @@ auto& entities(Orders& orders, int kind) {
   return kind == 0 ? orders.edges : kind == 1 ? orders.faces : orders.cells;
 }
 
-/// The lowest order that has a mode (`for_each_mode`).
+/// Returns the lowest order that contains a mode (`for_each_mode`).
 int first_order(EntityShape shape, ModeIndex m) {
   switch (shape) {
     case EntityShape::triangle:

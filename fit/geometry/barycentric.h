@@ -7,7 +7,7 @@
 
 namespace subvol {
 
-/// A point of a triangle: weights of its corners, with sum 1. Also the corners' values of a function linear on it.
+/// A point of a triangle: weights of its corners, with sum 1. Also the values at the corners of a linear function.
 using Barycentric = std::array<double, 3>;
 
 inline double dot(const Barycentric& a, const Barycentric& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -16,21 +16,21 @@ inline Barycentric operator-(const Barycentric& a, const Barycentric& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-/// The point a + t (b - a).
+/// Returns the point a + t (b - a).
 inline Barycentric between(const Barycentric& a, const Barycentric& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
 }
 
-/// Area of the triangle abc as a share of the whole one; negative where abc runs the other way.
+/// Returns the area of the triangle abc as a share of the whole one; negative if abc is oriented the other way.
 inline double share(const Barycentric& a, const Barycentric& b, const Barycentric& c) {
   return (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1]);
 }
 
-/// m += 1/area * integral of l_i l_j over a polygon, ij = 00 01 02 11 12 22; `at` takes its corners' numbers to them.
+/// m += 1/area * integral of l_i l_j over a polygon, ij = 00 01 02 11 12 22; at(i) is corner i.
 template <class At>
 void add_moments(std::size_t num_corners, const At& at, std::array<double, 6>& m) {
   if (num_corners < 3) return;
-  // Twelve times the moments, by products of corners and of their sums. Single numbers, as arrays end up in memory.
+  // Twelve times the moments, from products of corners and of their sums. Scalars, because arrays would be in memory.
   double m00 = 0, m01 = 0, m02 = 0, m11 = 0, m12 = 0, m22 = 0;
   const double a0 = at(0)[0], a1 = at(0)[1], a2 = at(0)[2];
   double b0 = at(1)[0], b1 = at(1)[1], b2 = at(1)[2];
@@ -55,7 +55,7 @@ void add_moments(std::size_t num_corners, const At& at, std::array<double, 6>& m
   m[5] += kFactor * m22;
 }
 
-/// Sum of all nine moments: the share of the triangle's area.
+/// Returns the sum of all nine moments: the polygon's share of the triangle's area.
 inline double total(const std::array<double, 6>& m) { return m[0] + m[3] + m[5] + 2 * (m[1] + m[2] + m[4]); }
 
 }  // namespace subvol

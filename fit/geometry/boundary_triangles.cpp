@@ -8,7 +8,7 @@ namespace subvol {
 
 namespace {
 
-/// For every corner of every polygon the number of the edge that starts there; numbers by first appearance.
+/// Returns, for every corner of every polygon, the number of the edge that starts there, by first appearance.
 std::vector<Index> number_edges(const PolygonMesh& polygons, std::size_t& num_edges) {
   struct Use {
     std::uint64_t key;

@@ -7,19 +7,20 @@
 
 namespace subvol {
 
-/// Triangles that follow the faces of linear cells: a quad face means the bilinear patch of its corners.
+/// Returns triangles that follow the faces of linear cells: a quad face is the bilinear patch of its corners.
 ///
-/// Every edge is halved. A triangle becomes four; a quad, or a larger polygon, becomes the fan of its centre (the mean
-/// of its corners, which lies on the patch) over its halved border: eight triangles. They leave the patch of corners p
-/// by |p_0 - p_1 + p_2 - p_3| / 16 at most, a quarter of what a diagonal does. Neighbours share their edges' points.
+/// Every edge is halved. A triangle becomes four; a quad, or a larger polygon, becomes the fan of its center (the mean
+/// of its corners, which for a quad lies on the patch) over its halved edges: eight triangles for a quad. They deviate
+/// from the patch of corners p by at most |p_0 - p_1 + p_2 - p_3| / 16, a quarter of the deviation of a diagonal.
+/// Neighbors share the points of their edges.
 ///
-/// polygons             each of at least 3 corners, or it gives nothing.
-/// polygon_of_triangle  if given: the polygon each triangle comes from. The triangles of one polygon are consecutive.
-/// returns              points [corners][edges, by first appearance][centres], orientation kept.
+/// polygons             polygons of fewer than 3 corners give no triangles.
+/// polygon_of_triangle  if given, receives the polygon of each triangle. The triangles of one polygon are consecutive.
+/// returns              points [corners][edges, by first appearance][centers]; orientation is kept.
 TriangleMesh refined_triangles(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle = nullptr);
 
-/// The same surface with as few triangles as describe it: triangles stay as they are, a quad, or a larger polygon,
-/// becomes the fan of its centre over its border. Points [corners][centres].
+/// Returns the same surface with fewer triangles: triangles stay as they are; a quad, or a larger polygon, becomes the
+/// fan of its center over its edges. Points [corners][centers].
 TriangleMesh fan_triangles(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle = nullptr);
 
 }  // namespace subvol

@@ -9,7 +9,7 @@ namespace subvol {
 
 namespace {
 
-constexpr double kAreaTolerance = 1e-14;  // of the triangle's area
+constexpr double kAreaTolerance = 1e-14;  // share of the triangle's area
 
 }  // namespace
 
@@ -60,7 +60,7 @@ CellEnvelope::Cut CellEnvelope::cut(int inside, int outside) {
   if (out == 0) return in == 0 ? Cut::tie : Cut::untouched;
   if (in == 0) return Cut::empty;
   if (n == kMaxCorners) return Cut::tie;
-  // What is outside lies between two corners: one run of corners is replaced by the bisector's two ends.
+  // The part outside lies between two corners: one run of corners is replaced by the two ends of the bisector.
   const std::uint32_t out_before = out << 1 | out >> (n - 1), all = (1u << n) - 1;
   const std::uint32_t run_begins = out & ~out_before, run_ends = ~out & out_before & all;
   if (!std::has_single_bit(run_begins)) return Cut::tie;

@@ -9,12 +9,12 @@
 
 namespace subvol {
 
-/// Parts a convex polygon by which of a set of linear functions is lowest: the Voronoi cells of nearby sites, when they
-/// are known to be few.
+/// Divides a convex polygon into the parts in which each of a set of linear functions is the lowest: the Voronoi cells
+/// of nearby sites, if they are known to be few.
 ///
-/// Each cell starts as the whole polygon and is cut by the functions found lowest at its corners until there are none
-/// lower than its own. Much cheaper than cutting in two again and again, as cells are not cut by the bisectors of
-/// others; but not safe where functions are alike within rounding, so the areas are checked in the end.
+/// Each cell starts as the whole polygon and is cut by the functions found lowest at its corners, until none is lower
+/// than its own. This is much cheaper than repeated cutting in two, because cells are not cut by the bisectors of
+/// others. It is not safe if functions agree within rounding, so the areas are checked in the end.
 class CellEnvelope {
  public:
   CellEnvelope() = default;
@@ -26,18 +26,19 @@ class CellEnvelope {
     std::array<double, 6> moments;
   };
 
-  /// Begins a new set of functions.
+  /// Starts a new set of functions.
   void clear();
-  /// Adds eight functions by their values at the triangle's corners; what is kNever at all of them is none. `ranks`
-  /// decide between equal functions: the lowest comes first.
+  /// Adds eight functions, given by their values at the triangle's corners; kNever at all corners means no function.
+  /// `ranks` decide between equal functions: the lowest comes first.
   void add(const std::array<Wide, 3>& values, const std::array<std::int32_t, kWide>& ranks);
   static constexpr double kNever = 1e300;
 
   /// Finds the cells of a polygon.
   ///
   /// first   the function lowest at one of the polygon's corners; functions are numbered as they were added.
-  /// noise   differences of functions below it are rounding.
-  /// returns whether the cells part the polygon's area exactly; where they do not (ties), use something else.
+  /// noise   differences of functions below it count as rounding.
+  /// returns true if the areas of the cells add up to the polygon's; if not (ties, or too many corners), another method
+  ///         must be used.
   bool compute(std::span<const Barycentric> polygon, int first, double noise);
   const std::vector<Cell>& cells() const { return cells_; }
 
@@ -46,7 +47,7 @@ class CellEnvelope {
   struct Polygon {
     int size = 0;
     std::array<Barycentric, kMaxCorners> at;
-    std::uint32_t checked = 0;  ///< bit i: no function is lower at corner i than the cell's
+    std::uint32_t checked = 0;  ///< bit i: no function is lower at corner i than that of the cell
   };
   struct Known {
     int count = 0;
@@ -71,7 +72,7 @@ class CellEnvelope {
   std::vector<Cell> cells_;
   Polygon buffers_[2];
   Polygon* polygon_ = &buffers_[0];  ///< the cell so far
-  Polygon* rest_ = &buffers_[1];     ///< the next, while it is cut
+  Polygon* rest_ = &buffers_[1];     ///< the cell after the current cut
 };
 
 }  // namespace subvol

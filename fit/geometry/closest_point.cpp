@@ -14,7 +14,7 @@ namespace subvol {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t kFewTriangles = 1000;  // which threads would take longer for than one of them
+constexpr std::size_t kFewTriangles = 1000;  // for so few, one thread is faster than several
 
 Vec3 closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   const Vec3 ab = b - a;
@@ -23,12 +23,13 @@ Vec3 closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return t >= length_squared ? b : Vec3(a + (t / length_squared) * ab);
 }
 
-/// Below a sine of 1e-12 the normal is rounding, and the edges are as close as the inside.
+/// True if the sine of the angle is below 1e-12: then the normal is rounding, and the edges are as close as the inside.
 bool is_sliver(double area_squared, double ab_squared, double ac_squared) {
   return !(area_squared > 1e-24 * ab_squared * ac_squared);
 }
 
-/// Inside the triangle's prism the foot of the perpendicular, else the closest point of the edges that p lies beyond.
+/// Returns the foot of the perpendicular if p is inside the triangle's prism, else the closest point of the edges that
+/// p lies beyond.
 Vec3 closest_on_triangle(const Vec3& p, const std::array<Vec3, 3>& x) {
   const Vec3 ab = x[1] - x[0], ac = x[2] - x[0], ap = p - x[0];
   const Vec3 n = ab.cross(ac);
@@ -69,7 +70,7 @@ void check(const TriangleMesh& mesh) {
 
 }  // namespace
 
-/// Halves the range until it has kWidth parts or no part is larger than a leaf; split(lower, upper) tells of each cut.
+/// Halves the range until it has kWidth parts or no part is larger than a leaf; calls split(lower, upper) for each cut.
 template <class Split>
 ClosestPoint::Parts ClosestPoint::parts_of(Range range, Split&& split) {
   Parts parts{{range}};
@@ -86,7 +87,7 @@ ClosestPoint::Parts ClosestPoint::parts_of(Range range, Split&& split) {
   return parts;
 }
 
-/// Brings the items into the order of the tree's leaves: every cut is at the median of the longest axis.
+/// Orders the items like the tree's leaves: every cut is at the median along the longest axis.
 void ClosestPoint::partition(std::vector<Item>& items, Range range) {
   constexpr Index kLeastTask = 4096;
   const Parts parts = parts_of(range, [&](Range lower, Range upper) {
@@ -111,7 +112,7 @@ void ClosestPoint::partition(std::vector<Item>& items, Range range) {
 #pragma omp taskwait
 }
 
-/// Adds the node of a range and all below it: the cuts depend on counts alone.
+/// Adds the node of a range and all nodes below it. The cuts depend on counts alone.
 Index ClosestPoint::add_node(Range range) {
   const Parts parts = parts_of(range, [](Range, Range) {});
   const Index number = static_cast<Index>(nodes_.size());
@@ -131,7 +132,7 @@ Index ClosestPoint::add_node(Range range) {
   return number;
 }
 
-/// Leaves and boxes from the triangles' corners.
+/// Computes the leaves and the boxes from the triangles' corners.
 void ClosestPoint::fit_boxes() {
   struct Box {
     Vec3 low = Vec3::Constant(kInfinity), high = Vec3::Constant(-kInfinity);
@@ -206,11 +207,12 @@ void ClosestPoint::move(std::span<const Vec3> positions) {
   fit_boxes();
 }
 
-/// Squared distances to all triangles of the leaf: to the plane where p is above the inside, else to the closest edge.
+/// Updates the best triangle with those of the leaf. The squared distance is that to the plane if p is above the
+/// inside, else that to the closest edge.
 void ClosestPoint::visit(const Leaf& leaf, const Vec3& p, Index& best, double& best_squared) const {
   const double px = p[0], py = p[1], pz = p[2];
   double squared[kWidth];
-  // One body without branches, so that it compiles to vector instructions.
+  // One loop body without branches, so that it compiles to vector instructions.
   for (int i = 0; i < kWidth; ++i) {
     const double bx = leaf.ab[0][i], by = leaf.ab[1][i], bz = leaf.ab[2][i];
     const double cx = leaf.ac[0][i], cy = leaf.ac[1][i], cz = leaf.ac[2][i];
@@ -253,7 +255,7 @@ ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
     best = hint;
     best_squared = (p - closest_on_triangle(p, corners_[hint])).squaredNorm();
   }
-  Pending stack[128];  // seven more per level; 2^31 triangles are eleven levels deep
+  Pending stack[128];  // at most seven more per level; 2^31 triangles make eleven levels
   int top = 0;
   stack[top++] = {0, 0, false};
   while (top > 0) {
@@ -277,7 +279,7 @@ ClosestPoint::Hit ClosestPoint::closest(const Vec3& p, Index hint) const {
     const int first = top;
     for (int c = 0; c < kWidth; ++c) {
       if (!(squared[c] <= best_squared) || node.child[c] == kNoIndex) continue;
-      int at = top++;  // farthest first, so that the closest is taken next
+      int at = top++;  // the farthest first, so that the closest is taken next
       for (; at > first && stack[at - 1].squared < squared[c]; --at) stack[at] = stack[at - 1];
       stack[at] = {squared[c], node.child[c], node.is_leaf[c]};
     }
@@ -295,7 +297,7 @@ void ClosestPoint::closest(std::span<const Vec3> points, std::span<Hit> hits) co
   if (points.size() != hits.size())
     throw InputError("closest point: " + std::to_string(hits.size()) + " hits for " + std::to_string(points.size()) +
                      " points");
-  constexpr std::size_t kRun = 256;  // hints do not pass from one run to the next, whatever thread takes it
+  constexpr std::size_t kRun = 256;  // points that share hints, whatever thread takes them
   const std::size_t num_runs = (points.size() + kRun - 1) / kRun;
 #pragma omp parallel for schedule(dynamic) if (num_runs > 1)
   for (std::size_t run = 0; run < num_runs; ++run) {

@@ -10,58 +10,59 @@
 
 namespace subvol {
 
-/// Closest points of a set of triangles, by a tree of axis-aligned boxes, eight children to a node.
+/// Finds closest points on a set of triangles, with a tree of axis-aligned boxes, eight children to a node.
 ///
-/// A tree of its own because a distance check asks some 10^5 such questions in well under a second: it answers in a
-/// fraction of a microsecond where neighbouring questions follow each other, several times faster than CGAL's.
-/// Copies the triangles; queries are safe from many threads at once. Soups and degenerate triangles are welcome.
+/// We have our own tree because a distance check makes some 10^5 queries in well under a second: a query takes a
+/// fraction of a microsecond if successive points are close to each other, several times less than with CGAL's. The
+/// triangles are copied; queries are safe from many threads at once. Soups and degenerate triangles are allowed.
 class ClosestPoint {
  public:
   struct Hit {
     Vec3 point;                  ///< the closest point
-    Index triangle = kNoIndex;   ///< a triangle that holds it
+    Index triangle = kNoIndex;   ///< a triangle that contains it
     double distance = 0;         ///< >= 0
   };
 
-  /// InputError: no triangles, a vertex number out of range, a position that is not finite. Parallel, the same tree for
-  /// any number of threads. Cost: n log n.
+  /// InputError: no triangles, a vertex number out of range, or a position that is not finite. Runs in parallel; the
+  /// tree is the same for any number of threads. Cost: n log n.
   explicit ClosestPoint(const TriangleMesh& mesh);
 
-  /// Moves the vertices. The tree keeps its shape and fits its boxes anew: several times faster than a new tree, and as
-  /// good as long as neighbours stay neighbours. InputError: another number of vertices, a position that is not finite.
+  /// Moves the vertices. The tree keeps its structure and recomputes its boxes: several times faster than a new tree,
+  /// and as good as long as neighbors stay neighbors. InputError: another number of vertices, or a position that is not
+  /// finite.
   void move(std::span<const Vec3> positions);
 
-  /// The closest point of the surface to p. Where p is not finite: triangle kNoIndex, distance NaN. Where it is so far
+  /// Returns the closest point of the surface to p. If p is not finite: triangle kNoIndex, distance NaN. If p is so far
   /// away that the square of every distance overflows: a corner of one of the triangles.
   ///
-  /// hint  a triangle likely to be close (the answer for a point near by), or kNoIndex. It saves time and nothing else,
-  ///       but that of several triangles at the same distance, up to rounding, the one returned may depend on it.
+  /// hint  a triangle likely to be close (the answer for a nearby point), or kNoIndex. It saves time and has one other
+  ///       effect: of several triangles at the same distance, up to rounding, the returned one may depend on it.
   Hit closest(const Vec3& p, Index hint = kNoIndex) const;
 
-  /// `closest` for many points, in parallel. Same bits for any number of threads. InputError: sizes differ.
+  /// Calls `closest` for many points, in parallel. Same bits for any number of threads. InputError: sizes differ.
   ///
-  /// hits  in: their triangles are hints; where those are kNoIndex, the answer for the point before serves.
+  /// hits  in: their triangles are hints; for kNoIndex, the hint is the answer for the point before. out: the answers.
   void closest(std::span<const Vec3> points, std::span<Hit> hits) const;
 
   std::size_t num_triangles() const { return order_.size(); }
-  /// Triangles in the order of the tree's leaves: neighbours in it are neighbours in space.
+  /// Triangles in the order of the tree's leaves: those close to each other in it are close in space.
   std::span<const Index> order() const { return order_; }
 
  private:
   static constexpr int kWidth = 8;
 
-  /// Boxes of the children, by coordinate so that all of them are tested at once.
+  /// Boxes of the children, coordinate by coordinate, so that all of them are tested at once.
   struct Node {
     std::array<std::array<double, kWidth>, 3> low, high;
     std::array<Index, kWidth> child;    ///< number of a node or leaf; kNoIndex: no child
     std::array<bool, kWidth> is_leaf;
   };
-  /// Triangles by coordinate for the same reason; unused places repeat the first triangle.
+  /// Triangles, coordinate by coordinate for the same reason; unused lanes repeat the first triangle.
   struct Leaf {
     using Lanes = std::array<double, kWidth>;
     std::array<Lanes, 3> a, ab, ac;
-    Lanes inverse_ab, inverse_ac, inverse_bc;  ///< 1 / squared length, 0 for none
-    Lanes inverse_area;                        ///< 1 / |ab x ac|^2, 0 for slivers: only their edges count
+    Lanes inverse_ab, inverse_ac, inverse_bc;  ///< 1 / squared length; 0 if the length is 0
+    Lanes inverse_area;                        ///< 1 / |ab x ac|^2; 0 for slivers: only edges count
     std::array<Index, kWidth> triangle;
   };
   struct Range {

@@ -7,10 +7,10 @@
 
 namespace subvol {
 
-/// The boundary of a curved mesh as triangles. Vertices are common to neighbours, also across sharp edges.
+/// The boundary of a curved mesh as triangles. Neighbors share their vertices, also across sharp edges.
 struct CurvedBoundary {
   TriangleMesh triangles;
-  std::vector<Index> faces;  ///< of each triangle: a place in `MeshTopology::boundary_faces()`
+  std::vector<Index> faces;  ///< per triangle: index into `MeshTopology::boundary_faces()`
   double chord_error = 0;    ///< distance of the triangles to the curved surface, in the mesh's unit
 };
 

@@ -16,7 +16,7 @@ namespace subvol {
 namespace {
 
 constexpr std::size_t kChunk = 256;
-constexpr double kMaxLooseness = 2;  // of the tree's boxes, before it is built anew
+constexpr double kMaxLooseness = 2;  // of the tree's boxes; beyond it, the tree is built anew
 
 Vec3 box_centre(std::span<const Vec3> points) {
   Vec3 low = points[0], high = points[0];
@@ -27,7 +27,8 @@ Vec3 box_centre(std::span<const Vec3> points) {
   return low + 0.5 * (high - low);
 }
 
-/// Positions relative to a centre, and the nearest site of each. The one before is a near-by start, no more.
+/// Computes the positions relative to a center and the nearest site of each. Each search starts from the site before,
+/// which does not change the result.
 void locate(std::span<const Vec3> positions, const Vec3& centre, const SiteTree& tree, std::vector<Vec3>& moved,
             std::vector<Index>& nearest) {
   moved.resize(positions.size());

@@ -10,7 +10,7 @@
 
 namespace subvol {
 
-/// The part of a triangle that is nearer to one site than to all others, by what an integral over it needs.
+/// The part of a triangle that is nearer to one site than to all others, with what an integral over it needs.
 struct VoronoiPiece {
   Index triangle;
   Index site;
@@ -33,34 +33,34 @@ struct VoronoiPiece {
 ///
 ///   Vor(i) cut with t = { y in t : |y - x_i| <= |y - x_j| for all j }         Paper: Eq. 9 integrates over it
 ///
-/// A triangle's cells are found among the few sites that may matter to it, and accepted where they part its area
-/// exactly. Elsewhere (ties, crowds of sites) it is cut in two by bisectors until every part lies in one cell, which,
-/// cells being convex, its corners decide: so no area is lost or counted twice in whatever position the sites are, and
-/// nearest-site queries are enough however far away they are. Shares of a triangle add up to 1 within a few roundings.
+/// A triangle's cells are found among the few sites that may matter to it, and accepted if their areas add up to its
+/// own. Otherwise (ties, many sites close together) it is cut in two by bisectors until every part lies in one cell. As
+/// cells are convex, the corners of a part decide that: so no area is lost or counted twice for any position of the
+/// sites, and nearest-site queries suffice, however far away the sites are. Shares of a triangle sum to 1 to rounding.
 ///
-/// Ties: where sites are equally near within rounding, on a set of positive area (equal sites, a triangle in a
-/// bisector), one of them gets it all; of equal sites the one with the lowest number.
+/// Ties: if sites are equally near within rounding on a set of positive area (equal sites, a triangle in a bisector),
+/// one of them gets all of it; of equal sites, the one with the lowest number.
 class RestrictedVoronoi {
  public:
-  /// Sites are finite and there is at least one, else InputError. Equal sites are allowed.
+  /// Sites must be finite, and there must be at least one, else InputError. Equal sites are allowed.
   explicit RestrictedVoronoi(std::span<const Vec3> sites);
 
-  /// Moves the sites (as many as before, else InputError); cheaper than building anew. The results are the same.
+  /// Moves the sites (as many as before, else InputError); cheaper than a new object, with the same results.
   void update_sites(std::span<const Vec3> sites);
 
   std::size_t num_sites() const { return tree_.num_sites(); }
 
-  /// The nearest site, of equally near ones the lowest number. Points are finite.
+  /// Returns the nearest site; of equally near ones, that with the lowest number. The point must be finite.
   Index nearest_site(const Vec3& point) const;
 
-  /// The pieces of all triangles, by triangle, then by site; at most one per pair.
+  /// Returns the pieces of all triangles, ordered by triangle, then by site; at most one per pair.
   ///
-  /// positions, triangles   finite; corners in [0, positions.size()), else InputError. Soups are welcome.
-  /// pieces                 receives the result; its memory is used again.
+  /// positions, triangles   finite; corners in [0, positions.size()), else InputError. Soups are allowed.
+  /// pieces                 receives the result; its memory is reused.
   ///
   /// Triangles without area have no pieces. Runs in parallel over triangles; same bits for any number of threads.
-  /// Cost: a query per position, some 0.1 microseconds, and 0.2 to 0.8 microseconds per piece of the triangles that
-  /// more than one cell meets.
+  /// Cost: a query per position, about 0.1 microseconds, and 0.2 to 0.8 microseconds per piece of the triangles that
+  /// meet more than one cell.
   void compute(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles,
                std::vector<VoronoiPiece>& pieces) const;
   std::vector<VoronoiPiece> compute(std::span<const Vec3> positions,
@@ -69,7 +69,7 @@ class RestrictedVoronoi {
  private:
   void take_sites(std::span<const Vec3> sites);
 
-  Vec3 centre_ = Vec3::Zero();  ///< sites and triangles are handled relative to it, or far origins would cost digits
+  Vec3 centre_ = Vec3::Zero();  ///< origin of all coordinates in use, so that a far origin costs no digits
   SiteTree tree_;
 };
 

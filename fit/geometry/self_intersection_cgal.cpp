@@ -46,15 +46,15 @@ class PairTest {
  private:
   Kernel::Triangle_3 triangle(const Triangle& t) const { return {points_[t[0]], points_[t[1]], points_[t[2]]}; }
 
-  /// Triangles that share their first corner meet elsewhere exactly when the edge opposite to it in one of them does.
+  /// Triangles that share their first corner meet elsewhere exactly if the opposite edge of either meets the other.
   bool meet_beyond_corner(const Triangle& a, const Triangle& b) const {
-    // Most have their opposite edges far from each other, or strictly to one side of the other's plane.
+    // Most pairs are decided here: opposite edges far from the other triangle, or strictly on one side of its plane.
     if (boxes_are_apart(a, b) && boxes_are_apart(b, a)) return false;
     if (strictly_beside(a, b) || strictly_beside(b, a)) return false;
     return CGAL::do_intersect(triangle(a), Kernel::Segment_3(points_[b[1]], points_[b[2]])) ||
            CGAL::do_intersect(triangle(b), Kernel::Segment_3(points_[a[1]], points_[a[2]]));
   }
-  /// Of the edge opposite to the first corner, and of a triangle.
+  /// True if the boxes of the edge opposite to the first corner and of a triangle are disjoint.
   bool boxes_are_apart(const Triangle& edge, const Triangle& triangle) const {
     for (int axis = 0; axis < 3; ++axis) {
       const auto at = [&](Index v) { return mesh_.positions[v][axis]; };
@@ -72,7 +72,7 @@ class PairTest {
     return first != CGAL::COPLANAR && first == side(other[2]);
   }
 
-  /// Triangles that share their first two corners: in one plane, and on the same side of the common edge.
+  /// True if triangles that share their first two corners lie in one plane, on the same side of the common edge.
   bool are_folded(const Triangle& a, const Triangle& b) const {
     const Point &p = points_[a[0]], &q = points_[a[1]], &r = points_[a[2]], &s = points_[b[2]];
     return CGAL::coplanar(p, q, r, s) && CGAL::coplanar_orientation(p, q, r, s) == CGAL::POSITIVE;
@@ -97,7 +97,7 @@ std::vector<Point> checked_points(const TriangleMesh& mesh) {
   return points;
 }
 
-/// Tests the pairs of triangles whose boxes meet, some at a time: there may be too many of them to keep.
+/// Tests the pairs of triangles whose boxes meet, in chunks, because there may be too many of them to keep.
 class Search {
  public:
   Search(const PairTest& test, const std::function<bool()>& cancelled, SelfIntersections& result)
@@ -106,7 +106,7 @@ class Search {
   void run(const std::vector<Box>& boxes) {
     std::vector<const Box*> pointers;
     for (const Box& box : boxes) pointers.push_back(&box);
-    constexpr std::ptrdiff_t kCutoff = 200;  // boxes below which all pairs are tested; measured: flat from 50 to 2000
+    constexpr std::ptrdiff_t kCutoff = 200;  // boxes up to which all pairs are tested; flat from 50 to 2000
     try {
       CGAL::box_self_intersection_d(
           pointers.begin(), pointers.end(), [&](const Box* a, const Box* b) { take(a->info(), b->info()); }, kCutoff);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::size_t kBranch = kWide;
 constexpr int kMaxLevels = 12;      // 8^12 boxes
-constexpr double kFarAway = 1e200;  // of the lanes that hold nothing: its square is infinite
-// A box may be farther by rounding than a site in it: the slack keeps the result independent of the bound.
+constexpr double kFarAway = 1e200;  // coordinate in unused lanes; its square is infinite
+// By rounding, a box may be farther than a site in it: the slack keeps the result independent of the bound.
 constexpr double kSlack = 1 + 1e-14;
 
 int longest_axis(std::span<const Vec3> sites, std::span<const Index> order) {
@@ -27,7 +27,7 @@ int longest_axis(std::span<const Vec3> sites, std::span<const Index> order) {
   return axis;
 }
 
-/// Orders sites so that every `unit` in a row form a subtree, and the same within each unit.
+/// Orders the sites so that every `unit` in a row form a subtree, and likewise within each unit.
 void order_sites(std::span<const Vec3> sites, std::span<Index> order, std::size_t unit) {
   if (order.size() <= kBranch) return;
   while (unit >= order.size()) unit /= kBranch;
@@ -133,7 +133,7 @@ void SiteTree::box_distances(const Boxes& boxes, const Vec3& point, Wide& square
 SiteTree::Nearest SiteTree::nearest(const Vec3& point, double bound) const {
   Nearest best;
   if (sites_.empty()) return best;
-  // Lanes without a box are infinitely far: no limit lets them in.
+  // Unused lanes are infinitely far away: no limit admits them.
   double limit = std::min(bound * kSlack, std::numeric_limits<double>::max());
   struct Entry {
     double distance;
@@ -159,7 +159,7 @@ SiteTree::Nearest SiteTree::nearest(const Vec3& point, double bound) const {
       continue;
     }
     box_distances(boxes_[level_offsets_[entry.level] + entry.number], point, d);
-    // The nearest child comes last onto the stack, so it is visited first.
+    // The nearest child is pushed last, so that it is visited first.
     const int first = size;
     for (unsigned lanes = lanes_within(d, limit); lanes != 0; lanes &= lanes - 1) {
       const int k = std::countr_zero(lanes);

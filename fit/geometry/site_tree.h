@@ -11,12 +11,12 @@
 
 namespace subvol {
 
-/// Nearest of a set of sites, by a tree of bounding boxes with eight children per box and eight sites per leaf.
+/// Finds the nearest of a set of sites, with a tree of bounding boxes: eight children per box, eight sites per leaf.
 ///
-/// Sites are put in an order in which every 8^k in a row lie close together, so the tree needs no pointers: box b of a
-/// level holds boxes 8 b .. 8 b + 7 of the level below. A site's rank in that order is its *place*: places, not site
-/// numbers, are what queries return, as things near each other in space are then near each other in memory. Moved sites
-/// only need their boxes computed again (`refit`).
+/// Sites are ordered so that every 8^k in a row lie close together, so the tree needs no pointers: box b of a level
+/// holds boxes 8 b .. 8 b + 7 of the level below. A site's rank in that order is its *place*. Queries return places,
+/// not site numbers, because sites close to each other in space are then close in memory. If sites move, only the boxes
+/// are computed again (`refit`).
 class SiteTree {
  public:
   struct Nearest {
@@ -29,27 +29,27 @@ class SiteTree {
   };
 
   SiteTree() = default;
-  /// Sites are finite; equal ones are allowed. Cost: n log n, about 0.2 microseconds a site.
+  /// Sites must be finite; equal ones are allowed. Cost: n log n, about 0.2 microseconds a site.
   explicit SiteTree(std::span<const Vec3> sites);
 
-  /// Takes the sites' new positions (as many as before), keeping their order. Cost: one pass. Queries stay exact for
-  /// any movement, and become slower as neighbours drift apart: `looseness` says how far.
+  /// Takes new positions of the sites (as many as before) and keeps their order. Cost: one pass. Queries stay exact for
+  /// any movement and become slower as neighbors drift apart; `looseness` measures how far they have.
   void refit(std::span<const Vec3> sites);
-  /// Sum of the leaf boxes' diagonals over that of the build: 1 where nothing has moved.
+  /// Sum of the leaf boxes' diagonals over that after the build: 1 if nothing has moved.
   double looseness() const { return built_extent_ > 0 ? extent_ / built_extent_ : 1; }
 
   std::size_t num_sites() const { return sites_.size(); }
   Index site(Index place) const { return sites_[place]; }
   const Vec3& position(Index place) const { return positions_[place]; }
 
-  /// The site nearest to a point, of equally near ones the one with the lowest number.
+  /// Returns the site nearest to a point; of equally near ones, that with the lowest number.
   ///
-  /// bound    squared distance beyond which sites do not matter. The result is the same for every bound of at least the
-  ///          squared distance of the nearest site; with a smaller one it may be kNoIndex.
+  /// bound    squared distance beyond which sites do not matter. The result is the same for every bound that is at
+  ///          least the squared distance of the nearest site; with a smaller one it may be kNoIndex.
   Nearest nearest(const Vec3& point, double bound = std::numeric_limits<double>::infinity()) const;
 
-  /// Appends to `places` the sites that lie in one of the balls (their borders included), in no particular order.
-  /// returns whether there were at most `max_count`; if not, `places` holds some of them.
+  /// Appends to `places` the sites that lie in one of the closed balls, in no particular order.
+  /// returns true if there are at most `max_count`; if not, `places` holds some of them.
   bool gather(std::span<const Ball> balls, std::size_t max_count, std::vector<Index>& places) const;
 
  private:
@@ -70,7 +70,7 @@ class SiteTree {
   std::vector<Vec3> positions_;  ///< by place
   std::vector<Leaf> leaves_;
   std::vector<Boxes> boxes_;                ///< level by level, lowest first
-  std::vector<std::size_t> level_offsets_;  ///< of `boxes_`
+  std::vector<std::size_t> level_offsets_;  ///< where each level begins in `boxes_`
   double extent_ = 0, built_extent_ = 0;
 };
 

@@ -23,7 +23,7 @@ double area_of(const TriangleMesh& mesh, Index t) {
   return 0.5 * (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).norm();
 }
 
-/// Per place in `order`: which corners (bits 0-2) and edges (bits 3-5) no earlier triangle has.
+/// Returns, per place in `order`, the corners (bits 0-2) and edges (bits 3-5) that no earlier triangle has.
 std::vector<std::uint8_t> first_uses(const TriangleMesh& mesh, std::span<const Index> order) {
   std::vector<std::uint8_t> uses(order.size(), 0);
   std::vector<char> seen(mesh.positions.size(), 0);
@@ -51,7 +51,7 @@ std::vector<std::uint8_t> first_uses(const TriangleMesh& mesh, std::span<const I
   return uses;
 }
 
-/// Distances from some consecutive triangles of one surface.
+/// Sums up the distances from some consecutive triangles of one surface.
 class Sampler {
  public:
   Sampler(const TriangleMesh& mesh, const ClosestPoint& other) : mesh_(mesh), other_(other) {}
@@ -74,7 +74,7 @@ class Sampler {
     }
   }
 
-  OneSided result;  ///< its mean still an integral
+  OneSided result;  ///< `mean` is still the integral, not divided by the area
 
  private:
   double distance(const Vec3& p) {
@@ -97,7 +97,7 @@ OneSided one_sided(const TriangleMesh& from, std::span<const Index> order, const
   for (std::size_t place = 0; place < order.size(); ++place) total += areas[place] = area_of(from, order[place]);
   const std::vector<std::uint8_t> uses =
       options.extremes ? first_uses(from, order) : std::vector<std::uint8_t>(order.size(), 0);
-  constexpr std::size_t kRun = 32;  // sums and hints stay inside a run, whatever thread takes it
+  constexpr std::size_t kRun = 32;  // sums and hints stay within a run, whatever thread takes it
   std::vector<OneSided> runs((order.size() + kRun - 1) / kRun);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < runs.size(); ++run) {

@@ -15,10 +15,10 @@ constexpr std::array<double, 6> kWholeTriangle = {1. / 6, 1. / 12, 1. / 12, 1. /
 // Six products and sums with relative errors of 1.1e-16 each, and as much again for interpolated corners.
 constexpr double kRounding = 4e-15;
 
-// Of sites that may matter to a part, for which finding its cells at once is tried; and of vain tries in a triangle.
+// Largest number of sites for which the cells of a part are found at once, and of failures of that in a row.
 constexpr std::size_t kMaxCandidates = 160;
 constexpr int kMaxFailures = 16;
-// The site on a ball's border must not be missed by rounding.
+// Rounding must not lose the site on the sphere of a ball.
 constexpr double kBallSlack = 1 + 1e-12;
 
 }  // namespace
@@ -89,7 +89,7 @@ bool TriangleCutter::inside_one_cell(int& c, int& b) const {
       return true;
     }
     if (i == 0) fallback = lower;
-    // Neighbours along the border are most likely neighbours in the diagram: their bisector cuts few other cells.
+    // Neighbors along the part's outline are most likely neighbors in the diagram: their bisector cuts few other cells.
     const Corner& next = part[i + 1 < part.size() ? i + 1 : 0];
     const double here = violation(next.slot, part[i]), there = violation(candidate, next);
     const double worst = std::max(here, there);
@@ -134,7 +134,7 @@ void TriangleCutter::split(int c, int b) {
   const std::size_t n = polygon_.size();
   height_.resize(n);
   for (std::size_t i = 0; i < n; ++i) height_[i] = height(polygon_[i]);
-  // In one half, corners of the other's site are as near to its own or nearer.
+  // In each half, corners labeled with the other half's site are at least as near to this half's own and get its label.
   const auto relabelled = [](Corner corner, int other, int own) {
     if (corner.slot == other || corner.slot < 0) corner.slot = own;
     return corner;
@@ -147,9 +147,9 @@ void TriangleCutter::split(int c, int b) {
     for (const Corner& corner : polygon_) corners_.push_back(in_b(corner));
     return;
   }
-  // One chord parts the polygon, whatever rounding has done to its shape, so the parts' areas add up to its own. Its
-  // ends are where the corners cease to be b's, seen both ways from the one that is most so; near the bisector they are
-  // corners.
+  // One chord divides the polygon, whatever rounding has done to its shape, so the areas of the parts add up to its
+  // own. Start from the corner that is deepest in b's part and walk both ways: the chord ends where the corners cease
+  // to be b's, at a corner if that is near the bisector.
   std::size_t first = 1, last = n - 1;
   while (height_[first] > noise) ++first;
   while (height_[last] > noise) --last;
@@ -168,8 +168,8 @@ void TriangleCutter::split(int c, int b) {
 }
 
 bool TriangleCutter::gather(std::span<const Corner> part) {
-  // A site that is farther than c from all corners is so everywhere between them: only sites in the balls through c
-  // matter. The smaller the balls, the better.
+  // A site that is farther than c from all corners is farther everywhere between them: only sites in the balls through
+  // c around the corners matter. The smaller the balls, the better.
   Barycentric sum{};
   for (const Corner& corner : part)
     for (int k = 0; k < 3; ++k) sum[k] += corner.at[k];

@@ -18,9 +18,9 @@
 namespace subvol {
 namespace {
 
-constexpr std::size_t kChunk = 512;  // points of a table, so that tables of high orders stay small
+constexpr std::size_t kChunk = 512;  // points per table, so that tables of high orders stay small
 
-/// What is kept of the samples of a cell.
+/// Summary of a cell's samples.
 struct Sampled {
   double least = 1, mean = 0;
   std::size_t count = 0;

@@ -7,16 +7,17 @@
 
 namespace subvol {
 
-/// Samples the scaled Jacobian of every curved cell and certifies det J > 0, as `measure_quality` of linear ones does.
+/// Samples the scaled Jacobian of every curved cell and certifies det J > 0, as `measure_quality` does for linear
+/// cells.
 ///
-///   SJ = det F / (|F e1| |F e2| |F e3|),   F = dx/du A^-1,   A: ideal cell, or the reference given
+///   SJ = det F / (|F e1| |F e2| |F e3|),   F = dx/du A^-1,   A: ideal cell, or the given reference
 ///
-/// samples_per_direction  n >= 2, or 0: 2p + 3 for each cell, p its largest order, at least 5: a grid finer than the
-///                        quadrature's 2p - 1 points, that has few of them.
-/// reference  of each cell, or empty: the ideal cells.
-/// returns   as for linear cells; centres of the worst cells are means of their corners.
-/// InputError: n < 2, but for 0. Parallel, same bits for any number of threads.
-/// Cost at orders 1, 2, 4, 8: a hex about 10 us, 50 us, 1 ms, 30 ms on one core.
+/// samples_per_direction  n >= 2, or 0: 2p + 3 but at least 5 for each cell, p its largest order: a grid that is finer
+///                        than the quadrature's 2p - 1 points and has few of them in common.
+/// reference  of each cell; empty: the ideal cells.
+/// returns   as for linear cells; the centers of the worst cells are the means of their corners.
+/// InputError: n < 2, except 0. Runs in parallel, with the same bits for any number of threads.
+/// Cost at orders 1, 2, 4, 8: about 10 us, 50 us, 1 ms, 30 ms per hex on one core.
 QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_direction = 0,
                               const CellReference& reference = {});
 

@@ -18,13 +18,13 @@ namespace {
 
 using bernstein::Vector;
 
-/// What is kept of a cell's samples; the mean is that over the cell, by the trapezoidal rule's weights.
+/// Summary of a cell's samples; the mean over the cell has the trapezoidal rule's weights.
 template <class T>
 struct Sampled {
   T least, mean;
 };
 
-/// What samples count in the mean over a cell, in their order.
+/// Weights of the samples in the mean over a cell, in their order.
 std::vector<double> sample_weights(CellKind kind, int n) {
   return make_quadrature(kind, QuadratureRule::trapezoidal, n).weights;
 }
@@ -34,7 +34,7 @@ Vector<T> blend(const Vector<T>& p, const Vector<T>& q, double t) {
   return {T((1 - t) * p[0] + t * q[0]), T((1 - t) * p[1] + t * q[1]), T((1 - t) * p[2] + t * q[2])};
 }
 
-/// v / |v|, and 0 for 0.
+/// Returns v / |v|, or 0 for 0.
 template <class T>
 Vector<T> direction(const Vector<T>& v) {
   const T length_squared = bernstein::dot(v, v);
@@ -42,7 +42,8 @@ Vector<T> direction(const Vector<T>& v) {
   return {T(v[0] * scale), T(v[1] * scale), T(v[2] * scale)};
 }
 
-/// F e2 and F e3 from derivatives along the canonical axes: A^-1 of the equilateral triangle and regular tetrahedron.
+/// F e2 and F e3 from derivatives along the canonical axes, with A^-1 of the equilateral triangle and regular
+/// tetrahedron.
 template <class T>
 Vector<T> second_column(const Vector<T>& xu, const Vector<T>& xv) {
   const double f = 1 / std::sqrt(3.0);
@@ -63,7 +64,7 @@ T triple(const Vector<T>& a, const Vector<T>& b, const Vector<T>& c) {
   return bernstein::dot(a, bernstein::cross(b, c));
 }
 
-/// Directions of dx/d(axis) on an n x n grid over the two other axes, the lower axis slower.
+/// Directions of dx/d(axis) on an n x n grid over the two other axes; the lower of these varies more slowly.
 template <class T>
 void edge_directions(const std::array<Vector<T>, 8>& x, int axis, int n, std::vector<Vector<T>>& out) {
   std::array<Vector<T>, 4> edge;
@@ -85,7 +86,7 @@ void edge_directions(const std::array<Vector<T>, 8>& x, int axis, int n, std::ve
   }
 }
 
-/// Buffers of one thread.
+/// Samples hexes, and holds the buffers of one thread.
 template <class T>
 struct HexSampler {
   std::array<std::vector<Vector<T>>, 3> directions;
@@ -157,7 +158,7 @@ Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n,
   return HexSampler<double>{}.run(x, n, weights);
 }
 
-/// The points of a rule with the gradients of the shape functions by canonical coordinates; unused rows are 0.
+/// The points of a rule with the gradients of the shape functions in canonical coordinates; unused rows are 0.
 struct SamplePoints {
   using Gradients = Eigen::Matrix<double, kMaxCellVertices, 3>;
   std::vector<Vec3> points;
@@ -176,7 +177,7 @@ struct SamplePoints {
   }
 };
 
-/// Samples of one cell against its reference.
+/// Samples one cell against its reference.
 Sampled<double> sample_cell(std::span<const Vec3> corners, const SamplePoints& at, const CellReference& reference,
                             Index cell) {
   Eigen::Matrix<double, 3, kMaxCellVertices> x = Eigen::Matrix<double, 3, kMaxCellVertices>::Zero();
@@ -193,7 +194,7 @@ Sampled<double> sample_cell(std::span<const Vec3> corners, const SamplePoints& a
   return result;
 }
 
-/// Samples of every cell; a mean that is not a number means that comparisons have lost the least value too.
+/// Samples every cell. If a mean is not a number, comparisons have lost the lowest value too.
 std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const CellReference& reference) {
   std::vector<Sampled<double>> result(mesh.num_cells());
   const auto keep = [&](std::size_t c, double least, double mean) {

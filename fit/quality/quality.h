@@ -14,25 +14,25 @@ namespace subvol {
 
 inline constexpr int kNumHistogramBins = 20;
 
-/// Shape of the cells of a mesh, and what is proved of them.
+/// Quality of the cells of a mesh, and what is proved about them.
 struct QualityReport {
   struct WorstCell {
     Index cell;    ///< from 0
     Vec3 centre;   ///< mean of its corners
-    double value;  ///< its least scaled Jacobian
+    double value;  ///< its lowest scaled Jacobian
   };
   std::size_t num_cells = 0, num_samples = 0;
-  double min_scaled_jacobian = 1;   ///< of all samples of all cells; 1 without cells
-  /// Means over the cells, by the trapezoidal rule's weights (so that faces, which many samples lie on, count no more
-  /// than they are), then over all: a cell counts as often as it has samples. 1 without cells.
+  double min_scaled_jacobian = 1;   ///< over all samples of all cells; 1 without cells
+  /// Mean over each cell with the trapezoidal rule's weights (so that faces, on which many samples lie, do not count
+  /// too much), then mean over all cells, where a cell counts as often as it has samples. 1 without cells.
   double mean_scaled_jacobian = 1;
-  std::vector<double> cell_minima;                            ///< least scaled Jacobian of each cell
+  std::vector<double> cell_minima;                            ///< lowest scaled Jacobian of each cell
   std::array<std::size_t, kNumHistogramBins> histogram{};     ///< of cell_minima; equal bins over [-1, 1]
   std::size_t inverted_cells = 0;                             ///< with a sample <= 0, or refuted by the certificate
   std::vector<WorstCell> worst_cells;                         ///< the ten lowest, ascending by value, then by number
   CertificateSummary certificate;
 
-  /// Counts one more cell: cell_minima, min_scaled_jacobian, histogram, inverted_cells.
+  /// Adds one cell to cell_minima, min_scaled_jacobian, histogram and inverted_cells.
   void add_cell(double least);
   /// Fills worst_cells from cell_minima.
   void keep_worst(const std::function<Vec3(Index)>& centre);
@@ -42,14 +42,15 @@ struct QualityReport {
 ///
 ///   SJ = det F / (|F e1| |F e2| |F e3|),   F = dx/dxi A^-1
 ///
-/// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2), or the reference given.
+/// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2), or the given reference.
 ///
-/// samples_per_direction  n >= 2: n^3 points of a hex, n^2 (n+1)/2 of a prism, n(n+1)(n+2)/6 of a tet, with corners.
-/// reference  of each cell, or empty: the ideal cells. Cost: ten times that without.
-/// returns   values in [-1, 1]; 1 for ideal cells at any size and orientation, 0 where a column of F vanishes, -1 where
-///           a coordinate is not finite.
-/// InputError: n < 2. The mesh must have valid vertex numbers. Parallel, same bits for any number of threads.
-/// Cost: about 0.8 us a hex on one core at n = 5.
+/// samples_per_direction  n >= 2: n^3 points for a hex, n^2 (n+1)/2 for a prism, n(n+1)(n+2)/6 for a tet, corners
+///                        included.
+/// reference  of each cell; empty: the ideal cells. Cost with a reference: ten times that without.
+/// returns   values in [-1, 1]; 1 for ideal cells of any size and orientation, 0 if a column of F vanishes, -1 if a
+///           coordinate is not finite.
+/// InputError: n < 2. The mesh must have valid vertex numbers. Runs in parallel, with the same bits for any number of
+/// threads. Cost: about 0.8 us per hex on one core at n = 5.
 QualityReport measure_quality(const VolumeMesh& mesh, int samples_per_direction = 5,
                               const CellReference& reference = {});
 

@@ -11,7 +11,7 @@
 
 namespace subvol {
 
-/// One number of each of kLanes hexes: kernels templated on their number type run on all of them at once.
+/// One number of each of kLanes hexes: kernels that are templates over the number type process them all at once.
 using Lanes = Eigen::Array<double, kLanes, 1>;
 
 inline double larger(double a, double b) { return a > b ? a : b; }
@@ -36,7 +36,7 @@ inline std::array<std::array<Lanes, 3>, 8> gather_hexes(std::span<const Vec3> po
   return x;
 }
 
-/// Corners of one cell; those of its kind's number are set.
+/// Corners of one cell; as many entries as its kind has corners are set.
 inline std::array<Vec3, kMaxCellVertices> gather_cell(std::span<const Vec3> positions, const VolumeMesh& mesh,
                                                       std::size_t cell) {
   std::array<Vec3, kMaxCellVertices> x;
@@ -47,7 +47,7 @@ inline std::array<Vec3, kMaxCellVertices> gather_cell(std::span<const Vec3> posi
 
 /// Calls hexes(first) for kLanes consecutive hexes and cell(c) for every other cell, in parallel.
 ///
-/// How cells are grouped depends on the mesh alone, so results do not depend on the number of threads.
+/// The grouping of cells depends on the mesh alone, so results do not depend on the number of threads.
 template <class Hexes, class Cell>
 void for_each_cell_block(const VolumeMesh& mesh, const Hexes& hexes, const Cell& cell) {
   const std::size_t num_cells = mesh.num_cells(), num_blocks = (num_cells + kLanes - 1) / kLanes;

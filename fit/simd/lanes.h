@@ -3,7 +3,8 @@
 
 namespace subvol {
 
-/// How many cells, or Jacobians, the kernels work on at once: one SIMD register of doubles, or several narrow ones.
+/// Number of cells or Jacobians that the kernels process at once: one SIMD register of doubles, or several narrower
+/// ones.
 inline constexpr int kLanes = 8;
 
 }  // namespace subvol

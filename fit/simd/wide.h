@@ -15,11 +15,11 @@
 
 namespace subvol {
 
-/// Eight numbers to compute with at once: a vector type of GCC and Clang, on any processor.
+/// Eight numbers that are processed at once: a vector type of GCC and Clang, on any processor.
 inline constexpr int kWide = 8;
 using Wide = double __attribute__((vector_size(kWide * sizeof(double))));
 
-/// Eight consecutive doubles, aligned or not.
+/// Loads eight consecutive doubles, aligned or not.
 inline Wide load_wide(const double* from) {
   Wide result;
   std::memcpy(&result, from, sizeof result);
@@ -27,14 +27,14 @@ inline Wide load_wide(const double* from) {
 }
 inline void store_wide(const Wide& value, double* to) { std::memcpy(to, &value, sizeof value); }
 
-/// The same in single precision, for what is kept: half the memory to go through.
+/// Eight numbers in single precision: half the memory traffic.
 using Narrow = float __attribute__((vector_size(kWide * sizeof(float))));
 inline void store_wide(const Narrow& value, float* to) { std::memcpy(to, &value, sizeof value); }
 inline Narrow narrow(const Wide& x) { return __builtin_convertvector(x, Narrow); }
 inline Wide widen(const Narrow& x) { return __builtin_convertvector(x, Wide); }
 inline Wide widen(const Wide& x) { return x; }
 
-/// Lanes of eight one place up (down); the first (last) one stays.
+/// Moves the eight lanes one place up (down); the first (last) lane keeps its value.
 template <class Vector>
 Vector shifted_up(const Vector& x) {
   return __builtin_shufflevector(x, x, 0, 0, 1, 2, 3, 4, 5, 6);
@@ -44,7 +44,7 @@ Vector shifted_down(const Vector& x) {
   return __builtin_shufflevector(x, x, 1, 2, 3, 4, 5, 6, 7, 7);
 }
 
-/// Sixteen numbers of single precision.
+/// Sixteen numbers in single precision.
 inline constexpr int kWideFloats = 16;
 using WideFloats = float __attribute__((vector_size(kWideFloats * sizeof(float))));
 inline WideFloats load_wide(const float* from) {
@@ -54,7 +54,7 @@ inline WideFloats load_wide(const float* from) {
 }
 inline void store_wide(const WideFloats& value, float* to) { std::memcpy(to, &value, sizeof value); }
 
-/// A vector of consecutive numbers, aligned or not.
+/// Loads a vector of consecutive numbers, aligned or not.
 template <class Vector>
 Vector load(const std::remove_cvref_t<decltype(Vector{}[0])>* from) {
   Vector result;
@@ -67,11 +67,11 @@ Vector size_of(const Vector& x) {
   return x < 0 ? -x : x;
 }
 
-/// The numbers in vectors, one after the other.
+/// The numbers of an array of vectors, one after the other.
 inline float* numbers(Narrow* vectors) { return reinterpret_cast<float*>(vectors); }
 inline const float* numbers(const Narrow* vectors) { return reinterpret_cast<const float*>(vectors); }
 
-/// Begins where a cache line does, so that vectors of whole lines do not cross any.
+/// Allocates memory that begins at a cache line, so that vectors of whole lines do not cross any.
 template <class Number>
 struct AlignedAllocator {
   using value_type = Number;
@@ -88,7 +88,7 @@ struct AlignedAllocator {
 using AlignedDoubles = std::vector<double, AlignedAllocator<double>>;
 using AlignedFloats = std::vector<float, AlignedAllocator<float>>;
 
-/// Lane by lane the lower (higher) of a and b, in a; a itself where b is not a number.
+/// Sets each lane of a to the lower (higher) of a and b; a stays if b is not a number.
 template <class Vector>
 void take_lower(Vector& a, const Vector& b) {
 #if defined __AVX512F__ && defined __AVX512VL__
@@ -112,11 +112,11 @@ void take_higher(Vector& a, const Vector& b) {
 #endif
 }
 
-/// Lane by lane |x| where that is higher than a >= 0, in a.
+/// Sets each lane of a >= 0 to |x| if that is higher.
 template <class Vector>
 void take_higher_size(Vector& a, const Vector& x) {
 #if defined __AVX512DQ__ && defined __AVX512VL__
-  constexpr int kWithoutSign = 0b1011;  // the higher of both sizes
+  constexpr int kWithoutSign = 0b1011;  // the higher of both absolute values
   if constexpr (std::is_same_v<Vector, Wide>) a = (Vector)_mm512_range_pd((__m512d)a, (__m512d)x, kWithoutSign);
   else if constexpr (std::is_same_v<Vector, Narrow>) a = (Vector)_mm256_range_ps((__m256)a, (__m256)x, kWithoutSign);
   else a = (Vector)_mm512_range_ps((__m512)a, (__m512)x, kWithoutSign);
@@ -126,10 +126,10 @@ void take_higher_size(Vector& a, const Vector& x) {
 #endif
 }
 
-/// 1/x and 1/sqrt x for |x| in [1e-300, 1e300], up to two units in the last place.
+/// 1/x and 1/sqrt x for |x| in [1e-300, 1e300], accurate to two units in the last place.
 inline Wide reciprocal(const Wide& x) {
 #ifdef __AVX512F__
-  // The processor's estimate of 14 bits, doubled twice by Newton's method: a division takes several times as long.
+  // Newton's method doubles the 14 bits of the processor's estimate twice: a division takes several times as long.
   Wide y = (Wide)_mm512_maskz_rcp14_pd(0xff, (__m512d)x);
   y += y * (1 - x * y);
   return y + y * (1 - x * y);
@@ -178,7 +178,7 @@ inline double sum_of_lanes(const Wide& v) {
   return (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }
 
-/// Bit k tells whether v[k] <= limit.
+/// Bit k is set if v[k] <= limit.
 template <class Vector>
 unsigned lanes_within(const Vector& v, std::remove_cvref_t<decltype(v[0])> limit) {
 #if defined __AVX512F__ && defined __AVX512VL__

@@ -8,10 +8,10 @@ namespace subvol {
 
 static_assert(kWide == kLanes);
 
-/// The eight numbers, to be set one by one.
+/// The eight numbers of a vector, to be set one by one.
 inline double* lanes(Wide& w) { return reinterpret_cast<double*>(&w); }
 
-/// c = a b, or a b^T, of 3x3 matrices by rows.
+/// c = a b, a b^T or a^T b, for 3x3 matrices stored by rows.
 inline void product(const Wide* a, const Wide* b, Wide* c) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];

@@ -10,14 +10,14 @@
 
 namespace subvol {
 
-/// Nodes of a mesh of which some stay: y = M x + y0 (`FitProblem`), x being those that may move.
+/// Nodes of a mesh, some of which are fixed: y = M x + y0 (`FitProblem`), where x holds the free ones.
 struct FreeNodes {
   SparseMap map;                ///< M
-  std::vector<Vec3> fixed;      ///< y0: the positions of those that stay, else 0
-  std::vector<Vec3> unknowns;   ///< x: the positions of the others, in their order
+  std::vector<Vec3> fixed;      ///< y0: the positions of fixed nodes, 0 for free ones
+  std::vector<Vec3> unknowns;   ///< x: the positions of the free nodes, in their order
 };
 
-/// is_fixed, positions: one entry per node.
+/// Separates fixed from free nodes. is_fixed, positions: one entry per node.
 FreeNodes free_nodes(std::span<const std::uint8_t> is_fixed, std::span<const Vec3> positions);
 
 }  // namespace subvol

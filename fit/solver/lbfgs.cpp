@@ -18,8 +18,8 @@ struct Value {
   double surface = 0, volume = 0, energy = std::numeric_limits<double>::infinity();
 };
 
-/// E and its gradient over the unknowns. Correspondences are found anew at each evaluation: dE/dx needs no derivative
-/// of theirs, since they are the best ones where they are found.
+/// E and its gradient over the degrees of freedom. Correspondences are found anew at each evaluation; the gradient
+/// takes them as frozen.
 class Objective {
  public:
   explicit Objective(FitProblem& problem)
@@ -45,7 +45,7 @@ class Objective {
   }
 
  private:
-  /// E_S; its gradient by the unknowns goes to from_samples_.
+  /// Returns E_S; from_samples_ receives its gradient over the degrees of freedom.
   double evaluate_surface(std::span<const Vec3> x) {
     problem_.apply_samples(x, samples_);
     problem_.surface->assign(samples_);
@@ -106,7 +106,8 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
       result.explanation = "the gradient vanishes";
       return result;
     }
-    // Weak Wolfe by bisection: +infinity fails Armijo, so the upper end closes in on the feasible part.
+    // Weak Wolfe conditions by bisection, without the curvature condition once an upper end is known. +infinity fails
+    // Armijo's condition, so that the upper end closes in on the feasible part.
     double low = 0, high = std::numeric_limits<double>::infinity();
     double t = history.empty() ? std::min(1.0, 1e-3 * std::sqrt(dot(x, x) / dot(d, d))) : 1;
     Value trial;

@@ -8,9 +8,9 @@
 
 namespace subvol {
 
-/// The reference that Newton is measured against, and the paper's algorithm 2: L-BFGS (m = 10) with a weak Wolfe line
-/// search by bisection, which takes +infinity as too long a step. Correspondences are exact at every evaluation.
-/// Converged where ten steps decrease E by less than `relative_decrease`.
+/// The paper's algorithm 2, and the reference for Newton's method: L-BFGS (m = 10) with a weak Wolfe line search by
+/// bisection, which treats +infinity as too long a step. Correspondences are found anew at every evaluation. If all
+/// cells of the start are certified, they stay so. Converged if ten steps decrease E by less than `relative_decrease`.
 MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
 }  // namespace subvol

@@ -12,7 +12,7 @@ namespace subvol {
 
 struct FitProblem;
 
-/// Why one minimisation ended; infeasible_start: at once, for E is infinite there.
+/// Why a minimization ended; infeasible_start: at once, because E is infinite at the start.
 enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
 
 /// One Newton (or L-BFGS) step.
@@ -25,37 +25,38 @@ struct IterationRecord {
 
 struct MinimizerResult {
   MinimizerStop stop;
-  std::string explanation;  ///< the test that fired, with its figure
+  std::string explanation;  ///< the test that ended it, with its figure
   std::vector<IterationRecord> iterations;
-  std::vector<std::vector<Index>> densified{};  ///< cells that were given more quadrature points, in this order
-  std::vector<Vec3> densified_at{};             ///< x when the last of them were; empty: none were
-  int small_steps = 0;                          ///< how many of the last steps decreased E by next to nothing
+  std::vector<std::vector<Index>> densified{};  ///< cells of each quadrature refinement, in order
+  std::vector<Vec3> densified_at{};             ///< x at the last refinement; empty: there was none
+  int small_steps = 0;                          ///< number of small decreases of E in a row at the end
 };
 
-/// Does to the problem's cells what was done to them on the way to this result, so that E is the same function again.
-/// InputError: `densified` and `densified_at` are not those of such a problem.
+/// Repeats the quadrature refinements of this result in the problem, so that E is the same function again.
+/// InputError: `densified` and `densified_at` do not fit the problem.
 void densify_again(FitProblem& problem, const MinimizerResult& result);
 
 struct MinimizerOptions {
   int max_iterations = 20;
-  double relative_decrease = 1e-3;  ///< converged when two steps in a row decrease E by less than this share of E
-  double cg_tolerance = 0.1;        ///< of the preconditioned residual
+  double relative_decrease = 1e-3;  ///< converged if two steps in a row decrease E by less than this share of E
+  double cg_tolerance = 0.1;        ///< relative, of the preconditioned residual
   int cg_max_iterations = 200;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
-  /// Asked many times within a step, which may be long; true: it is given up, and the minimisation ends as cancelled
-  /// with the step before.
+  /// Asked many times within a step, which may take long. If it returns true, the step is abandoned, and the
+  /// minimization ends as cancelled with the result of the step before.
   std::function<bool()> ended;
-  /// Newton's method only: called every few steps with x and what has been done so far, which is all that it takes to
-  /// go on from there (`begun`).
+  /// Newton's method only: called every few steps with x and the result so far. These suffice to resume the
+  /// minimization from there (`begun`).
   std::function<void(std::span<const Vec3> x, const MinimizerResult& so_far)> keep;
-  const MinimizerResult* begun = nullptr;  ///< what was done to get to x, as `keep` was told; null: nothing
+  const MinimizerResult* begun = nullptr;  ///< the result so far, as passed to `keep`; null: a new start
 };
 
-/// Ends the result as cancelled where the caller wants an end within a step.
+/// Returns true, and marks the result as cancelled, if the caller asks for an end within a step.
 bool has_ended(const MinimizerOptions& options, MinimizerResult& result);
 
-/// Keeps the record of a step and tells the caller; false, with the result's stop set, when they want to end here.
+/// Adds the record of a step to the result and reports it. Returns false, with the result marked as cancelled, if the
+/// caller wants to stop.
 bool record_step(const IterationRecord& record, const MinimizerOptions& options, MinimizerResult& result);
 
 }  // namespace subvol

@@ -19,7 +19,8 @@ namespace {
 /// The pulled-back Hessian M^T H_W M + N^T H_S N with its block-Jacobi preconditioner.
 class ReducedHessian {
  public:
-  /// inverse_diagonal  of an earlier Hessian of the same problem, to be used again; empty: computed.
+  /// inverse_diagonal  in/out: that of an earlier Hessian of the same problem, to be used again; if empty, it is
+  ///                   computed.
   ReducedHessian(const FitProblem& problem, std::vector<Mat3>& inverse_diagonal)
       : problem_(problem),
         inverse_diagonal_(inverse_diagonal),
@@ -35,7 +36,7 @@ class ReducedHessian {
       add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
 #pragma omp parallel for schedule(static)
     for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
-      // Vertices of no cell have no energy: they stay.
+      // Vertices of no cell have no energy: they do not move.
       const Mat3 block = inverse_diagonal_[j];
       inverse_diagonal_[j] = block.trace() > 0 ? Mat3(block.inverse()) : Mat3(Mat3::Zero());
     }
@@ -63,7 +64,7 @@ class ReducedHessian {
   std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
 };
 
-/// Solves H d = -g approximately, or not where the caller wants an end; returns the number of iterations.
+/// Solves H d = -g approximately and returns the number of iterations. Stops early if the caller asks for an end.
 int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient, const MinimizerOptions& options,
                         std::vector<Vec3>& d) {
   const std::size_t n = gradient.size();
@@ -92,14 +93,14 @@ int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient,
   return iteration;
 }
 
-/// Cells of `now` that are not in `before` (both ascending).
+/// Returns the cells of `now` that are not in `before` (both ascending).
 std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vector<Index>& now) {
   std::vector<Index> result;
   std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(result));
   return result;
 }
 
-/// One minimisation by Newton's method.
+/// One minimization by Newton's method.
 class NewtonRun {
  public:
   NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
@@ -107,24 +108,24 @@ class NewtonRun {
 
  private:
   enum class Search {
-    found,    ///< a step
-    stiffer,  ///< no: cells are in its way, and stiffer now
-    no_step,  ///< there is none
-    level,    ///< not looked for: the direction does not lead down
-    ended     ///< by the caller
+    found,    ///< a step was found
+    stiffer,  ///< no step: cells block it; they are stiffer now
+    no_step,  ///< no step is acceptable
+    level,    ///< no line search: the directional derivative is numerically zero
+    ended     ///< stopped by the caller
   };
 
-  /// The energy, its gradient and Hessian at x. False: it is infinite.
+  /// Computes the energy, its gradient and its Hessian at x. Returns false if the energy is infinite.
   bool linearize();
-  /// A direction and a step along it, the Hessian made stiffer where that would be short.
+  /// Finds a direction and a step along it. If the step would be short, makes the Hessian stiffer and tries again.
   Search find_step(IterationRecord& record);
   bool find_direction(IterationRecord& record);
-  /// The longest of t, t / 2, ... that decreases E and leaves no more cells uncertified; half of it where one that does
-  /// not was tried before.
+  /// Finds the longest of t, t / 2, ... that decreases E and leaves no further cell uncertified. If cells were
+  /// uncertified at a longer one, it is halved once more (`VolumeTerm::keeps_off_inversion`).
   Search search_line(bool may_stiffen, IterationRecord& record);
-  /// Goes the step that was found.
+  /// Takes the step that was found.
   void take_step(IterationRecord& record);
-  /// Whether E has stopped decreasing, or the caller wants an end.
+  /// Records the step. Returns true if E has stopped decreasing or the caller wants to stop.
   bool is_done(const IterationRecord& record);
   void stop(MinimizerStop why, std::string explanation) {
     result_.stop = why;
@@ -139,12 +140,12 @@ class NewtonRun {
   std::vector<Vec3> node_gradient_, sample_gradient_, gradient_, from_samples_;
   std::vector<Vec3> d_, dy_, dz_, y_trial_, z_trial_;
   std::vector<Mat3> inverse_diagonal_;
-  std::vector<Index> uncertified_;  // at x, or some steps before
+  std::vector<Index> uncertified_;  // at x, up to rounding
   double energy_ = 0, slope_ = 0, t_ = 0;
   double trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
   std::vector<Index> trial_uncertified_;
-  std::vector<Index> blocking_;  // cells that were in the way of this step
-  bool is_stiffened_ = false;    // the Hessian, for this step
+  std::vector<Index> blocking_;  // cells that blocked this step
+  bool is_stiffened_ = false;    // true if the Hessian was made stiffer for this step
 };
 
 NewtonRun::NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
@@ -183,7 +184,7 @@ bool NewtonRun::linearize() {
 bool NewtonRun::find_direction(IterationRecord& record) {
   ReducedHessian reduced(problem_, inverse_diagonal_);
   record.linear_iterations += conjugate_gradients(reduced, gradient_, options_, d_);
-  constexpr double kLevel = 1e-26;  // of an energy without dimension: less is rounding, and nobody's gain
+  constexpr double kLevel = 1e-26;  // dimensionless, like E; smaller slopes are rounding
   slope_ = dot(gradient_, d_);
   return slope_ < -kLevel;
 }
@@ -199,7 +200,7 @@ NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
     if (!downhill) return Search::level;
     problem_.nodes.apply(d_, dy_);
     t_ = problem_.volume->max_step(y_, dy_);
-    // Few points would have the whole step be short: better that they stay.
+    // Points that limit the whole step this much had better stay where they are.
     const bool may_stiffen = round < kMaxStiffenings;
     if (!may_stiffen || t_ >= kShortStep || !problem_.volume->stiffen(y_, dy_, kShortStep)) {
       const Search found = search_line(may_stiffen, record);
@@ -264,7 +265,7 @@ MinimizerResult NewtonRun::run() {
     return std::move(result_);
   };
   for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
-    // Here x and the result are all that passes on, so that they are enough to go on from.
+    // From here on nothing but x and the result is used, so that the minimization can be resumed from them.
     if (iteration > 0 && iteration % kPreconditionerLife == 0) {
       if (problem_.surface) problem_.surface->forget();
       inverse_diagonal_.clear();
@@ -273,7 +274,7 @@ MinimizerResult NewtonRun::run() {
     }
     if (!linearize())
       return end(MinimizerStop::infeasible_start, "the start has a cell that is inverted at a quadrature point");
-    if (iteration < 2 || is_stiffened_) inverse_diagonal_.clear();  // else it changes slowly
+    if (iteration < 2 || is_stiffened_) inverse_diagonal_.clear();  // later it changes slowly
     IterationRecord record;
     const Search found = find_step(record);
     if (found == Search::ended) return std::move(result_);

@@ -38,7 +38,7 @@ class Writer {
   void raw(const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); }
 };
 
-/// Reads what the writer wrote; an InputError says what cannot be.
+/// Reads what the writer wrote; throws InputError for content that cannot be valid.
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : bytes_(bytes) {}
@@ -49,7 +49,7 @@ class Reader {
     return value;
   }
   std::string text() { return std::string(take(number(), 1)); }
-  /// Finite numbers, in groups of so many.
+  /// Reads finite numbers, whose count must be a multiple of `group`.
   std::vector<double> numbers(std::size_t group) {
     const std::string_view raw = take(number(), sizeof(double));
     std::vector<double> values(raw.size() / sizeof(double));

@@ -11,28 +11,30 @@
 
 namespace subvol {
 
-/// What a run must have in common with the one that it continues: names, and what they stand for, as text. The
-/// program's version, options that bear on the result, fingerprints of the inputs.
+/// Properties that a run must share with the run that it continues, as pairs of name and value: the program's version,
+/// the options that affect the result, and fingerprints of the inputs.
 using RunIdentity = std::vector<std::pair<std::string, std::string>>;
 
-/// A run that ended before its time, as its file has it.
+/// A run that ended early, as read from its file.
 struct Checkpoint {
   RunIdentity identity;
   std::vector<SolvedStage> stages;
 };
 
-/// The content of a checkpoint's file: a line that names the format, one with the fingerprint of the rest, then
-/// numbers as this machine holds them.
+/// Returns the content of a checkpoint file: a line that names the format, a line with the fingerprint of the rest,
+/// then numbers in this machine's binary representation.
 std::string checkpoint_bytes(const RunIdentity& identity, const std::vector<SolvedStage>& stages);
 
-/// Reads it back. Nothing is allocated by what the file claims.
-/// InputError, naming the file: it is none, was cut off or changed, or holds what no run writes.
+/// Parses the content of a checkpoint file. Memory use is bounded by the size of `bytes`, whatever sizes the file
+/// claims.
+/// InputError, naming the file: it is not a checkpoint of this version, was truncated or changed, or holds values that
+/// no run writes.
 Checkpoint parse_checkpoint(std::string_view bytes, const std::string& name);
 
-/// InputError as `read_file` and `parse_checkpoint`.
+/// Reads and parses a file. InputError as for `read_file` and `parse_checkpoint`.
 Checkpoint read_checkpoint(const std::filesystem::path& path);
 
-/// InputError, naming the file and all that differs, unless a run has the identity of the checkpoint.
+/// Throws InputError, naming the file and all differences, unless the run has the checkpoint's identity.
 void require_same_run(const RunIdentity& checkpoint, const RunIdentity& run, const std::string& name);
 
 }  // namespace subvol

@@ -14,9 +14,9 @@ namespace subvol {
 
 class StageLog;
 
-/// What the fit is made to agree with the target.
+/// The surface that is compared with the target.
 enum class FittedSurface {
-  limit,  ///< the Catmull-Clark limit surface of the cage: what an artist's tool shows at any level (default)
+  limit,  ///< the Catmull-Clark limit surface of the cage, as modeling tools show it at any level (default)
   mesh    ///< the refined mesh itself (the paper's plain S)
 };
 
@@ -24,26 +24,30 @@ enum class SolverKind { newton, lbfgs };
 
 struct FitOptions {
   int levels = 3;                                ///< subdivision level of the finest mesh, 1..6
-  /// Stop once the mean distance is below; per cent of the diagonal, > 0.
+  /// The fit ends once the mean distance is at most this, in per cent of the target's diagonal; > 0.
   std::optional<double> tolerance_percent;
   FittedSurface surface = FittedSurface::limit;
   BoundaryRule boundary = BoundaryRule::catmull_clark;
-  bool cage_only = false;                        ///< unknowns stay on the given template
-  double lambda_far = 1.0, lambda_close = 0.005; ///< > 0; close may be lowered further when a tolerance asks for it
-  /// Edges of the target sharper than this stay sharp where the template has edges that follow them: those become
-  /// creases and are drawn to them. In [0, 180]; empty: only the template's own tags are creases, and are drawn to
-  /// edges above 40 degrees.
+  bool cage_only = false;                        ///< the degrees of freedom stay the vertices of the given template
+  /// Weights of E_W, > 0. lambda_far: cap on lambda while a level is started. lambda_close: lambda of the last stage on
+  /// the finest level; if the fit is not accurate enough, lambda is lowered below it (`kLeastDefaultLambdaShare`,
+  /// `kLeastLambdaShare`).
+  double lambda_far = 1.0, lambda_close = 0.005;
+  /// Edges of the target sharper than this angle stay sharp if the template has edges that follow them: those template
+  /// edges become creases and are drawn to the target's edges. In [0, 180]. Empty: only the template's own tags are
+  /// creases, and they are drawn to target edges above 40 degrees.
   std::optional<double> crease_angle_degrees;
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
-  PointWeights point_weights = PointWeights::equal;  ///< of a point cloud
-  Distortion distortion = Distortion::hencky;    ///< e of E_W
-  int max_iterations = 0;                        ///< per stage; 0: the schedule's own
-  double time_limit_seconds = 0;                 ///< 0: none
-  double memory_limit_bytes = 0;                 ///< of the process; 0: none. As `MemoryBudget` keeps it
-  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; empty: none
-  std::function<bool()> cancelled;  ///< asked within steps too, from the calling thread; true cancels; empty: none
-  /// Takes the results of minimisations from here and keeps them here; null: no.
+  PointWeights point_weights = PointWeights::equal;  ///< weights of a point cloud's points
+  Distortion distortion = Distortion::hencky;    ///< the distortion e in E_W
+  int max_iterations = 0;                        ///< per stage; 0: as the schedule says
+  double time_limit_seconds = 0;                 ///< 0: no limit
+  double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit
+  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
+  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
+  std::function<bool()> cancelled;
+  /// Supplies the results of earlier minimizations and records new ones; null: no log.
   StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills FitResult::states
 };

@@ -6,34 +6,34 @@
 
 namespace subvol {
 
-/// Foretells whether the next part of a fit, a level or an order, fits into the memory that the process may take.
+/// Predicts if the next part of a fit, a level or an order, fits into the memory that the process may use.
 ///
-/// A part takes memory about in proportion to its size (cells, or nodes of curved ones):
+/// A part takes memory roughly in proportion to its size (number of cells, or of nodes of curved cells):
 ///
 ///   expected = held now + kMemoryOfAnyPart + rate * size
 ///
-/// The rate is a bound found by measuring, or what the part before took where that was more.
+/// The rate starts at a measured bound and rises if the previous part took more.
 class MemoryBudget {
  public:
-  /// limit_bytes  of the process; 0: none.
-  /// rate         bytes for each cell or node, at least.
+  /// limit_bytes  limit for the process; 0: no limit.
+  /// rate         least number of bytes per cell or node.
   MemoryBudget(double limit_bytes, double rate) : limit_(limit_bytes), rate_(rate) {}
 
-  /// Whether a part of this size may begin; the one before has ended then.
+  /// Returns true if a part of this size may begin. The previous part must have ended.
   bool allows(std::size_t size);
-  /// "level 3 would take about 900 MB of memory, the limit is 500 MB", of what was last asked for.
+  /// Returns a message about the last size asked for: "level 3 would take about 900 MB of memory, the limit is 500 MB".
   std::string refusal(const std::string& part) const;
 
  private:
   double limit_, rate_, expected_ = 0;
-  double held_ = 0, size_ = 0;  ///< when the last part began
+  double held_ = 0, size_ = 0;  ///< values at the start of the last part
 };
 
-/// Memory that a part takes whatever its size: samples of the target, search trees (30 MB were measured).
+/// Bytes that a part takes regardless of its size, for samples of the target and search trees (30 MB were measured).
 inline constexpr double kMemoryOfAnyPart = 40e6;
-/// For each hex of a level: 3.8 to 4.7 kB were measured from 40 000 to 360 000 cells.
+/// Bytes per hex of a level; 3.8 to 4.7 kB were measured from 40 000 to 360 000 cells.
 inline constexpr double kMemoryOfLevelCell = 6e3;
-/// For each node of curved cells: 5 to 8 kB were measured from order 4 to order 8.
+/// Bytes per node of curved cells; 5 to 8 kB were measured from order 4 to order 8.
 inline constexpr double kMemoryOfNode = 8e3;
 
 }  // namespace subvol

@@ -3,14 +3,14 @@
 
 namespace subvol {
 
-/// One minimisation: weights, and when it ends.
+/// Settings of one minimization: its weights and its stop tests.
 struct Stage {
   double lambda, tangential_weight;
   int max_iterations = 20;
   double relative_decrease = 1e-3;
 };
 
-/// L-BFGS steps allowed for each Newton step of a stage.
+/// Number of L-BFGS steps that replace one Newton step of a stage.
 inline constexpr int kLbfgsSteps = 30;
 
 }  // namespace subvol

@@ -37,7 +37,8 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
                         options_.progress({record.name.c_str(), record.level, ++iteration, energy, fraction});
     return wanted && !is_over();
   };
-  // What earlier stages of the same problem have left behind, those that come from a log have not.
+  // A stage recalled from a log leaves no correspondences behind, so those left by a solved stage must not matter
+  // either.
   if (problem.surface) problem.surface->forget();
   SolvedStage solved{record.name, options_.log ? start_of(problem, minimizer, x) : 0, x, {}, 0};
   const SolvedStage* known = options_.log ? options_.log->recall(solved) : nullptr;

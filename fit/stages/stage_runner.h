@@ -19,41 +19,42 @@
 
 namespace subvol {
 
-/// Runs the minimisations of a fit one after the other, with one clock and one report.
+/// Runs the minimizations of a fit one after the other, with one clock and one report.
 class StageRunner {
  public:
-  /// What the fit's options say of all stages.
+  /// The fit's options that apply to all stages.
   struct Options {
     SolverKind solver = SolverKind::newton;
-    int max_iterations = 0;         ///< 0: the stage's own
-    double time_limit_seconds = 0;  ///< 0: none
+    int max_iterations = 0;         ///< 0: as the stage says
+    double time_limit_seconds = 0;  ///< 0: no limit
     std::function<bool(const FitProgress&)> progress;
     std::function<bool()> cancelled;
-    StageLog* log = nullptr;        ///< null: none is kept
+    StageLog* log = nullptr;        ///< null: no log
   };
 
   explicit StageRunner(Options options) : options_(std::move(options)) {}
 
-  /// Minimises over x and appends the record, whose name, level or order, and cells are set, to the report. `fraction`
-  /// is told to whoever follows the progress. False, with the report's stop reason set, when the fit must end.
+  /// Minimizes over x and appends the record to the report. The record's name, level or order, and number of cells must
+  /// be set. `fraction` is passed on to the progress callback. If the fit must end, sets the report's stop reason and
+  /// returns false.
   ///
-  /// Where the log knows the result nothing is minimised, but the cells that were given a denser quadrature get it, so
-  /// that the same problem may be solved twice: correspondences are forgotten at the start. Who looks at them
-  /// afterwards must call `SurfaceTerm::forget` before.
+  /// If the log holds the result, nothing is minimized, and only the recorded quadrature refinements are repeated. To
+  /// make both cases alike, correspondences are reset at the start; call `SurfaceTerm::forget` before inspecting them
+  /// afterwards.
   bool run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction, std::vector<Vec3>& x,
            FitReport& report) const;
 
-  /// Asked before work that takes long. False, with the report's stop reason set, where the time is over.
+  /// Checks the time limit before long work. If the time is over, sets the report's stop reason and returns false.
   bool in_time(const std::string& work, FitReport& report) const;
 
-  /// The pairs of triangles of a fitted boundary that intersect. None, with the report's stop reason set, where the fit
-  /// must end: the search was given up.
+  /// Returns the number of intersecting triangle pairs of a fitted boundary. If the search was interrupted and the fit
+  /// must end, sets the report's stop reason and returns nothing.
   std::optional<std::size_t> intersecting_pairs(const TriangleMesh& boundary, FitReport& report) const;
 
-  /// Says how a fit ended whose stages are all done, at this mean distance.
+  /// Sets the report's stop reason and explanation for a fit that has run all its stages, given its mean distance.
   void conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const;
 
-  /// Whether what is under way is to be given up: the time is over, or the caller wants an end.
+  /// Returns true if the current work must be interrupted: the time is over, or the caller cancels.
   bool is_to_end() const { return is_over() || (options_.cancelled && options_.cancelled()); }
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
@@ -62,9 +63,9 @@ class StageRunner {
   using Clock = std::chrono::steady_clock;
 
   bool is_over() const { return options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds; }
-  /// Says that the fit must end in the midst of such work.
+  /// Sets the report's stop reason, time limit or cancellation, for `work` that was interrupted.
   void give_up(const std::string& work, FitReport& report) const;
-  /// From the stage's x, and what was done to get there, on.
+  /// Minimizes from the stage's x, continuing the steps that its result already records.
   void solve(FitProblem& problem, MinimizerOptions minimizer, SolvedStage& stage) const;
 
   Options options_;

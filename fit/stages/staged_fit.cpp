@@ -31,7 +31,8 @@ bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t
     if (pairs_now && *pairs_now <= pairs / 2) {
       pairs = *pairs_now;
       report().undo_stages(start.num_stages, softer.num_stages);
-      states_.resize(std::min(states_.size(), start.num_states + 1));  // up to the start, from which it went
+      // Keep the states up to the start of this repetition.
+      states_.resize(std::min(states_.size(), start.num_states + 1));
     } else {
       go_back(std::move(softer));
     }

@@ -13,16 +13,16 @@
 
 namespace subvol {
 
-/// What a fit goes back to where a stage that it tries is no help.
+/// State to roll back to if an attempted stage brings no improvement.
 struct FitSnapshot {
   std::vector<Vec3> x;
   double lambda;
-  std::optional<double> mean_percent;  ///< distance, if it is known
-  std::size_t num_stages, num_states;  ///< then in the report, and kept
+  std::optional<double> mean_percent;  ///< mean distance, if known
+  std::size_t num_stages, num_states;  ///< stages in the report and kept states at that time
 };
 
-/// A fit that leads its unknowns through one minimisation after the other: how it goes back to where it was, and how
-/// it unfolds a boundary that has come to intersect itself.
+/// Base of fits that move their degrees of freedom through a sequence of minimizations. Provides roll-back and the
+/// removal of self-intersections of the boundary.
 class StagedFit {
  public:
   StagedFit(const StagedFit&) = delete;
@@ -34,14 +34,16 @@ class StagedFit {
 
   virtual std::vector<Vec3>& unknowns() = 0;
   virtual FitReport& report() = 0;
-  /// The last stage of all with this lambda. False when the fit must end.
+  /// Runs the last stage of the schedule with this lambda. Returns false if the fit must end.
   virtual bool run_final_stage(double lambda) = 0;
-  /// Of triangles of the boundary. None when the fit must end.
+  /// Returns the number of intersecting triangle pairs of the boundary, or nothing if the fit must end.
   virtual std::optional<std::size_t> intersecting_pairs() = 0;
 
   FitSnapshot snapshot();
+  /// Restores the state and marks the later stages as not kept.
   void go_back(FitSnapshot snapshot);
-  /// What `work` returns. Where memory runs out in it the fit is back at `before`, for which none is needed.
+  /// Returns the result of `work`. If memory runs out in it, rolls back to `before`, which needs no memory, and
+  /// rethrows.
   template <class Work>
   auto or_back(FitSnapshot& before, const Work& work) {
     try {
@@ -51,16 +53,16 @@ class StagedFit {
       throw;
     }
   }
-  /// Keeps where the unknowns are, under the name of what they came from; if states are kept.
+  /// If states are kept, records the current state under the name of the stage that it came from.
   void keep_state();
-  /// The last stage again from `start`, with more weight on the cells' shape up to most_lambda, while there are `pairs`
-  /// that intersect: thin walls that meet in a soft fit stay apart in a stiffer one. Kept where that leaves at most
-  /// half of them. False when the fit must end.
+  /// Repeats the last stage from `start` with increasing weight on the cells' shape, up to most_lambda, while `pairs`
+  /// (in/out) of triangles intersect: thin walls that meet in a soft fit stay apart in a stiffer one. A repetition is
+  /// kept if at most half of the pairs remain. Returns false if the fit must end.
   bool unfold(const FitSnapshot& start, double most_lambda, std::size_t& pairs);
 
-  std::vector<FitState> states_;  ///< of the current try, by the numbers of the unknowns
-  double lambda_ = 0;             ///< of the last stage
-  std::optional<double> mean_;    ///< distance, percent, of the current state
+  std::vector<FitState> states_;  ///< states of the current attempt, numbered like the degrees of freedom
+  double lambda_ = 0;             ///< lambda of the last stage
+  std::optional<double> mean_;    ///< mean distance of the current state, in per cent of the diagonal
 
  private:
   bool keep_states_;

@@ -12,19 +12,20 @@ namespace subvol {
 
 namespace {
 
-/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell, and falls as fast as
-/// they come right (the rule of the published code). Where a round gains little it is at most half the last one.
+/// Epsilon is this share of the worst determinant: the barrier then reaches every inverted cell and falls as fast as
+/// the cells recover (the rule of the published code). After a round that gains little, the next epsilon is at most
+/// kLeastFall times the last one.
 constexpr double kShareOfWorst = 0.2, kLeastFall = 0.5, kLeastEpsilon = 1e-4;
-/// A round that takes off less of the energy is as far as it gets with its epsilon.
+/// Relative decrease of the energy below which a round counts as converged for its epsilon.
 constexpr double kStuck = 0.1;
-/// Cells that are still not certified after a round count so much more in the next.
+/// Factor on the weight of cells that are not certified after such a round.
 constexpr double kWeightGrowth = 1.5;
 constexpr int kSteps = 5;
 constexpr double kRelativeDecrease = 1e-2;
-/// A round without fewer failing cells gains if the worst determinant rises by this share.
+/// Relative rise of the worst determinant that counts as a gain even if no fewer cells fail.
 constexpr double kLeastRise = 0.01;
 
-/// The cells of a problem between rounds.
+/// The cells of a problem and their state between rounds.
 class TangledCells {
  public:
   TangledCells(FitProblem& problem, const VolumeMesh& mesh)
@@ -38,13 +39,13 @@ class TangledCells {
   TangledCells& operator=(const TangledCells&) = delete;
   ~TangledCells() { energy_.set_regularisation(0); }
 
-  /// Measures a state; true when every cell is certified.
+  /// Certifies the cells of a state and measures their determinants; returns true if every cell is certified.
   bool look(std::span<const Vec3> x) {
     problem_.apply_nodes(x, nodes_);
     uncertified_ = certify(nodes_, mesh_).not_certified;
     if (uncertified_.empty()) return true;
     energy_.least_determinants(nodes_, least_);
-    // What is positive at its points and still fails is to be seen at more of them.
+    // Cells that are positive at all their points but still fail need more points to show where they invert.
     std::vector<Index> hidden;
     for (const Index c : uncertified_)
       if (least_[c] > 0) hidden.push_back(c);

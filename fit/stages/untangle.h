@@ -9,24 +9,24 @@
 namespace subvol {
 
 struct UntangleOptions {
-  double tangential_weight = 0;  ///< of the problem's surface term, for the report
-  int max_rounds = 40;           ///< solves of some Newton steps, each with a smaller epsilon
-  int patience = 6;              ///< rounds without a gain after which it ends
+  double tangential_weight = 0;  ///< weight in the problem's surface term, for the report
+  int max_rounds = 40;           ///< largest number of solves of a few Newton steps, each with its own epsilon
+  int patience = 6;              ///< number of rounds in a row without a gain after which the work ends
 };
 
 struct UntangleResult {
-  bool going = true;               ///< false: the caller or the clock ended it (the report tells)
-  std::vector<Index> uncertified;  ///< cells that are not proved positive in the end, ascending
+  bool going = true;               ///< false: the caller or the time limit ended the work; the report says which
+  std::vector<Index> uncertified;  ///< cells that are not certified at the end, ascending
 };
 
-/// Minimises E = E_S + lambda E_W with the regularised barrier (`regularised_barrier.h`) while epsilon falls, until
-/// every cell is certified. Cells that are positive at their points but not certified get denser quadrature; cells that
-/// fail round after round get more weight.
+/// Minimizes E = E_S + lambda E_W with the regularized barrier (`regularised_barrier.h`) in rounds that adapt epsilon
+/// to the worst determinant, until every cell is certified. Cells that are positive at their quadrature points but not
+/// certified get more points; cells that still fail when a round has nearly stopped decreasing E get more weight.
 ///
-/// problem   its volume term is a VolumeEnergy over `mesh`, which is left without regularisation.
-/// record    name, level and cells of the stages to report; one per round.
+/// problem   its volume term is a VolumeEnergy over `mesh`; on return, its regularization is off.
+/// record    name, level and cells of the reported stages, one per round.
 /// x         any finite start; receives the result, certified or not.
-/// A round gains where fewer cells fail or the worst determinant rises.
+/// A round counts as a gain if fewer cells fail than in any round before or the worst determinant rises.
 UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
                         const StageRunner& runner, const StageRecord& record, double fraction, std::vector<Vec3>& x,
                         FitReport& report);

@@ -17,24 +17,24 @@ namespace subvol {
 namespace {
 
 constexpr std::size_t kNeighbors = 16;
-constexpr double kLeastShare = 1e-20;   // of the squared radius that would suit points all over a box's diagonal
-constexpr double kSlack = 1 + 1e-14;    // the tree sums up squared distances in another order
+constexpr double kLeastShare = 1e-20;   // floor of a squared radius, as a share of diagonal^2 (k + 1) / n
+constexpr double kSlack = 1 + 1e-14;    // the tree sums squared distances in another order
 
-/// A point of the tree by its distance from the one that is looked at.
+/// A point of the tree with its distance from the query point.
 struct Neighbor {
   double squared_distance;
   Index place;
   auto operator<=>(const Neighbor&) const = default;
 };
 
-/// The k nearest of the others, nearest first; k is at most their number.
+/// Finds the k nearest of the other points, nearest first; k is at most their number.
 class NeighborSearch {
  public:
   NeighborSearch(const SiteTree& tree, std::size_t k, double least) : tree_(tree), k_(k), least_(least) {}
 
-  /// squared_radius  a guess at how far they are, >= least, on which the result does not depend: one that is much too
-  ///                 large looks at too many points. Receives a good one for points near by, >= least > 0 even where
-  ///                 points lie on each other.
+  /// squared_radius  in: a guess of their squared distance, >= least. The result does not depend on it, but a much too
+  ///                 large one looks at too many points. out: a good guess for points nearby, >= least > 0 even if
+  ///                 points coincide.
   const std::vector<Neighbor>& operator()(Index place, double& squared_radius) {
     const Vec3& centre = tree_.position(place);
     for (;; squared_radius *= 4) {
@@ -61,7 +61,7 @@ class NeighborSearch {
   std::vector<Neighbor> found_;
 };
 
-/// The direction in which a point and its neighbours are thinnest.
+/// Returns the direction in which a point and its neighbors are thinnest.
 Vec3 thin_direction(const SiteTree& tree, Index place, std::span<const Neighbor> neighbors) {
   Vec3 mean = tree.position(place);
   for (const Neighbor& n : neighbors) mean += tree.position(n.place);
@@ -94,13 +94,13 @@ CloudGeometry cloud_geometry(std::span<const Vec3> points) {
   CloudGeometry result;
   result.normals.resize(n);
   result.areas.resize(n);
-  constexpr std::size_t kRun = 256;  // radii are handed on inside a run, whatever thread takes it
+  constexpr std::size_t kRun = 256;  // radii are passed on within a run, whatever thread takes it
   const double least = kLeastShare * (high - low).squaredNorm() * static_cast<double>(k + 1) / static_cast<double>(n);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t run = 0; run < (n + kRun - 1) / kRun; ++run) {
     NeighborSearch neighbors(tree, k, least);
-    // What is beside a point in the tree is near it. The bounding box tells nothing: one point far away would put the
-    // whole cloud within reach.
+    // Points next to each other in the tree are close in space. The bounding box gives no good guess: one point far
+    // away would put the whole cloud within reach.
     const std::size_t first = run * kRun, beside = first + 1 < n ? first + 1 : first - 1;
     double squared_radius = std::max(
         least, (tree.position(static_cast<Index>(beside)) - tree.position(static_cast<Index>(first))).squaredNorm());

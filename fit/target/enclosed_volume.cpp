@@ -51,7 +51,7 @@ class Grid {
     }
   }
 
-  /// Zero where the outside has reached everything that the surface leaves free.
+  /// Zero if the flood has reached all cells that are not on the surface.
   double inside_volume() const {
     const auto inside = std::count(states_.begin(), states_.end(), kUnknown);
     const auto surface = std::count(states_.begin(), states_.end(), kSurface);
@@ -79,7 +79,7 @@ double signed_volume(std::span<const Vec3> positions, std::span<const std::array
 
 namespace {
 
-/// A grid around points, with so many cells along its longest side.
+/// Returns a grid around points, with `resolution` cells along its longest side.
 template <class Points>
 Grid grid_around(const Points& points, int resolution) {
   Vec3 low = *points.begin(), high = low;
@@ -100,7 +100,7 @@ double flooded_volume(std::span<const Vec3> positions, std::span<const std::arra
   for (const auto& t : triangles)
     for (Index v : t) corners.push_back(positions[v]);
   Grid grid = grid_around(corners, resolution);
-  // Samples a third of a cell apart leave no gap that the flood, which goes through faces of cells, could pass.
+  // Samples a third of a cell apart leave no gap for the flood, which passes through faces of cells only.
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const Vec3 &a = corners[3 * t], u = corners[3 * t + 1] - a, v = corners[3 * t + 2] - a;
     const double longest = std::max({u.norm(), v.norm(), (u - v).norm()});

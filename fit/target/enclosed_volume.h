@@ -8,19 +8,19 @@
 
 namespace subvol {
 
-/// |1/6 sum of det(a, b, c)| over the triangles, taken about the first corner. The enclosed volume of a closed,
-/// oriented surface; meaningless for others.
+/// Returns |1/6 sum of det(a, b, c)| over the triangles, relative to the first corner: the enclosed volume of a closed,
+/// oriented surface, and meaningless for others.
 double signed_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles);
 
-/// Volume of the grid cells that cannot be reached from outside without crossing the surface, and half of those that it
-/// passes through.
+/// Returns the volume of the grid cells that cannot be reached from outside without crossing the surface, plus half of
+/// those that it passes through. 0 if all cells off the surface can be reached.
 ///
-/// The box of the surface has `resolution` cells along its longest side, >= 1. Orientation does not matter; holes
-/// smaller than a cell close themselves. Relative error about area * cell / volume / 10.
+/// The bounding box of the surface has `resolution` cells along its longest side, >= 1. Orientation does not matter,
+/// and holes smaller than a cell are closed. Relative error: about area * cell / volume / 10.
 double flooded_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles, int resolution);
 
-/// The same for a surface that is known by points on it. It holds back what is outside where points are denser than
-/// cells; elsewhere the result is 0.
+/// As above for a surface given by points on it. They stop the flood only if they are denser than the cells; otherwise
+/// the result is 0.
 double flooded_volume(std::span<const Vec3> points, int resolution);
 
 }  // namespace subvol

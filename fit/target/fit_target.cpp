@@ -44,7 +44,7 @@ std::vector<Vec3> Normalisation::to_unit(std::vector<Vec3> points) const {
 }
 
 void Normalisation::take_in(VolumeMesh& mesh) const {
-  // Below, cells are lost in the rounding of the target's coordinates, above the target in that of the cells'.
+  // Below this range, cells vanish in the rounding of the target's coordinates; above it, the target in that of cells.
   constexpr double kLeastSize = 1e-6, kMostSize = 1e6;
   mesh.positions = to_unit(std::move(mesh.positions));
   Eigen::AlignedBox3d box;
@@ -72,7 +72,7 @@ FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
 
 void FitTarget::sample(std::size_t num_samples, std::size_t least) {
   const double count = static_cast<double>(std::max(num_samples, least));
-  // A needle of next to no area would be cut up along its length without end.
+  // The second bound keeps a needle of almost no area from being cut along its length endlessly.
   surface.resample(std::max(1.8 * std::sqrt(surface.area() / count), 0.1 / std::sqrt(count)));
 }
 

@@ -13,7 +13,8 @@
 
 namespace subvol {
 
-/// Centred coordinates in which the target's box has the diagonal 1: nothing depends on the origin or the unit.
+/// Centered coordinates in which the target's bounding box has the diagonal 1, so that results do not depend on the
+/// origin or the unit.
 struct Normalisation {
   Vec3 centre = Vec3::Zero();
   double diagonal = 1;
@@ -22,37 +23,37 @@ struct Normalisation {
   explicit Normalisation(const TriangleMesh& target);
   explicit Normalisation(const PointCloud& target);
   std::vector<Vec3> to_unit(std::vector<Vec3> points) const;
-  /// Moves a mesh to these coordinates. InputError: its cells are next to nothing beside the target, or the target is
-  /// beside them, or is as far away.
+  /// Transforms a mesh to these coordinates. InputError: the mesh is more than 1e6 times smaller or larger than the
+  /// target, or more than 1e6 diagonals away from it.
   void take_in(VolumeMesh& mesh) const;
   std::vector<Vec3> from_unit(std::vector<Vec3> points) const;
 };
 
-/// The target is sampled at least about so many times.
+/// Approximate least number of samples of a target.
 inline constexpr std::size_t kLeastTargetSamples = 20000;
 
-/// What a fit is to reproduce, in normalised coordinates: lengths are shares of the target's diagonal.
+/// The surface that a fit approximates, in normalized coordinates: lengths are shares of the target's diagonal.
 struct FitTarget {
   Normalisation normalisation;
-  TriangleMesh mesh;                 ///< no triangles: a cloud is fitted
-  std::optional<ClosestPoint> tree;  ///< of its triangles
-  TargetSurface surface;             ///< its samples are those of the last `sample`
+  TriangleMesh mesh;                 ///< without triangles: the target is a cloud
+  std::optional<ClosestPoint> tree;  ///< tree over the triangles; none for a cloud
+  TargetSurface surface;             ///< with the samples of the last `sample`
 
-  /// InputError: as Normalisation.
+  /// InputError: as for `Normalisation`.
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);
 
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
-  /// surface that belong to a neighbouring facet. A cloud keeps its points.
-  /// least  samples that are taken in any case (triangles have one each at least).
+  /// surface that belong to a neighboring facet. A cloud keeps its points.
+  /// least  approximate least number of samples; every triangle has at least one.
   void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples);
 
-  /// Symmetric distances to another surface; of a cloud, those of its points to the surface.
+  /// Symmetric distances to another surface; for a cloud, those of its points to the surface.
   SurfaceDistance distance(const TriangleMesh& fitted) const { return measure(fitted, true); }
   double mean_distance(const TriangleMesh& fitted) const { return measure(fitted, false).mean(); }
 
-  /// Measures how far a template's boundary is, and describes the state of the target. If the target encloses nothing,
-  /// the boundary's volume is taken for the one wanted.
+  /// Measures the distance of a template's boundary to the target and describes the state of the target, with area and
+  /// volume in the target's unit. If the target encloses nothing, the volume in the template is used as its volume.
   StartComparison compare_start(const TriangleMesh& boundary);
 
  private:

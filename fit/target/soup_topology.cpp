@@ -11,7 +11,7 @@ namespace subvol {
 
 namespace {
 
-/// Equal positions of corners get equal numbers; other vertices keep their own.
+/// Returns a number per vertex: corners at equal positions get equal numbers; other vertices keep their own.
 std::vector<Index> merged_numbers(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
   std::vector<Index> number(positions.size()), order;
   std::iota(number.begin(), number.end(), 0);
@@ -37,7 +37,7 @@ struct HalfEdge {
   auto operator<=>(const HalfEdge&) const = default;
 };
 
-/// All half-edges but those of triangles with equal corners, those of one edge in a row.
+/// Returns all half-edges, except those of triangles with equal corners. Half-edges of one edge are consecutive.
 std::vector<HalfEdge> sorted_half_edges(std::span<const Vec3> positions,
                                         std::span<const std::array<Index, 3>> triangles) {
   const std::vector<Index> number = merged_numbers(positions, triangles);
@@ -79,7 +79,7 @@ SoupTopology soup_topology(std::span<const Vec3> positions, std::span<const std:
   for_each_edge(half_edges, [&](std::span<const HalfEdge> edge) {
     const auto forward = std::count_if(edge.begin(), edge.end(), [](const HalfEdge& h) { return h.forward; });
     const auto backward = static_cast<long>(edge.size()) - forward;
-    // Where surfaces touch along an edge there are several, each with one half-edge of either direction.
+    // An edge along which surfaces touch counts as several edges, each with one half-edge of either direction.
     matched += static_cast<std::size_t>(2 * std::min(forward, backward));
     num_edges += std::max(forward, backward);
     result.open_edges += edge.size() == 1;

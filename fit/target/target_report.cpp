@@ -7,7 +7,7 @@ namespace subvol {
 
 namespace {
 
-/// Nothing where a surface does not bound a solid.
+/// Returns nothing if the surface does not bound a solid.
 std::optional<BettiNumbers> betti_numbers(const TriangleMesh& surface) {
   try {
     return solid_boundary(surface).topology;
@@ -16,7 +16,7 @@ std::optional<BettiNumbers> betti_numbers(const TriangleMesh& surface) {
   }
 }
 
-/// With the boundary's Euler number, which is twice the solid's.
+/// Adds the Euler number of the boundary, which is twice that of the solid.
 std::string words(const BettiNumbers& numbers) {
   return to_string(numbers) + " (Euler number of its boundary " + std::to_string(2 * numbers.euler_number()) + ")";
 }

@@ -12,29 +12,29 @@
 
 namespace subvol {
 
-/// The state that a target is in, and whether a template can become it at all.
+/// The state of a target, and whether a template can take its topology at all.
 struct TargetReport {
-  std::size_t num_points = 0;     ///< of a cloud; 0: the target is a surface
-  SoupTopology edges;             ///< of a surface
-  double area = 0, volume = 0;    ///< in the target's unit; of a cloud, estimates
+  std::size_t num_points = 0;     ///< number of points of a cloud; 0: the target is a surface
+  SoupTopology edges;             ///< edges of a surface
+  double area = 0, volume = 0;    ///< in the target's unit; estimates for a cloud
   VolumeSource volume_source = VolumeSource::signed_sum;
-  /// How the solids inside target and template hang together; where the target is closed and manifold, whatever way its
-  /// triangles run.
+  /// Topology of the solids inside target and template. It is set if the target bounds a solid without open or
+  /// non-manifold edges, whatever the orientation of its triangles.
   std::optional<BettiNumbers> topology, template_topology;
   bool same_topology() const { return topology == template_topology; }
 };
 
-/// How a fit begins: how far the template's boundary is from the target.
+/// The start of a fit: distances between the template's boundary and the target.
 struct StartComparison {
   double mean_distance = 0, max_distance = 0;  ///< symmetric, in shares of the target's diagonal
   TargetReport target;
 };
 
-/// boundary  closed and oriented: the template's. Cost: sorts of the edges.
+/// Describes a target. boundary  the template's, closed and oriented. Cost: sorts of the edges.
 TargetReport describe_target(const TargetSurface& target, const TriangleMesh& boundary);
 
-/// What is odd about it, in words: holes, edges of many triangles, triangles turned over, a volume that is an estimate,
-/// another topology than the template's.
+/// Returns warnings in words about open, inconsistently oriented and non-manifold edges, a volume that was not computed
+/// from the surface itself, and a topology other than the template's.
 std::vector<std::string> warnings_of(const TargetReport& target);
 
 }  // namespace subvol

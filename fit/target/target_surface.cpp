@@ -21,16 +21,16 @@ namespace subvol {
 namespace {
 
 constexpr double kClosedEnough = 0.95;  // share of paired half-edges above which the signed sum is trusted
-constexpr double kFlatness = 1e-6;      // of the isoperimetric bound: below it, nothing is enclosed
+constexpr double kFlatness = 1e-6;      // share of the isoperimetric bound below which nothing is enclosed
 constexpr int kFloodResolution = 96;
 constexpr std::size_t kMaxSamples = std::size_t{1} << 27;
-constexpr double kOnEdge = 1e-9;        // barycentric coordinates up to this are 0
+constexpr double kOnEdge = 1e-9;        // barycentric coordinates up to this count as 0
 
-/// Cells of a cloud's grid, by the spacing of its points: first those that hold ten of them or so where the surface
-/// goes straight through, then larger ones.
+/// Sizes of the cells of a cloud's grid, in units of its points' spacing: first cells with about ten points each if the
+/// surface passes straight through them, then larger ones.
 constexpr double kCloudCells[] = {3, 4.5, 6.5};
 
-/// Volume of the sphere of the given area: no surface of that area encloses more.
+/// Returns the volume of the sphere of the given area: no surface of that area encloses more.
 double isoperimetric_bound(double area) { return area * std::sqrt(area / std::numbers::pi) / 6; }
 
 struct Volume {
@@ -38,7 +38,7 @@ struct Volume {
   VolumeSource source;
 };
 
-/// The volume of the solid that the surface bounds once it is mended; 0 where it cannot be.
+/// Returns the volume of the solid that the mended surface bounds; 0 if it cannot be mended.
 double mended_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
   try {
     return solid_boundary({{positions.begin(), positions.end()}, {triangles.begin(), triangles.end()}}).volume;
@@ -109,7 +109,7 @@ TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOption
     }
   }
   if (triangles_.empty()) throw InputError("target: no triangle has an area");
-  set_box(low, high);  // positions of no triangle take no part, whatever they are
+  set_box(low, high);  // positions that no triangle uses are ignored
   rim_parts_ = rim_parts(positions_, triangles_);
   const Volume volume = find_volume(positions_, triangles_, area_);
   volume_ = volume.value;

@@ -16,70 +16,71 @@ struct TargetSurfaceOptions {
   double sample_spacing = 0;
 };
 
-/// How much each point of a cloud counts.
+/// The weight of each point of a cloud.
 enum class PointWeights {
-  equal,   ///< all alike: dense parts count more (default)
-  by_area  ///< by the area that it stands for (`cloud_geometry.h`): scans of uneven density count evenly
+  equal,   ///< the same for all: dense parts count more (default)
+  by_area  ///< the area that it represents (`cloud_geometry.h`): scans of uneven density count evenly
 };
 const char* to_string(PointWeights weights);
 
 /// How the enclosed volume was found.
 enum class VolumeSource {
   signed_sum,    ///< sum of the triangles' signed tetrahedra: the surface is closed and oriented, up to small gaps
-  mended,        ///< the same once triangles were turned to agree and holes closed (`solid_boundary`)
-  flood,         ///< cells of a grid that the outside does not reach: not oriented, holes smaller than a cell
+  mended,        ///< that sum after orienting triangles and closing holes (`solid_boundary`)
+  flood,         ///< grid cells that cannot be reached from outside: any orientation, holes smaller than a cell
   isoperimetric, ///< half the volume of the sphere of equal area: the surface encloses nothing
-  given          ///< by the caller
+  given          ///< set by the caller
 };
 const char* to_string(VolumeSource source);
 
-/// What to fit, as the energies need it: triangles with normals, area A, enclosed volume V, samples; or points.
+/// The target as the energies need it: triangles with normals, area A, enclosed volume V and samples; or points.
 ///
-/// A soup is welcome: neither connectivity nor orientation nor closedness matters, but for V (see `VolumeSource`). Of a
-/// point cloud there are only samples, its points; their normals and the area are estimated (`cloud_geometry.h`).
+/// A soup is allowed: connectivity, orientation and closedness do not matter, except for V (see `VolumeSource`). A
+/// point cloud has only samples, which are its points; their normals and the area are estimated (`cloud_geometry.h`).
 class TargetSurface {
  public:
-  /// mesh   finite positions of its triangles' corners, corner numbers in range, at least one triangle with an area, an
-  ///        extent that `require_length` takes, else InputError. Triangles without area are dropped; the others keep
-  ///        their order.
+  /// mesh   must have finite positions of its triangles' corners, corner numbers in range, at least one triangle with
+  ///        an area, and an extent that `require_length` accepts, else InputError. Triangles without area are dropped;
+  ///        the others keep their order.
   explicit TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOptions& options = {});
-  /// InputError: as `cloud_geometry`, and an extent out of that range.
+  /// InputError: as for `cloud_geometry`.
   explicit TargetSurface(const PointCloud& cloud, PointWeights weights = PointWeights::equal);
 
-  /// Whether there are points only: no triangles, nothing to integrate over.
+  /// True if there are only points: no triangles, nothing to integrate over.
   bool is_cloud() const { return triangles_.empty(); }
   const std::vector<Vec3>& positions() const { return positions_; }
   const std::vector<std::array<Index, 3>>& triangles() const { return triangles_; }
-  /// Of each triangle: unit normal, by its corners' order; and area.
+  /// Unit normal of each triangle, oriented by the order of its corners, and its area.
   const std::vector<Vec3>& normals() const { return normals_; }
   const std::vector<double>& areas() const { return areas_; }
-  /// Whether a triangle has an open edge, or a corner at one.
+  /// True if a triangle has a boundary edge, or a corner on one.
   bool has_rim(Index triangle) const { return rim_parts_[triangle] != 0; }
-  /// Whether a point of a triangle, by its barycentric coordinates, lies on an open edge: what is nearest to a rim may
-  /// belong to something that the surface lacks.
+  /// True if a point of a triangle, given by its barycentric coordinates, lies on a boundary edge. A place whose
+  /// closest point is on the boundary may belong to a part that the surface lacks.
   bool on_rim(Index triangle, const std::array<double, 3>& barycentric) const;
-  /// About how many vertices the surface is known by.
+  /// Approximate number of vertices of the surface, or number of points of a cloud.
   std::size_t num_details() const { return is_cloud() ? samples_.size() : triangles_.size() / 2; }
 
   double area() const { return area_; }      ///< A > 0
   double volume() const { return volume_; }  ///< V > 0
   VolumeSource volume_source() const { return volume_source_; }
-  /// For a surface that encloses nothing. InputError: not positive and finite.
+  /// Sets V, for a surface that encloses nothing. InputError: not positive and finite.
   void set_volume(double volume);
   /// L = V / A, the length that makes the surface energy dimensionless.           Paper: Eq. 9
   double length() const { return volume_ / area_; }
-  double diagonal() const { return diagonal_; }  ///< of the bounding box
-  Vec3 centre() const { return centre_; }        ///< of the bounding box
+  double diagonal() const { return diagonal_; }  ///< diagonal of the bounding box
+  Vec3 centre() const { return centre_; }        ///< center of the bounding box
 
-  /// Points on the surface: the triangles' barycentres, or, where an edge is longer than the spacing, those of the
-  /// parts that halving its longest edges leads to. A cloud's points.
+  /// Points on the surface: the barycenters of the triangles or, if an edge is longer than the spacing, those of the
+  /// parts that result from repeatedly halving the longest edge. For a cloud, its points.
   const std::vector<Vec3>& samples() const { return samples_; }
-  /// The triangle each lies in; empty for a cloud.
+  /// The triangle that each sample lies in; empty for a cloud.
   const std::vector<Index>& sample_triangles() const { return sample_triangles_; }
-  /// The unit normal at each, and the area that it stands for; areas add up to A.
+  /// The unit normal at each sample, and the area that it represents; the areas add up to A.
   const std::vector<Vec3>& sample_normals() const { return sample_normals_; }
   const std::vector<double>& sample_areas() const { return sample_areas_; }
-  /// Takes samples with another spacing. A cloud keeps its points. InputError: negative, not finite, far too small.
+  /// Samples the surface anew with another spacing. A cloud keeps its points. InputError: the spacing is negative, not
+  /// finite, or far too small.
   void resample(double spacing);
 
  private:

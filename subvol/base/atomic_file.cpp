@@ -26,7 +26,7 @@ namespace {
   throw IoError(path.string() + ": cannot " + step + ": " + std::strerror(error));
 }
 
-/// An open descriptor; closed on every way out.
+/// Owns an open file descriptor and closes it.
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -40,7 +40,7 @@ class Descriptor {
   int fd_;
 };
 
-/// The name of a temporary file that is there or about to be, where a signal handler finds it.
+/// Name of a temporary file that exists or is about to be created, kept where a signal handler finds it.
 struct Slot {
   std::atomic<bool> is_taken{false}, is_named{false};
   std::array<char, 4096> name{};
@@ -48,7 +48,7 @@ struct Slot {
 static_assert(std::atomic<bool>::is_always_lock_free);
 std::array<Slot, 16> slots;
 
-/// A name to delete again unless it was renamed.
+/// Deletes a temporary file on destruction, unless it has been forgotten (after its rename).
 class Temporary {
  public:
   Temporary() = default;
@@ -59,7 +59,7 @@ class Temporary {
     forget();
   }
   const fs::path& path() const { return path_; }
-  /// Before the file is made.
+  /// To be called before the file is created.
   void set(fs::path path) {
     forget();
     path_ = std::move(path);
@@ -73,7 +73,7 @@ class Temporary {
       break;
     }
   }
-  /// It is not there any more, or someone else's.
+  /// To be called if the file no longer exists or belongs to someone else.
   void forget() {
     path_.clear();
     if (slot_ == nullptr) return;
@@ -98,7 +98,7 @@ void write_all(int fd, std::string_view bytes, const fs::path& path) {
   }
 }
 
-/// Writes under way to what may have no reader.
+/// Number of writes under way to something that may have no reader, such as a pipe.
 std::atomic<int> num_waiting{0};
 static_assert(std::atomic<int>::is_always_lock_free);
 
@@ -109,7 +109,7 @@ struct Waiting {
   ~Waiting() { --num_waiting; }
 };
 
-/// path: what it is called in messages.
+/// Writes to `target` in place; messages call it `path`.
 void write_directly(const fs::path& target, const fs::path& path, std::string_view bytes) {
   const Waiting waiting;
   Descriptor file(::open(target.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
@@ -118,7 +118,7 @@ void write_directly(const fs::path& target, const fs::path& path, std::string_vi
   if (!file.close()) fail(path, "close", errno);
 }
 
-/// Creates an empty file of a fresh name. Not mkstemp: that would hide the user's umask behind mode 0600.
+/// Creates an empty file under a fresh name. It does not use mkstemp, whose mode 0600 would override the user's umask.
 int create_temporary(const fs::path& target, const fs::path& path, Temporary& temporary) {
   std::random_device random;
   for (int attempt = 0; attempt < 100; ++attempt) {
@@ -133,7 +133,8 @@ int create_temporary(const fs::path& target, const fs::path& path, Temporary& te
   fail(path, "create a temporary file in its folder", EEXIST);
 }
 
-/// A rename is on the disk only when the folder is; a file system that cannot flush folders is not an error.
+/// Flushes the folder of `target`: a rename reaches the disk only with its folder. It is not an error if the file
+/// system cannot flush folders.
 void flush_folder(const fs::path& target) {
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   Descriptor descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -148,10 +149,10 @@ fs::path behind_links(const fs::path& path) {
   std::error_code ignored;
   for (int i = 0; i < kMostLinks; ++i) {
     if (!fs::is_symlink(target, ignored)) return target;
-    // The folder may be a link, too: /dev/fd leads to one in /proc.
+    // The folder may be a link, too: /dev/fd leads to a folder in /proc.
     const fs::path folder = fs::canonical(target.has_parent_path() ? target.parent_path() : ".", ignored);
     if (folder.native().starts_with("/proc/")) return folder / target.filename();
-    target = target.parent_path() / fs::read_symlink(target, ignored);  // an absolute one stands by itself
+    target = target.parent_path() / fs::read_symlink(target, ignored);  // an absolute target replaces the folder
   }
   fail(path, "write", ELOOP);
 }
@@ -180,7 +181,7 @@ void write_file_atomically(const fs::path& path, std::string_view bytes) {
   flush_folder(target);
 }
 
-// Only what a signal handler may call.
+// Signal handlers call this: it uses async-signal-safe functions only.
 void delete_temporaries() noexcept {
   for (const Slot& slot : slots)
     if (slot.is_named) (void)::unlink(slot.name.data());

@@ -7,7 +7,7 @@
 
 namespace subvol {
 
-/// How a number is stored in a binary file.
+/// Storage format of a number in a binary file.
 struct ValueType {
   enum class Class { real, whole, natural };
   std::size_t size;  ///< bytes: 1, 2, 4 or 8; a real has 4 or 8
@@ -22,7 +22,7 @@ inline constexpr ValueType kInt16 = {2, ValueType::Class::whole}, kUInt16 = {2, 
 inline constexpr ValueType kInt32 = {4, ValueType::Class::whole}, kUInt32 = {4, ValueType::Class::natural};
 inline constexpr ValueType kInt64 = {8, ValueType::Class::whole}, kUInt64 = {8, ValueType::Class::natural};
 
-/// The number in the first type.size bytes. Whole numbers beyond 2^53 are rounded.
+/// Returns the number in the first type.size bytes. Whole numbers beyond 2^53 are rounded.
 inline double decode(const char* bytes, ValueType type, std::endian order) {
   std::uint64_t bits = 0;
   for (std::size_t i = 0; i < type.size; ++i) {

@@ -9,8 +9,8 @@
 
 namespace subvol {
 
-/// 64 bits that tell data apart (FNV-1a): changed files and mistaken inputs, not forgeries. The order of what is added
-/// counts, and so do lengths. The bytes are those of this machine.
+/// 64-bit hash (FNV-1a) that tells data apart: it detects changed files and mistaken inputs, not forgeries. It depends
+/// on the order of the added values, on the lengths of arrays and on how this machine stores numbers.
 class Fingerprint {
  public:
   template <class T>
@@ -18,7 +18,7 @@ class Fingerprint {
   Fingerprint& add(T value) {
     return mix(&value, sizeof value);
   }
-  /// Values without padding.
+  /// Adds the length and the bytes of an array, whose values must have no padding.
   template <class T>
   Fingerprint& add(std::span<const T> values) {
     add(values.size());
@@ -27,7 +27,7 @@ class Fingerprint {
   Fingerprint& add(std::string_view text) { return add(std::span<const char>(text)); }
 
   std::uint64_t value() const { return hash_; }
-  /// 16 hexadecimal digits.
+  /// Returns the value as 16 hexadecimal digits.
   std::string text() const {
     std::string digits;
     for (int shift = 60; shift >= 0; shift -= 4) digits += "0123456789abcdef"[(hash_ >> shift) & 15];

@@ -10,7 +10,7 @@ namespace subvol {
 
 std::string formatted(const char* form, ...) {
   static const locale_t plain = newlocale(LC_ALL_MASK, "C", nullptr);
-  const locale_t before = uselocale(plain);  // of this thread alone
+  const locale_t before = uselocale(plain);  // affects this thread only
   char text[160];
   std::va_list values;
   va_start(values, form);

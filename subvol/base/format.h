@@ -5,7 +5,7 @@
 
 namespace subvol {
 
-/// printf into a string, with a decimal point whatever the program's locale; what is beyond 159 characters is cut off.
+/// Formats like printf into a string, with a decimal point in any locale. Text beyond 159 characters is cut off.
 [[gnu::format(printf, 1, 2)]] std::string formatted(const char* form, ...);
 
 }  // namespace subvol

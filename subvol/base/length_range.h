@@ -3,11 +3,11 @@
 
 namespace subvol {
 
-/// Sizes of meshes and targets: products of six lengths within, which certificates and areas have, are far from
-/// overflow and underflow.
+/// Range of the sizes of meshes and targets. Within it, products of six lengths, as certificates and areas have them,
+/// are far from overflow and underflow.
 inline constexpr double kLeastLength = 1e-40, kMostLength = 1e40;
 
-/// InputError, naming what it is of, unless kLeastLength <= extent <= kMostLength.
+/// Throws InputError, naming `what`, unless kLeastLength <= extent <= kMostLength.
 void require_length(double extent, const char* what);
 
 }  // namespace subvol

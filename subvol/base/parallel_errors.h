@@ -6,14 +6,14 @@
 
 namespace subvol {
 
-/// Carries an exception out of a parallel region, where one that leaves a thread's work would end the program.
+/// Carries an exception out of a parallel region, in which an exception that leaves a thread's work ends the program.
 ///
 ///   ParallelErrors errors;
 ///   #pragma omp parallel for
 ///   for (..) errors.guard([&] { work(); });
 ///   errors.rethrow();
 ///
-/// The first one that is met is kept; work that comes after it is left out.
+/// The first exception is kept; work that would start after it is skipped.
 class ParallelErrors {
  public:
   template <class Work>
@@ -25,7 +25,7 @@ class ParallelErrors {
       if (!error_) error_ = std::current_exception();
     }
   }
-  /// After the region: throws what was met in it, if anything.
+  /// To be called after the region: rethrows the exception that was kept, if there is one.
   void rethrow() {
     if (error_) std::rethrow_exception(error_);
   }

@@ -5,7 +5,8 @@
 
 namespace subvol {
 
-/// Bytes of memory that this process holds now, and the most it has held. 0 where the system does not tell.
+/// Return the bytes of memory that this process holds now, and the most that it has held; 0 if the system does not
+/// report them.
 std::size_t held_memory_bytes();
 std::size_t peak_memory_bytes();
 

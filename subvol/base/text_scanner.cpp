@@ -28,8 +28,8 @@ std::optional<Number> parse(std::string_view word) {
 
 constexpr std::size_t kNotFound = std::string_view::npos;
 
-/// Whether so many of the first units of two bytes (or all there are, but one at least) are printable or blank ASCII,
-/// in the byte order that puts the zero at `zero`: 0 or 1.
+/// Returns true if the first kUnits units of two bytes (or all of them, if there are fewer but at least one) are
+/// printable or blank ASCII. zero: which byte of a unit must be 0; 0 for big-endian, 1 for little-endian.
 bool has_wide_ascii(std::string_view bytes, std::size_t zero) {
   constexpr std::size_t kUnits = 4;
   if (bytes.size() < 2) return false;
@@ -52,7 +52,7 @@ std::string read_file(const std::filesystem::path& path) {
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) throw InputError(path.string() + ": no such file");
   if (std::filesystem::is_directory(status)) throw InputError(path.string() + ": is a folder, expected a file");
-  // A device may have no end, a pipe no beginning; and some files are read twice.
+  // A device may have no end, a pipe can be read only once, and some files are read twice.
   if (!std::filesystem::is_regular_file(status))
     throw InputError(path.string() + ": is a " + kind_name(status) + ", expected a file");
 
@@ -70,12 +70,12 @@ std::string read_file(const std::filesystem::path& path) {
 TextScanner::TextScanner(std::string name, std::string_view bytes, Comments comments)
     : name_(std::move(name)), bytes_(bytes), comments_(comments) {
   require_no_utf16(name_, bytes_);
-  if (bytes_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // a byte order mark some editors leave
+  if (bytes_.starts_with("\xEF\xBB\xBF")) at_ = 3;  // a byte order mark that some editors leave
   const std::size_t first_end = line_end();
   cr_alone_ = first_end < bytes_.size() && bytes_[first_end] == '\r' && behind(first_end) == first_end + 1;
 }
 
-// What was found is kept: the LF may be far off, or missing, where lines end with CR.
+// The place of the next LF is kept: if lines end with CR, the LF may be far away or missing.
 std::size_t TextScanner::line_end() {
   if (next_lf_ < at_ || (next_lf_ == 0 && at_ == 0)) next_lf_ = std::min(bytes_.find('\n', at_), bytes_.size());
   const std::size_t length = bytes_.substr(at_, next_lf_ - at_).find('\r');
@@ -145,7 +145,7 @@ std::int64_t TextScanner::integer(const char* expected) {
 std::size_t TextScanner::count(const char* expected, std::size_t words_per_entry) {
   const std::int64_t n = integer(expected);
   if (n < 0) fail(std::string(expected) + " is negative: " + std::to_string(n));
-  // A word takes a byte and a separator, the last one in the file only a byte.
+  // A word takes at least one byte and a separator; the last word of the file needs no separator.
   const std::size_t room = (bytes_left() + 1) / 2 / std::max<std::size_t>(words_per_entry, 1);
   if (static_cast<std::uint64_t>(n) > room)
     fail(std::string(expected) + " is " + std::to_string(n) + ", more than the rest of the file can hold");

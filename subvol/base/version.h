@@ -3,7 +3,7 @@
 
 namespace subvol {
 
-/// The library's version, "major.minor.patch", as it stands in reports and exported files.
+/// Returns the library's version, "major.minor.patch", as it stands in reports and exported files.
 const char* version();
 
 }  // namespace subvol

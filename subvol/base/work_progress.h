@@ -5,11 +5,11 @@
 
 namespace subvol {
 
-/// Told by work that may take more than a second what it does next, and an estimate of the share done, in [0, 1].
-/// Returns false to end it there, with what there is. May be empty.
+/// Callback of work that may take more than a second. It receives the part that comes next and an estimate of the share
+/// done, in [0, 1], and returns false to end the work there with the results so far. It may be empty.
 using WorkProgress = std::function<bool(const char* part, double fraction)>;
 
-/// Tells it, and whether the work is to go on.
+/// Reports progress; returns true if the work must go on.
 inline bool goes_on(const WorkProgress& progress, const char* part, double fraction) {
   return !progress || progress(part, fraction);
 }

@@ -9,14 +9,14 @@
 
 namespace subvol {
 
-/// What a file holds and nothing is made of: how many of what, in the order in which it was met.
+/// Counts the contents of a file that are not used, by kind and in the order in which the kinds are first met.
 class LeftOut {
  public:
   void add(std::string_view what, std::size_t n = 1);
   bool empty() const { return counts_.empty(); }
-  /// "6 groups, 24 texture coordinates".
+  /// Returns text such as "6 groups, 24 texture coordinates".
   std::string text() const;
-  /// Appends one warning, unless there is nothing to tell.
+  /// Appends one warning, unless nothing was left out.
   void tell(std::vector<std::string>& warnings) const;
 
  private:

@@ -11,23 +11,25 @@
 
 namespace subvol {
 
-/// A mesh as the file says, and what there is to remark (without the file's name).
+/// A mesh as the file describes it, and warnings without the file's name.
 struct ParsedMesh {
   VolumeMesh mesh;
   std::vector<std::string> warnings;
 };
 
-/// `name` is the file's name for messages. Errors as `read_volume_mesh`, which also does the checks that are not the
-/// format's business. Indices are in range, positions finite.
-/// references: `ReadOptions::references`.
+/// Parse a mesh; its indices are in range and its positions are finite. `read_volume_mesh` makes all other checks.
+///
+/// name        the file's name for messages.
+/// references  `ReadOptions::references`.
+/// Errors: as `read_volume_mesh`.
 ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const std::string& references);
 ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes, const std::string& references);
 
-/// The file's bytes. The mesh is consistent: `write_volume_mesh` has looked.
+/// Return the bytes of the file. The mesh must be consistent, which `write_volume_mesh` checks.
 std::string format_medit(const VolumeMesh& mesh);
 std::string format_legacy_vtk(const VolumeMesh& mesh);
 
-/// Why no pyramid can be read, for messages.
+/// Reason for messages why pyramids cannot be read.
 inline constexpr const char* kNoPyramids =
     "pyramids cannot be used: four edges meet at the apex, so splitting its corners gives no hexes; cut each pyramid "
     "into "

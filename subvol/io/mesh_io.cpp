@@ -42,7 +42,7 @@ bool is_warning(const MeshDefect& defect) {
   return defect.kind == MeshDefect::Kind::inverted_cell || defect.kind == MeshDefect::Kind::unused_vertex;
 }
 
-/// Drops tags off the boundary: other programs also mark edges between subdomains. Returns how many.
+/// Drops tags off the boundary: other programs also mark edges between subdomains. Returns the number of dropped tags.
 std::size_t drop_inner_tags(VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
   const std::size_t dropped_edges = std::erase_if(mesh.tags.creases, [&](const CreaseEdge& crease) {
@@ -88,7 +88,7 @@ void check_mesh(const std::string& name, ParsedMesh& parsed) {
   warn_of(defects, MeshDefect::Kind::unused_vertex, " vertices belong to no cell", parsed.warnings);
 }
 
-/// InputError: all vertices of the cells are in one place.
+/// Throws InputError if all vertices of the cells are in one place.
 void require_extent(const std::string& name, const VolumeMesh& mesh) {
   const Vec3& first = mesh.positions[mesh.cell_vertices.front()];
   if (std::all_of(mesh.cell_vertices.begin(), mesh.cell_vertices.end(),
@@ -96,7 +96,7 @@ void require_extent(const std::string& name, const VolumeMesh& mesh) {
     throw InputError(name + ": all vertices of the cells are in one place");
 }
 
-/// Whether a cell's determinant is negative at every corner.
+/// Returns true if a cell's Jacobian determinant is negative at every corner.
 bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
   const CellTopology& topology = cell_topology(mesh.kinds[c]);
   const auto cell = mesh.cell(c);
@@ -110,7 +110,7 @@ bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
   return true;
 }
 
-/// The same cell seen from the other side.
+/// Renumbers the corners of a cell so that its orientation is reversed.
 void turn_over(VolumeMesh& mesh, std::size_t c) {
   const auto corner = [&](std::size_t i) -> Index& { return mesh.cell_vertices[mesh.cell_offsets[c] + i]; };
   if (mesh.kinds[c] == CellKind::hex) {
@@ -122,9 +122,10 @@ void turn_over(VolumeMesh& mesh, std::size_t c) {
   if (mesh.kinds[c] == CellKind::prism) std::swap(corner(4), corner(5));
 }
 
-/// Cells that are left-handed at every corner are no tangle but another way to number corners, if all cells are, or all
-/// prisms, which programs number in two ways: these are numbered anew, unless others would then see a common face from
-/// the same side. Without `mend` this is only said.
+/// Renumbers the corners of all cells, or of all prisms, if each of them is left-handed at every corner: that is not
+/// tangling, but a mirrored mesh or another numbering (programs number prisms in two ways). Prisms alone are left as
+/// they are if the result has a defect that is more than a warning, such as two cells that see their common face from
+/// the same side. Without `mend` nothing is renumbered, and there is only a warning.
 void turn_over_mirrored(ParsedMesh& parsed, bool mend) {
   VolumeMesh& mesh = parsed.mesh;
   const auto all_mirrored = [&](bool only_prisms) {

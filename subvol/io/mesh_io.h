@@ -9,15 +9,16 @@
 
 namespace subvol {
 
-/// How strictly a volume mesh is read.
+/// Options for reading a volume mesh.
 struct ReadOptions {
-  /// Refuse what `validate` finds, but for inverted cells and unused vertices, which become warnings. Without it only
-  /// the file itself must be sound; tags are kept as they stand.
+  /// If true, a mesh with a defect that `validate` finds is refused; inverted cells and unused vertices only give
+  /// warnings, and tags off the boundary are dropped with a warning. If false, only the file itself must be valid, and
+  /// tags are kept as they stand.
   bool check = true;
-  /// Where warnings go, one line each with the file's name; may be null.
+  /// Receives the warnings, one line each with the file's name; may be null.
   std::vector<std::string>* warnings = nullptr;
-  /// Name of the cell data that become the references; empty: those that are meant (docs/file-formats.md). InputError
-  /// where there is none of that name.
+  /// Name of the cell data to use as references; if empty, they are chosen by the rules of docs/file-formats.md.
+  /// InputError if there are none of that name.
   std::string references{};
 };
 
@@ -26,28 +27,28 @@ struct ReadOptions {
 ///   .mesh  Medit ASCII, versions 1 to 4, dimension 3; tags from Edges + Ridges and Corners
 ///   .vtk   legacy VTK 2.0 to 5.1, ASCII or binary, UNSTRUCTURED_GRID; a VTK wedge is renumbered to our prism
 ///
-/// Vertices and cells keep the file's order (Medit: section by section). Nothing is flipped or repaired, but with a
-/// warning: tags off the boundary are dropped; and with `check` cells are numbered anew where all of them, or all
-/// prisms, are left-handed at every corner. Cells of lower dimension are skipped.
+/// Vertices and cells keep the file's order (Medit: section by section). Cells of lower dimension are skipped. Only
+/// `check` repairs anything, with a warning: tags off the boundary are dropped, and the corners of cells are renumbered
+/// if all cells, or all prisms, are left-handed at every corner.
 ///
-/// Throws InputError with file and line (binary VTK: the line is that of the last text) for anything else: unknown
+/// Throws InputError with the file and, for its contents, the line (binary VTK: that of the last text) for an unknown
 /// extension, keyword or cell type; pyramids and cells of higher order; indices out of range; numbers that are not
 /// finite; counts beyond what the file can hold; a file cut short; no cells; all their vertices in one place; and, with
-/// `check`, a mesh that is not sound.
+/// `check`, a mesh that is not valid.
 /// Memory: a few times the size of the file, whatever counts it claims.
 VolumeMesh read_volume_mesh(const std::filesystem::path& path, const ReadOptions& options = {});
 
-/// Writes a volume mesh atomically; the extension chooses the format. Doubles survive bit by bit.
+/// Writes a volume mesh atomically; the extension chooses the format. Reading it back gives the same bits of positions.
 ///
 ///   .mesh  Medit ASCII version 2: hexes, then prisms, then tets; tags as Edges + Ridges + Corners,
-///          finite sharpness in comments of our own (10 and above is written as infinite)
+///          finite sharpness in comments of our own (values of 10 and above are written as infinite)
 ///   .vtk   legacy VTK 3.0 ASCII; references as cell data; carries no tags
 ///
-/// An unknown extension, inconsistent arrays, no cells, a position that is not finite or a bad tag: InputError. 
-/// A refusing disk: IoError.
+/// InputError: an unknown extension, inconsistent arrays, no cells, a position that is not finite, or a bad tag.
+/// IoError: the file cannot be written.
 void write_volume_mesh(const std::filesystem::path& path, const VolumeMesh& mesh);
 
-/// Extensions `read_volume_mesh` accepts, with their versions, as text for help and messages.
+/// Returns the extensions that `read_volume_mesh` accepts, with their versions, as text for help and messages.
 std::string volume_mesh_formats();
 
 }  // namespace subvol

@@ -21,11 +21,11 @@ constexpr CellSection kCellSections[] = {
     {"Hexahedra", CellKind::hex}, {"Prisms", CellKind::prism}, {"Tetrahedra", CellKind::tet},
     {"Pentahedra", CellKind::prism}};  // an old name of Prisms, never written
 
-/// Sections that say nothing about cells or features, and the numbers in each of their entries.
+/// A section that says nothing about cells or features, and how many numbers each of its entries has.
 struct SkippedSection {
   const char* keyword;
   std::size_t numbers_per_entry;
-  bool has_reference = false;  ///< its last number, of which one that is not 0 is missed
+  bool has_reference = false;  ///< true if the last number is a reference; a nonzero one counts as left out
 };
 constexpr std::size_t kUntilKeyword = 0;  // files disagree on the length of an entry
 constexpr SkippedSection kSkippedSections[] = {
@@ -35,11 +35,11 @@ constexpr SkippedSection kSkippedSections[] = {
     {"TangentAtEdgeVertices", 3}, {"SubDomainFromMesh", kUntilKeyword}, {"SubDomainFromGeom", kUntilKeyword}};
 constexpr SkippedSection kSkippedValues[] = {{"AngleOfCornerBound", 1}, {"BoundingBox", 6}};
 
-/// Openings of the comments in which finite sharpness is kept; other readers pass over them.
+/// Prefixes of the comments that store finite sharpness; other readers skip them.
 constexpr std::string_view kRidgeSharpness = "subvol:RidgeSharpness";
 constexpr std::string_view kCornerSharpness = "subvol:CornerSharpness";
 
-/// A number in the file (from 1) that can only be checked when everything has been read.
+/// A number in the file (from 1) that can only be checked once everything has been read.
 struct Numbered {
   std::int64_t number;
   std::size_t line;
@@ -159,7 +159,7 @@ class MeditParser {
     }
   }
 
-  /// Vertex number from 0. Without Vertices so far, only that it fits is checked here.
+  /// Reads a vertex number and returns it counted from 0. Before the section Vertices, the only check is that it fits.
   Index read_vertex_number() {
     const std::int64_t number = scan_.integer("a vertex number");
     check_number(number, has_vertices_ ? parsed_.mesh.num_vertices() : std::numeric_limits<Index>::max(), "vertex",

@@ -18,7 +18,7 @@ namespace subvol {
 
 namespace {
 
-/// A VTK cell type we know. corner[i]: place in the VTK cell of our corner i.
+/// A VTK cell type that can be read. corner[i]: the VTK cell's number of our corner i.
 struct VtkCell {
   int type;
   CellKind kind;
@@ -32,7 +32,7 @@ constexpr VtkCell kVtkCells[] = {
 };
 
 constexpr int kPyramid = 14;
-/// Vertices, lines, polygons, linear and of higher order.
+/// Types of vertices, lines and polygons, linear and of higher order.
 constexpr int kLowerDimensions[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75, 76, 77};
 
 struct VtkType {
@@ -48,11 +48,12 @@ constexpr VtkType kVtkTypes[] = {
     {"vtktypeuint32", kUInt32},
 };
 
-/// An attribute that nothing is made of: keyword, name, number of components where it is given, type unless it is
-/// colours. Then so many values for each point, cell or, after its size, entry of a lookup table.
+/// An attribute that is skipped: its keyword, its name, the number of components unless that is fixed, the size of a
+/// lookup table, and the type unless the values are colors. Then come the components of each point, cell or table
+/// entry.
 struct VtkAttribute {
   const char* keyword;
-  std::size_t components;  ///< 0: given
+  std::size_t components;  ///< fixed number; 0: given in the file
   bool is_colors = false;  ///< bytes in binary files, fractions in text
 };
 constexpr VtkAttribute kSkippedAttributes[] = {
@@ -78,7 +79,7 @@ class VtkParser {
       else if (keyword == "field") read_field(false);
       else if (keyword == "metadata") skip_metadata();
       else scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
-      if (stray_attribute_) break;  // the mesh itself stands before its attributes
+      if (stray_attribute_) break;  // the mesh itself comes before its attributes
     }
     if (!has_points_) scan_.fail("the file ends without POINTS");
     if (!has_cells_) scan_.fail("the file ends without CELLS");
@@ -122,7 +123,7 @@ class VtkParser {
     return std::nullopt;
   }
 
-  /// A count of things of which each takes at least one word or byte.
+  /// Reads the number of things that each take at least one byte.
   std::size_t read_count(const char* what) {
     const std::int64_t n = scan_.integer(what);
     if (n < 0) scan_.fail(std::string(what) + " is negative: " + std::to_string(n));
@@ -131,7 +132,7 @@ class VtkParser {
     return static_cast<std::size_t>(n);
   }
 
-  /// n values that follow the current line; visit(i, value) for each.
+  /// Reads n values, which in a binary file start on the next line, and calls visit(i, value) for each.
   template <class Visit>
   void read_values(std::size_t n, ValueType type, const char* what, const Visit& visit) {
     if (!binary_) {
@@ -146,7 +147,7 @@ class VtkParser {
     for (std::size_t i = 0; i < n; ++i) visit(i, decode(bytes.data() + i * type.size, type, std::endian::big));
   }
 
-  /// Those beyond 1e15 come as 1e15: nothing counted here is as large.
+  /// Reads n whole numbers, clamped to +-1e15: no valid number here is that large.
   std::vector<std::int64_t> read_whole_numbers(std::size_t n, ValueType type, const char* what) {
     if (type.is_real()) scan_.fail(std::string(what) + " must be of a whole-number type");
     std::vector<std::int64_t> numbers;
@@ -186,7 +187,7 @@ class VtkParser {
     num_cells_ = offsets_.size() - 1;
   }
 
-  // Before 5.0: for each cell its number of corners, then the corners.
+  // Before 5.0, each cell is its number of corners followed by the corners.
   void split_counted_lists(std::size_t n, const std::vector<std::int64_t>& numbers) {
     std::size_t at = 0;
     for (std::size_t c = 0; c < n; ++c) {
@@ -203,7 +204,7 @@ class VtkParser {
     if (at != numbers.size()) scan_.fail("the size of CELLS is larger than its cells", cells_line_);
   }
 
-  // From 5.0 on: n counts the offsets, one more than there are cells.
+  // From 5.0 on, n is the number of offsets, one more than there are cells.
   void read_offsets_and_connectivity(std::size_t n, std::size_t size) {
     scan_.next();
     const std::vector<std::int64_t> offsets = read_whole_numbers(n, read_type(), "offsets");
@@ -229,7 +230,7 @@ class VtkParser {
     types_ = read_whole_numbers(n, kInt32, "cell types");
   }
 
-  // Attributes may be of many kinds; read are the scalars of cells, of which one may become the references.
+  // Attributes may be of many kinds. Arrays of one whole number per cell are kept: one may become the references.
   void read_attributes(std::size_t expected, bool of_cells) {
     const std::int64_t n = scan_.integer("the number of attribute entries");
     if (n < 0 || static_cast<std::uint64_t>(n) != expected)
@@ -247,7 +248,7 @@ class VtkParser {
     }
   }
 
-  /// False: its kind or type is not known.
+  /// Returns false if the kind or type of the attribute is not known.
   bool skip_attribute(const std::string& keyword, std::size_t n, bool of_cells) {
     const auto* attribute = std::find_if(std::begin(kSkippedAttributes), std::end(kSkippedAttributes),
                                          [&](const VtkAttribute& a) { return keyword == a.keyword; });
@@ -265,7 +266,7 @@ class VtkParser {
     return true;
   }
 
-  /// At one that cannot be passed over.
+  /// Stops reading at an attribute that cannot be skipped.
   void end_attributes(std::string_view word) {
     stray_attribute_ = true;
     if (std::none_of(arrays_.begin(), arrays_.end(), may_be_references) || !asked_.empty())
@@ -313,7 +314,8 @@ class VtkParser {
     }
   }
 
-  /// A line in text; in binary its length in 1, 2, 4 or 8 bytes, as the top two bits say, then the characters.
+  /// Skips a string: in text, a line; in binary, its length in 1, 2, 4 or 8 bytes, as the top two bits say, and then
+  /// its characters.
   void skip_string() {
     if (!binary_) {
       if (!scan_.line()) scan_.fail("the file ends within an array");
@@ -327,7 +329,7 @@ class VtkParser {
     scan_.bytes(length, "an array");
   }
 
-  enum class Array { of_cells, other, no_data };  ///< a lookup table is no data
+  enum class Array { of_cells, other, no_data };  ///< no_data: a lookup table
 
   void read_array(std::size_t n, std::size_t components, ValueType type, std::string_view name, Array kind) {
     if (components > 0 && n > scan_.bytes_left() / components) scan_.fail("the file ends within an array");
@@ -339,7 +341,7 @@ class VtkParser {
     };
     if (binary_ || !type.is_real())
       read_values(n * components, type, "an array", take);
-    else  // quality values and the like may well be nan
+    else  // values such as cell qualities may well be nan
       for (std::size_t i = 0; i < n * components; ++i) {
         const auto value = parse_number(scan_.word("an array"));
         take(i, value.value_or(std::numeric_limits<double>::quiet_NaN()));
@@ -351,7 +353,7 @@ class VtkParser {
     num_arrays_ += kind != Array::no_data;
   }
 
-  /// Names are words: VTK writes a blank in one as %20.
+  /// Decodes a name: since names are single words, VTK writes a blank as %20.
   static std::string decoded(std::string_view word) {
     std::string name;
     for (std::size_t i = 0; i < word.size(); ++i) {
@@ -446,7 +448,7 @@ class VtkParser {
   TextScanner scan_;
   std::string name_, asked_;
   ParsedMesh parsed_;
-  std::vector<CellNumbers> arrays_;   ///< of which the references may be chosen
+  std::vector<CellNumbers> arrays_;   ///< arrays from which the references may be chosen
   std::vector<std::string> others_;   ///< names of the other cell data
   int major_ = 0;
   bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false;

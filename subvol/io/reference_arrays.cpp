@@ -11,18 +11,18 @@ namespace subvol {
 
 namespace {
 
-/// Names as `plain` makes them, without a plural's s; those that come first are meant first.
+/// Names of references as `plain` returns them, in order of preference.
 constexpr std::string_view kReferenceNames[] = {
     "reference",  "ref",        "meditref",   "material",  "materialid", "mat",      "matid",      "attribute",
     "gmshphysical", "physical", "cellentityid", "region",  "regionid",   "subdomain", "subdomainid", "domain",
     "domainid",   "zone",       "zoneid",     "block",     "blockid",    "elementblockid", "part",  "partid",
     "component",  "componentid", "label",     "tag",       "celltag",    "marker",   "gmshgeometrical"};
 
-/// Numbers of things, one for each cell or process.
+/// Names, as `plain` returns them, of arrays that only number cells or processes.
 constexpr std::string_view kIdNames[] = {"id", "cellid", "elementid", "elemid", "cellnumber", "elementnumber", "index",
                                          "cellindex", "processid", "vtkprocessid", "processorid", "rank", "procid"};
 
-/// Small letters and digits, without a plural's s.
+/// Returns a name's letters, in lower case, and digits, without a plural's s.
 std::string plain(std::string_view name) {
   std::string text;
   for (const char c : lower_case(name))

@@ -12,21 +12,22 @@ namespace subvol {
 /// A one-component array of cell data whose values are all whole numbers.
 struct CellNumbers {
   std::string name;
-  bool is_real = false;  ///< the file's type is one of fractions
+  bool is_real = false;  ///< true if the file stores floating-point numbers
   std::vector<std::int64_t> values;
 };
 
-/// Which of the arrays are the cells' references: nothing where none is meant.
+/// Returns the place of the array that holds the cells' references, or nothing if there is none.
 ///
-/// name  the array that is asked for, in any case of letters. Empty: the name that comes first in a list of names that
-///       programs give to materials and regions; without one, the first array of a type of whole numbers. Arrays of
-///       ghosts, of numbers of cells and of processes are never taken unless they are asked for.
-/// InputError (without the file's name): there is none of that name; it lists those there are, `others` among them as
-/// unfit.
+/// name    the array that is asked for; upper and lower case are the same unless a name matches exactly. If empty, the
+///         array is chosen whose name comes first in a list of names that programs give to materials and regions;
+///         without such a name, the first array of an integer type. Ghost arrays and arrays of cell or process numbers
+///         are taken only if they are asked for.
+/// others  names of the cell data that are unfit, for messages.
+/// InputError (without the file's name): there is no array of that name; the message lists `arrays` and `others`.
 std::optional<std::size_t> choose_references(const std::vector<CellNumbers>& arrays, const std::string& name,
                                              const std::vector<std::string>& others = {});
 
-/// Whether an array of this name may be the references though nobody asks for it.
+/// Returns true if the array may be chosen as references without being asked for.
 bool may_be_references(const CellNumbers& array);
 
 }  // namespace subvol

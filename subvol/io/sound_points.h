@@ -8,11 +8,11 @@
 
 namespace subvol {
 
-/// Points as a cloud that can be fitted, as `read_point_cloud` makes it of those in a file.
+/// Checks points and returns a cloud that can be fitted, as `read_point_cloud` does with the points of a file.
 ///
-/// name  where they are from, for messages.
-/// returns  points in their order; of those in one place the first, with a warning.
-/// InputError: no points, fewer than kLeastCloudPoints places, coordinates that `read_polygon_mesh` refuses.
+/// name     source of the points for messages.
+/// returns  the points in their order. Dropped, with a warning: all but the first of points in one place.
+/// InputError: no points, fewer than kLeastCloudPoints places, or coordinates that `read_polygon_mesh` refuses.
 PointCloud sound_points(std::vector<Vec3> points, const std::string& name,
                         std::vector<std::string>* warnings = nullptr);
 

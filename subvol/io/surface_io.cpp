@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Twice a triangle's area, relative to its longest edge squared, at or below which it has no direction left.
+/// Twice a triangle's area, relative to the square of its longest edge: at or below this it has no normal up to
+/// rounding.
 constexpr double kNoArea = 1e-15;
 
 struct Format {
@@ -33,7 +34,7 @@ constexpr Format kFormats[] = {{".off", "OFF text", parse_off},
                                {".stl", "STL text or binary", parse_stl},
                                {".ply", "PLY 1.0 text or binary", parse_ply}};
 
-/// Remarks about one file.
+/// Warnings and errors about one file.
 class Remarks {
  public:
   Remarks(std::string name, std::vector<std::string>* warnings) : name_(std::move(name)), warnings_(warnings) {}
@@ -51,7 +52,7 @@ class Remarks {
   std::vector<std::string>* warnings_;
 };
 
-/// Keeps the faces that are polygons; their corners without repetitions of the one before.
+/// Drops corners that repeat the one before, and then faces that are not polygons.
 void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
   PolygonMesh kept;
   std::size_t num_shortened = 0, num_dropped = 0;
@@ -82,7 +83,7 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
   if (mesh.num_faces() == 0) remarks.fail(num_dropped ? "no usable faces" : "no faces");
 }
 
-/// Drops positions that `corners` does not name and renumbers it. Returns how many went.
+/// Drops positions that `corners` does not name and renumbers `corners`. Returns the number of dropped positions.
 std::size_t drop_unused(std::vector<Vec3>& positions, std::span<Index> corners) {
   std::vector<Index> renumbered(positions.size(), kNoIndex);
   for (const Index v : corners) renumbered[static_cast<std::size_t>(v)] = 0;
@@ -122,7 +123,7 @@ bool has_area(const std::vector<Vec3>& x, const Triangle& t) {
   return a.cross(b).norm() > kNoArea * std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
 }
 
-/// For every vertex a number that it shares with exactly the vertices in the same place.
+/// Returns for every vertex a number that it shares with exactly the vertices in the same place.
 std::vector<Index> places(const std::vector<Vec3>& x) {
   std::vector<Index> order(x.size()), place(x.size());
   std::iota(order.begin(), order.end(), Index{0});
@@ -135,7 +136,7 @@ std::vector<Index> places(const std::vector<Vec3>& x) {
   return place;
 }
 
-/// Drops all but the first of triangles with the same three places. Returns how many went.
+/// Drops all but the first of triangles with the same three places. Returns the number of dropped triangles.
 std::size_t drop_duplicates(TriangleMesh& mesh) {
   const std::vector<Index> place = places(mesh.positions);
   std::vector<std::pair<Triangle, std::size_t>> keys(mesh.triangles.size());
@@ -155,7 +156,7 @@ std::size_t drop_duplicates(TriangleMesh& mesh) {
   return keys.size() - kept;
 }
 
-/// Keeps the first of points in one place. Returns how many went.
+/// Drops all but the first of points in one place. Returns the number of dropped points.
 std::size_t drop_repeated(std::vector<Vec3>& points) {
   const std::vector<Index> place = places(points);
   std::vector<Index> first(points.size(), kNoIndex);

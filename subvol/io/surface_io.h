@@ -10,53 +10,53 @@
 
 namespace subvol {
 
-/// Most corners a polygon in a file may have.
+/// Largest number of corners that a polygon in a file may have.
 inline constexpr std::size_t kMaxPolygonCorners = 1000;
 
 /// Reads polygons; the extension chooses the format (docs/file-formats.md). Soups are welcome: nothing is welded,
-/// flipped or oriented, but STL, which has no vertex numbers, gets one vertex per distinct position.
+/// flipped or oriented, except that STL, which has no vertex numbers, gets one vertex per distinct position.
 ///
 ///   .off  OFF, COFF, NOFF, CNOFF, STOFF and the like, text     .stl  text or binary
 ///   .obj  polygons only; materials and the like are skipped    .ply  1.0, text or binary of either byte order
 ///
-/// warnings  where remarks go, one line each with the file's name; may be null.
+/// warnings  receives the warnings, one line each with the file's name; may be null.
 /// returns   faces and vertices in the file's order. Dropped, with a warning: corners that repeat the one before, faces
 ///           that then have fewer than three corners or name a vertex twice, and vertices of no face.
 ///
-/// Throws InputError with file and line (binary: byte) for anything malformed, counts beyond what the file can hold,
-/// indices out of range, numbers that are not finite, larger polygons, no faces, all vertices in one place, and
-/// coordinates or extents whose squares overflow or underflow. Memory: a few times the size of the file, whatever it
-/// claims.
+/// Throws InputError with the file and, for its contents, the line (binary: byte) for anything malformed, counts beyond
+/// what the file can hold, indices out of range, numbers that are not finite, polygons of more than kMaxPolygonCorners,
+/// no faces, all vertices in one place, coordinates beyond kMostLength, and an extent below kLeastLength. Memory: a few
+/// times the size of the file, whatever it claims.
 PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
-/// The same as triangles (`triangulate`). Also dropped, with a warning: triangles without area, and all but the first
-/// of triangles with the same three positions.
+/// Reads polygons like `read_polygon_mesh` and cuts them into triangles (`triangulate`). Also dropped, with a warning:
+/// triangles without area, and all but the first of triangles with the same three positions. InputError: also if no
+/// triangle has any area.
 TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
-/// Fewest points that a cloud may have.
+/// Smallest number of points that a cloud may have.
 inline constexpr std::size_t kLeastCloudPoints = 10;
 
-/// Whether a file holds points without faces: .xyz, or a .ply whose header tells of no faces. InputError: a .ply that
-/// cannot be read, or with a malformed header.
+/// Returns true if a file holds points without faces: an .xyz, or a .ply whose header announces no faces. InputError: a
+/// .ply that cannot be read or has a malformed header.
 bool is_point_cloud_file(const std::filesystem::path& path);
 
-/// Reads points: .xyz (one to a line, three coordinates and whatever follows them) or .ply (`x y z` of `vertex`).
+/// Reads points from .xyz (one per line: three coordinates, then anything) or .ply (`x y z` of `vertex`).
 ///
-/// returns  points in the file's order. Dropped, with a warning: all but the first of points in one place; the further
-///          columns of .xyz and the faces of .ply.
-/// InputError: as `read_polygon_mesh`; fewer than kLeastCloudPoints places.
+/// returns  points in the file's order. Dropped, with a warning: all but the first of points in one place, further
+///          columns of .xyz, and faces of .ply.
+/// InputError: as `read_polygon_mesh`, but faces are not needed; fewer than kLeastCloudPoints places.
 PointCloud read_point_cloud(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
 
-/// Values of a vertex property of a .ply, one per vertex in the file's order.
+/// Reads a vertex property of a .ply: one value per vertex, in the file's order.
 ///
-/// InputError: another extension; no such property; a file that `read_polygon_mesh` refuses; a value that is not
-/// finite.
+/// InputError: another extension; no such property; a malformed file; a value that is not finite.
 std::vector<double> read_vertex_attribute(const std::filesystem::path& path, const std::string& attribute);
 
-/// Whether `read_polygon_mesh` knows an extension, in small letters and with its point.
+/// Returns true if `read_polygon_mesh` knows an extension, given in lower case with its dot.
 bool is_surface_extension(const std::string& extension);
 
-/// Extensions the readers accept, as text for help and messages.
+/// Return the extensions that the readers accept, as text for help and messages.
 std::string surface_formats();
 std::string point_cloud_formats();
 

@@ -47,7 +47,7 @@ struct Element {
 
 class PlyParser {
  public:
-  /// attribute  vertex property whose values are kept as well; empty: none.
+  /// attribute  vertex property whose values are kept, too; empty: none.
   PlyParser(const std::string& name, std::string_view bytes, std::string attribute = "")
       : name_(name),
         size_(bytes.size()),
@@ -66,18 +66,18 @@ class PlyParser {
     return parsed;
   }
 
-  /// Whether the header, which is all that is read, announces faces.
+  /// Reads only the header; returns true if it announces faces.
   bool has_faces() {
     read_header();
     return std::any_of(elements_.begin(), elements_.end(),
                        [](const Element& element) { return element.name == "face" && element.count > 0; });
   }
 
-  /// What `parse` found of the attribute, one value per vertex that has it.
+  /// Returns the values of the attribute that `parse` found, one per vertex; none if there is no such property.
   std::vector<double> take_attribute() { return std::move(values_); }
 
  private:
-  /// Where the text is lines, the line tells the place; in binary data, the byte.
+  /// Throws InputError that names the line in text, or the byte in binary data.
   [[noreturn]] void fail(const std::string& message) const {
     if (text_) scan_.fail(message);
     throw InputError(name_ + ": byte " + std::to_string(size_ - scan_.bytes_left()) + ": " + message);
@@ -139,7 +139,7 @@ class PlyParser {
     note(elements_.back(), property, name);
   }
 
-  /// Normals are not missed: faces have them.
+  /// Counts a property that is not used. Normals do not count: faces define them.
   void note(const Element& element, const Property& property, std::string_view name) {
     const bool is_normal = name == "nx" || name == "ny" || name == "nz";
     if (element.count == 0 || property.use != Property::Use::none || is_normal) return;
@@ -169,7 +169,7 @@ class PlyParser {
     if (vertices && !(element.has(Property::Use::x) && element.has(Property::Use::y) && element.has(Property::Use::z)))
       fail("vertices without x, y and z");
     if (faces && !element.has(Property::Use::corners)) fail("faces without vertex_indices");
-    // An element without properties takes no bytes: its count means nothing.
+    // An element without properties takes no bytes, so its count means nothing.
     if (element.properties.empty()) return;
     if (element.count > (scan_.bytes_left() + 1) / element.least_bytes(text_))
       fail("element " + in_quotes(element.name) + " has a count of " + std::to_string(element.count) +

@@ -14,16 +14,16 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kHeaderBytes = 84;    // 80 bytes of anything, then the number of facets
-constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, two bytes that say how many of attributes follow
+constexpr std::size_t kHeaderBytes = 84;    // 80 arbitrary bytes, then the number of facets
+constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, number of attribute bytes that follow (two bytes)
 constexpr std::size_t kFirstVertexByte = 12;
 constexpr std::size_t kAttributeCountByte = 48;
 
-/// STL repeats a vertex in every facet: equal positions become one vertex.
+/// Merges equal positions into one vertex, because STL repeats a vertex in every facet.
 class Welder {
  public:
   void add(const Vec3& position) {
-    // + 0.0 makes one zero of the two.
+    // + 0.0 turns -0.0 into 0.0.
     const std::array<double, 3> key = {position[0] + 0.0, position[1] + 0.0, position[2] + 0.0};
     const auto [it, is_new] = vertices_.try_emplace(key, static_cast<Index>(mesh_.positions.size()));
     if (is_new) mesh_.positions.push_back(position);
@@ -46,8 +46,9 @@ bool has_room_for_facets(std::string_view bytes) {
   return num_binary_facets(bytes) <= (bytes.size() - kHeaderBytes) / kFacetBytes;
 }
 
-/// Whatever the header says: four bytes of text announce more than 150 million facets, and no text has control
-/// characters where a number of facets or a facet is.
+/// Returns true if the file is binary, even if its header begins like text: it has room for its number of facets (four
+/// bytes of text would mean more than 150 million), or its first bytes contain a control character below tab, which
+/// text does not have.
 bool is_binary(std::string_view bytes) {
   const auto is_no_text = [](unsigned char c) { return c < '\t'; };
   if (bytes.size() < kHeaderBytes) return false;
@@ -55,13 +56,14 @@ bool is_binary(std::string_view bytes) {
   return has_room_for_facets(bytes) || std::any_of(first.begin(), first.end(), is_no_text);
 }
 
-/// Where the facets are, and where the last ends.
+/// Places of the facets, and the end of the last one, in bytes.
 struct BinaryFacets {
   std::vector<std::size_t> begins;
   std::size_t end;
 };
 
-/// Walks the facets, each with as many bytes of attributes as it says. Nothing: one is not within the file.
+/// Finds the facets, each followed by as many bytes of attributes as it says. Returns nothing if one runs past the end
+/// of the file.
 std::optional<BinaryFacets> facets_with_attributes(std::string_view bytes) {
   BinaryFacets facets{{}, kHeaderBytes};
   for (std::size_t f = 0, n = num_binary_facets(bytes); f < n; ++f) {
@@ -75,7 +77,7 @@ std::optional<BinaryFacets> facets_with_attributes(std::string_view bytes) {
   return facets;
 }
 
-/// Many programs keep a colour where the count of attribute bytes should be: then the facets alone fill the file.
+/// Finds the facets. Many programs store a color as the number of attribute bytes: the facets alone then fill the file.
 BinaryFacets binary_facets(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
   const std::size_t n = num_binary_facets(bytes), plain_end = kHeaderBytes + kFacetBytes * n;
   if (!has_room_for_facets(bytes))
@@ -91,7 +93,7 @@ BinaryFacets binary_facets(const std::string& name, std::string_view bytes, std:
                      " facets end here without their attributes" +
                      (facets ? ", and at byte " + std::to_string(facets->end) + " with them" : "") +
                      ", but the file has " + std::to_string(bytes.size()) + " bytes");
-  if (facets->end != bytes.size())  // no facet has attributes: there is no doubt where they are
+  if (facets->end != bytes.size())  // no facet has attributes, so it is certain where the facets are
     warnings.push_back(std::to_string(bytes.size() - plain_end) + " bytes after the last facet are passed over");
   return std::move(*facets);
 }

@@ -14,13 +14,13 @@ namespace {
 constexpr std::string_view kPlainOff = "OFF";
 constexpr std::string_view kOtherOff[] = {"COFF", "NOFF", "CNOFF", "NCOFF", "STOFF", "STCOFF", "STNOFF", "STCNOFF"};
 
-/// The three counts of an OFF file; many files leave out the third.
+/// Counts of an OFF file. A third count, of edges, is not used; many files leave it out.
 struct OffCounts {
   std::size_t vertices, faces;
 };
 
 OffCounts read_off_counts(TextScanner& scan) {
-  // Both counts are checked before either list is read, so the bytes left serve as a bound for both.
+  // Both counts are checked before either list is read, so the bytes left bound both.
   const std::size_t vertices = scan.count("the number of vertices", 3);
   const std::size_t faces = scan.count("the number of faces", 2);
   const std::size_t line = scan.word_line();
@@ -29,13 +29,13 @@ OffCounts read_off_counts(TextScanner& scan) {
   return {vertices, faces};
 }
 
-/// Whether there was anything in it.
+/// Skips the rest of the line; returns true if it held a word.
 bool skip_rest_of_line(TextScanner& scan) {
   const auto rest = scan.line();
   return rest && TextScanner("", *rest).next().has_value();
 }
 
-/// Words of OBJ that say nothing about polygons, and what of them is missed.
+/// A keyword of OBJ that says nothing about polygons, and the name under which it counts as left out, if it does.
 struct SkippedObj {
   std::string_view keyword;
   const char* missed = nullptr;
@@ -53,7 +53,7 @@ class ObjParser {
     while (auto line = scan_.line()) {
       line_ = scan_.word_line();
       std::string joined;
-      while (line->ends_with('\\')) {  // a long line goes on in the next
+      while (line->ends_with('\\')) {  // a long line continues on the next
         joined.append(line->substr(0, line->size() - 1)).push_back(' ');
         line = scan_.line();
         if (!line) break;
@@ -90,7 +90,7 @@ class ObjParser {
       position[i] = *value;
     }
     mesh_.positions.push_back(position);
-    std::size_t more = 0;  // one is a weight
+    std::size_t more = 0;  // a single one is a weight
     while (words.next()) ++more;
     if (more >= 3) left_out_.add("colours of vertices");
   }
@@ -110,7 +110,7 @@ class ObjParser {
     face_lines_.push_back(line_);
   }
 
-  // Vertices may stand after the faces that name them.
+  // Vertices may come after the faces that name them.
   void check_indices() const {
     for (std::size_t f = 0; f < mesh_.num_faces(); ++f)
       for (std::size_t i = mesh_.face_offsets[f]; i < mesh_.face_offsets[f + 1]; ++i)
@@ -146,7 +146,7 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
   mesh.positions.resize(num_vertices);
   for (Vec3& position : mesh.positions) {
     for (int i = 0; i < 3; ++i) position[i] = scan.number("a coordinate");
-    if (!plain) skip_rest_of_line(scan);  // normals, colours, texture coordinates
+    if (!plain) skip_rest_of_line(scan);  // normals, colors, texture coordinates
   }
   for (std::size_t f = 0; f < num_faces; ++f) {
     const std::size_t corners = scan.count("the number of corners of a face", 1);

@@ -7,8 +7,8 @@
 
 namespace subvol {
 
-/// The kinds of cells. Local numbering below is that of Medit; every face is listed so that its right-hand normal
-/// points out of a cell of positive volume.
+/// The kinds of cells. The local numbering is that of Medit; the corners of every face are listed so that its
+/// right-hand normal points out of a cell of positive volume.
 ///
 ///       3            5             7------6
 ///      /|\          /|\           /|     /|        tet   0 1 2 seen from 3 counter-clockwise
@@ -33,11 +33,11 @@ struct CellTopology {
   std::array<std::array<std::int8_t, 2>, kMaxCellEdges> edges;     ///< end vertices of each edge
   std::array<std::int8_t, kMaxCellFaces> face_sizes;               ///< 3 or 4
   std::array<std::array<std::int8_t, 4>, kMaxCellFaces> faces;     ///< corners of each face, outward
-  /// The three neighbours of each corner, ordered so that det[n0-c, n1-c, n2-c] > 0 in a cell of positive volume.
+  /// The three neighbors of each corner, ordered so that det[n0-c, n1-c, n2-c] > 0 in a cell of positive volume.
   std::array<std::array<std::int8_t, 3>, kMaxCellVertices> corner_neighbors;
 };
 
-/// The table of a kind. Never fails; cost: one array access.
+/// Returns the table of a kind. Never fails; cost: one array access.
 const CellTopology& cell_topology(CellKind kind);
 
 }  // namespace subvol

@@ -10,21 +10,21 @@ namespace subvol {
 /// Sharpness at and above which a crease or corner never softens (OpenSubdiv's convention).
 inline constexpr double kInfiniteSharpness = 10.0;
 
-/// A boundary edge kept sharp through `sharpness` refinements (fractions blend; >= kInfiniteSharpness: for ever).
+/// A boundary edge kept sharp through `sharpness` refinements (fractions blend; >= kInfiniteSharpness: forever).
 struct CreaseEdge {
   Index v0, v1;  ///< v0 < v1
   double sharpness = kInfiniteSharpness;
   friend bool operator==(const CreaseEdge&, const CreaseEdge&) = default;
 };
 
-/// A boundary vertex kept in its place.
+/// A boundary vertex kept in its place through `sharpness` refinements (likewise).
 struct CornerVertex {
   Index vertex;
   double sharpness = kInfiniteSharpness;
   friend bool operator==(const CornerVertex&, const CornerVertex&) = default;
 };
 
-/// Which parts of a mesh's boundary are features. Each edge and vertex at most once, sorted; sharpness > 0.
+/// Features of a mesh's boundary. Every edge and vertex occurs at most once; both lists are sorted; sharpness > 0.
 struct FeatureTags {
   std::vector<CreaseEdge> creases;
   std::vector<CornerVertex> corners;

@@ -14,12 +14,13 @@ namespace subvol {
 
 namespace {
 
-/// In [0, 180]; 0 where a vector vanishes. By atan2: acos would lose half the digits near 0 and 180.
+/// Returns an angle in [0, 180]; 0 if a vector vanishes. Uses atan2: acos would lose half the digits near 0 and 180.
 double angle_between_degrees(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
 
-/// Area vector of a triangle or quad (half the cross product of the diagonals, for any warp), up to its length.
+/// Returns the direction of the area vector of a triangle or quad, which is half the cross product of the diagonals for
+/// any warp; zero if there is no area.
 Vec3 face_normal(const VolumeMesh& mesh, std::span<const Index> face) {
   const auto& x = mesh.positions;
   const Vec3 d0 = x[face[2]] - x[face[0]], d1 = x[face[face.size() - 1]] - x[face[1]];
@@ -71,7 +72,7 @@ std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const std::vector<C
   return corners;
 }
 
-/// Sorts by key and keeps the sharpest of equal ones.
+/// Sorts tags by key and keeps the sharpest of those with equal keys.
 template <class Tag, class Key>
 void unify(std::vector<Tag>& tags, const Key& key) {
   std::sort(tags.begin(), tags.end(), [&](const Tag& a, const Tag& b) {

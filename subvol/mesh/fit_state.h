@@ -8,10 +8,10 @@
 
 namespace subvol {
 
-/// Where a mesh was at some time of a fit, by the numbers of the mesh that the fit ended with.
+/// Positions of a mesh at some moment of a fit, in the numbering of the mesh that the fit ended with.
 struct FitState {
-  std::string name;             ///< "template", or of the minimisation that came to it
-  std::vector<Vec3> positions;  ///< of the finished mesh's vertices; of a high-order mesh its coefficients
+  std::string name;             ///< "template", or the name of the minimization that led to this state
+  std::vector<Vec3> positions;  ///< of the finished mesh's vertices, or the coefficients of a high-order mesh
 };
 
 }  // namespace subvol

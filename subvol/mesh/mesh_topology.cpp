@@ -10,8 +10,8 @@ namespace subvol {
 
 namespace {
 
-/// Chains of entities hung on that one of their vertices that has the fewest cells: a lookup costs the number of
-/// entities there, which is small even beside a vertex of all cells.
+/// Linked lists of edges or faces, each kept at the one of its vertices that has the fewest cells. A lookup costs the
+/// length of one list, which is short even next to a vertex that all cells share.
 struct Chains {
   explicit Chains(std::size_t num_vertices) : head(num_vertices, kNoIndex) {}
   std::vector<Index> head, next;
@@ -23,12 +23,12 @@ std::vector<Index> cells_at_vertices(const VolumeMesh& mesh) {
   return counts;
 }
 
-/// Equality of sorted corners, in registers.
+/// Returns true if the sorted corners are equal; without branches.
 bool same_corners(const std::array<Index, 4>& a, const std::array<Index, 4>& b) {
   return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2]) | (a[3] ^ b[3])) == 0;
 }
 
-/// Ascending, with kNoIndex last.
+/// Returns the corners in ascending order, with kNoIndex last.
 std::array<Index, 4> sorted_corners(std::array<Index, 4> corners, int size) {
   const auto order = [&](int i, int j) {
     if (corners[i] > corners[j]) std::swap(corners[i], corners[j]);

@@ -168,7 +168,7 @@ class Validator {
     return defects_.size() == before;
   }
 
-  // A quad of the boundary must not stand against triangles.
+  // A boundary quad must not lie against boundary triangles.
   void check_conformity(const MeshTopology& topology) {
     for (std::size_t f = 0; f < topology.num_faces(); ++f)
       if (topology.face(static_cast<Index>(f)).size() == 3)
@@ -190,14 +190,14 @@ class Validator {
     }
   }
 
-  /// Face number of a triangle of any cell, or kNoIndex.
+  /// Returns the number of the triangular face with these corners, or kNoIndex.
   Index find_triangle(const std::array<Index, 3>& corners) const {
     const std::pair<Key, Index> wanted{sorted_key(corners), kNoIndex};
     const auto it = std::lower_bound(triangles_.begin(), triangles_.end(), wanted);
     return it != triangles_.end() && it->first == wanted.first ? it->second : kNoIndex;
   }
 
-  // A boundary edge a-b with a chain of boundary edges from a to b that runs along it: the neighbour is cut finer.
+  // Finds boundary edges a-b with a chain of shorter boundary edges from a to b along them: the neighbor is cut finer.
   void check_hanging_vertices(const MeshTopology& topology) {
     std::vector<std::vector<Index>> neighbors(mesh_.num_vertices());
     const auto for_each_edge = [&](const auto& visit) {
@@ -208,7 +208,7 @@ class Validator {
       for (int i = 0; i < 2; ++i) neighbors[edge[i]].push_back(edge[1 - i]);
     });
     for_each_edge([&](const std::array<Index, 2>& edge) {
-      // From the end with fewer neighbours: a vertex may have as many as the mesh has edges.
+      // The walk starts at the end with fewer neighbors: a vertex may have as many as the mesh has edges.
       const bool turned = neighbors[edge[1]].size() < neighbors[edge[0]].size();
       const Index v = first_on_chain(neighbors, edge[turned], edge[!turned]);
       // A flat triangle of one cell is a degenerate cell, not a hanging vertex.
@@ -217,7 +217,8 @@ class Validator {
     });
   }
 
-  /// First inner vertex of a path of two or more edges along the segment from a to b, or kNoIndex where there is none.
+  /// Returns the first inner vertex of a path of two or more edges along the segment from a to b, or kNoIndex if there
+  /// is none.
   Index first_on_chain(const std::vector<std::vector<Index>>& neighbors, Index a, Index b) const {
     const Vec3 along = mesh_.positions[b] - mesh_.positions[a];
     const double length2 = along.squaredNorm();
@@ -267,7 +268,7 @@ class Validator {
     }
   }
 
-  /// Number of groups of the faces around v, two faces being in one group when an edge at v joins them.
+  /// Returns the number of fans of the faces around v: two faces are in one fan if they share an edge at v.
   static int num_fans(const MeshTopology& topology, Index v, std::span<const Index> faces) {
     std::vector<std::pair<Index, std::size_t>> spokes;  // other end of an edge at v, face
     for (std::size_t i = 0; i < faces.size(); ++i) {
@@ -292,7 +293,7 @@ class Validator {
     return groups;
   }
 
-  // The first cell sees a face's corners in its order; the second must see the same loop backwards.
+  // The first cell sees the corners of a face in the stored order; the second must see the same loop backwards.
   void check_orientation(const MeshTopology& topology) {
     for (std::size_t c = 0; c < mesh_.num_cells(); ++c) {
       const CellTopology& local = cell_topology(mesh_.kinds[c]);

@@ -14,7 +14,7 @@ namespace subvol {
 
 /// A mesh of linear hexes, prisms and tets as a plain value: flat arrays, no derived data.
 ///
-/// Corners of a cell follow `CellKind`'s numbering. Anything may be stored; `validate` says what is wrong with it.
+/// The corners of a cell follow `CellKind`'s numbering. Anything may be stored; `validate` says what is wrong with it.
 struct VolumeMesh {
   std::vector<Vec3> positions;
   std::vector<CellKind> kinds;             ///< one per cell

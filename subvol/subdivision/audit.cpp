@@ -14,9 +14,9 @@ namespace subvol {
 
 namespace {
 
-constexpr double kSlack = std::numbers::pi / 180;  // flat up to noise: one degree
+constexpr double kSlack = std::numbers::pi / 180;  // one degree: angles this close to straight are noise
 
-/// Boundary faces at each boundary vertex joined across shared edges: more than one group is more than one fan.
+/// Groups the corners of boundary faces at each vertex, joined across shared edges: each group is one fan.
 class Fans {
  public:
   explicit Fans(std::size_t num_corners) : parents_(num_corners) { std::iota(parents_.begin(), parents_.end(), 0); }
@@ -104,7 +104,7 @@ double corner_angle(const SurfaceTopology& surface, Index h, std::span<const Vec
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// The smooth edges within spans of more than half a turn between two creases around a fixed vertex.
+/// Returns the smooth edges within spans of more than half a turn between two creases around a fixed vertex.
 std::vector<Index> folding_edges(const SurfaceTopology& surface, Index v, std::span<const Vec3> points) {
   const auto edge = [&](Index h) { return surface.corner_edges[h]; };
   const auto sharp = [&](Index h) { return surface.edge_sharpness[edge(h)] > 0; };

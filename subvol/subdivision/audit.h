@@ -9,21 +9,21 @@
 
 namespace subvol {
 
-/// What in a mesh's boundary works against good cells under subdivision, however good the cells are now.
+/// Boundary configurations that degrade cells under subdivision, however good the cells are now.
 ///
 /// Edges are pairs of vertices, the smaller first; all lists ascend.
 struct SubdivisionAudit {
   std::size_t num_boundary_edges = 0;
-  /// Smooth boundary edges of one cell: the limit surface is flat across them, so that cell's angle there tends to 180
-  /// degrees and its smallest scaled Jacobian about halves per level. Remedy: a crease, or a layer of cells (pillow).
+  /// Smooth boundary edges of one cell: the limit surface is smooth across them, so the cell's angle there tends to 180
+  /// degrees and its smallest scaled Jacobian roughly halves per level. Remedy: a crease, or a layer of cells (pillow).
   std::vector<std::array<Index, 2>> flattened_edges;
-  /// Creases whose faces enclose more than 180 degrees inside the volume. Interior rows are made for them.
+  /// Creases whose faces enclose more than 180 degrees inside the volume. `CreaseSheets` keeps valid cells valid.
   std::vector<std::array<Index, 2>> reflex_creases;
-  /// Fixed vertices where two or more boundary faces between two creases span more than 180 degrees: there the
-  /// Catmull-Clark surface itself folds. Remedy: creases along the edges within the span, `folding_edges`.
+  /// Fixed vertices at which two or more boundary faces between two creases span more than 180 degrees: the
+  /// Catmull-Clark surface itself folds there. Remedy: creases along the edges within the span, `folding_edges`.
   std::vector<Index> folding_corners;
   std::vector<std::array<Index, 2>> folding_edges;
-  /// Boundary edges of other than two boundary faces, and vertices of more than one fan: `subdivide` refuses them.
+  /// Boundary edges without exactly two boundary faces, and vertices of more than one fan: `subdivide` refuses them.
   std::vector<std::array<Index, 2>> nonmanifold_edges;
   std::vector<Index> nonmanifold_vertices;
   std::vector<std::string> warnings;  ///< one line for people per kind of finding, with its count
@@ -31,15 +31,18 @@ struct SubdivisionAudit {
   bool can_subdivide() const { return nonmanifold_edges.empty() && nonmanifold_vertices.empty(); }
 };
 
-/// Looks a mesh's boundary over. Cells may be inverted; indices must be sound (InputError, as `MeshTopology`).
+/// Audits the boundary of a mesh. Cells may be inverted; indices must be valid.
 ///
-/// Angles are of mean planes of faces and count from 1 degree beyond straight. On a boundary that is no manifold only
-/// the non-manifold entities and flattened edges are listed. Cost: linear.
+/// Angles at creases are those between the mean planes of the faces; an angle counts if it exceeds 180 degrees by more
+/// than 1. If the boundary is not a manifold, only the non-manifold entities and flattened edges are listed.
+/// InputError: as `MeshTopology` and, if the boundary is a manifold, `tagged_boundary`. Cost: linear.
 SubdivisionAudit audit(const VolumeMesh& mesh);
 
-/// The mesh's tags with the audit's `folding_edges` as creases too, so that its boundary does not fold at corners.
+/// Returns the mesh's tags with the audit's `folding_edges` added as creases, so that the boundary does not fold at
+/// corners.
 ///
-/// sharpness  of the added creases, > 0: above 1 the first refinement keeps the span straight, infinite for ever.
+/// sharpness  of the added creases, > 0: from 1 on, the first refinement keeps the edges straight; an infinite one
+///            always does.
 FeatureTags unfolding_tags(const VolumeMesh& mesh, const SubdivisionAudit& found,
                            double sharpness = kInfiniteSharpness);
 

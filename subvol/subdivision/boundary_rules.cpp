@@ -10,13 +10,14 @@ namespace subvol {
 
 namespace {
 
-/// What one face of n corners adds to an averaged smooth edge child: `end` to both ends, `face` to its centroid.
+/// Share of one face in the averaged child of a smooth edge: the weight of each end, and that of the face's centroid.
 struct FaceShare {
   double end, face;
 };
 
-/// The mean of the two fine quads at the edge, written with the face's centroid. Only triangles and quads have it in
-/// this form: there the corner next to each end is known from the centroid and the ends.
+/// Returns the mean of the centroids of the face's two fine quads at the edge, as weights of the ends and the centroid.
+/// Only triangles and quads have this form: there the ends and the centroid determine the sum of the corners next to
+/// the ends.
 FaceShare averaged_share(int size) { return size == 3 ? FaceShare{3.0 / 16, 5.0 / 8} : FaceShare{1.0 / 4, 1.0 / 2}; }
 
 VertexWeights smooth_vertex(BoundaryRule rule, int valence) {
@@ -50,7 +51,7 @@ VertexWeights weights_of(Rule vertex, BoundaryRule rule, std::span<const float> 
   return smooth_vertex(rule, static_cast<int>(edges.size()));
 }
 
-/// Mean of the sharpnesses that reach 0 in this step, at most 1.
+/// Returns the mean of the sharpnesses that reach 0 in this step, at most 1.
 float transition(float corner, std::span<const float> edges) {
   float sum = 0;
   int count = 0;
@@ -93,7 +94,7 @@ VertexWeights vertex_weights(BoundaryRule rule, float corner_sharpness, std::spa
   const Rule child = vertex_rule(child_sharpness(corner_sharpness), child_edges);
   if (child == parent) return before;
 
-  // Never two creases with different ends: a crease only ever turns smooth, a corner has no ends.
+  // At most one of the two rules has crease ends: a crease can only turn smooth, and a corner has no ends.
   const VertexWeights after = weights_of(child, rule, child_edges);
   const double w = transition(corner_sharpness, edge_sharpness);
   return {w * before.self + (1 - w) * after.self, w * before.edge + (1 - w) * after.edge,

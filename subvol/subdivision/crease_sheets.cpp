@@ -60,7 +60,7 @@ void CreaseSheets::add_edge(Index e, double weight, RowBuilder& row) const {
   while (last != edge_faces_.end() && last->edge == e) ++last;
   const auto [a, b] = topology_.edge(e);
   const double count = static_cast<double>(last - first);
-  // At a fixed end, and where the crease runs out, there is nothing to be smooth along.
+  // At a fixed vertex and at the end of the crease there is no curve along which the sheet could be smooth.
   const bool straight = fixed_[a] || fixed_[b] || count == 1;
   const double end = straight ? 0.5 : 0.25;
   row.add(a, weight * end);

@@ -16,7 +16,7 @@ namespace {
 
 using Row = Eigen::RowVectorXd;
 
-/// Places in a ring of valence n.
+/// Places of edges and faces in a ring mask of valence n.
 struct Ring {
   int n;
   int size() const { return 1 + 2 * n; }
@@ -24,7 +24,8 @@ struct Ring {
   int face(int i) const { return 1 + n + (i + n) % n; }
 };
 
-/// Weights on the ring before one refinement, from those on the ring after it: times the matrix of the rules.
+/// Turns weights on the ring after one refinement into weights on the ring before it: the product with the matrix of
+/// the rules.
 Row before_refinement(const Row& mask, const RingSharpness& sharpness) {
   const Ring ring{static_cast<int>(sharpness.edges.size())};
   const VertexWeights vertex = vertex_weights(BoundaryRule::catmull_clark, sharpness.corner, sharpness.edges);
@@ -58,11 +59,11 @@ std::vector<int> sharp_edges(const RingSharpness& ring) {
   return ends;
 }
 
-/// The ring as it is once no finite sharpness is left, and what it was in the refinements on the way.
+/// The ring once no finite sharpness is left, and its states in the refinements up to then.
 struct Decay {
   RingSharpness stationary;
   std::vector<RingSharpness> steps;
-  /// Weights on the ring at the start, from those on the stationary one.
+  /// Turns weights on the stationary ring into weights on the ring at the start.
   RingMask at_start(Row mask) const {
     for (auto step = steps.rbegin(); step != steps.rend(); ++step) mask = before_refinement(mask, *step);
     return {mask.data(), mask.data() + mask.size()};
@@ -95,7 +96,7 @@ Row crease_limit(const Ring& ring, int a, int b) {
 }
 
 Row dart_limit(const RingSharpness& sharpness) {
-  constexpr int kRefinements = 512;  // the next eigenvalue of any usual valence has vanished
+  constexpr int kRefinements = 512;  // by then the powers of the next eigenvalue vanish for usual valences
   Row mask = Row::Unit(2 * static_cast<int>(sharpness.edges.size()) + 1, 0);
   for (int i = 0; i < kRefinements; ++i) mask = before_refinement(mask, sharpness);
   return mask / mask.sum();
@@ -109,7 +110,7 @@ Row stationary_limit(const RingSharpness& sharpness) {
   return ends.empty() ? smooth_limit(ring) : dart_limit(sharpness);
 }
 
-/// The dominant eigenvalue of the Fourier mode of angle t around a vertex, and the weight of faces against edges in
+/// The dominant eigenvalue of the Fourier mode of angle t around a vertex, and the weight of faces relative to edges in
 /// its left eigenvector.
 struct Mode {
   double eigenvalue, face_weight;
@@ -118,7 +119,7 @@ struct Mode {
 Mode fourier_mode(double t) {
   const double c = std::cos(t), half = std::cos(t / 2);
   const double lambda = (5 + c + std::sqrt((c + 9) * (c + 1))) / 16;
-  // At t = pi edges and faces do not mix and the face alone is left.
+  // At t = pi edges and faces do not mix: the weight of the faces is 0.
   return {lambda, half < 1e-12 ? 0 : 2 * (lambda - 3.0 / 8 - c / 8) / half};
 }
 
@@ -135,8 +136,8 @@ std::array<Row, 2> smooth_tangents(const Ring& ring) {
   return tangents;
 }
 
-/// Into a sector of `count` quads from edge `first`: sine weights inside, the rest from the left eigenvector equations
-/// of the vertex and of the two border edges.
+/// Returns the mask of the tangent into a sector of `count` quads from edge `first`: the weights inside are sines, the
+/// others follow from the left eigenvector equations of the vertex and of the two border edges.
 Row inward_tangent(const Ring& ring, int first, int count, bool corner) {
   Row mask = Row::Zero(ring.size());
   const double t = std::numbers::pi / count;
@@ -152,9 +153,9 @@ Row inward_tangent(const Ring& ring, int first, int count, bool corner) {
   const double lambda = mode.eigenvalue;
   const double into_border = mask[ring.edge(first + 1)] / 16 + mask[ring.face(first)] / 4;
   const double into_vertex = 3.0 / 8 * edges + faces / 4;
-  // Unknown: weight a of the vertex, b of both border edges.
+  // The unknowns are the weight a of the vertex and b of both border edges:
   //   (lambda - 1/2) b - a / 8 = into_border,   (lambda - 3/4) a - b = into_vertex     (crease)
-  // At a corner the vertex takes nothing from the border: (lambda - 1/2) b = into_border, and the weights sum to 0.
+  // At a corner the vertex does not depend on the border: (lambda - 1/2) b = into_border, and the weights sum to 0.
   double a, b;
   if (corner) {
     b = into_border / (lambda - 0.5);
@@ -181,7 +182,7 @@ std::array<Row, 2> sector_tangents(const Ring& ring, int first, int count, bool 
   return tangents;
 }
 
-/// No closed form: the differences that are left after many refinements, scaled back to size.
+/// Returns what is left of the smooth tangents after many refinements, scaled back: there is no closed form.
 std::array<Row, 2> dart_tangents(const RingSharpness& sharpness) {
   constexpr int kRefinements = 24;
   std::array<Row, 2> tangents = smooth_tangents({static_cast<int>(sharpness.edges.size())});

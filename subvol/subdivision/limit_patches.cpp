@@ -25,7 +25,7 @@ std::array<Vec3, 4> combine_rows(const std::array<double, 4>& w, const ControlNe
   return row;
 }
 
-/// The vertex at a corner with its ring; place 0 of the ring is that corner.
+/// The vertex at a corner with its ring, which starts at that corner.
 class VertexRing {
  public:
   VertexRing(const SurfaceTopology& surface, std::span<const Vec3> points, Index corner)
@@ -45,7 +45,7 @@ class VertexRing {
 
   Vec3 position() const { return apply(limit_mask(sharpness_)); }
 
-  /// Of the smooth piece that the corner belongs to.
+  /// Returns the normal of the smooth piece that the corner belongs to.
   Vec3 normal() const {
     const int valence = static_cast<int>(sharpness_.edges.size());
     for (const TangentSector& sector : tangent_sectors(sharpness_)) {
@@ -75,12 +75,12 @@ struct LimitPatches::Samples {
   std::size_t at(std::size_t i, std::size_t j) const { return j * u.size() + i; }
 };
 
-/// A quad of some level and the samples to be taken in it: u[first_u .. last_u - 1] and so on.
+/// A quad of some level and the samples to take in it: u[first_u .. last_u - 1] and so on.
 struct LimitPatches::Block {
   int level;
   Index face;
   int turn;  // the quad's corner of lowest parameters
-  int u, v;  // those
+  int u, v;  // the lowest parameters
   std::size_t first_u, last_u, first_v, last_v;
   int size() const { return kUnits >> level; }
   bool empty() const { return first_u == last_u || first_v == last_v; }
@@ -165,7 +165,7 @@ void LimitPatches::fill(const Block& block, const Samples& samples) const {
     }
 }
 
-// A child starts at its parent's corner of its own number, so its corner of lowest parameters is another one.
+// Child k has its corner 0 at its parent's corner k, so its corner of lowest parameters has another number.
 void LimitPatches::fill_children(const Block& block, const Samples& samples) const {
   assert(block.level + 1 < static_cast<int>(levels_.size()));
   const int half = block.size() / 2;

@@ -12,9 +12,9 @@ namespace subvol {
 
 /// The Catmull-Clark limit surface of a control cage, evaluated exactly at dyadic parameters, patch by patch.
 ///
-/// Where a quad and its neighbours are regular (valence 4, or beside creases of infinite sharpness that bound them as a
-/// knot line would) it is one bicubic B-spline patch; else its four children are looked at, down to quads whose samples
-/// are corners only, and those have limit masks. So every point is exact, up to rounding, at every kind of vertex.
+/// A quad is one bicubic B-spline patch if it and its neighbors are regular (valence 4, or next to creases of infinite
+/// sharpness that bound them as a knot line would). Otherwise its four children are evaluated, down to quads that are
+/// sampled only at corners, which have limit masks. So every point is exact, up to rounding, at every kind of vertex.
 class LimitPatches : public PatchSurface {
  public:
   /// InputError: as `tagged_boundary`. Cost: linear, about 1 microsecond per patch.
@@ -24,12 +24,12 @@ class LimitPatches : public PatchSurface {
   const std::array<Index, 2>& face_corner(Index patch) const override { return layout_.face_corners[patch]; }
   const std::array<bool, 2>& sharp_sides(Index patch) const override { return layout_.sharp_sides[patch]; }
 
-  /// Does work once per depth, for the quads that are still irregular there: few, but along semi-sharp creases 2^depth
-  /// a quad.
+  /// Works once per depth on the quads that are still irregular there: few of them, except along semi-sharp creases,
+  /// where there are 2^depth per quad.
   void prepare(int depth) override;
 
-  /// Normals are outward but for tangents spanning more than 180 degrees at a vertex; on creases of infinite sharpness
-  /// they are of this patch's side. Cost: about 10 ns per point.
+  /// Normals point outward, except at a vertex whose tangents span more than 180 degrees; on creases of infinite
+  /// sharpness they are those of this patch's side. Cost: about 10 ns per point.
   void evaluate(Index patch, std::span<const int> u, std::span<const int> v, Vec3* positions,
                 Vec3* normals = nullptr) const override;
 
@@ -37,8 +37,8 @@ class LimitPatches : public PatchSurface {
   struct Level {
     SurfaceTopology surface;
     std::vector<Vec3> points;
-    std::vector<char> regular;          // of the faces that belong to patches: they come first
-    std::vector<Index> first_children;  // in the next level, once that is there; kNoIndex for regular faces
+    std::vector<char> regular;          // true for regular faces; only for faces of patches, which come first
+    std::vector<Index> first_children;  // in the next level, once it exists; kNoIndex for regular faces
   };
   struct Block;
   struct Samples;

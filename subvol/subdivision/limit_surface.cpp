@@ -17,7 +17,7 @@ namespace {
 constexpr int kMaxBoundaryLevels = 8;
 constexpr BoundaryRule kRule = BoundaryRule::catmull_clark;
 
-/// The corners around a vertex, counter-clockwise: corner i lies in the face between edges i and i + 1.
+/// Returns the corners around a vertex, counter-clockwise: corner i lies in the face between edges i and i + 1.
 std::vector<Index> corners_around(const SurfaceTopology& surface, Index v) {
   std::vector<Index> corners;
   const Index start = surface.vertex_corners[v];
@@ -40,7 +40,8 @@ bool all_quads(const SurfaceTopology& surface, std::span<const Index> corners) {
                      [&](Index h) { return surface.face_size(surface.corner_faces[h]) == 4; });
 }
 
-/// A ring mask turned into a row: directly where all faces are quads, else on the children, which are.
+/// Turns ring masks of a vertex into rows: directly if all its faces are quads, otherwise through its children, whose
+/// faces are.
 class RingRow {
  public:
   RingRow(const SurfaceTopology& surface, Index v, std::span<const Index> columns)
@@ -102,7 +103,7 @@ void add_limit_row(const SurfaceTopology& surface, Index v, std::span<const Inde
   ring.add(limit_mask(ring.sharpness()), row);
 }
 
-/// Rows of limit positions by `columns`.
+/// Returns the rows of limit positions; surface vertex v is column columns[v].
 SparseMap limit_rows(const SurfaceTopology& surface, std::span<const Index> columns, std::size_t num_cols) {
   return assemble_rows(surface.num_vertices(), num_cols, [&](std::size_t v, RowBuilder& row) {
     add_limit_row(surface, static_cast<Index>(v), columns, row);
@@ -153,7 +154,8 @@ std::array<Index, 4> face_entries(const SurfaceTopology& surface, Index f, std::
   return entries;
 }
 
-/// The 2^levels descendants of every crease. Those of edge e are e 2^levels and on, as `refined_topology` numbers them.
+/// Returns the 2^levels descendants of every crease. Those of edge e have the numbers from e 2^levels on, as
+/// `refined_topology` numbers them.
 std::vector<std::array<Index, 2>> refined_creases(const VolumeMesh& mesh, const MeshTopology& topology,
                                                   std::span<const Index> volume_edges, const SurfaceTopology& refined,
                                                   int levels) {
@@ -242,7 +244,7 @@ std::vector<Vec3> limit_normals(const BoundaryRefinement& refinement, std::span<
           (points[quad[(i + 1) % size]] - p).cross(points[quad[(i + size - 1) % size]] - p);
     }
   }
-  // Tangents this close to parallel carry no direction: a hundred times the rounding of their rows.
+  // Tangents this close to parallel define no normal: a hundred times the rounding error of their rows.
   constexpr double kParallel = 1e-10;
   std::vector<Vec3> normals(u.size());
   for (std::size_t s = 0; s < u.size(); ++s) {

@@ -11,20 +11,21 @@
 
 namespace subvol {
 
-/// Control vertices -> nodes whose boundary lies on the Catmull-Clark limit surface; interior vertices stay.
+/// Returns the map from control vertices to nodes: boundary vertices go to their positions on the Catmull-Clark limit
+/// surface, interior vertices stay.
 ///
 /// Square, num_vertices() rows; boundary rows sum to 1 and use boundary vertices only. Exact for smooth vertices,
-/// creases, corners, semi-sharp features and darts, beside quads and triangles.
+/// creases, corners, semi-sharp features and darts, next to quads and triangles.
 /// InputError: as `tagged_boundary` (a boundary that is not a manifold, bad tags). Cost: linear.
 SparseMap limit_map(const VolumeMesh& mesh);
 
-/// The boundary of a volume mesh refined by itself, its vertices at limit positions.
+/// The boundary of a volume mesh, refined on its own, with its vertices at limit positions.
 struct BoundaryRefinement {
   SparseMap positions;  ///< refined boundary vertices x control vertices of the volume mesh
-  /// Faces of the refined boundary, outward. All quads, but for level 0 of a boundary with triangles: those have
-  /// kNoIndex as their last corner.
+  /// Faces of the refined boundary, outward. All of them are quads, except at level 0 of a boundary with triangles,
+  /// which have kNoIndex as their last corner.
   std::vector<std::array<Index, 4>> quads;
-  std::vector<Index> face_of_quad;  ///< boundary face each came from: a place in MeshTopology::boundary_faces()
+  std::vector<Index> face_of_quad;  ///< boundary face of each quad: a place in MeshTopology::boundary_faces()
   std::vector<Index> vertices;      ///< volume vertex of each of the first vertices.size() refined vertices
   /// Refined edges along the mesh's creases, in the order of its tags: 2^levels for each.
   std::vector<std::array<Index, 2>> crease_edges;
@@ -35,20 +36,22 @@ struct BoundaryRefinement {
   std::vector<std::array<Index, 4>> quad_sites;  ///< site of each corner of `quads`
 };
 
-/// levels         0 .. 8 further refinements of the boundary alone; each quarters its quads.
-/// with_tangents  fills tangent_u, tangent_v and quad_sites as well.
+/// Refines the boundary of a mesh and moves its vertices to their limit positions.
+///
+/// levels         0 .. 8 further refinements of the boundary alone; each splits every quad into four.
+/// with_tangents  fills tangent_u, tangent_v and quad_sites, too.
 ///
 /// Each refined vertex lies exactly on the limit surface (as `limit_map`), so the quads are a tessellation of it.
 /// Cost: about 1 microsecond per refined vertex.
 BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with_tangents = false);
 
-/// Unit normals of the limit surface at the sites of a refinement made with tangents; outward.
+/// Returns the outward unit normals of the limit surface at the sites of a refinement with tangents.
 ///
 /// points  positions.apply(control positions). A site whose tangents are parallel gets the mean normal of its quads.
 std::vector<Vec3> limit_normals(const BoundaryRefinement& refinement, std::span<const Vec3> control,
                                 std::span<const Vec3> points);
 
-/// A point of the limit surface with its derivatives by the face's parameters.
+/// A point of the limit surface with its derivatives with respect to the face's parameters.
 struct LimitPoint {
   Vec3 position, du, dv;
   Vec3 normal() const { return du.cross(dv).normalized(); }
@@ -56,8 +59,8 @@ struct LimitPoint {
 
 /// Evaluates the limit surface anywhere, by OpenSubdiv's base face representation.
 ///
-/// Positions are exact but for the immediate neighbourhood of darts and of semi-sharp features (2e-4 of the extent);
-/// normals at extraordinary vertices are good to 1e-5. The boundary must consist of quads (one `subdivide` sees to it).
+/// Positions are exact except close to darts and semi-sharp features (2e-4 of the extent); normals at extraordinary
+/// vertices are accurate to 1e-5. The boundary must consist of quads, as it does after one `subdivide` (InputError).
 class LimitSurface {
  public:
   explicit LimitSurface(const VolumeMesh& mesh);
@@ -67,8 +70,8 @@ class LimitSurface {
 
   std::size_t num_faces() const;
   /// face  a place in MeshTopology::boundary_faces(), whose corners are (u, v) = (0,0), (1,0), (1,1), (0,1).
-  /// InputError: face, u or v out of range. Cost: about 100 ns once the face has been prepared (at its first use; not
-  /// to be called from several threads at a time).
+  /// InputError: face, u or v out of range. Cost: about 100 ns once the face has been prepared, at its first use. Must
+  /// not be called from several threads at a time.
   LimitPoint evaluate(Index face, double u, double v) const;
 
  private:

@@ -20,7 +20,7 @@ namespace {
 namespace far = OpenSubdiv::Far;
 namespace bfr = OpenSubdiv::Bfr;
 
-constexpr int kApproximationLevel = 8;  // isolation around extraordinary vertices: normals to 1e-5 there
+constexpr int kApproximationLevel = 8;  // isolation level; normals at extraordinary vertices are accurate to 1e-5
 
 std::unique_ptr<far::TopologyRefiner> make_refiner(const SurfaceTopology& surface) {
   std::vector<int> sizes, crease_ends, corners;
@@ -66,7 +66,7 @@ bfr::SurfaceFactory::Options factory_options() {
 struct LimitSurface::Implementation {
   using Factory = bfr::RefinerSurfaceFactory<bfr::SurfaceFactoryCache>;
 
-  /// A face's surface with its patch points, made at its first use.
+  /// The surface of a face with its patch points, made at its first use.
   struct Patch {
     bfr::Surface<double> surface;
     std::vector<double> points;

@@ -6,7 +6,7 @@
 namespace subvol {
 
 Vec3 unit_normal(const Vec3& du, const Vec3& dv) {
-  // Tangents this close to parallel carry no direction: a hundred times the rounding of their weights.
+  // Tangents this close to parallel define no normal: a hundred times the rounding error of their weights.
   constexpr double kParallel = 1e-10;
   const Vec3 cross = du.cross(dv);
   const double length = cross.norm();

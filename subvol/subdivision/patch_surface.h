@@ -8,13 +8,13 @@
 
 namespace subvol {
 
-/// A smooth boundary of a volume mesh, patch by patch, to be evaluated at dyadic parameters.
+/// A smooth boundary of a volume mesh that is evaluated patch by patch at dyadic parameters.
 ///
 /// A patch is a quad of the boundary refined once: the part of a boundary face next to one of its corners.
 ///
-///   (0, kUnits) ------ (kUnits, kUnits)      corner 0 is a vertex of the mesh, corner 2 the centre of the face;
+///   (0, kUnits) ------ (kUnits, kUnits)      corner 0 is a vertex of the mesh, corner 2 the center of the face;
 ///       |  3          2  |                   sides 3-0 and 0-1 are halves of the mesh's edges. Across every side the
-///       |  0          1  |                   parameter along it runs the same way in the neighbour.
+///       |  0          1  |                   parameter along it runs the same way in the neighbor.
 ///   (0, 0) ----------- (kUnits, 0)
 class PatchSurface {
  public:
@@ -24,29 +24,31 @@ class PatchSurface {
   virtual ~PatchSurface() = default;
 
   std::size_t num_patches() const { return quads().num_faces(); }
-  /// The quads of one refinement: corner k of patch p is corner 4 p + k. Normals part at edges of infinite sharpness.
+  /// Returns the quads of one refinement: corner k of patch p is corner 4 p + k. Normals jump across edges of infinite
+  /// sharpness.
   virtual const SurfaceTopology& quads() const = 0;
-  /// Boundary face of each patch (a place in MeshTopology::boundary_faces()), and which of its corners.
+  /// Returns the boundary face of a patch (a place in MeshTopology::boundary_faces()), and the number of its corner.
   virtual const std::array<Index, 2>& face_corner(Index patch) const = 0;
-  /// Whether the patch's sides 0-1 and 3-0 lie on creases, of any sharpness.
+  /// Returns true for each of the patch's sides 0-1 and 3-0 that lies on a crease, of any sharpness.
   virtual const std::array<bool, 2>& sharp_sides(Index patch) const = 0;
 
-  /// Makes ready for parameters that are multiples of kUnits / 2^depth; 0 <= depth <= kMaxDepth.
+  /// Prepares for parameters that are multiples of kUnits / 2^depth; 0 <= depth <= kMaxDepth.
   virtual void prepare(int depth) = 0;
 
-  /// Points of the surface at u.size() x v.size() parameters, u fastest; normals too unless null.
+  /// Evaluates the surface at u.size() x v.size() parameters, u fastest; also its normals, unless null.
   ///
-  /// u, v       ascending, within the patch, multiples of what has been prepared.
-  /// normals    unit, outward where the patch is not folded; zero where tangents are parallel; of this patch's side.
-  /// Reads only: may be called from several threads.
+  /// u, v       ascending, within the patch, multiples of the step that has been prepared.
+  /// normals    unit, outward unless the patch is folded; zero if the tangents are parallel; those of this patch's
+  ///            side.
+  /// May be called from several threads.
   virtual void evaluate(Index patch, std::span<const int> u, std::span<const int> v, Vec3* positions,
                         Vec3* normals = nullptr) const = 0;
 };
 
-/// The unit vector along du x dv; zero where they are parallel up to rounding.
+/// Returns the unit vector along du x dv; zero if they are parallel up to rounding.
 Vec3 unit_normal(const Vec3& du, const Vec3& dv);
 
-/// Which patches the faces of a boundary have: face, corner of each, and which of its two outer sides are sharp.
+/// The patches of a boundary: the face and corner of each, and which of its two outer sides are sharp.
 struct PatchLayout {
   std::vector<std::array<Index, 2>> face_corners;
   std::vector<std::array<bool, 2>> sharp_sides;

@@ -28,7 +28,8 @@ bool is_regular_corner(const SurfaceTopology& surface, Index corner) {
   const bool stays = own > 0 || num_sharp > 2;
   if (stays) return out && in;
   if (num_sharp != 2 || out == in) return false;
-  // One more face lies between the creases: counter-clockwise from this one if the edge out is sharp, else clockwise.
+  // Exactly one more face must lie between the creases: counter-clockwise from this one if the edge out is sharp,
+  // otherwise clockwise.
   return out ? is_sharp(surface.prev(surface.rotate(corner))) : is_sharp(surface.next(surface.twins[corner]));
 }
 
@@ -48,7 +49,7 @@ ControlNet control_net(const SurfaceTopology& surface, std::span<const Vec3> poi
     corners[k] = surface.face_offsets[face] + (turn + k) % 4;
     crease[k] = surface.edge_sharpness[surface.corner_edges[corners[k]]] > 0;
   }
-  // beyond[k]: across side k, next to its first and to its second corner.
+  // beyond[k]: the points across side k, next to its first and to its second corner.
   std::array<std::array<Vec3, 2>, 4> beyond;
   for (int k = 0; k < 4; ++k) {
     const Vec3 &a = point(corners[k]), &b = point(corners[(k + 1) % 4]);

@@ -7,8 +7,9 @@ namespace subvol {
 
 /// Refines several times: V_fine = S_levels ... S_1 V_control.
 ///
-/// levels  0 .. 8. matrix: if given, the product of the S, with a row for every fine and a column for every control
-/// vertex. InputError: levels out of range, more cells than can be numbered, and as `subdivide`.
+/// levels  0 .. 8.
+/// matrix  if not null, receives the product of the S: fine vertices x control vertices.
+/// InputError: levels out of range, more cells than can be numbered, and as `subdivide`.
 VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule = BoundaryRule::catmull_clark,
                                 SparseMap* matrix = nullptr);
 

@@ -17,7 +17,7 @@
 
 namespace subvol {
 
-/// One row of a sparse map in the making: sums weights by column, in the order they are added.
+/// Builds one row of a sparse map: sums the weights of each column in the order in which they are added.
 class RowBuilder {
  public:
   explicit RowBuilder(std::size_t num_cols) : slots_(num_cols, kNoIndex) {}
@@ -71,14 +71,15 @@ class RowBuilder {
   std::vector<double> weights_;
 };
 
-/// Asks the system for large pages behind what a vector has reserved: fresh memory costs most of the time otherwise.
+/// Asks the system for large pages in the memory that a vector has reserved: fresh memory takes most of the time
+/// otherwise.
 template <class T>
 void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 #ifdef MADV_HUGEPAGE
   constexpr std::uintptr_t kPage = 4096;
   const auto begin = (reinterpret_cast<std::uintptr_t>(reserved.data()) + kPage - 1) / kPage * kPage;
   const auto end = reinterpret_cast<std::uintptr_t>(reserved.data() + reserved.capacity()) / kPage * kPage;
-  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // advice: failure is no harm
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // failure does no harm
 #endif
 }
 
@@ -89,12 +90,12 @@ void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 template <class Fill>
 SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill) {
   constexpr std::size_t kChunkRows = 256, kWaveChunks = 8;
-  constexpr std::size_t kExpectedRowSize = 16;  // what is reserved and not used costs address space only
+  constexpr std::size_t kExpectedRowSize = 16;  // reserved memory that is not used costs address space only
   struct Chunk {
     std::vector<Index> columns;
     std::vector<double> values;
   };
-  std::array<Chunk, kWaveChunks> chunks;  // used again by every wave: fresh memory is what costs most here
+  std::array<Chunk, kWaveChunks> chunks;  // reused by every wave: fresh memory is the main cost here
   SparseMap map;
   map.num_cols = num_cols;
   map.offsets.resize(num_rows + 1);

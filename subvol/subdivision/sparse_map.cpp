@@ -43,7 +43,8 @@ std::vector<Vec3> SparseMap::apply(std::span<const Vec3> in) const {
 void SparseMap::apply_transposed(std::span<const Vec3> in, std::span<Vec3> out) const {
   if (in.size() != num_rows() || out.size() != num_cols)
     throw_sizes("SparseMap::apply_transposed", in.size(), num_rows(), out.size(), num_cols);
-  // A fixed number of slices, each with its own accumulator: the order of every sum is the same for any team size.
+  // A fixed number of slices, each with its own accumulator: the order of every sum is the same for any number of
+  // threads.
   constexpr std::size_t kSlices = 8;
   const std::size_t slices = num_rows() < 4096 ? 1 : kSlices;
   std::vector<Vec3> partial(slices * num_cols, Vec3::Zero());

@@ -15,20 +15,20 @@ namespace subvol {
 
 namespace {
 
-/// Weights of a cell's corners, by local number.
+/// Weights of the corners of a cell, by local number.
 using CellMask = std::array<double, kMaxCellVertices>;
 
-/// What one cell adds to the children of its entities: the centroids of its child hexes around each of them, averaged.
+/// Contribution of one cell to the children of its entities: the mean of the centroids of its child hexes around each.
 struct CellMasks {
   std::array<CellMask, kMaxCellVertices> vertices{};
   std::array<CellMask, kMaxCellEdges> edges{};
   std::array<CellMask, kMaxCellFaces> faces{};
 };
 
-/// Local numbers of the corners, edges and faces that the child hex of a corner has as vertices, in hex order.
+/// Local numbers of the edges and faces whose children are vertices of the child hex of a corner.
 struct ChildHex {
   std::array<std::int8_t, 3> edges;  ///< to corner_neighbors 0, 1, 2: hex vertices 1, 3, 4
-  std::array<std::int8_t, 3> faces;  ///< of neighbours (0,1), (0,2), (1,2): hex vertices 2, 5, 7
+  std::array<std::int8_t, 3> faces;  ///< of neighbors (0,1), (0,2), (1,2): hex vertices 2, 5, 7
 };
 
 std::int8_t find_local_edge(const CellTopology& cell, int a, int b) {
@@ -57,7 +57,7 @@ ChildHex make_child(const CellTopology& cell, int corner) {
            find_local_face(cell, corner, n[1], n[2])}};
 }
 
-/// Centroid of the child hex of a corner (the tables of 64ths of the hex, of 96ths of the tet and the prism).
+/// Returns the centroid of the child hex of a corner: multiples of 1/64 for a hex, of 1/96 for a tet and a prism.
 CellMask child_centroid(const CellTopology& cell, int corner, const ChildHex& child) {
   CellMask mask{};
   mask[corner] += 1;
@@ -98,7 +98,7 @@ const CellTables& cell_tables(CellKind kind) {
   return tables[static_cast<std::size_t>(kind)];
 }
 
-/// The (cell, local number) pairs of each entity of one dimension, ascending by cell.
+/// The pairs (cell, local number) of each entity of one dimension, ascending by cell.
 class Incidence {
  public:
   template <class EntitiesOfCell>
@@ -130,7 +130,7 @@ void add_mean(const Vertices& vertices, RowBuilder& row, double weight = 1) {
   for (Index v : vertices) row.add(v, share);
 }
 
-/// Everything the rows of one refinement are read from.
+/// Builds the rows, cells and tags of one refinement.
 class Refiner {
  public:
   Refiner(const VolumeMesh& mesh, BoundaryRule rule)
@@ -169,7 +169,7 @@ class Refiner {
     return numbers;
   }
 
-  /// Mean of the masks that the cells around an entity have for it.
+  /// Adds `weight` times the mean of the masks that the cells around an entity have for it.
   template <class Mask>
   void add_cell_mean(std::span<const std::uint32_t> uses, double weight, Mask&& mask, RowBuilder& row) const {
     const double share = weight / static_cast<double>(uses.size());

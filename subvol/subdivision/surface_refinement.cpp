@@ -104,8 +104,8 @@ SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std
   });
 }
 
-// The half of edge e at its own corner is edge 2e, the other half 2e + 1; then come the edges into the faces, by the
-// corner of the edge they start from.
+// The half of edge e at its own corner becomes edge 2e, the other half 2e + 1. The edge from the middle of the edge out
+// of corner h into the face becomes 2 ne + h.
 SurfaceTopology refined_topology(const SurfaceTopology& coarse) {
   const Index nv = static_cast<Index>(coarse.num_vertices()), ne = static_cast<Index>(coarse.num_edges());
   const Index nf = static_cast<Index>(coarse.num_faces());

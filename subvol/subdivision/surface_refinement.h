@@ -9,7 +9,8 @@
 
 namespace subvol {
 
-/// Where the rows of a refinement go: surface vertex v is column columns[v], and every weight is scaled.
+/// Target of the rows of a refinement: surface vertex v is column columns[v], and every weight is multiplied by
+/// `scale`.
 struct RowTarget {
   BoundaryRule rule;
   std::span<const Index> columns;
@@ -17,38 +18,43 @@ struct RowTarget {
   double scale = 1;
 };
 
-/// Adds the child of face f (its centroid), of edge e, of vertex v.
+/// Add the row of the child of face f (its centroid), of edge e, or of vertex v.
 void add_face_child(const SurfaceTopology& surface, Index f, const RowTarget& target);
 void add_edge_child(const SurfaceTopology& surface, Index e, const RowTarget& target);
 void add_vertex_child(const SurfaceTopology& surface, Index v, const RowTarget& target);
 
-/// The rule of vertex v with its sharpnesses; crease_ends count edges from surface.vertex_corners[v].
+/// Returns the weights of vertex v for its sharpnesses; crease_ends count edges from surface.vertex_corners[v].
 VertexWeights vertex_weights_at(const SurfaceTopology& surface, Index v, BoundaryRule rule);
 
-/// Rows of all children [vertices][edges][faces] by `columns` of `num_cols` (ascending, one per surface vertex).
+/// Returns the rows of all children [vertices][edges][faces].
+///
+/// columns  column of each surface vertex, ascending, below num_cols.
 SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std::span<const Index> columns,
                           std::size_t num_cols);
 
-/// The refined surface: one quad per corner, in order, (vertex, edge out, face, edge in). Sharpnesses carried.
+/// Returns the refined surface: one quad per corner, in order, with the corners (vertex, edge out, face, edge in) and
+/// the sharpnesses of `child_sharpness`.
 ///
-/// Works on open pieces as well (see `surface_piece`): sides of border faces get no twin.
+/// Works on open pieces, too (see `surface_piece`): sides on the border get no twin.
 SurfaceTopology refined_topology(const SurfaceTopology& surface);
 
-/// Points of all children [vertices][edges][faces] by the Catmull-Clark rules: `refinement_rows` applied, but without
-/// the rows.
+/// Returns the points of all children [vertices][edges][faces] by the Catmull-Clark rules, as `refinement_rows` would
+/// give them, without building the rows.
 ///
-/// surface  may be an open piece: children of border vertices and border edges are then meaningless.
+/// surface  may be an open piece: the children of border vertices and border edges are then meaningless (zero).
 /// points   one per surface vertex.
 std::vector<Vec3> refined_points(const SurfaceTopology& surface, std::span<const Vec3> points);
 
-/// Some faces of a surface and all that share a vertex with them, as an open surface with its own numbers.
+/// Some faces of a surface and all that share a vertex with them, as an open surface with its own numbering.
 struct SurfacePiece {
   SurfaceTopology topology;      ///< border edges have one corner, whose twin is kNoIndex
-  std::vector<Index> vertices;   ///< of the whole surface, for each vertex of the piece
+  std::vector<Index> vertices;   ///< vertex of the whole surface for each vertex of the piece
 };
 
-/// faces  chosen faces: they come first, in this order, and keep their first corners. None of their vertices may lie on
-///        a border.
+/// Cuts chosen faces and all that share a vertex with them out of a surface.
+///
+/// faces  the chosen faces: they come first, in this order, and keep their first corners. None of their vertices may
+///        lie on a border.
 SurfacePiece surface_piece(const SurfaceTopology& surface, std::span<const Index> faces);
 
 }  // namespace subvol

@@ -36,7 +36,7 @@ class PolygonCutter {
     std::array<Triangle, 2> cut = {{{q[0], q[1], q[2]}, {q[0], q[2], q[3]}}};
     std::array<Triangle, 2> other = {{{q[0], q[1], q[3]}, {q[1], q[2], q[3]}}};
     if ((x_[q[3]] - x_[q[1]]).squaredNorm() < (x_[q[2]] - x_[q[0]]).squaredNorm()) std::swap(cut, other);
-    // In a dart the shorter diagonal may run outside.
+    // In a dart (a quad with a reflex corner) the shorter diagonal may run outside.
     if (!same_side(cut[0], cut[1]) && same_side(other[0], other[1])) std::swap(cut, other);
     triangles_.insert(triangles_.end(), cut.begin(), cut.end());
   }
@@ -53,7 +53,8 @@ class PolygonCutter {
     cut_quad(rest);
   }
 
-  /// The corner with the shortest cut among those that are convex and cover no other corner; else just the shortest.
+  /// Returns the corner with the shortest cut among those that are convex and cover no other corner; if there is none,
+  /// the corner with the shortest cut of all.
   std::size_t best_ear(const std::vector<Index>& rest, const Vec3& normal) const {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const std::size_t n = rest.size();

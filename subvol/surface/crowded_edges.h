@@ -8,13 +8,13 @@
 
 namespace subvol {
 
-/// Edges of more than two faces, for a message: all are counted, the first ten are listed.
+/// Collects non-manifold edges (of more than two faces) for a message: all are counted, the first ten are listed.
 class CrowdedEdges {
  public:
-  /// The ends by `vertex_text`.
+  /// from, to  the ends of the edge, as `vertex_text` writes them.
   void add(const std::string& from, const std::string& to, std::size_t num_faces);
   bool empty() const { return count_ == 0; }
-  /// "1 edge has more than two faces: from vertex 4 (0 0 1) to 6 (0 1 1) has 3".
+  /// Returns "1 edge has more than two faces: from vertex 4 (0 0 1) to 6 (0 1 1) has 3" and a note on the numbering.
   std::string text() const;
 
  private:
@@ -22,7 +22,7 @@ class CrowdedEdges {
   std::string list_;
 };
 
-/// "4 (0 0 1)": a vertex's number and, where it is given, its position.
+/// Returns "4 (0 0 1)": the number of a vertex and, unless null, its position.
 std::string vertex_text(Index number, const Vec3* position);
 
 }  // namespace subvol

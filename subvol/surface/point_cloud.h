@@ -7,7 +7,7 @@
 
 namespace subvol {
 
-/// Points on a surface, in no order: what a scanner delivers. Nothing is known of what lies between them.
+/// Points on a surface in no particular order, as a scanner delivers them. The surface between them is not known.
 struct PointCloud {
   std::vector<Vec3> points;
 };

@@ -17,8 +17,8 @@ namespace subvol {
 
 namespace {
 
-/// Equal positions become one vertex; vertices of no triangle go. Numbers ascend as in the input; `names` are the first
-/// of those that became one vertex.
+/// Merges vertices of equal position and removes vertices of no triangle. The remaining vertices are numbered in the
+/// order in which the triangles name them; `names` receives the smallest input number of each.
 TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped, std::vector<Index>& names) {
   std::vector<char> used(mesh.positions.size(), 0);
   for (const auto& t : mesh.triangles)
@@ -78,7 +78,7 @@ std::vector<HalfEdge> sorted_half_edges(const TriangleMesh& mesh) {
   return edges;
 }
 
-/// Calls visit(run) for the half-edges of each edge.
+/// Calls visit(run) with the half-edges of each edge.
 template <class Visit>
 void for_each_edge(std::span<const HalfEdge> edges, Visit&& visit) {
   for (std::size_t first = 0, last; first < edges.size(); first = last) {
@@ -90,7 +90,7 @@ void for_each_edge(std::span<const HalfEdge> edges, Visit&& visit) {
 
 struct Neighbor {
   Index triangle = kNoIndex;
-  bool flipped = false;  ///< runs the same way along the common edge
+  bool flipped = false;  ///< true if both triangles run the same way along their common edge
 };
 
 void require_two_triangles(const TriangleMesh& mesh, std::span<const HalfEdge> edges, std::span<const Index> names) {
@@ -102,7 +102,7 @@ void require_two_triangles(const TriangleMesh& mesh, std::span<const HalfEdge> e
   if (!crowded.empty()) throw InputError("surface: it bounds no solid: " + crowded.text());
 }
 
-/// Neighbours across the edges of each triangle, in no order of edges. names: numbers of vertices for messages.
+/// Returns the neighbors across the edges of each triangle, in no particular order. names: vertex numbers for messages.
 std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const HalfEdge> edges,
                                                 std::span<const Index> names) {
   require_two_triangles(mesh, edges, names);
@@ -116,8 +116,8 @@ std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::s
   return neighbors;
 }
 
-/// Turns triangles to agree with their neighbours; the majority of a component stays as it is. Returns the component of
-/// each triangle; one without neighbours has none (-1).
+/// Flips triangles to agree with their neighbors; the majority of a component stays as it is. Returns the component of
+/// each triangle, or -1 for a triangle without neighbors.
 std::vector<int> orient(TriangleMesh& mesh, std::span<const Index> names, SolidBoundary& result) {
   const auto neighbors = neighbors_of(mesh, sorted_half_edges(mesh), names);
   std::vector<int> component(mesh.triangles.size(), -1);
@@ -156,7 +156,7 @@ std::vector<int> orient(TriangleMesh& mesh, std::span<const Index> names, SolidB
   return component;
 }
 
-/// Drops the triangles of no component.
+/// Drops the triangles that belong to no component.
 void drop_loners(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary& result) {
   std::size_t kept = 0;
   for (std::size_t t = 0; t < component.size(); ++t) {
@@ -169,7 +169,7 @@ void drop_loners(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
   component.resize(kept);
 }
 
-/// Closes every loop of edges with one triangle by a fan.
+/// Closes every loop of boundary edges, those with one triangle, by a fan.
 void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary& result) {
   std::vector<std::array<Index, 3>> rims;  // from, to, triangle
   for_each_edge(sorted_half_edges(mesh), [&](std::span<const HalfEdge> run) {
@@ -178,13 +178,13 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
           {run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
   });
   std::sort(rims.begin(), rims.end());
-  std::vector<std::size_t> left(mesh.positions.size(), rims.size());  // the first of a vertex's rims that is in no loop
+  std::vector<std::size_t> left(mesh.positions.size(), rims.size());  // each vertex's first unused edge
   for (std::size_t i = rims.size(); i-- > 0;) left[rims[i][0]] = i;
   for (std::size_t start = 0; start < rims.size(); ++start) {
     if (start < left[rims[start][0]]) continue;
     std::vector<std::size_t> loop;
     Vec3 mean = Vec3::Zero();
-    // Each rim vertex has as many edges out as in, so a walk comes back to where it began.
+    // As many boundary edges leave a vertex as enter it, so a walk returns to its start.
     for (std::size_t at = start;;) {
       left[rims[at][0]] = at + 1;
       loop.push_back(at);
@@ -205,7 +205,7 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
   }
 }
 
-/// Vertices - edges + triangles of each component, each fan at a vertex counting as a vertex of its own.
+/// Returns vertices - edges + triangles of each component; each fan at a vertex counts as a vertex of its own.
 std::vector<int> euler_numbers(const TriangleMesh& mesh, std::span<const int> component, int count) {
   std::vector<int> euler(static_cast<std::size_t>(count), 0);
   // Corners at one vertex that share an edge belong to one fan.
@@ -254,7 +254,7 @@ std::vector<Component> measured(const TriangleMesh& mesh, std::span<const int> c
   return result;
 }
 
-/// Boxes to be asked whether one of them holds another one: a tree with the largest box of each branch at its root.
+/// Finds out if one of many boxes contains a given box: a tree with the largest box of each branch at its root.
 class BoxTree {
  public:
   explicit BoxTree(std::vector<Eigen::AlignedBox3d> boxes) : boxes_(std::move(boxes)), hulls_(boxes_.size()) {
@@ -263,7 +263,8 @@ class BoxTree {
   bool holds(const Eigen::AlignedBox3d& box) const { return holds(0, boxes_.size(), box); }
 
  private:
-  /// Branch: boxes first .. last - 1, that at `first` and two branches of half of the others each.
+  /// A branch holds the boxes first .. last - 1: its root at `first`, and two branches of half of the others each.
+  /// Returns the place where the second one begins.
   static std::size_t middle(std::size_t first, std::size_t last) { return first + 1 + (last - first - 1) / 2; }
 
   void arrange(std::size_t first, std::size_t last) {
@@ -288,10 +289,11 @@ class BoxTree {
   }
 
   std::vector<Eigen::AlignedBox3d> boxes_;
-  std::vector<Eigen::AlignedBox3d> hulls_;  ///< of the branch that begins there
+  std::vector<Eigen::AlignedBox3d> hulls_;  ///< bounding box of the branch that begins at each place
 };
 
-/// Void walls are the components that were oriented against the whole and lie inside another one's box.
+/// Marks the walls of voids: components whose signed volume is opposite to the total and that lie inside the box of a
+/// component of the total's sign.
 std::vector<char> find_cavities(std::span<const Component> parts) {
   const double total =
       std::accumulate(parts.begin(), parts.end(), 0.0, [](double s, const Component& c) { return s + c.volume; });
@@ -336,7 +338,7 @@ SolidBoundary solid_boundary(const TriangleMesh& surface) {
     const auto c = static_cast<std::size_t>(component[t]);
     if ((parts[c].volume > 0) == (cavity[c] != 0)) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
   }
-  // Below this share of the largest volume its area could hold, a surface is flat up to rounding.
+  // A surface with a volume below kFlat area^(3/2) is flat up to rounding.
   double area = 0;
   for (const auto& t : mesh.triangles) {
     const Vec3& a = mesh.positions[t[0]];

@@ -14,7 +14,7 @@ std::string name_of(Index v, std::span<const Index> names) {
   return std::to_string(names.empty() ? v : names[static_cast<std::size_t>(v)]);
 }
 
-/// What a closed surface is here: the boundary of something.
+/// Prefix for messages: a closed surface is the boundary of a volume mesh.
 std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
 
 void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<const Index> names, SurfaceKind kind,
@@ -27,7 +27,8 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
     surface.vertex_corners[v] = static_cast<Index>(h);
     ++valence[v];
   }
-  // Corners as chains on that end of their edge that has fewer: a lookup is short even beside a vertex of all faces.
+  // Each corner is kept in a list at the end of its edge that has fewer corners: lookups are short even next to a
+  // vertex that all faces share.
   std::vector<Index> head(num_vertices, kNoIndex), next(num_corners);
   const auto hook = [&](Index a, Index b) {
     return valence[a] < valence[b] || (valence[a] == valence[b] && a < b) ? a : b;
@@ -63,7 +64,7 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
     }
     const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
     if (same + opposite > 2) {
-      bool is_first = true;  // of the corners at this edge
+      bool is_first = true;  // true if h is the first corner of this edge
       for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g])
         is_first = is_first && (g >= h || !joins(g, from, to));
       if (is_first) crowded.add(vertex(from), vertex(to), static_cast<std::size_t>(same + opposite));
@@ -97,7 +98,7 @@ void check_fans(const SurfaceTopology& surface, std::span<const Index> names, Su
     int fan = 0;
     Index h = start;
     for (; h != kNoIndex && (fan == 0 || h != start); h = surface.rotate(h)) ++fan;
-    if (h == kNoIndex)  // an open fan: what lies clockwise of the start
+    if (h == kNoIndex)  // an open fan: also count the corners clockwise of the start
       for (h = start; (h = surface.twins[h]) != kNoIndex; h = surface.next(h)) ++fan;
     if (fan != counts[v])
       throw InputError(prefix(kind) + "vertex " + name_of(static_cast<Index>(v), names) + " must have one fan of " +

@@ -9,9 +9,9 @@
 
 namespace subvol {
 
-/// An oriented surface of polygons, by corners: the boundary of a volume mesh with its tags, or a surface of its own.
+/// An oriented polygon surface as half-edges: the boundary of a volume mesh with its tags, or a surface of its own.
 ///
-/// A *corner* h is one vertex of one face and stands for the directed edge to the next vertex of that face, which sees
+/// A *corner* h is one vertex of one face and stands for the directed edge to the next vertex of that face, which has
 /// the face on its left (normals point outward). Vertices have their own compact numbers.
 ///
 ///        prev(h)
@@ -23,8 +23,8 @@ namespace subvol {
 struct SurfaceTopology {
   std::vector<Index> face_offsets{0};
   std::vector<Index> corner_vertices, corner_faces, twins, corner_edges;
-  std::vector<Index> edge_corners;    ///< one corner of each edge: the smaller number
-  std::vector<Index> vertex_corners;  ///< one corner at each vertex: the smallest number
+  std::vector<Index> edge_corners;    ///< one corner of each edge: that of the smaller number
+  std::vector<Index> vertex_corners;  ///< one corner at each vertex: that of the smallest number
   std::vector<float> edge_sharpness, vertex_sharpness;
 
   std::size_t num_vertices() const { return vertex_corners.size(); }
@@ -42,7 +42,7 @@ struct SurfaceTopology {
     const Index f = corner_faces[h];
     return h == face_offsets[f] ? face_offsets[f + 1] - 1 : h - 1;
   }
-  /// The next corner at the same vertex, counter-clockwise seen from outside.
+  /// Returns the next corner at the same vertex, counter-clockwise as seen from outside.
   Index rotate(Index h) const { return twins[prev(h)]; }
 };
 
@@ -51,13 +51,14 @@ enum class SurfaceKind {
   maybe_open   ///< edges of one face are allowed: the border
 };
 
-/// Pairs the corners of oriented polygons; all sharpnesses are 0.
+/// Builds a surface from oriented polygons by pairing their corners; all sharpnesses are 0.
 ///
-/// face_offsets, face_vertices  polygons on vertices 0 .. num_vertices - 1, each of them used.
-/// InputError: an edge that is not between exactly two faces with opposite directions (or beside one face, where the
-/// surface may be open), or a vertex whose faces form more than one fan. The message has the numbers `names[v]`, or v
-/// where `names` is empty; edges of more than two faces are all counted, and the first ten listed with the positions of
-/// their ends, where these are given.
+/// face_offsets, face_vertices  polygons on vertices 0 .. num_vertices - 1, each of which is used.
+/// names                        vertex numbers for messages; if empty, those of the surface.
+/// positions                    positions of the vertices for messages; may be empty.
+/// InputError: an edge that does not lie between exactly two faces that run along it in opposite directions (or at one
+/// face, if the surface may be open), or a vertex whose faces form more than one fan. Non-manifold edges (of more than
+/// two faces) are all counted, and the first ten are listed.
 SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_offsets,
                               std::vector<Index> face_vertices, std::span<const Index> names = {},
                               SurfaceKind kind = SurfaceKind::closed, std::span<const Vec3> positions = {});
@@ -70,7 +71,8 @@ struct BoundarySurface {
   SurfaceTopology topology;
 };
 
-/// Cost: linear. InputError: as `build_surface`, or a tag that is no boundary edge or vertex, or sharpness <= 0 or NaN.
+/// Builds the boundary of a volume mesh with its tags as sharpnesses. Cost: linear. InputError: as `build_surface`; a
+/// tag that is not a boundary edge or vertex; sharpness <= 0 or NaN.
 BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology);
 
 }  // namespace subvol

@@ -16,11 +16,13 @@ namespace subvol {
 namespace {
 
 constexpr Index kLeafSize = 8;
-// A node counts as a whole from this many of its radii on: what second moments would add is then below 0.01 in all.
+// A node is taken as a whole from a distance of this many radii on: the second moments, which are left out, then add
+// less than 0.01 in total.
 constexpr double kFarRadii = 6;
 
-/// Signed solid angle of a triangle seen from the origin:  tan(A/2) = det / (|a||b||c| + (a.b)|c| + (b.c)|a| +
-/// (c.a)|b|)
+/// Returns the signed solid angle A of a triangle seen from the origin.
+///
+///   tan(A/2) = det / (|a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|)
 double solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
   const double numerator = a.dot(b.cross(c));
@@ -88,9 +90,9 @@ Index WindingNumber::build(std::vector<Index>& order, Index begin, Index end) {
   return number;
 }
 
-// Far away: sum of n.r/|r|^3 with r to the centre, and its first derivative applied to the moment.
+// A far node adds n.r/|r|^3, with r from p to its center, and the first derivative of that applied to its moment.
 double WindingNumber::at(const Vec3& p) const {
-  constexpr std::size_t kDeepest = 64;  // halving 2^31 triangles ends long before
+  constexpr std::size_t kDeepest = 64;  // far above the depth of the tree: 2^31 triangles are halved at most 31 times
   std::array<Index, kDeepest> stack{0};
   std::size_t size = 1;
   double sum = 0;

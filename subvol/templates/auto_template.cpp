@@ -22,21 +22,21 @@ namespace subvol {
 
 namespace {
 
-/// Where a grid lies.
+/// Orientation, cell size and offset of a grid.
 struct Placement {
   Mat3 frame;
-  double size = 0;                   ///< edge of a cell
-  std::array<bool, 3> half_offset{}; ///< moved by half a cell along each axis
+  double size = 0;                   ///< edge length of a cell
+  std::array<bool, 3> half_offset{}; ///< true: the grid is shifted by half a cell along this axis
 };
 
-/// Edges of cells that are tried, by the one that the count and the volume make.
+/// Edge lengths to try, relative to the length that follows from the count and the volume.
 constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
 constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
-/// Most cells of one grid, empty ones and those to spare counted in, where so many are asked for in the solid: half a
-/// gigabyte per thread or less.
+/// Largest number of cells of one grid, including the empty and spare ones, if `cells` are requested in the solid: half
+/// a gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
 
-/// The box around a surface, in the coordinates of a frame.
+/// Bounding box of a surface, in the coordinates of a frame.
 Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
   Eigen::AlignedBox3d box;
   for (const auto& t : surface.triangles)
@@ -44,15 +44,15 @@ Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
   return box;
 }
 
-/// Along each axis the whole number of cells of the grid around a box, whether an integer holds it or not. Two layers
-/// of cells are to spare on all sides: one stays empty, one lets holes go around.
+/// Number of cells, along each axis, of the grid around a box; a whole number that may exceed the range of int. On
+/// every side the grid has two spare layers: the outer one stays empty, the inner one leaves room for handles.
 Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
   constexpr int kSpare = 2;
   return (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
 }
 
-/// Those frames whose grids for so many cells in the solid have few enough in all. The farther apart the solid's parts
-/// are, or the thinner its walls, the more of a grid is empty.
+/// Returns the frames whose grids have at most `most` cells in all if about `cells` of them lie in the solid. The
+/// farther apart the solid's parts are, or the thinner its walls, the more of a grid is empty.
 std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t cells, double most,
                                         std::span<const Mat3> frames) {
   const double size = kLeastSize * std::cbrt(solid.volume / static_cast<double>(cells));
@@ -62,7 +62,7 @@ std::vector<Mat3> frames_of_small_grids(const SolidBoundary& solid, std::size_t 
   return result;
 }
 
-/// The grid around a surface, of so many cells that they can be numbered.
+/// The grid around a surface; the placement must be such that its cells can be numbered.
 VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
   const Eigen::AlignedBox3d box = box_in(placement.frame, surface);
   const Eigen::Array3d cells = cells_around(box, placement.size);
@@ -94,13 +94,13 @@ std::size_t num_boundary_faces(const VoxelSolid& solid) {
   return count;
 }
 
-/// The search for one number of cells.
+/// The search for templates with one number of cells.
 class Search {
  public:
   Search(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t cells, std::vector<Mat3> frames)
       : solid_(solid), options_(options), cells_(static_cast<double>(cells)), frames_(std::move(frames)) {}
 
-  /// False where cancelled. Candidates come in the order of their grids.
+  /// Returns false if cancelled. Candidates are in the order of their grids.
   bool run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
            double fraction_share);
 
@@ -118,7 +118,7 @@ class Search {
   std::vector<Mat3> frames_;
 };
 
-/// Size of the cells for which a grid's inner cells and a layer around them are as many as asked.
+/// Cell size for which the inner cells of a grid and a layer around them add up to the requested count.
 double Search::pillowed_size(const Mat3& frame) const {
   constexpr int kHalvings = 10, kLines = 3;
   const double plain = std::cbrt(solid_.volume / cells_);
@@ -135,7 +135,7 @@ double Search::pillowed_size(const Mat3& frame) const {
   return std::sqrt(low * high);
 }
 
-/// All sizes, frames and offsets, the likeliest first.
+/// All combinations of size, frame and offset, the most promising first.
 std::vector<Placement> Search::placements() const {
   std::vector<double> sizes;
   for (const Mat3& frame : frames_)
@@ -178,8 +178,8 @@ std::optional<Candidate> Search::best_of(const Placement& placement, std::size_t
 
 bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
                  double fraction_share) {
-  constexpr std::size_t kBatch = 16;    // grids between two looks at the clock of the caller
-  constexpr std::size_t kEnough = 200;  // right candidates, after which hardly anything better turns up
+  constexpr std::size_t kBatch = 16;    // grids between two calls of the progress callback
+  constexpr std::size_t kEnough = 200;  // valid candidates after which a better one hardly ever turns up
   const std::vector<Placement> all = placements();
   std::size_t right = 0;
   for (std::size_t first = 0; first < all.size() && right < kEnough; first += kBatch) {
@@ -234,7 +234,7 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
     if (usable.empty()) break;
     std::vector<Candidate> candidates;
     const double done = static_cast<double>(rung) / kLadder.size();
-    // Most often the first rung is all there is.
+    // Most often only the first count is needed.
     if (!Search(solid, options, cells, std::move(usable))
              .run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
       result.cancelled = true;

@@ -14,9 +14,10 @@ namespace subvol {
 
 namespace {
 
-constexpr std::array<double, 3> kPlaces{1.0 / 6, 0.5, 5.0 / 6};  // centres of thirds
+constexpr std::array<double, 3> kPlaces{1.0 / 6, 0.5, 5.0 / 6};  // centers of thirds
 
-/// 27 points spread over a cell by its canonical coordinates; simplices take the points of the cube folded into them.
+/// Appends 27 points spread over a cell in its canonical coordinates; for prisms and tets, the points of the cube are
+/// folded into the cell.
 void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& points) {
   const auto corner = [&](std::size_t i) -> const Vec3& { return mesh.positions[mesh.cell(c)[i]]; };
   const auto between = [](const Vec3& a, const Vec3& b, double t) -> Vec3 { return a + t * (b - a); };
@@ -38,7 +39,7 @@ void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& poi
             break;
           }
           case CellKind::tet: {
-            std::array<double, 3> cut{u, v, w};  // sorted, they cut [0, 1] into the four weights of a point
+            std::array<double, 3> cut{u, v, w};  // sorted, they cut [0, 1] into the four barycentric weights of a point
             std::sort(cut.begin(), cut.end());
             points.push_back(cut[0] * corner(0) + (cut[1] - cut[0]) * corner(1) + (cut[2] - cut[1]) * corner(2) +
                              (1 - cut[2]) * corner(3));

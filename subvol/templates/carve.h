@@ -10,24 +10,25 @@
 
 namespace subvol {
 
-/// Keeps the cells that a predicate chooses, with their references, on the vertices they use; both keep their order.
-/// Tags stay where their edge or vertex is still on the boundary.
+/// Keeps the cells that a predicate selects, with their references, and the vertices that these cells use; cells and
+/// vertices keep their order. Tags stay if their edge or vertex is still on the boundary.
 ///
-/// mesh    index-correct cells.
-/// InputError: no cell is kept; what is kept touches itself along an edge or at a vertex, with the place: its boundary
-/// would be no manifold (`validate`).
+/// mesh    a mesh whose cells have valid indices.
+/// InputError: no cell is kept; the kept part touches itself along an edge or at a vertex, so that its boundary would
+/// not be a manifold (`validate`). The message names the place.
 VolumeMesh carve(const VolumeMesh& mesh, const std::function<bool(std::size_t cell)>& keep);
 
-/// The cells that lie in a surface by at least a share of their volume, non-zero for those to keep.
+/// Marks the cells of which at least a share of the volume lies inside a surface: non-zero for those to keep.
 ///
-/// A cell counts by the mean over 27 points of whether the generalised winding number (`WindingNumber`) is above 1/2;
-/// so the surface may have holes. least_share  in (0, 1], else InputError. InputError as `WindingNumber`.
+/// The share of a cell is the fraction of 27 sample points at which the generalized winding number (`WindingNumber`)
+/// exceeds 1/2; so the surface may have holes.
+/// least_share  in (0, 1], else InputError. InputError also as `WindingNumber`.
 std::vector<char> cells_inside(const VolumeMesh& mesh, const TriangleMesh& surface, double least_share = 0.5);
 
-/// The cells whose centre (mean of the corners) lies in a closed box.
+/// Marks the cells whose center (mean of the corners) lies in a closed box.
 std::vector<char> cells_in_box(const VolumeMesh& mesh, const Vec3& low, const Vec3& high);
 
-/// The cells listed. InputError: a number out of range.
+/// Marks the listed cells. InputError: a cell number out of range.
 std::vector<char> cells_listed(const VolumeMesh& mesh, std::span<const Index> cells);
 
 }  // namespace subvol

@@ -14,12 +14,13 @@ namespace subvol {
 
 namespace {
 
-/// Adds the tets that join a vertex of a cell with its faces that do not hold it. A quad is cut at its smallest vertex.
+/// Adds the tets that join the cell's smallest vertex to the faces that do not contain it. A quad is cut at its
+/// smallest vertex.
 void fan_tets(const VolumeMesh& mesh, std::size_t c, VolumeMesh& result) {
   const auto cell = mesh.cell(c);
   const CellTopology& local = cell_topology(mesh.kinds[c]);
   const Index apex = *std::min_element(cell.begin(), cell.end());
-  const auto add = [&](Index a, Index b, Index d) {  // seen from outside
+  const auto add = [&](Index a, Index b, Index d) {  // in the order seen from outside
     result.add_cell(CellKind::tet, std::array<Index, 4>{a, d, b, apex});
     if (!mesh.references.empty()) result.references.push_back(mesh.references[c]);
   };
@@ -35,10 +36,11 @@ void fan_tets(const VolumeMesh& mesh, std::size_t c, VolumeMesh& result) {
   }
 }
 
-/// For every hex the local edge, one of 0-1, 0-3, 0-4, that the direction runs along; kNoIndex: not reached.
+/// For every hex, the axis that the direction runs along: 0, 1 or 2 for local edge 0-1, 0-3 or 0-4; kNoIndex if not
+/// reached.
 std::vector<int> carried_axes(const VolumeMesh& mesh, const MeshTopology& topology, Index v0, Index v1) {
   const CellTopology& hex = cell_topology(CellKind::hex);
-  // Axis of each local edge: edges of a hex are parallel to 0-1, 0-3 or 0-4.
+  // The axis of a local edge: every edge of a hex is parallel to 0-1, 0-3 or 0-4.
   const auto axis_of = [&](std::size_t c, Index a, Index b) {
     const auto cell = mesh.cell(c);
     const auto i = std::find(cell.begin(), cell.end(), a) - cell.begin(),
@@ -55,7 +57,7 @@ std::vector<int> carried_axes(const VolumeMesh& mesh, const MeshTopology& topolo
     }
     return {kNoIndex, kNoIndex};
   };
-  // Axis of the edges that leave a face.
+  // The axis of the edges that leave a face.
   const auto axis_across = [&](std::size_t c, std::span<const Index> face) {
     for (int axis = 0; axis < 3; ++axis)
       if (edge_along(c, axis, face)[0] == kNoIndex) return axis;
@@ -111,10 +113,10 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
     if (mesh.kinds[c] != CellKind::hex) throw InputError("split: cell " + std::to_string(c) + " is no hex");
   const MeshTopology topology(mesh);
   const std::vector<int> axes = carried_axes(mesh, topology, v0, v1);
-  // Lower faces in right-hand order about each axis, and the corners above them.
+  // For each axis, the lower face in right-hand order about it, and then the corners above.
   constexpr std::array<std::array<int, 8>, 3> kUpright{
       {{0, 3, 7, 4, 1, 2, 6, 5}, {0, 4, 5, 1, 3, 7, 6, 2}, {0, 1, 2, 3, 4, 5, 6, 7}}};
-  // The diagonal of each face that is cut: one of its ends.
+  // One end of the diagonal that cuts each face, or kNoIndex for a face that is not cut.
   std::vector<Index> cut_at(topology.num_faces(), kNoIndex);
   const auto upright = [&](std::size_t c) {
     std::array<Index, 8> corners{};

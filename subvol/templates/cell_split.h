@@ -5,17 +5,20 @@
 
 namespace subvol {
 
-/// Cuts every hex and prism into tets without new vertices: a prism into 3, a hex into 5 or 6. Each quad is cut by the
-/// diagonal at its smallest vertex number, so that neighbours agree.
+/// Cuts every hex into 6 tets and every prism into 3, without new vertices. Each quad is cut along the diagonal at its
+/// smallest vertex number, so that neighbors agree.
 /// Source: Dompierre, Labbe, Vallet, Camarero, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"
-/// (1999). returns  parts of a cell one after another, with its reference; tags as they are. InputError: a mesh that is
-/// not sound, or a tet that would be inverted: cells whose quads are strongly warped.
+/// (1999).
+///
+/// returns  the parts of each cell, one after another, with the cell's reference; the tags are unchanged.
+/// InputError: an invalid mesh; a tet that would be inverted, which happens in cells with strongly warped quads.
 VolumeMesh split_into_tets(const VolumeMesh& mesh);
 
-/// Cuts every hex into two prisms whose triangles lie across the direction of an edge; that direction is carried from
-/// hex to hex through the mesh. The quads of a column of hexes are all cut alike, from the smallest vertex of its first
-/// one. InputError: other cells than hexes; no such edge; a mesh in which the direction cannot be carried around; a
-/// mesh that is not sound.
+/// Cuts every hex into two prisms whose axis is the direction of an edge; that direction is carried from hex to hex
+/// through the mesh. The triangles cut the quads across this direction; all such quads of a column of hexes are cut
+/// alike, at the smallest vertex of the column's first one.
+/// InputError: cells other than hexes; no edge between v0 and v1; a mesh in which the direction cannot be carried
+/// around consistently, or does not reach every cell; an invalid mesh.
 VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1);
 
 }  // namespace subvol

@@ -17,7 +17,8 @@ namespace subvol {
 
 namespace {
 
-// Below 1/6 a mesh of equal cubes cannot be inverted: each edge keeps more than half its length in its own direction.
+// With less than 1/6, no cell of a mesh of equal cubes can be inverted: each edge keeps more than half its length in
+// its own direction.
 constexpr double kShare = 0.15;
 constexpr double kSameNormal = 0.99;  // cosine above which two faces count as one plane
 
@@ -56,7 +57,8 @@ std::vector<Face> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& to
   return faces;
 }
 
-/// Numbers of the new vertices by the old ones', from `first`, in the old order; kNoIndex away from the faces.
+/// New vertex number of each old vertex on the faces, counted from `num_vertices` in the old order; kNoIndex for
+/// vertices on none.
 std::vector<Index> new_numbers(std::size_t num_vertices, std::span<const Face> faces) {
   std::vector<Index> number(num_vertices, kNoIndex);
   for (const Face& face : faces)
@@ -87,7 +89,8 @@ Vec3 unit_normal(const VolumeMesh& mesh, std::span<const Index> face) {
   return (face.size() == 4 ? (p(2) - p(0)).cross(p(3) - p(1)) : (p(1) - p(0)).cross(p(2) - p(0))).normalized();
 }
 
-/// How far each vertex of the faces moves: against the sum of its distinct normals, by its shortest edge in the set.
+/// Displacement of each vertex of the faces: against the sum of its distinct normals, in proportion to its shortest
+/// edge in the set.
 std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const Face> faces, std::span<const char> in_set) {
   std::vector<double> shortest(mesh.num_vertices(), std::numeric_limits<double>::infinity());
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
@@ -113,7 +116,7 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const Face> fac
   return steps;
 }
 
-/// Shortens steps around cells that are inverted until none is.
+/// Halves the steps of the vertices of inverted cells until no cell is inverted.
 void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<const Vec3> steps) {
   constexpr int kRounds = 20;
   std::vector<Index> old(mesh.num_vertices(), kNoIndex);

@@ -7,27 +7,27 @@
 
 namespace subvol {
 
-/// Puts a layer of cells around a set of cells: they shrink, and each face of the set's boundary becomes a new cell
-/// between its old place and its new one (a hex for a quad, a prism for a triangle).
+/// Puts a layer of cells around a set of cells: the set shrinks, and each face of its boundary becomes a new cell
+/// between its old and its new position (a hex for a quad, a prism for a triangle).
 ///
 ///        o---o---o            o---o---o
-///        |   |   |            |\ /|\ /|        faces of the set that lie on the mesh's boundary get a cell as well:
-///        |   |   |    ->      | o-o-o |        with all cells the layer lies inside the whole boundary
+///        |   |   |            |\ /|\ /|        Faces of the set on the mesh's boundary get a cell as well: if the set
+///        |   |   |    ->      | o-o-o |        holds all cells, the layer lies inside the whole boundary.
 ///        |   |   |            |/ \|/ \|
 ///        o---o---o            o---o---o
 ///
-/// mesh    passes `validate` but for unused vertices.
-/// cells   numbers of the set, each once; or empty: all cells.
-/// returns the same cells, those of the set on new vertices, then one cell per face of the set's boundary, by cell and
-///         local order. Old vertices keep their numbers and places, and so do tags, which lie on the old boundary; new
-///         ones are appended. New cells get their neighbour's reference.
+/// mesh    passes `validate` except for unused vertices.
+/// cells   numbers of the cells of the set, each once; empty: all cells.
+/// returns the old cells, those of the set on new vertices, then one cell per face of the set's boundary, ordered by
+/// cell and local face. Old vertices keep their numbers and positions, and so do tags, which lie on the old boundary;
+/// new vertices are appended. A new cell gets the reference of its neighbor in the set.
 ///
-/// New vertices move inward by 0.15 of the shortest edge along the sum of the distinct normals around, and less where a
-/// cell would be inverted. On a mesh of equal cubes no cell can be inverted where some direction sees all faces around
-/// from their front (`VertexRule::pillowable`).
+/// A new vertex moves inward by 0.15 of the shortest edge that its old vertex has in the set, times the sum of the
+/// distinct unit normals there; less if a cell would be inverted. In a mesh of equal cubes no cell can be inverted if
+/// some direction sees all boundary faces around the vertex from their front (`VertexRule::pillowable`).
 ///
-/// InputError: a mesh that is not sound; a cell number out of range or given twice; a set whose boundary is no manifold
-/// (it touches itself along an edge or at a vertex); a vertex around which no direction keeps all cells valid.
+/// InputError: an invalid mesh; a cell number out of range or given twice; a set whose boundary is not a manifold (it
+/// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid.
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells = {});
 
 }  // namespace subvol

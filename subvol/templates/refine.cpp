@@ -18,10 +18,10 @@ namespace subvol {
 
 namespace {
 
-/// A place in the canonical hex, in sixths of its edges.
+/// A point of the canonical hex, in sixths of its edges.
 using Place = std::array<int, 3>;
 using HexPlaces = std::array<Place, 8>;
-/// Marked corners of a hex, a bit each.
+/// Marked corners of a hex, one bit each.
 using Marks = std::uint8_t;
 
 constexpr int kWhole = 6;
@@ -45,7 +45,7 @@ struct Strip {
   std::array<Place, 2> middle, far;
 };
 
-/// The hexes in the making of one pattern.
+/// Collects the hexes of one pattern.
 class Pattern {
  public:
   void add_box(const Place& low, const Place& high) {
@@ -55,7 +55,8 @@ class Pattern {
     hexes.push_back(hex);
   }
 
-  /// The hex between two quads, each starting at vertices that an edge joins and running around the same way.
+  /// Adds the hex between two quads. Both quads start at the ends of one edge between them and run around in the same
+  /// sense.
   void add_between(const std::array<Place, 4>& a, const std::array<Place, 4>& b) {
     HexPlaces hex{a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]};
     const auto edge = [&](int to) {
@@ -81,7 +82,8 @@ class Pattern {
   std::vector<HexPlaces> hexes;
 };
 
-/// Corner 0 is marked: a small cube there, and a hex from each of its inner sides to the side opposite.
+/// Corner 0 is marked: a small cube lies there, and a hex joins each of its three inner faces to the opposite face of
+/// the cell.
 Pattern vertex_pattern() {
   Pattern pattern;
   pattern.add_box({0, 0, 0}, {2, 2, 2});
@@ -91,7 +93,8 @@ Pattern vertex_pattern() {
   return pattern;
 }
 
-/// Corners 0 and 4 are marked: three cubes along their edge; strips run from the sides beside it to the diagonal.
+/// Corners 0 and 4 are marked: three cubes lie along their edge; strips are swept from the two sides beside it to the
+/// diagonal.
 Pattern edge_pattern() {
   Pattern pattern;
   for (int z = 0; z < kWhole; z += 2) pattern.add_box({0, 0, z}, {2, 2, z + 2});
@@ -105,7 +108,7 @@ Pattern edge_pattern() {
   return pattern;
 }
 
-/// Corners 0 to 3 are marked: nine boxes at their side; three sweeps over them, and one hex above.
+/// Corners 0 to 3 are marked: nine boxes lie at their face, with three sweeps over them and one hex above.
 Pattern face_pattern() {
   Pattern pattern;
   for (int x = 0; x < kWhole; x += 2)
@@ -132,8 +135,8 @@ Pattern full_pattern() {
   return pattern;
 }
 
-/// A rotation of the canonical hex onto itself: place[d] goes to coordinate axes[d], counted from the other end where
-/// flipped.
+/// A rotation of the canonical hex onto itself: place[d] becomes coordinate axes[d], counted from the other end if
+/// flips[d].
 struct Turn {
   std::array<std::size_t, 3> axes;
   std::array<bool, 3> flips;
@@ -165,9 +168,10 @@ Marks turned_marks(Marks marks, const Turn& turn) {
   return static_cast<Marks>(result);
 }
 
-/// The parts of a hex for each pattern of marks, and the pattern that any marks grow to.
+/// The parts of a hex for each pattern of marks, and for any set of marks the pattern that it grows to.
 struct Patterns {
-  std::array<std::vector<HexPlaces>, 256> parts;  ///< empty: not one of the patterns, or nothing marked
+  std::array<std::vector<HexPlaces>, 256> parts;  ///< empty: nothing is marked, or the marks are not one of the
+                                                  ///< patterns
   std::array<Marks, 256> grown;
 
   Patterns() {
@@ -204,7 +208,7 @@ Marks marks_of(std::span<const Index> hex, std::span<const char> marked) {
   return static_cast<Marks>(marks);
 }
 
-/// Marks more vertices until the cells all have one of the patterns.
+/// Marks more vertices until every cell has one of the patterns.
 void grow_marks(const VolumeMesh& mesh, std::vector<char>& marked) {
   std::vector<std::vector<Index>> cells_of(mesh.num_vertices());
   std::vector<std::size_t> queue;
@@ -230,7 +234,7 @@ void grow_marks(const VolumeMesh& mesh, std::vector<char>& marked) {
   }
 }
 
-/// Numbers the places of the cells: one vertex for all cells around an edge, two for those beside a face.
+/// Numbers the new vertices: all cells around an edge share those on it, and the two cells of a face share those in it.
 class PlaceNumbers {
  public:
   PlaceNumbers(const VolumeMesh& mesh, VolumeMesh& result)
@@ -264,7 +268,7 @@ class PlaceNumbers {
   }
 
   const MeshTopology& topology() const { return topology_; }
-  /// The vertex on edge e next to one of its ends, or kNoIndex.
+  /// The vertex on edge e next to one of its ends, or kNoIndex if the edge has none there.
   Index near_end(Index e, Index end) const { return on_edges_[e][topology_.edge(e)[0] == end ? 0 : 1]; }
 
  private:
@@ -318,8 +322,8 @@ class PlaceNumbers {
   VolumeMesh& result_;
   MeshTopology topology_;
   std::size_t cell_ = 0;
-  std::vector<std::array<Index, 2>> on_edges_;  ///< by the end they are next to
-  std::vector<std::array<Index, 4>> on_faces_;  ///< by the corner they are next to
+  std::vector<std::array<Index, 2>> on_edges_;  ///< by the end that they are next to
+  std::vector<std::array<Index, 4>> on_faces_;  ///< by the corner that they are next to
   std::vector<std::pair<Place, Index>> inside_;
 };
 

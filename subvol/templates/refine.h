@@ -8,8 +8,8 @@
 
 namespace subvol {
 
-/// Refines a mesh of hexes where its vertices are marked, and stays conforming: each edge between two marked vertices
-/// is cut into three, each edge with one marked end at a third from it, and the other edges stay whole.
+/// Refines a mesh of hexes near its marked vertices and keeps it conforming: an edge between two marked vertices is cut
+/// into three, an edge with one marked end is cut at a third from that end, and all other edges stay whole.
 ///
 ///        o-----------o     o-----------o     *---o---o---*
 ///        |           |     |\         /|     |   |   |   |       marked vertices: *
@@ -19,24 +19,25 @@ namespace subvol {
 ///        |  |\______ |     | |       | |     |   |   |   |
 ///        *--o--------o     *-o-------o-*     *---o---o---*
 ///
-/// Cells of which other vertices are marked get more marks, until every cell has one of these patterns: two diagonal
-/// marks of a face become four, all else becomes eight. So around what was asked for, the marks end up convex.
+/// Cells with any other set of marked vertices get more marks, until every cell has one of these patterns: two marks on
+/// a diagonal of a face, or three on a face, become four; all others become eight. So the marks end up convex around
+/// the region that was asked for.
 ///
 /// marked  one entry per vertex, non-zero for marked ones.
-/// returns old vertices with their numbers and places, then new ones at their places in the trilinear map of the cell;
-///         a cell's parts follow one another, with its reference. Creases are cut with their edges, corners stay.
+/// returns the old vertices with their numbers and positions, then the new ones, placed by the trilinear map of their
+/// cell; the parts of a cell follow one another, with its reference. Creases are cut with their edges; corners stay.
 ///
-/// Nothing marked: the mesh as it is. InputError: a mesh that is not sound, or that gets a cell whose corners are not
-/// positive; a mark on a cell that is no hex. Cost: linear but for the marks, which spread cell by cell.
-/// Source: Schneiders, "A grid-based algorithm for the generation of hexahedral element meshes" (1996), where the four
-/// patterns are from; that each can be made of strips swept from face to face is how they are built here.
+/// If nothing is marked, the mesh is returned unchanged. InputError: an invalid mesh; a part that would have a corner
+/// Jacobian <= 0; a mark on a cell that is not a hex. Cost: linear, except for the marks, which spread cell by cell.
+/// Source: the four patterns are those of Schneiders, "A grid-based algorithm for the generation of hexahedral element
+/// meshes" (1996); they are built here from strips swept from face to face.
 VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked);
 
-/// All vertices of the cells chosen, as `refine_at` takes them: those cells are cut in 27. chosen: one entry per cell.
+/// Marks all vertices of the chosen cells, as `refine_at` expects them: those cells are cut into 27. chosen: one entry
+/// per cell.
 std::vector<char> vertices_of(const VolumeMesh& mesh, std::span<const char> chosen);
 
-/// The hexes that are all there is between two opposite faces of the boundary, non-zero for those: where a mesh is one
-/// cell thick.
+/// Marks the hexes with two opposite faces on the boundary (non-zero): the places at which the mesh is one cell thick.
 std::vector<char> thin_cells(const VolumeMesh& mesh);
 
 }  // namespace subvol

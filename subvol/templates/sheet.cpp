@@ -26,7 +26,7 @@ Index edge_between(const MeshTopology& topology, Index v0, Index v1) {
   return e;
 }
 
-/// The quads at each edge, as corners starting along the edge.
+/// For each edge, the quads that contain it.
 std::vector<std::vector<Index>> quads_of_edges(const MeshTopology& topology) {
   std::vector<std::vector<Index>> quads(topology.num_edges());
   for (std::size_t f = 0; f < topology.num_faces(); ++f) {
@@ -37,7 +37,7 @@ std::vector<std::vector<Index>> quads_of_edges(const MeshTopology& topology) {
   return quads;
 }
 
-/// The edge across a quad from (a, b), directed alike.
+/// The edge opposite to (a, b) in a quad, in the same direction.
 Edge across(std::span<const Index> quad, Index a, Index b) {
   for (std::size_t i = 0; i < 4; ++i) {
     if (quad[i] == a && quad[(i + 1) % 4] == b) return {quad[(i + 3) % 4], quad[(i + 2) % 4]};
@@ -46,13 +46,14 @@ Edge across(std::span<const Index> quad, Index a, Index b) {
   return {kNoIndex, kNoIndex};
 }
 
-/// Where of two merged vertices the one left lies: on the boundary if one of them does, else at `otherwise`.
+/// Position of the vertex that two merged ones become: that of the one on the boundary if only one of them is there,
+/// else `otherwise`.
 Vec3 merged_place(const VolumeMesh& mesh, const MeshTopology& topology, Index a, Index b, const Vec3& otherwise) {
   const bool a_outside = topology.is_boundary_vertex(a), b_outside = topology.is_boundary_vertex(b);
   return a_outside == b_outside ? otherwise : mesh.positions[a_outside ? a : b];
 }
 
-/// Merges pairs of vertices, each into its first.
+/// Merges pairs of vertices, each pair into its first vertex.
 VolumeMesh merge_pairs(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const Edge> pairs, bool half_way,
                        const std::string& name) {
   VolumeMesh moved = mesh;
@@ -74,8 +75,8 @@ VolumeMesh merge_pairs(const VolumeMesh& mesh, const MeshTopology& topology, std
   return merge_vertices(moved, target, name);
 }
 
-/// For each corner of a cell that a sheet cuts: the lower end of the sheet's edge at that corner, and whether the
-/// corner is the upper one.
+/// One corner of a cell that a sheet cuts: the lower end of the sheet's edge at that corner, and true if the corner is
+/// the upper end.
 struct CutCorner {
   Index lower;
   bool upper;
@@ -92,7 +93,8 @@ std::vector<CutCorner> cut_corners(const VolumeMesh& mesh, std::size_t c, const 
       if (edge != above.end() && edge->second == v) corners.push_back({below, true});
     }
   }
-  // Each corner once: a sheet that crosses itself finds some twice, one that runs into a triangle misses some.
+  // Each corner must be found once: if the sheet crosses itself, some are found twice; if it runs into a triangle, some
+  // are missing.
   bool sound = corners.size() == cell.size();
   for (std::size_t i = 0; sound && i < cell.size(); ++i)
     sound = (corners[i].upper ? above.at(corners[i].lower) : corners[i].lower) == cell[i];
@@ -128,7 +130,7 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
   require_sound(mesh, "split");
   const MeshTopology topology(mesh);
   const std::vector<Edge> sheet = sheet_edges(topology, v0, v1);
-  std::map<Index, Index> above;   // upper end of the sheet's edge at each lower end
+  std::map<Index, Index> above;   // upper end of the sheet's edge that starts at each lower end
   std::map<Index, Index> between; // first new vertex of that edge
   VolumeMesh result;
   result.positions = mesh.positions;
@@ -191,7 +193,7 @@ VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1) {
 VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2) {
   require_sound(mesh, "collapse");
   const MeshTopology topology(mesh);
-  std::vector<Edge> pairs;         // of each quad in the column, by its number in `faces`
+  std::vector<Edge> pairs;         // corners to join in each quad of the column, in the order of `faces`
   std::vector<Index> faces;
   std::vector<char> seen(topology.num_faces(), 0);
   const auto add = [&](Index f, const Edge& pair) {
@@ -213,7 +215,7 @@ VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2) {
       if (c == kNoIndex) continue;
       if (mesh.kinds[c] != CellKind::hex)
         throw InputError("collapse: the column meets cell " + std::to_string(c) + ", which is no hex");
-      // The corners across the cell: ends of the edges that leave the face.
+      // The corners across the cell are the other ends of the edges that leave the face.
       const auto face = topology.face(faces[i]);
       const auto partner = [&](Index v) {
         const CellTopology& local = cell_topology(CellKind::hex);

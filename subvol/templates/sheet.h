@@ -9,39 +9,41 @@
 
 namespace subvol {
 
-/// The edges that face an edge across quads, and those that face these, and so on; all directed alike, from the first
-/// end's side of the sheet to the second's.
+/// Returns the edges of a sheet: the edge v0-v1, the edges opposite to it across quads, the edges opposite to those,
+/// and so on. All are directed alike, from the side of the sheet that holds v0 to the side that holds v1.
 ///
-///        o---o---o        starting from edge a-b, the sheet holds
-///        |   |   |        all the edges drawn upright
+///        o---o---o        Starting from edge a-b, the sheet holds
+///        |   |   |        all the edges drawn upright.
 ///        a---o---o
 ///        |   |   |
 ///        b---o---o
 ///
-/// returns  pairs of vertices, in order of discovery, the first one (v0, v1).
-/// InputError: there is no edge between v0 and v1; the sheet comes back to an edge the other way round.
+/// returns  pairs of vertices, in order of discovery; the first one is (v0, v1).
+/// InputError: there is no edge between v0 and v1; the sheet returns to an edge in the opposite direction.
 std::vector<std::array<Index, 2>> sheet_edges(const MeshTopology& topology, Index v0, Index v1);
 
-/// Cuts all edges of a sheet into equal parts, and with them the cells: a hex into hexes, a prism between its triangles
-/// into prisms. Old vertices keep their numbers and places; creases along the edges are cut as well.
+/// Cuts all edges of a sheet into equal parts, and its cells with them: a hex into hexes, and a prism into prisms
+/// between its triangles. Old vertices keep their numbers and positions; creases along the cut edges are cut as well.
 ///
-/// parts  >= 2. A cell's parts follow one another, with its reference.
-/// InputError: as `sheet_edges`; a sheet that crosses itself in a cell, or runs into a triangle; parts < 2; a mesh that
-/// is not sound.
+/// parts  >= 2. The parts of a cell follow one another, with its reference.
+/// InputError: as `sheet_edges`; a sheet that crosses itself in a cell, or runs into a triangle; parts < 2; an invalid
+/// mesh.
 VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts = 2);
 
-/// Takes the cells of a sheet out: every edge shrinks to its end on the side of v0, or to the other one where only that
+/// Removes the cells of a sheet: every edge shrinks to its end on the side of v0, or to its other end if only that one
 /// is on the boundary. `collapse_sheet(m, a, n)` undoes a `split_sheet(m, a, b)` that put n between a and b.
-/// InputError: as `sheet_edges`; what `merge_vertices` refuses.
+/// InputError: as `sheet_edges`; an invalid mesh; a result that `merge_vertices` refuses.
 VolumeMesh collapse_sheet(const VolumeMesh& mesh, Index v0, Index v1);
 
-/// Shrinks one edge to its midpoint, or to its end on the boundary where only one end is there. Tets around the edge
-/// go; a mesh of hexes allows that for a sheet only. InputError: no such edge; what `merge_vertices` refuses.
+/// Shrinks one edge to its midpoint, or to its end on the boundary if only one end is there. The tets around the edge
+/// disappear; in a mesh of hexes, only a whole sheet can be collapsed. InputError: no such edge; an invalid mesh; a
+/// result that `merge_vertices` refuses.
 VolumeMesh collapse_edge(const VolumeMesh& mesh, Index v0, Index v1);
 
-/// Folds a quad shut, joining its opposite corners v0 and v2 half-way (or on the boundary where only one is there),
-/// with all quads that face it through hexes: a whole column of hexes goes. InputError: no such face; a column that
-/// meets other cells than hexes, or crosses itself; what `merge_vertices` refuses.
+/// Folds a quad shut by joining its opposite corners v0 and v2 halfway (or on the boundary if only one of them is
+/// there), and with it all quads opposite to it through hexes: a whole column of hexes disappears. InputError: no such
+/// face; an invalid mesh; a column that meets cells other than hexes, or crosses itself; a result that `merge_vertices`
+/// refuses.
 VolumeMesh collapse_face(const VolumeMesh& mesh, Index v0, Index v2);
 
 }  // namespace subvol

@@ -10,17 +10,18 @@ namespace subvol {
 
 namespace {
 
-// Lines avoid the planes on which vertices of regular meshes lie: no simple fraction of a cell.
+// Lines are shifted by this, in units of their distance, to avoid the planes that hold the vertices of regular meshes:
+// it is not a simple fraction of a cell.
 constexpr double kShift = 0.0141421356237;
 
 struct Crossing {
   Index line;
   double height;
-  int winding;  ///< +1: into the solid, going up
+  int winding;  ///< +1: the line enters the solid on its way up
 };
 
-/// Twice the signed area of (a, b, p) in the plane, for the edge a-b seen from its end of smaller number: the same bits
-/// for both triangles of an edge.
+/// Twice the signed area of (a, b, p) in the plane. Callers pass the end of smaller number as a, so that both triangles
+/// at an edge get the same bits.
 double side_of(const Vec3& a, const Vec3& b, double x, double y) {
   return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
 }
@@ -40,7 +41,7 @@ class LineCrossings {
     for (const auto& t : surface.triangles) add(t);
   }
 
-  /// Crossings line by line, each line's from below.
+  /// Crossings sorted by line, and from below along each line.
   const std::vector<Crossing>& sorted() {
     std::sort(crossings_.begin(), crossings_.end(), [](const Crossing& a, const Crossing& b) {
       return a.line != b.line ? a.line < b.line : a.height < b.height;
@@ -76,7 +77,7 @@ class LineCrossings {
       }
   }
 
-  /// +1 or -1 where the point lies on that side of all three edges, else 0.
+  /// Returns +1 or -1 if the point lies on that side of all three edges, else 0.
   int common_side(const std::array<Index, 3>& t, double x, double y) const {
     int sum = 0;
     for (std::size_t e = 0; e < 3; ++e) {
@@ -98,7 +99,7 @@ void add_length(double low, double high, int count, Index first, Index stride, d
                 std::vector<double>& sums) {
   low = std::max(low, 0.0);
   high = std::min(high, double(count));
-  if (!(low < high)) return;  // no integer may hold it then
+  if (!(low < high)) return;  // otherwise low or high may be too large for an integer
   for (int k = static_cast<int>(low); k < count && k < high; ++k)
     sums[first + stride * k] += weight * (std::min(high, k + 1.0) - std::max(low, double(k)));
 }

@@ -8,19 +8,19 @@
 
 namespace subvol {
 
-/// Share of each cell of a grid that lies inside a closed, oriented surface.
+/// Computes the share of each cell of a grid that lies inside a closed, oriented surface.
 ///
 ///   f(cell) = mean over n x n lines through the cell, along its third edge, of the share of the line with w(x) > 0
 ///
-/// w(x) is the number of times the surface winds around x: crossings along the line, counted by the side they are
-/// crossed from. Two triangles decide about their common edge by the same number, so a line crosses exactly one of
-/// them.
+/// w(x) is the number of times the surface winds around x: the signed sum of the crossings along the line up to x. Both
+/// triangles at an edge decide on which side of it a line passes by the same number, so a line near the edge crosses
+/// exactly one of them.
 ///
-/// surface  closed: every edge as often in one direction as in the other; normals point outward. Where it is not closed
-///          a line may end inside; such lines do not count.
-/// num_lines  n >= 1, by cell and direction.
-/// returns  one number in [0, 1] per cell.
-/// Cost: linear in triangles and lines. Serial.
+/// surface    closed: every edge occurs as often in one direction as in the other; normals point outward. If the
+///            surface is not closed, a line may end inside; such lines contribute nothing.
+/// num_lines  n >= 1, lines per cell along each of its first two edges.
+/// returns    one number in [0, 1] per cell.
+/// Cost: linear in the numbers of triangles and lines. Serial.
 std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines = 4);
 
 }  // namespace subvol

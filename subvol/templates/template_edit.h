@@ -8,28 +8,28 @@
 
 namespace subvol {
 
-/// What the operations that edit templates share.
+/// Helpers shared by the operations that edit templates.
 
-/// Throws InputError, starting with `name`, where `validate` finds anything but unused vertices.
+/// Throws InputError, starting with `name`, if `validate` finds anything but unused vertices.
 void require_sound(const VolumeMesh& mesh, const std::string& name);
 
-/// Whether det[n0-c, n1-c, n2-c] > 0 at every corner c of a cell.
+/// True if det[n0-c, n1-c, n2-c] > 0 at every corner c of a cell, with neighbors n0, n1, n2.
 bool corners_positive(const VolumeMesh& mesh, std::size_t cell);
 
-/// Group number of a cell: 0 where the mesh has none.
+/// Group number of a cell; 0 if the mesh has none.
 inline int reference_of(const VolumeMesh& mesh, std::size_t cell) {
   return mesh.references.empty() ? 0 : mesh.references[cell];
 }
 
-/// The cells whose entry in `kept` is not zero, with references, on the vertices they use; both keep their order. Tags
-/// stay where their edge or vertex is still on the boundary. kept: one entry per cell.
+/// Returns the cells whose entry in `kept` is not zero, with their references and the vertices they use; cells and
+/// vertices keep their order. Tags stay if their edge or vertex is still on the boundary. kept: one entry per cell.
 VolumeMesh kept_cells(const VolumeMesh& mesh, std::span<const char> kept);
 
-/// Tags that name edges and vertices of the boundary of the mesh they are in; the others are dropped.
+/// Drops the tags whose edge or vertex is not on the mesh's boundary.
 void drop_lost_tags(VolumeMesh& mesh);
 
-/// Sorts tags as `FeatureTags` wants them, the larger sharpness of two equal entries counting; drops creases of one
-/// vertex.
+/// Sorts tags as `FeatureTags` requires; of equal entries the one with the larger sharpness remains. Drops creases
+/// whose ends are the same vertex.
 void normalise_tags(FeatureTags& tags);
 
 }  // namespace subvol

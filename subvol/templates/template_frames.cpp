@@ -44,9 +44,9 @@ Mat3 principal_frame(const std::vector<Facet>& facets) {
   return right_handed(Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvectors());
 }
 
-/// Directions by the area that faces them, up to sign, the largest first.
+/// Facing directions, up to sign, ordered by the area that faces them, the largest first.
 std::vector<Vec3> facing_directions(const std::vector<Facet>& facets) {
-  constexpr double kBins = 8;  // per unit: neighbouring bins are about 7 degrees apart
+  constexpr double kBins = 8;  // per unit: neighboring bins are about 7 degrees apart
   std::map<std::array<int, 3>, Vec3> bins;
   for (const Facet& f : facets) {
     const double area = f.area_vector.norm();
@@ -66,7 +66,7 @@ std::vector<Vec3> facing_directions(const std::vector<Facet>& facets) {
 }
 
 Mat3 facing_frame(const std::vector<Facet>& facets) {
-  constexpr double kPerpendicular = 0.3;  // cosine below which a second direction counts as one across the first
+  constexpr double kPerpendicular = 0.3;  // cosine below which a second direction counts as perpendicular to the first
   const std::vector<Vec3> directions = facing_directions(facets);
   Mat3 frame;
   frame.col(0) = directions.front().normalized();
@@ -81,7 +81,7 @@ Mat3 facing_frame(const std::vector<Facet>& facets) {
   return frame;
 }
 
-/// Whether the axes agree, in any order and direction.
+/// True if the axes agree, in any order and direction.
 bool same_axes(const Mat3& a, const Mat3& b) {
   constexpr double kSame = 0.999;  // cosine of 2.5 degrees
   return ((a.transpose() * b).cwiseAbs().colwise().maxCoeff().array() > kSame).all();

@@ -26,14 +26,14 @@ bool are_distinct(Corners corners) {
   return std::adjacent_find(corners.begin(), corners.end()) == corners.end();
 }
 
-/// What the corners of a cell become.
+/// Corners of a cell after merging.
 Corners merged_corners(const VolumeMesh& mesh, std::size_t c, std::span<const Index> target) {
   Corners corners;
   for (Index v : mesh.cell(c)) corners.push_back(target[v]);
   return corners;
 }
 
-/// A face without corners that repeat the one before; empty where nothing of it is left.
+/// Returns a face without repeated consecutive corners; empty if nothing of it remains.
 Corners reduced_face(const CellTopology& local, int f, std::span<const Index> corners) {
   Corners face;
   for (int i = 0; i < local.face_sizes[f]; ++i) {
@@ -44,7 +44,7 @@ Corners reduced_face(const CellTopology& local, int f, std::span<const Index> co
   return face.size() < 3 || !are_distinct(face) ? Corners{} : face;
 }
 
-/// Whether the faces that are left cover each other in pairs.
+/// True if the remaining faces cover each other in pairs.
 bool is_flat(const CellTopology& local, std::span<const Index> corners) {
   std::map<Corners, int> count;
   for (int f = 0; f < local.num_faces; ++f) {
@@ -56,7 +56,7 @@ bool is_flat(const CellTopology& local, std::span<const Index> corners) {
   return std::all_of(count.begin(), count.end(), [](const auto& entry) { return entry.second == 2; });
 }
 
-/// The prism that a hex with two parallel edges of one face collapsed has become.
+/// Returns the prism that a hex has become if two parallel edges of one face collapsed; empty if it has become none.
 std::optional<std::array<Index, 6>> prism_of(const CellTopology& hex, std::span<const Index> corners) {
   std::vector<int> triangles;  // local faces
   for (int f = 0; f < hex.num_faces; ++f)
@@ -67,7 +67,7 @@ std::optional<std::array<Index, 6>> prism_of(const CellTopology& hex, std::span<
   if (distinct.size() != 6 || triangles.size() != 2) return std::nullopt;
   std::array<Index, 6> prism{};
   std::size_t n = 0;
-  // Seen from inside the cell the bottom runs against its outward order.
+  // Seen from inside the cell, the bottom runs against its outward order.
   for (int i = 3; i >= 0; --i) {
     const int bottom = hex.faces[triangles[0]][i];
     if (std::find(prism.begin(), prism.begin() + static_cast<std::ptrdiff_t>(n), corners[bottom]) !=
@@ -113,7 +113,7 @@ VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target,
   for (CornerVertex& corner : merged.tags.corners) corner.vertex = target[corner.vertex];
   normalise_tags(merged.tags);
   const std::vector<char> all(merged.num_cells(), 1);
-  FeatureTags tags = std::move(merged.tags);  // checked only once the cells are known to be sound
+  FeatureTags tags = std::move(merged.tags);  // checked only after the cells have proved valid
   merged.tags = {};
   require_sound(merged, name);
   merged.tags = std::move(tags);
@@ -143,7 +143,7 @@ VolumeMesh joined(const VolumeMesh& a, const VolumeMesh& b) {
 VolumeMesh glue(const VolumeMesh& mesh, double distance) {
   if (!(distance >= 0) || !std::isfinite(distance)) throw InputError("merge: the distance must be finite and >= 0");
   const MeshTopology topology(mesh);
-  // Swept along a direction in which few vertices of a grid are level with each other.
+  // Sweeps along a direction in which few vertices of a grid have the same height.
   const Vec3 along = Vec3(1, std::sqrt(2.0), std::sqrt(3.0)).normalized();
   std::vector<std::pair<double, Index>> order;  // height, vertex
   double largest = 0;
@@ -153,7 +153,7 @@ VolumeMesh glue(const VolumeMesh& mesh, double distance) {
     largest = std::max(largest, mesh.positions[v].norm());
   }
   std::stable_sort(order.begin(), order.end());
-  const double reach = distance + 4e-15 * largest;  // heights are rounded
+  const double reach = distance + 4e-15 * largest;  // tolerance for the rounding of heights
   std::vector<Index> target(mesh.num_vertices());
   std::iota(target.begin(), target.end(), 0);
   const auto root = [&](Index v) {

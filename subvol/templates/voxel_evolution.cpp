@@ -13,10 +13,10 @@ namespace subvol {
 
 namespace {
 
-constexpr int kLongLoop = 40;  // cells; longer loops are no better
+constexpr int kLongLoop = 40;  // cells; longer loops count as this long
 
-/// Shortest way, in cells, through cells with filled(c) == side between two groups of a cell's face neighbours, not
-/// through the cell itself. 0 where there is none.
+/// Computes the length, in cells, of the shortest path between two groups of a cell's face neighbors. The path runs
+/// through cells with filled(c) == side and not through the cell itself. Returns 0 if there is none.
 class LoopLengths {
  public:
   explicit LoopLengths(std::size_t num_cells) : stamp_(num_cells, 0) {}
@@ -37,7 +37,7 @@ class LoopLengths {
     int steps = 1;
     for (std::size_t q = 0, end = queue_.size(); q < queue_.size(); ++steps, end = queue_.size())
       for (; q < end; ++q) {
-        if (!solid.may_flip(queue_[q])) continue;  // the outer layer has no neighbours beyond; ways around it are long
+        if (!solid.may_flip(queue_[q])) continue;  // the outer layer has no neighbors beyond; paths around it are long
         for (Index offset : solid.face_offsets()) {
           const Index c = queue_[q] + offset;
           if (solid.filled(c) != side || stamp_[c] == stamps_) continue;
@@ -59,17 +59,19 @@ class LoopLengths {
 struct HandleFlip {
   Index cell = kNoIndex;
   double gain = 0;
-  bool through_filled = false;               ///< the side on which the loop runs
+  bool through_filled = false;               ///< the loop runs through filled cells (true) or empty ones
   std::array<std::uint32_t, 2> ends{};       ///< faces at either end of the loop
 };
 
-/// Whether flipping a cell changes the number of handles in the direction wanted, and how.
+/// True if flipping a cell changes the number of handles in the wanted direction; then sets the fields of `flip` except
+/// `gain`.
 bool handle_flip(const VoxelSolid& solid, Index cell, bool add_handle, HandleFlip& flip) {
   if (!solid.may_flip(cell) || !solid.good_after_flip(cell)) return false;
   const VoxelSolid::Contact k = solid.contact(cell);
   const bool two_discs = k.components == 2 && k.euler_number == 2;
   const bool annulus = k.components == 1 && k.euler_number == 0;
-  // Two discs: the cell closes a loop of the solid. Annulus: it stops up a loop of the outside.
+  // Two discs: filling the cell closes a loop of the solid, and emptying it opens one. Annulus: filling the cell plugs
+  // a loop of the outside, and emptying it opens one.
   const bool closes = !solid.filled(cell);
   if (!(two_discs && add_handle == closes) && !(annulus && add_handle != closes)) return false;
   const std::vector<std::uint32_t> groups = VoxelSolid::face_groups(two_discs ? k.shared : k.open);
@@ -80,11 +82,11 @@ bool handle_flip(const VoxelSolid& solid, Index cell, bool add_handle, HandleFli
   return true;
 }
 
-/// The best flip that changes the number of handles, or none. To add one, long loops are best; to remove one, short
-/// ones. Flips may go against the fractions by `tolerance`.
+/// Returns the best flip that changes the number of handles, or none. Long loops are best for adding a handle, short
+/// ones for removing one. The gain of a flip must be above -tolerance.
 std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& goal, bool add_handle, double tolerance,
                                       LoopLengths& loops) {
-  constexpr std::size_t kLookedAt = 40;  // most promising flips whose loops are measured
+  constexpr std::size_t kLookedAt = 40;  // most promising flips, whose loops are measured
   std::vector<HandleFlip> flips;
   for (std::size_t c = 0; c < solid.num_cells(); ++c) {
     HandleFlip flip;
@@ -98,7 +100,7 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
   double best_score = 0;
   for (const HandleFlip& flip : flips) {
     const int length = loops.length(solid, flip.cell, flip.through_filled, flip.ends);
-    if (length == 0) continue;  // it would join or part components, or open or shut a cavity
+    if (length == 0) continue;  // the flip would join or split components, or open or close a cavity
     const double measure = std::min(length, kLongLoop);
     const double score = (flip.gain + tolerance) * (add_handle ? measure : 1 / measure);
     if (!best || score > best_score) best = flip.cell, best_score = score;
@@ -121,7 +123,7 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
     queue.push({goal.gain(solid, c), c});
   };
   for (std::size_t c = 0; c < solid.num_cells(); ++c) offer(static_cast<Index>(c));
-  // A cell is flipped once at most: afterwards it is as wanted.
+  // A cell is flipped at most once: afterwards it is as wanted.
   while (!queue.empty()) {
     const Index c = queue.top().second;
     queue.pop();
@@ -133,13 +135,13 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
 }
 
 bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
-  constexpr int kMostFlips = 3;  // of one cell: repairs may undo each other for ever
+  constexpr int kMostFlips = 3;  // per cell: repairs may undo each other forever
   std::vector<char> flips(solid.num_cells(), 0);
   std::vector<Index> bad;
   for (std::size_t p = 0; p < solid.num_points(); ++p)
     if (!solid.good(static_cast<Index>(p))) bad.push_back(static_cast<Index>(p));
   while (!bad.empty()) {
-    // Best flip of all cells at the oldest bad point.
+    // The best flip among all cells at the most recently found bad point.
     const Index p = bad.back();
     if (solid.good(p)) {
       bad.pop_back();
@@ -163,7 +165,8 @@ bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
 
 bool drop_surplus(VoxelSolid& solid, const VoxelGoal& goal) {
   std::vector<int> component;
-  // Keeps the largest components of one side; the outside counts as the one that holds the first cell.
+  // Keeps the largest components of one side; of the empty side, the outside (the component of the first cell) is
+  // always kept.
   const auto drop = [&](bool side, int wanted) {
     const int count = solid.components(side, component);
     if (count < wanted) return false;
@@ -187,7 +190,7 @@ bool drop_surplus(VoxelSolid& solid, const VoxelGoal& goal) {
 bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
   const BettiNumbers now = solid.topology();
   if (now.components != goal.topology.components || now.cavities != goal.topology.cavities) return false;
-  // Many wrong handles mean that the grid is too coarse; mending them one by one would not make a likeness.
+  // Many wrong handles mean that the grid is too coarse; correcting them one by one would not give a good likeness.
   constexpr int kMostFlips = 24;
   const int missing = goal.topology.handles - now.handles;
   if (missing == 0) return true;
@@ -195,7 +198,7 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
   LoopLengths loops(solid.num_cells());
   for (int i = 0; i < std::abs(missing); ++i) {
     std::optional<Index> cell;
-    for (double tolerance : {0.25, 1.0})  // a little against the shape, or if need be through it
+    for (double tolerance : {0.25, 1.0})  // first slightly against the shape, then if necessary right through it
       if (!cell) cell = best_handle_flip(solid, goal, missing > 0, tolerance, loops);
     if (!cell) return false;
     solid.flip(*cell);

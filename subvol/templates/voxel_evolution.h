@@ -8,39 +8,40 @@
 
 namespace subvol {
 
-/// What a voxel solid is to become: filled where the fraction is above the threshold, as far as its topology allows.
+/// Target of a voxel solid: cells are filled if their fraction is above the threshold, as far as the topology allows.
 struct VoxelGoal {
-  std::span<const double> fractions;  ///< of each cell that lies in the shape, in [0, 1]
+  std::span<const double> fractions;  ///< share of each cell that lies in the shape, in [0, 1]
   double threshold = 0.5;             ///< in (0, 1)
   BettiNumbers topology;
 
   bool wants(Index cell) const { return fractions[cell] > threshold; }
-  /// What flipping a cell gains, in [-1, 1]: positive where it is not as wanted.
+  /// Gain of flipping a cell, in [-1, 1]: positive if the cell is not as wanted.
   double gain(const VoxelSolid& solid, Index cell) const {
     return solid.filled(cell) ? threshold - fractions[cell] : fractions[cell] - threshold;
   }
 };
 
-/// Flips cells that are not as wanted, most certain ones first, while the topology stays as it is.
+/// Flips cells that are not as wanted, in order of decreasing gain, as long as the topology does not change.
 void evolve(VoxelSolid& solid, const VoxelGoal& goal);
 
-/// Flips single cells until all points are good, each time where most is won. False where that does not end.
+/// Flips single cells, each time the one that improves most, until all points are good. Returns false if it does not
+/// reach that.
 bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal);
 
-/// Empties the components and fills the cavities that are too many, smallest first. False where there are too few.
+/// Empties surplus components and fills surplus cavities, smallest first. Returns false if there are too few of either.
 bool drop_surplus(VoxelSolid& solid, const VoxelGoal& goal);
 
-/// Adds or removes handles one by one until their number is right, large ones first and small ones first respectively,
-/// evolving after each. False where that is not possible. Points must be good.
+/// Adds or removes handles one by one until their number is right; it prefers large handles when adding and small ones
+/// when removing, and calls `evolve` after each. Returns false if that is not possible. All points must be good.
 bool match_handles(VoxelSolid& solid, const VoxelGoal& goal);
 
-/// Grows towards parts of the shape that no filled cell is near: tails and fingers thinner than a cell. The topology
-/// stays.
+/// Grows toward parts of the shape that no filled cell is near, such as tails and fingers thinner than a cell. The
+/// topology does not change.
 void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal);
 
-/// Starts a solid of the goal's topology in one of three ways; empty where it cannot be reached.
+/// Creates a solid of the goal's topology in one of three ways; returns nothing if that topology cannot be reached.
 ///
-///   cut     the cells above the threshold, with bad points repaired
+///   cut     from the cells above the threshold: bad points repaired, surplus components and cavities dropped
 ///   grown   from the fullest cell             } for one component without cavities
 ///   shrunk  from all cells the grid may fill  }
 enum class VoxelStart { cut, grown, shrunk };

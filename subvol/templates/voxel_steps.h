@@ -7,9 +7,9 @@
 
 namespace subvol {
 
-/// Fewest steps from one cell to a face neighbour that lead from the cells with `from` to each cell, all on the way
-/// with `through`; -1 where there is no way. previous  if given: the cell before, on one such way; kNoIndex for cells
-/// with `from` and those not reached.
+/// Returns for each cell the smallest number of steps between face neighbors that leads to it from a cell with `from`,
+/// stepping only onto cells with `through`; -1 if there is no such path. previous: if given, receives for each cell the
+/// one before it on such a path; kNoIndex for cells with `from` and those not reached.
 template <class From, class Through>
 std::vector<int> voxel_steps(const VoxelSolid& solid, From&& from, Through&& through,
                              std::vector<Index>* previous = nullptr) {
@@ -22,7 +22,7 @@ std::vector<int> voxel_steps(const VoxelSolid& solid, From&& from, Through&& thr
       queue.push_back(static_cast<Index>(c));
     }
   for (std::size_t q = 0; q < queue.size(); ++q) {
-    if (!solid.may_flip(queue[q])) continue;  // on the grid's outer layer, beyond which there is nothing
+    if (!solid.may_flip(queue[q])) continue;  // on the grid's outer layer, beyond which there are no cells
     for (Index offset : solid.face_offsets()) {
       const Index c = queue[q] + offset;
       if (steps[c] >= 0 || !through(c)) continue;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kElements = 27;
 
-/// Whether the octants in a set hang together through faces; none do.
+/// True if the octants of a set are connected through faces; also true for the empty set.
 constexpr bool face_connected(unsigned octants) {
   if (octants == 0) return true;
   unsigned reached = octants & (~octants + 1);
@@ -21,7 +21,7 @@ constexpr bool face_connected(unsigned octants) {
   return reached == octants;
 }
 
-/// Whether boundary faces at the point look both ways along one axis.
+/// True if boundary faces at the point look both ways along one axis.
 constexpr bool looks_both_ways(unsigned octants) {
   for (unsigned axis : {1u, 2u, 4u}) {
     bool up = false, down = false;
@@ -46,8 +46,8 @@ constexpr std::array<bool, 256> make_table(VertexRule rule) {
 constexpr std::array<bool, 256> kManifold = make_table(VertexRule::manifold);
 constexpr std::array<bool, 256> kPillowable = make_table(VertexRule::pillowable);
 
-/// Eight times a point's share of the Euler number: itself, half its edges, a quarter of its faces, an eighth of its
-/// cells.
+/// Eight times a point's contribution to the Euler number: the point itself, half its edges, a quarter of its faces, an
+/// eighth of its cells.
 constexpr int eight_shares(unsigned octants) {
   if (octants == 0) return 0;
   int edges = 0, faces = 0;
@@ -69,10 +69,10 @@ constexpr std::array<int, 256> kEightShares = [] {
   return table;
 }();
 
-/// Faces, edges and vertices of a cell, by the direction from its centre: element x+1 + 3(y+1) + 9(z+1).
+/// Faces, edges and vertices of a cell, numbered by the direction from its center: element x+1 + 3(y+1) + 9(z+1).
 struct Elements {
-  std::array<std::uint32_t, kElements> closure{};  ///< elements within the closure of this one
-  std::array<std::uint32_t, kElements> touching{}; ///< elements within it, or that it is within
+  std::array<std::uint32_t, kElements> closure{};  ///< elements in the closure of this one
+  std::array<std::uint32_t, kElements> touching{}; ///< elements in its closure, or whose closure contains it
   std::uint32_t all = 0, vertices = 0, edges = 0, faces = 0;
 };
 
@@ -101,7 +101,7 @@ constexpr Elements make_elements() {
 
 constexpr Elements kCube = make_elements();
 
-/// The elements connected with the lowest one of a set.
+/// Returns the part of a set that is connected with its lowest element.
 std::uint32_t first_part(std::uint32_t elements) {
   std::uint32_t part = elements & (~elements + 1), front = part;
   while (front) {
@@ -148,7 +148,7 @@ VoxelSolid::VoxelSolid(const std::array<int, 3>& cells, VertexRule rule) : cells
       }
 }
 
-// Of the point at a cell's corner with bits o the cell is the one across: the offsets are those of the opposite corner.
+// A cell is octant o of the point at its opposite corner, hence the reversed bits in point_offsets_.
 std::array<Index, 8> VoxelSolid::points(Index cell) const {
   std::array<Index, 8> result;
   for (std::size_t o = 0; o < 8; ++o) result[o] = first_point_[cell] + point_offsets_[o];
