@@ -42,6 +42,8 @@ constexpr int kMostDraws = 4, kDrawSteps = 20;
 /// is good.
 constexpr double kFirstEmphasis = 4, kLastEmphasis = 512, kGoodScaledJacobian = 0.5;
 constexpr int kLiftSteps = 8;
+/// Emphases in a row that may fail to help before no stronger one is attempted.
+constexpr int kMostFailedLifts = 3;
 /// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
 constexpr int kMostImprovements = 3;
 constexpr double kMostDistanceGrowth = 1.2;
@@ -200,10 +202,7 @@ std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace&
   for (std::size_t c = 0; c < points.size(); ++c)
     points[c] = std::max({kLeastPoints, points_for_order(space.pattern_order(space.pattern(c))),
                           stays_dense_ ? points_[c] : 0});
-  // Equal steps integrate cosines exactly (paper: Eq. 6), and polynomials poorly, the more so at the ends of edges.
-  const QuadratureRule rule =
-      space.basis() == Basis::fourier ? QuadratureRule::trapezoidal : QuadratureRule::gauss_lobatto;
-  auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points, rule);
+  auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
   volume->set_distortion(options_.distortion);
   return volume;
 }
@@ -459,7 +458,9 @@ bool HighOrderFit::improve_worst_places() {
   most_mean_ = options_.tolerance_percent ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
                                           : kMostDistanceGrowth * outcome_.mean_percent;
   for (int round = 0; round < kMostImprovements; ++round) {
+    const double far_length_before = far_length_;
     if (draw_in_far_places() == Again::ended) return false;
+    if (round > 0 && far_length_ == far_length_before) break;  // the same lifts would fail again
     const double emphasis_before = emphasis_;
     if (lift_worst_places() == Again::ended) return false;
     if (emphasis_ == emphasis_before) break;  // otherwise, cells may now tolerate what they could not before
@@ -505,15 +506,20 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   return last;
 }
 
-/// Puts more and more emphasis on places of poor shape, as long as there are any.
+/// Puts more and more emphasis on places of poor shape, as long as there are any. An emphasis that does not help may be
+/// too weak to change the worst cell, so stronger ones are attempted as well before this ends.
 HighOrderFit::Again HighOrderFit::lift_worst_places() {
-  Again last = Again::kept;
   const auto is_poor = [&] {
     return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < kGoodScaledJacobian;
   };
-  while (last == Again::kept && is_poor() && emphasis_ < kLastEmphasis)
-    last = run_again(emphasis_, emphasis_ == 0 ? kFirstEmphasis : 2 * emphasis_, kLiftSteps);
-  return last;
+  double attempted = emphasis_;
+  for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < kLastEmphasis;) {
+    attempted = attempted == 0 ? kFirstEmphasis : 2 * attempted;
+    const Again last = run_again(emphasis_, attempted, kLiftSteps);
+    if (last == Again::ended) return last;
+    failures = last == Again::kept ? 0 : failures + 1;
+  }
+  return Again::kept;
 }
 
 std::vector<Vec3> HighOrderFit::in_target_units(std::vector<Vec3> coefficients) const {

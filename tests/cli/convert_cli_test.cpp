@@ -50,7 +50,7 @@ TEST_CASE("convert writes every format, and what can be read back is the same", 
   CHECK(place.run("convert target.off --limit -o t2.glb").status == 2);
 }
 
-TEST_CASE("--references chooses the cell data that become references, and names those there are", "[cli]") {
+TEST_CASE("The option --references chooses the cell data that become references, and names those there are", "[cli]") {
   const Workplace place;
   subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
   mesh.references = {7, 9};

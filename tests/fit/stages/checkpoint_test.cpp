@@ -111,7 +111,8 @@ TEST_CASE("A fit that was stopped within a minimisation ends at the same bits") 
 TEST_CASE("A minimisation that was stopped after cells were densified ends at the same bits") {
   const samples::Sample sample = samples::torus_sample();
   const auto run = [&](StageLog* log) {
-    HighOrderFitOptions options{.order = 2, .tolerance_percent = 0.01, .max_iterations = 12};
+    HighOrderFitOptions options{
+        .order = 2, .basis = Basis::fourier, .tolerance_percent = 0.01, .max_iterations = 12};
     options.log = log;
     return fit_high_order(sample.target, sample.template_mesh, options);
   };
