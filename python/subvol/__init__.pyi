@@ -118,7 +118,7 @@ class SurfaceMesh:
     def copy(self) -> SurfaceMesh: ...
 
 class HighOrderMesh:
-    def __init__(self, mesh: Volume, order: int, *, basis: Basis = "fourier") -> None: ...
+    def __init__(self, mesh: Volume, order: int, *, basis: Basis = "legendre") -> None: ...
     @property
     def coefficients(self) -> Floats: ...
     @property
@@ -206,7 +206,7 @@ def fit(
     max_iterations: int = 0,
     time_limit: float = 0.0,
     order: Optional[int] = None,
-    basis: Basis = "fourier",
+    basis: Basis = "legendre",
     adaptive: bool = False,
     keep_states: bool = False,
     checkpoint: Optional[Path] = None,
@@ -227,7 +227,7 @@ def optimize(
     max_tolerance: float = 0.5,
     lambda_: Optional[float] = None,
     order: Optional[int] = None,
-    basis: Basis = "fourier",
+    basis: Basis = "legendre",
     max_iterations: int = 0,
     time_limit: float = 0.0,
     checkpoint: Optional[Path] = None,
@@ -290,8 +290,8 @@ def write(
     up: Literal["y", "z"] = "y",
     limit: bool = False,
     intervals: int = 0,
-    map_tolerance: float = 0.001,
     cut: Optional[str] = None,
     wireframe: bool = True,
     quantize: bool = False,
+    map_tolerance: float = 0.001,
 ) -> None: ...
