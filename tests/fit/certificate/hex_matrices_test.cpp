@@ -460,7 +460,7 @@ TEST_CASE("Boxes of a hex have the Jacobian of the cell, by models and by halves
       boxes.set_cell(modes, others);  // of which nothing must stay
       boxes.set_cell(modes, coefficients);
       int halved = 0, narrow_halved = 0, looked_at = 0;
-      for (int walk = 0; walk < 40; ++walk) {
+      for (int walk = 0; walk < 80; ++walk) {
         HexBoxes::Box box = boxes.root();
         for (int level = 0; level < 9; ++level) {
           double lowest = -std::numeric_limits<double>::infinity();
