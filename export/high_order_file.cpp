@@ -210,9 +210,8 @@ PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension
   const double wanted = map_tolerance_percent / 100 * vertex_diagonal(mesh);
   if (extension == ".vtu") return polynomial_map(mesh, {kMaxVtkOrder, kMaxVtkOrder, kMaxVtkOrder}, wanted);
   if (extension == ".msh")
-    return polynomial_map(mesh,
-                          {max_gmsh_order(CellKind::tet), max_gmsh_order(CellKind::prism), max_gmsh_order(CellKind::hex)},
-                          wanted);
+    return polynomial_map(
+        mesh, {max_gmsh_order(CellKind::tet), max_gmsh_order(CellKind::prism), max_gmsh_order(CellKind::hex)}, wanted);
   throw InputError("file_cells: expected the extension .vtu or .msh, found " + extension);
 }
 

@@ -224,7 +224,9 @@ TEST_CASE("Every room is described in docs/architecture.md", "[includes]") {
   CHECK(rows == folders);
 }
 
-TEST_CASE("Files include only what their room may", "[includes]") { CHECK(upward_includes(all_sources()) == Strings{}); }
+TEST_CASE("Files include only what their room may", "[includes]") {
+  CHECK(upward_includes(all_sources()) == Strings{});
+}
 
 TEST_CASE("Libraries of others are included only where they belong", "[includes]") {
   CHECK(stray_libraries(all_sources()) == Strings{});

@@ -59,10 +59,11 @@ Json lagrange_json(const LagrangeCheck& check) {
 
 std::string to_text(const LagrangeCheck& check) {
   if (!check.differs && check.valid()) return "Lagrange cells      as other programs read them: the same map\n";
-  return formatted("Lagrange cells      as other programs read them: up to %.3g %% of the diagonal from the map, %zu of %zu "
-                   "certified, scaled Jacobian min %.4f%s\n",
-                   check.difference_percent, check.quality.certificate.certified, check.quality.num_cells,
-                   check.quality.min_scaled_jacobian, check.valid() ? "" : ": NOT VALID");
+  return formatted(
+      "Lagrange cells      as other programs read them: up to %.3g %% of the diagonal from the map, %zu of %zu "
+      "certified, scaled Jacobian min %.4f%s\n",
+      check.difference_percent, check.quality.certificate.certified, check.quality.num_cells,
+      check.quality.min_scaled_jacobian, check.valid() ? "" : ": NOT VALID");
 }
 
 namespace {

@@ -291,7 +291,8 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
 void add_solver_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
   const auto group = "Solver";
-  verb.add_option("--lambda-far", fit.lambda_far, "Largest weight of the cells' shape to which the way from one level to the next may raise it")
+  verb.add_option("--lambda-far", fit.lambda_far,
+                  "Largest weight of the cells' shape to which the way from one level to the next may raise it")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()

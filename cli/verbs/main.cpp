@@ -61,8 +61,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-/// Refuses an option that neither the verb nor the program has. The parser would first complain about arguments that are
-/// missing.
+/// Refuses an option that neither the verb nor the program has. The parser would first complain about arguments that
+/// are missing.
 void require_known_options(const CLI::App& app, int argc, char** argv) {
   const CLI::App* verb = &app;
   std::string name = "subvol";

@@ -318,7 +318,8 @@ PolynomialMap polynomial_map(const HighOrderMesh& mesh, const OrderLimits& limit
     const int target_order = list_of(which, orders)[n];
     const EntitySeries series(shape, order, matrices[order],
                               {mesh.coefficients.data() + first, static_cast<std::size_t>(num_modes(shape, order))});
-    series.write(target_order, {coefficients.data() + target, static_cast<std::size_t>(num_modes(shape, target_order))});
+    series.write(target_order,
+                 {coefficients.data() + target, static_cast<std::size_t>(num_modes(shape, target_order))});
   });
   return result;
 }

@@ -55,8 +55,8 @@ void Normalisation::take_in(VolumeMesh& mesh) const {
     throw InputError(formatted("the mesh is %.2g times as large as the target; expected one roughly in place", size));
   const double distance = box.center().stableNorm();
   if (!(distance <= kMostSize))
-    throw InputError(formatted("the mesh is %.2g times the target's diagonal away from it; expected one roughly in place",
-                               distance));
+    throw InputError(formatted(
+        "the mesh is %.2g times the target's diagonal away from it; expected one roughly in place", distance));
 }
 
 std::vector<Vec3> Normalisation::from_unit(std::vector<Vec3> points) const {

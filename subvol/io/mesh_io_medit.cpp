@@ -28,11 +28,22 @@ struct SkippedSection {
   bool has_reference = false;  ///< true if the last number is a reference; a nonzero one counts as left out
 };
 constexpr std::size_t kUntilKeyword = 0;  // files disagree on the length of an entry
-constexpr SkippedSection kSkippedSections[] = {
-    {"Triangles", 4, true}, {"Quadrilaterals", 5, true}, {"RequiredVertices", 1}, {"RequiredEdges", 1}, {"RequiredTriangles", 1},
-    {"RequiredQuadrilaterals", 1}, {"Normals", 3}, {"NormalAtVertices", 2}, {"NormalAtTriangleVertices", 3},
-    {"NormalAtQuadrilateralVertices", 4}, {"Tangents", 3}, {"TangentAtVertices", 2}, {"TangentAtEdges", 3},
-    {"TangentAtEdgeVertices", 3}, {"SubDomainFromMesh", kUntilKeyword}, {"SubDomainFromGeom", kUntilKeyword}};
+constexpr SkippedSection kSkippedSections[] = {{"Triangles", 4, true},
+                                               {"Quadrilaterals", 5, true},
+                                               {"RequiredVertices", 1},
+                                               {"RequiredEdges", 1},
+                                               {"RequiredTriangles", 1},
+                                               {"RequiredQuadrilaterals", 1},
+                                               {"Normals", 3},
+                                               {"NormalAtVertices", 2},
+                                               {"NormalAtTriangleVertices", 3},
+                                               {"NormalAtQuadrilateralVertices", 4},
+                                               {"Tangents", 3},
+                                               {"TangentAtVertices", 2},
+                                               {"TangentAtEdges", 3},
+                                               {"TangentAtEdgeVertices", 3},
+                                               {"SubDomainFromMesh", kUntilKeyword},
+                                               {"SubDomainFromGeom", kUntilKeyword}};
 constexpr SkippedSection kSkippedValues[] = {{"AngleOfCornerBound", 1}, {"BoundingBox", 6}};
 
 /// Prefixes of the comments that store finite sharpness; other readers skip them.

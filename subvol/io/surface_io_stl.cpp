@@ -174,7 +174,8 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes, std::vec
 ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
   ParsedSurface parsed;
   if (is_binary(bytes) && !has_room_for_facets(bytes)) require_no_utf16(name, bytes);
-  parsed.mesh = is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes, parsed.warnings);
+  parsed.mesh =
+      is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes, parsed.warnings);
   return parsed;
 }
 

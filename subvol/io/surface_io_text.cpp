@@ -40,10 +40,25 @@ struct SkippedObj {
   std::string_view keyword;
   const char* missed = nullptr;
 };
-constexpr SkippedObj kSkippedObj[] = {
-    {"vt", "texture coordinates"}, {"vn"}, {"vp"}, {"g", "names of groups"}, {"o", "names of objects"}, {"s"}, {"mg"},
-    {"usemtl", "uses of materials"}, {"mtllib"}, {"usemap", "uses of maps"}, {"maplib"}, {"l", "lines"}, {"p", "points"},
-    {"bevel"}, {"c_interp"}, {"d_interp"}, {"lod"}, {"shadow_obj"}, {"trace_obj"}};
+constexpr SkippedObj kSkippedObj[] = {{"vt", "texture coordinates"},
+                                      {"vn"},
+                                      {"vp"},
+                                      {"g", "names of groups"},
+                                      {"o", "names of objects"},
+                                      {"s"},
+                                      {"mg"},
+                                      {"usemtl", "uses of materials"},
+                                      {"mtllib"},
+                                      {"usemap", "uses of maps"},
+                                      {"maplib"},
+                                      {"l", "lines"},
+                                      {"p", "points"},
+                                      {"bevel"},
+                                      {"c_interp"},
+                                      {"d_interp"},
+                                      {"lod"},
+                                      {"shadow_obj"},
+                                      {"trace_obj"}};
 
 class ObjParser {
  public:

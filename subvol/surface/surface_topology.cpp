@@ -74,8 +74,8 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
       const std::string edge = prefix(kind) + "edge " + name_of(from, names) + "-" + name_of(to, names);
       if (first_fault.empty())
         first_fault = same > 1 ? edge + ": its two faces run the same way along it"
-                               : edge + " must lie between two " + prefix(kind) + "faces of opposite direction; it has " +
-                                     std::to_string(same + opposite);
+                               : edge + " must lie between two " + prefix(kind) +
+                                     "faces of opposite direction; it has " + std::to_string(same + opposite);
       continue;
     }
     surface.twins[h] = twin;

@@ -85,10 +85,11 @@ TEST_CASE("an input that cannot be read is told as what it is, by every verb", "
     place.file(name, "x");
     const std::string file = name;
     for (const std::string verb :
-         {"convert " + file + " -o b.mesh", "convert " + file + " -o b.obj", "check " + file, "optimize " + file + " -o b.mesh",
-          "subdivide " + file + " -o b.mesh", "fit " + file + " -o b.mesh", "template auto " + file + " -o b.mesh",
-          "template pillow " + file + " -o b.mesh", "shell " + file + " --thickness 1 -o b.mesh",
-          "check template.mesh --target " + file, "fit target.off --template " + file + " -o b.mesh"}) {
+         {"convert " + file + " -o b.mesh", "convert " + file + " -o b.obj", "check " + file,
+          "optimize " + file + " -o b.mesh", "subdivide " + file + " -o b.mesh", "fit " + file + " -o b.mesh",
+          "template auto " + file + " -o b.mesh", "template pillow " + file + " -o b.mesh",
+          "shell " + file + " --thickness 1 -o b.mesh", "check template.mesh --target " + file,
+          "fit target.off --template " + file + " -o b.mesh"}) {
       const Run run = place.run(verb);
       CAPTURE(verb, run.err);
       CHECK(run.status == 3);
@@ -100,10 +101,11 @@ TEST_CASE("an input that cannot be read is told as what it is, by every verb", "
   CHECK(surface.status == 3);
   CHECK(surface.err.find("cells are wanted") != std::string::npos);
   // A .vtu of another program is told as such, and not by one of its attributes only.
-  for (const std::string header :
-       {R"(type="UnstructuredGrid" version="0.1" byte_order="LittleEndian")",
-        R"(type="UnstructuredGrid" version="2.2" byte_order="LittleEndian")",
-        R"(type="UnstructuredGrid" version="2.2" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor")"}) {
+  for (
+      const std::string header :
+      {R"(type="UnstructuredGrid" version="0.1" byte_order="LittleEndian")",
+       R"(type="UnstructuredGrid" version="2.2" byte_order="LittleEndian")",
+       R"(type="UnstructuredGrid" version="2.2" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor")"}) {
     place.file("foreign.vtu", "<?xml version=\"1.0\"?>\n<VTKFile " + header + ">\n<UnstructuredGrid/>\n</VTKFile>\n");
     for (const std::string verb : {"check foreign.vtu", "convert foreign.vtu -o b.mesh"}) {
       const Run run = place.run(verb);

@@ -78,7 +78,8 @@ TEST_CASE("A surface that faces inward is told, with holes or without, and calle
       text += std::to_string(p.x()) + " " + std::to_string(p.y()) + " " + std::to_string(p.z()) + "\n";
     for (std::size_t t = num_missing; t < ball.triangles.size(); ++t) {
       const auto& [a, b, c] = ball.triangles[t];
-      text += "3 " + std::to_string(a) + " " + std::to_string(inward ? c : b) + " " + std::to_string(inward ? b : c) + "\n";
+      text +=
+          "3 " + std::to_string(a) + " " + std::to_string(inward ? c : b) + " " + std::to_string(inward ? b : c) + "\n";
     }
     place.file("ball.off", text);
   };
@@ -121,10 +122,10 @@ TEST_CASE("No verb takes a mesh that is a point", "[cli]") {
   const subvol::HighOrderMesh mesh(subvol::ElementSpace(straight, subvol::Basis::fourier, 2), straight);
   subvol::write_volume(place / "point.vtu", mesh, {});
   for (const std::string verb :
-       {"check point.mesh", "convert point.mesh -o a.vtk", "subdivide point.mesh -o a.mesh", "optimize point.mesh -o a.mesh",
-        "fit target.off --template point.mesh -o a.mesh", "fit point.mesh -o a.mesh", "template pillow point.mesh -o a.mesh",
-        "shell point.mesh --thickness 1 -o a.mesh", "check template.mesh --target point.mesh", "check point.vtu",
-        "convert point.vtu -o a.mesh"}) {
+       {"check point.mesh", "convert point.mesh -o a.vtk", "subdivide point.mesh -o a.mesh",
+        "optimize point.mesh -o a.mesh", "fit target.off --template point.mesh -o a.mesh", "fit point.mesh -o a.mesh",
+        "template pillow point.mesh -o a.mesh", "shell point.mesh --thickness 1 -o a.mesh",
+        "check template.mesh --target point.mesh", "check point.vtu", "convert point.vtu -o a.mesh"}) {
     const Run run = place.run(verb);
     CAPTURE(verb, run.err);
     CHECK(run.status == 3);

@@ -81,7 +81,9 @@ TEST_CASE("a .msh holds the cells by volume and kind, with physical groups and e
   const auto skip = [&](int n) {
     for (std::string word; n > 0; --n) in >> word;
   };
-  line("$MeshFormat 4.1 0 8 $EndMeshFormat $PhysicalNames 3 3 1 \"reference 0\" 3 2 \"reference 2\" 3 5 \"reference 5\"");
+  line(
+      "$MeshFormat 4.1 0 8 $EndMeshFormat $PhysicalNames 3 3 1 \"reference 0\" 3 2 \"reference 2\" 3 5 \"reference "
+      "5\"");
   line("$EndPhysicalNames $Entities 0 0 0 3 1");
   skip(6);
   line("1 1 0 2");

@@ -287,7 +287,8 @@ TEST_CASE("A template that is next to nothing beside its target, or far beyond i
   const samples::Sample sample = samples::ball_sample();
   VolumeMesh scaled = sample.template_mesh;
   for (const double size : {1e-8, 1e-20, 1e8, 1e100}) {
-    for (std::size_t v = 0; v < scaled.num_vertices(); ++v) scaled.positions[v] = size * sample.template_mesh.positions[v];
+    for (std::size_t v = 0; v < scaled.num_vertices(); ++v)
+      scaled.positions[v] = size * sample.template_mesh.positions[v];
     CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, scaled, quick()),
                       Catch::Contains("times as large as the target"));
     CHECK_THROWS_AS(fit_high_order(sample.target, scaled, {.order = 2}), InputError);

@@ -410,7 +410,8 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
   add_face(three, {0, 1, 2});
   add_face(three, {1, 0, 3});
   add_face(three, {1, 0, 4});
-  CHECK_THROWS_WITH(make_shell(three, {.thickness = 0.1}), Catch::Contains("1 edge has more than two faces: from vertex 0"));
+  CHECK_THROWS_WITH(make_shell(three, {.thickness = 0.1}),
+                    Catch::Contains("1 edge has more than two faces: from vertex 0"));
 
   PolygonMesh flipped{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}}, {0}, {}};
   add_face(flipped, {0, 1, 2});

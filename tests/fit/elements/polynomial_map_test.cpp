@@ -76,8 +76,9 @@ TEST_CASE("polynomial_map: refused limits and distances", "[elements]") {
   CHECK_THROWS_AS(polynomial_map(mesh, {.hex = kMaxOrder + 1}, 1), InputError);
   CHECK_THROWS_AS(polynomial_map(mesh, {}, -1), InputError);
   CHECK_THROWS_AS(polynomial_map(mesh, {}, std::nan("")), InputError);
-  CHECK_THROWS_AS(sampled_distance(mesh, random_mesh(ElementSpace(single_cell(CellKind::hex), Basis::fourier, 2), source), 3),
-                  InputError);
+  CHECK_THROWS_AS(
+      sampled_distance(mesh, random_mesh(ElementSpace(single_cell(CellKind::hex), Basis::fourier, 2), source), 3),
+      InputError);
 }
 
 TEST_CASE("lagrange_cells: the polynomials of Lagrange cells are the Legendre cells that they sample", "[export]") {

@@ -12,7 +12,8 @@ using namespace subvol;
 
 namespace {
 
-/// Its one unknown tells what came of it: lambda, of the last stage. The boundary intersects itself in `pairs_at(lambda)`.
+/// Its one unknown tells what came of it: lambda, of the last stage. The boundary intersects itself in
+/// `pairs_at(lambda)`.
 class FoldedFit : public StagedFit {
  public:
   explicit FoldedFit(std::size_t (*pairs_at)(double)) : StagedFit(true), pairs_at_(pairs_at), x_(1, Vec3(7, 0, 0)) {}

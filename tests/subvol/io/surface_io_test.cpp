@@ -179,8 +179,9 @@ TEST_CASE("text whose lines end with CR, or CR and LF, is read, and its lines ar
     CHECK_THAT(refusal("a.off", with_ends(replaced(kTetOff, "3 0 2 1", "3 0 2 9"), end)), Contains(":7:"));
     // The first of the binary numbers may look like the end of a line.
     std::string header = replaced(replaced(kPlyHeader, "uchar red", "uchar r"), "uchar int", "uchar uchar");
-    header = with_ends("ply\nformat binary_little_endian 1.0\n" + header.substr(0, header.find("property list uchar f")) +
-                           "end_header\n", end);
+    header = with_ends("ply\nformat binary_little_endian 1.0\n" +
+                           header.substr(0, header.find("property list uchar f")) + "end_header\n",
+                       end);
     std::string numbers;
     for (const Vec3& x : kTetPoints) {
       append(numbers, std::uint8_t{'\n'});

@@ -99,7 +99,8 @@ TEST_CASE("A soup with holes and flipped triangles becomes a solid's boundary", 
   fan.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
   CHECK_THROWS_AS(solid_boundary(fan), InputError);
   // Numbers are those of the input, though vertices are welded, and come in another order in the triangles.
-  fan.positions = {Vec3(9, 9, 9), Vec3(0, 0, 1), Vec3(0, -1, 0), Vec3(0, 0.5, 0), Vec3(1, 0, 0), Vec3(0, 0, 0), Vec3(1, 0, 0)};
+  fan.positions = {Vec3(9, 9, 9), Vec3(0, 0, 1), Vec3(0, -1, 0), Vec3(0, 0.5, 0),
+                   Vec3(1, 0, 0), Vec3(0, 0, 0), Vec3(1, 0, 0)};
   fan.triangles = {{5, 4, 3}, {6, 5, 1}, {5, 4, 2}};
   CHECK_THROWS_WITH(solid_boundary(fan), Catch::Contains("1 edge has more than two") && Catch::Contains("4 (1 0 0)") &&
                                              Catch::Contains("5 (0 0 0)") && Catch::Contains("has 3"));
