@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `fit`, `convert` and `check` say of the polynomial cells in .vtu and .msh.
+// `fit`, `convert` and `check` report on the polynomial cells in .vtu and .msh.
 
 #include "export/high_order_file.h"
 #include "tests/support/element_fixtures.h"

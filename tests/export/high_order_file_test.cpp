@@ -98,7 +98,7 @@ const std::vector<int> kVtkTypes{71, 73, 72};  // by CellKind
 /// Points between the nodes of any order, and on the cell's border.
 std::vector<Vec3> dense_points(CellKind kind) { return make_quadrature(kind, QuadratureRule::trapezoidal, 7).points; }
 
-/// Whether VTK finds in a written file what `file_cells` says that it holds: the polynomials that are certified.
+/// Writes the mesh and compares the cells that VTK reads with those of `file_cells`, which are certified.
 int compare_with_vtk(const HighOrderMesh& mesh) {
   const TemporaryFolder folder;
   write_volume(folder / "mesh.vtu", mesh);
