@@ -38,8 +38,8 @@ void require_fitting_options(const CLI::App& verb, bool points);
 CLI::Validator number_in(double low, double high);
 /// The options of a verb that have a value, given or default, by long name; a list for several values.
 Json options_in_force(const CLI::App& verb);
-/// Returns those options that affect the result, without those on how a run is reported, limited, or stored. Files other than
-/// reports record these, so that their bytes are the same for any number of threads and for a resumed run.
+/// Returns those options that affect the result, without those on how a run is reported, limited, or stored. Files
+/// other than reports record these, so that their bytes are the same for any number of threads and for a resumed run.
 Json options_of_result(const CLI::App& verb);
 
 /// Identifies a run by its version, verb, inputs (name and fingerprint), and those options that affect the result of
