@@ -23,6 +23,9 @@ std::array<double, 3> barycentric(const Vec3& p, const Vec3& a, const Vec3& b, c
 
 constexpr std::size_t kMostPoints = 6;
 
+/// Distance, as a share of the target's length, below which rounding makes the direction between two points arbitrary.
+constexpr double kLeastOffset = 1e-6;
+
 /// The points of a triangle that correspond to the target, by their number: the centroid; three inside; these and the
 /// corners, which serve as points of the edges, where the surfaces are farthest apart.
 std::span<const std::array<double, 3>> triangle_points(std::size_t number) {
@@ -73,6 +76,7 @@ void ClosestPointEnergy::refine(std::span<const std::uint8_t> refined) {
 }
 
 void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
+  const bool straight = pull_ == SurfacePull::straight_both_ways;
   const std::vector<Vec3>& points = target_->samples();
   if (surface_tree_) {
     surface_tree_->move(samples);
@@ -89,11 +93,14 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   for (std::size_t j = 0; j < points.size(); ++j) {
     const Index t = target_hits_[j].triangle;
     const auto& q = triangles()[t];
+    const double distance = target_hits_[j].distance;
+    const bool has_direction = straight && distance > kLeastOffset * target_->length();
     target_links_[next[t]++] = {t,
                                 barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]),
                                 points[j],
-                                target_->sample_normals()[j],
-                                emphasis(target_hits_[j].distance) * target_->sample_areas()[j],
+                                has_direction ? Vec3((points[j] - target_hits_[j].point) / distance)
+                                              : target_->sample_normals()[j],
+                                emphasis(distance) * target_->sample_areas()[j],
                                 tau_};
   }
 }
@@ -113,12 +120,11 @@ double ClosestPointEnergy::share_over_rim(const Link& link, const ClosestPoint::
 }
 
 void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
-  constexpr double kLeastOffset = 1e-6;  // below it, rounding makes the direction of x - t(x) arbitrary
   if (!target_tree_) return;
   surface_links_.resize(surface_offsets_.back());
   surface_hints_.resize(surface_links_.size(), kNoIndex);
   surface_distances_.resize(surface_links_.size());
-  const bool straight = pull_ == SurfacePull::straight;
+  const bool straight = pull_ != SurfacePull::along_normals;
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < triangles().size(); ++t) {
     const auto& q = triangles()[t];

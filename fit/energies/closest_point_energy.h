@@ -9,14 +9,16 @@
 
 namespace subvol {
 
-/// Direction n in which points of the fitted surface are drawn to the target, in the second sum below.
+/// Direction n in which the surfaces are drawn to each other; the first two differ in the second sum below only.
 ///
 ///   along_normals  the normal of the triangle that t(x_q) lies on. If t(x_q) is on an edge or a corner, x_q - t(x_q)
 ///                  may be perpendicular to it: then only tau pulls, and what sticks out there stays out.
 ///   straight       (x_q - t(x_q)) / |x_q - t(x_q)|, which is the normal up to sign if t(x_q) lies inside a smooth
 ///                  face. Curved cells get closer with it: the largest distance of a bust of 7 cells fell from 1.1 to
 ///                  0.7 % of the diagonal; that of a tangled mesh of 2,832 straight hexes rose from 0.49 to 0.50 %.
-enum class SurfacePull { along_normals, straight };
+///   straight_both_ways  as `straight`, and (y_j - s(y_j)) / |y_j - s(y_j)| in the first sum: a tip of the target that
+///                  the fitted surface falls short of draws it outward, however steep its flanks are.
+enum class SurfacePull { along_normals, straight, straight_both_ways };
 
 /// The surface energy of Eq. 9 with exact closest points in place of Voronoi cells.
 ///

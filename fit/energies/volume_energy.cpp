@@ -10,7 +10,6 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -21,26 +20,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Colors the cells greedily, so that cells of one color share no vertex.
-std::vector<int> color_cells(const VolumeMesh& mesh) {
-  std::vector<std::vector<std::uint64_t>> used;  // one bit mask per vertex for every 64 colors
-  std::vector<int> colors(mesh.num_cells());
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    std::size_t word = 0;
-    for (;; ++word) {
-      if (word == used.size()) used.emplace_back(mesh.num_vertices(), 0);
-      std::uint64_t mask = 0;
-      for (Index v : mesh.cell(c)) mask |= used[word][v];
-      if (~mask == 0) continue;
-      const int bit = std::countr_one(mask);
-      for (Index v : mesh.cell(c)) used[word][v] |= std::uint64_t{1} << bit;
-      colors[c] = static_cast<int>(64 * word) + bit;
-      break;
-    }
-  }
-  return colors;
-}
-
 }  // namespace
 
 VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction)
@@ -48,7 +27,8 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_l
       num_nodes_(mesh.num_vertices()),
       weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
       points_(mesh.num_cells(), points_per_direction),
-      colors_(color_cells(mesh)) {
+      colors_(color_cells(mesh)),
+      blocks_(mesh) {
   if (ideal_lengths.size() != mesh.num_cells())
     throw InputError("VolumeEnergy: ideal_lengths must hold one entry per cell (" + std::to_string(mesh.num_cells()) +
                      "), got " + std::to_string(ideal_lengths.size()));
@@ -58,7 +38,6 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_l
       throw InputError("VolumeEnergy: ideal_lengths must be positive and finite");
     inverse_lengths_.push_back(h.cwiseInverse());
   }
-  find_pattern();
   rebuild_groups();
 }
 
@@ -69,25 +48,9 @@ VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, CellReference reference, int 
       weights_(mesh.num_cells(), 1.0 / static_cast<double>(std::max<std::size_t>(mesh.num_cells(), 1))),
       reference_(std::move(reference)),
       points_(mesh.num_cells(), points_per_direction),
-      colors_(color_cells(mesh)) {
-  find_pattern();
+      colors_(color_cells(mesh)),
+      blocks_(mesh) {
   rebuild_groups();
-}
-
-void VolumeEnergy::find_pattern() {
-  const VolumeMesh& mesh = *mesh_;
-  pattern_ = clique_pattern(num_nodes_, mesh.cell_offsets, mesh.cell_vertices);
-  if (pattern_.num_entries() > std::numeric_limits<Index>::max())
-    throw InputError("VolumeEnergy: a mesh of " + std::to_string(num_nodes_) +
-                     " vertices has more pairs of them than can be numbered");
-  pattern_.blocks = {};
-  block_offsets_.assign(1, 0);
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    const auto cell = mesh.cell(c);
-    for (Index a : cell)
-      for (Index b : cell) block_slots_.push_back(static_cast<Index>(pattern_.find(a, b)));
-    block_offsets_.push_back(block_slots_.size());
-  }
 }
 
 void VolumeEnergy::densify(std::span<const Index> cells, std::span<const Vec3>) {
@@ -276,7 +239,7 @@ double VolumeEnergy::hessian_of(std::span<const Vec3> nodes, double scale, std::
     for (int l = 0; l < group.active[b]; ++l) {
       const Index cell = group.batches[b][l];
       const Index* corners = mesh_->cell_vertices.data() + mesh_->cell_offsets[cell];
-      const Index* slots = block_slots_.data() + block_offsets_[cell];
+      const Index* slots = blocks_.of_cell(cell);
       for (int a = 0; a < n; ++a) {
         gradient[corners[a]] += Vec3(g[a][0][l], g[a][1][l], g[a][2][l]);
         for (int c = a; c < n; ++c) {
@@ -393,12 +356,6 @@ double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3>
     return 0.0;
   });
   return steps.step();
-}
-
-BlockSparse VolumeEnergy::pattern() const {
-  BlockSparse result = pattern_;
-  result.blocks.assign(9 * result.columns.size(), 0.0f);
-  return result;
 }
 
 }  // namespace subvol

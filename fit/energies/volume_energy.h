@@ -3,7 +3,7 @@
 
 #include "fit/elements/cell_reference.h"
 #include "fit/elements/element_rule.h"
-#include "fit/energies/block_sparse.h"
+#include "fit/energies/cell_blocks.h"
 #include "fit/energies/distortion.h"
 #include "fit/energies/volume_term.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -70,7 +70,7 @@ class VolumeEnergy final : public VolumeTerm {
   double add_hessian(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse& hessian) const;
 
   /// Returns a zero matrix with one block per pair of nodes that share a cell.
-  BlockSparse pattern() const;
+  BlockSparse pattern() const { return blocks_.zero_matrix(); }
 
  private:
   /// Cells of one kind and rule; `batches` hold kLanes of them, the last one of each color padded with repeats.
@@ -100,7 +100,6 @@ class VolumeEnergy final : public VolumeTerm {
   template <class Kernel>
   double hessian_of(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
                     BlockSparse& hessian) const;
-  void find_pattern();
   void rebuild_groups();
   void fill_references(Group& group) const;
   void gather(const Group& group, std::size_t batch, std::span<const Vec3> nodes, double (*x)[3][kLanes]) const;
@@ -117,9 +116,8 @@ class VolumeEnergy final : public VolumeTerm {
   std::vector<int> points_;        ///< points per direction of each cell
   std::vector<int> colors_;
   std::vector<Group> groups_;
-  BlockSparse pattern_, hessian_;
-  std::vector<std::size_t> block_offsets_;  ///< where each cell begins in block_slots_
-  std::vector<Index> block_slots_;          ///< block number of (a, b), a-major, in the pattern
+  CellBlocks blocks_;
+  BlockSparse hessian_;
 };
 
 }  // namespace subvol

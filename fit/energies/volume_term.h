@@ -47,6 +47,13 @@ class VolumeTerm {
 
   /// Returns the cells that are not certified, i.e. not proved to have det J > 0 everywhere, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
+  /// Returns the cells that a step from one state to another ruins, ascending, so that it must be shortened at their
+  /// vertices. None for terms that limit steps by `max_step`.
+  virtual std::vector<Index> ruined(std::span<const Vec3> /*before*/, std::span<const Vec3> /*after*/) const {
+    return {};
+  }
+  /// Returns the nodes of these cells, possibly with repetitions. Needed by minimizers that shorten steps there.
+  virtual std::vector<Index> nodes_of(std::span<const Index> /*cells*/) const { return {}; }
   /// If true, a step that had to be shortened to keep all cells certified is halved once more.
   virtual bool keeps_off_inversion() const { return false; }
   /// Refines the quadrature of these cells, because they are inverted between their points. From then on the weights of

@@ -4,6 +4,8 @@
 #include "fit/solver/fit_problem.h"
 #include "subvol/base/error.h"
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 
 namespace subvol {
@@ -16,6 +18,12 @@ void cancel(MinimizerResult& result) {
 }
 
 }  // namespace
+
+std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vector<Index>& now) {
+  std::vector<Index> result;
+  std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(result));
+  return result;
+}
 
 bool has_ended(const MinimizerOptions& options, MinimizerResult& result) {
   if (!options.ended || !options.ended()) return false;

@@ -41,6 +41,8 @@ struct MinimizerOptions {
   double relative_decrease = 1e-3;  ///< converged if two steps in a row decrease E by less than this share of E
   double cg_tolerance = 0.1;        ///< relative, of the preconditioned residual
   int cg_max_iterations = 200;
+  /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
+  double longest_move = 0;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
   /// Asked many times within a step, which may take long. If it returns true, the step is abandoned, and the
@@ -51,6 +53,9 @@ struct MinimizerOptions {
   std::function<void(std::span<const Vec3> x, const MinimizerResult& so_far)> keep;
   const MinimizerResult* begun = nullptr;  ///< the result so far, as passed to `keep`; null: a new start
 };
+
+/// Returns the cells of `now` that are not in `before` (both ascending).
+std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vector<Index>& now);
 
 /// Returns true, and marks the result as cancelled, if the caller asks for an end within a step.
 bool has_ended(const MinimizerOptions& options, MinimizerResult& result);

@@ -1,104 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/solver/newton.h"
 
+#include "fit/solver/reduced_hessian.h"
 #include "fit/solver/vector_math.h"
 #include "subvol/base/format.h"
 
-#include <Eigen/LU>
-
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <string>
 #include <utility>
 
 namespace subvol {
 
 namespace {
-
-/// The pulled-back Hessian M^T H_W M + N^T H_S N with its block-Jacobi preconditioner.
-class ReducedHessian {
- public:
-  /// inverse_diagonal  in/out: that of an earlier Hessian of the same problem, to be used again; if empty, it is
-  ///                   computed.
-  ReducedHessian(const FitProblem& problem, std::vector<Mat3>& inverse_diagonal)
-      : problem_(problem),
-        inverse_diagonal_(inverse_diagonal),
-        node_in_(problem.nodes.num_rows()),
-        node_out_(problem.nodes.num_rows()),
-        sample_in_(problem.samples.num_rows()),
-        sample_out_(problem.samples.num_rows()),
-        from_samples_(problem.nodes.num_cols) {
-    if (!inverse_diagonal_.empty()) return;
-    inverse_diagonal_.assign(problem.nodes.num_cols, Mat3::Zero());
-    problem.volume->add_diagonal_blocks(problem.nodes, problem.nodes_transposed, inverse_diagonal_);
-    if (problem.surface)
-      add_diagonal_blocks(problem.samples, problem.samples_transposed, problem.surface->hessian(), inverse_diagonal_);
-#pragma omp parallel for schedule(static)
-    for (std::size_t j = 0; j < inverse_diagonal_.size(); ++j) {
-      // Vertices of no cell have no energy: they do not move.
-      const Mat3 block = inverse_diagonal_[j];
-      inverse_diagonal_[j] = block.trace() > 0 ? Mat3(block.inverse()) : Mat3(Mat3::Zero());
-    }
-  }
-
-  void multiply(std::span<const Vec3> in, std::span<Vec3> out) {
-    problem_.nodes.apply(in, node_in_);
-    problem_.volume->multiply(node_in_, node_out_);
-    problem_.nodes_transposed.apply(node_out_, out);
-    if (!problem_.surface) return;
-    problem_.multiply_samples(in, sample_in_);
-    problem_.surface->hessian().multiply(sample_in_, sample_out_);
-    problem_.pull_back_samples(sample_out_, from_samples_);
-    add_scaled(1, from_samples_, out);
-  }
-
-  void precondition(std::span<const Vec3> in, std::span<Vec3> out) const {
-#pragma omp parallel for schedule(static)
-    for (std::size_t j = 0; j < in.size(); ++j) out[j] = inverse_diagonal_[j] * in[j];
-  }
-
- private:
-  const FitProblem& problem_;
-  std::vector<Mat3>& inverse_diagonal_;
-  std::vector<Vec3> node_in_, node_out_, sample_in_, sample_out_, from_samples_;
-};
-
-/// Solves H d = -g approximately and returns the number of iterations. Stops early if the caller asks for an end.
-int conjugate_gradients(ReducedHessian& hessian, std::span<const Vec3> gradient, const MinimizerOptions& options,
-                        std::vector<Vec3>& d) {
-  const std::size_t n = gradient.size();
-  std::vector<Vec3> r(n), z(n), p(n), hp(n);
-  d.assign(n, Vec3::Zero());
-  for (std::size_t i = 0; i < n; ++i) r[i] = -gradient[i];
-  hessian.precondition(r, z);
-  p = z;
-  double rz = dot(r, z);
-  const double stop = options.cg_tolerance * options.cg_tolerance * rz;
-  int iteration = 0;
-  while (iteration < options.cg_max_iterations && rz > stop && !(options.ended && options.ended())) {
-    ++iteration;
-    hessian.multiply(p, hp);
-    const double php = dot(p, hp);
-    if (!(php > 0)) break;
-    add_scaled(rz / php, p, d);
-    add_scaled(-rz / php, hp, r);
-    hessian.precondition(r, z);
-    const double next = dot(r, z);
-    const double beta = next / rz;
-    rz = next;
-#pragma omp parallel for schedule(static)
-    for (std::size_t i = 0; i < n; ++i) p[i] = z[i] + beta * p[i];
-  }
-  return iteration;
-}
-
-/// Returns the cells of `now` that are not in `before` (both ascending).
-std::vector<Index> newly_failed(const std::vector<Index>& before, const std::vector<Index>& now) {
-  std::vector<Index> result;
-  std::set_difference(now.begin(), now.end(), before.begin(), before.end(), std::back_inserter(result));
-  return result;
-}
 
 /// One minimization by Newton's method.
 class NewtonRun {
@@ -115,8 +29,6 @@ class NewtonRun {
     ended     ///< stopped by the caller
   };
 
-  /// Computes the energy, its gradient and its Hessian at x. Returns false if the energy is infinite.
-  bool linearize();
   /// Finds a direction and a step along it. If the step would be short, makes the Hessian stiffer and tries again.
   Search find_step(IterationRecord& record);
   bool find_direction(IterationRecord& record);
@@ -137,7 +49,7 @@ class NewtonRun {
   const MinimizerOptions& options_;
   MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
   std::vector<Vec3> y_, z_;  // nodes and samples at x
-  std::vector<Vec3> node_gradient_, sample_gradient_, gradient_, from_samples_;
+  Linearization linearized_;
   std::vector<Vec3> d_, dy_, dz_, y_trial_, z_trial_;
   std::vector<Mat3> inverse_diagonal_;
   std::vector<Index> uncertified_;  // at x, up to rounding
@@ -157,35 +69,17 @@ NewtonRun::NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerO
   z_.resize(problem.samples.num_rows());
   problem.apply_nodes(x, y_);
   problem.apply_samples(x, z_);
-  for (auto* nodes : {&node_gradient_, &dy_, &y_trial_}) nodes->resize(y_.size());
-  for (auto* samples : {&sample_gradient_, &dz_, &z_trial_}) samples->resize(z_.size());
-  gradient_.resize(x.size());
-  from_samples_.resize(x.size());
+  for (auto* nodes : {&dy_, &y_trial_}) nodes->resize(y_.size());
+  for (auto* samples : {&dz_, &z_trial_}) samples->resize(z_.size());
   uncertified_ = problem.volume->uncertified(y_);
 }
 
-bool NewtonRun::linearize() {
-  SurfaceTerm* surface = problem_.surface.get();
-  if (surface) surface->assign(z_);
-  std::fill(node_gradient_.begin(), node_gradient_.end(), Vec3::Zero());
-  const double distance = surface ? surface->value(z_) : 0;
-  energy_ = distance + problem_.lambda * problem_.volume->linearize(y_, problem_.lambda, node_gradient_);
-  if (!std::isfinite(energy_)) return false;
-  problem_.nodes_transposed.apply(node_gradient_, gradient_);
-  if (surface) {
-    std::fill(sample_gradient_.begin(), sample_gradient_.end(), Vec3::Zero());
-    surface->add_gradient(z_, sample_gradient_);
-    problem_.pull_back_samples(sample_gradient_, from_samples_);
-    add_scaled(1, from_samples_, gradient_);
-  }
-  return true;
-}
-
 bool NewtonRun::find_direction(IterationRecord& record) {
-  ReducedHessian reduced(problem_, inverse_diagonal_);
-  record.linear_iterations += conjugate_gradients(reduced, gradient_, options_, d_);
+  ReducedHessian reduced(problem_);
+  if (inverse_diagonal_.empty()) inverse_diagonal_ = inverse_blocks(reduced.diagonal());
+  record.linear_iterations += conjugate_gradients(reduced, inverse_diagonal_, linearized_.gradient(), options_, d_);
   constexpr double kLevel = 1e-26;  // dimensionless, like E; smaller slopes are rounding
-  slope_ = dot(gradient_, d_);
+  slope_ = dot(linearized_.gradient(), d_);
   return slope_ < -kLevel;
 }
 
@@ -272,7 +166,8 @@ MinimizerResult NewtonRun::run() {
       uncertified_ = problem_.volume->uncertified(y_);
       if (options_.keep) options_.keep(x_, result_);
     }
-    if (!linearize())
+    energy_ = linearized_.linearize(problem_, y_, z_);
+    if (!std::isfinite(energy_))
       return end(MinimizerStop::infeasible_start, "the start has a cell that is inverted at a quadrature point");
     if (iteration < 2 || is_stiffened_) inverse_diagonal_.clear();  // later it changes slowly
     IterationRecord record;

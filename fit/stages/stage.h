@@ -8,6 +8,9 @@ struct Stage {
   double lambda, tangential_weight;
   int max_iterations = 20;
   double relative_decrease = 1e-3;
+  /// Longest move of a node in one step, as a share of the target's diagonal, if the energy of the cells is a sum of
+  /// squares, which the Levenberg-Marquardt method minimizes. 0: the fit's own solver does.
+  double longest_move = 0;
 };
 
 /// Number of L-BFGS steps that replace one Newton step of a stage.

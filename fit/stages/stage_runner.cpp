@@ -3,6 +3,7 @@
 
 #include "fit/geometry/self_intersection.h"
 #include "fit/solver/lbfgs.h"
+#include "fit/solver/levenberg_marquardt.h"
 #include "fit/solver/newton.h"
 #include "subvol/base/fingerprint.h"
 #include "subvol/base/format.h"
@@ -10,6 +11,9 @@
 namespace subvol {
 
 namespace {
+
+/// Relative tolerance of the linear systems of the Levenberg-Marquardt method, which are well conditioned.
+constexpr double kLeastSquaresTolerance = 0.05;
 
 std::uint64_t start_of(const FitProblem& problem, const MinimizerOptions& minimizer, std::span<const Vec3> x) {
   Fingerprint start;
@@ -27,8 +31,11 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   record.unknowns = x.size();
   MinimizerOptions minimizer;
   minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
-  if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0) minimizer.max_iterations *= kLbfgsSteps;
+  if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0 && stage.longest_move == 0)
+    minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
+  minimizer.longest_move = stage.longest_move;
+  if (stage.longest_move > 0) minimizer.cg_tolerance = kLeastSquaresTolerance;
   int iteration = 0;
   minimizer.ended = [this] { return is_to_end(); };
   minimizer.progress = [&](const IterationRecord& step) {
@@ -118,8 +125,10 @@ void StageRunner::solve(FitProblem& problem, MinimizerOptions minimizer, SolvedS
       kept.result.stop = MinimizerStop::cancelled;
       options_.log->add(std::move(kept));
     };
-  stage.result = options_.solver == SolverKind::lbfgs ? minimize_lbfgs(problem, stage.x, minimizer)
-                                                      : minimize_newton(problem, stage.x, minimizer);
+  const auto minimize = minimizer.longest_move > 0              ? minimize_levenberg_marquardt
+                        : options_.solver == SolverKind::lbfgs ? minimize_lbfgs
+                                                               : minimize_newton;
+  stage.result = minimize(problem, stage.x, minimizer);
   stage.seconds = seconds() - begin;
   if (options_.log && stage.is_over()) options_.log->add(stage);
 }

@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/energies/quality_energy.h"
+
+#include "fit/certificate/certificate.h"
+#include "subvol/base/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+constexpr int kPoints = 3, kDensePoints = 5;
+constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
+constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
+constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
+
+/// Returns the corner of a hex or a prism at a place in canonical coordinates, -1 if there is none. A tet has one point
+/// only, which stands for the whole cell.
+int corner_at(CellKind kind, const Vec3& at) {
+  if (kind == CellKind::tet) return -1;
+  for (int a = 0; a < cell_topology(kind).num_vertices; ++a) {
+    const int layer = kind == CellKind::hex ? 4 : 3, in_layer = a % layer;
+    const Vec3 corner = kind == CellKind::hex ? Vec3(in_layer == 1 || in_layer == 2, in_layer >= 2, a >= layer)
+                                              : Vec3(in_layer == 1, in_layer == 2, a >= layer);
+    if ((at - corner).norm() < 1e-12) return a;
+  }
+  return -1;
+}
+
+/// The three directions at a point, scaled to length 1, and their scaled Jacobian.
+struct Frame {
+  std::array<Vec3, 3> u;
+  std::array<double, 3> length;
+  Vec3 cross12;
+  double s;
+
+  Frame(std::span<const ElementRule::Entry> entries, const Vec3* corners, double least_length) {
+    std::array<Vec3, 3> d{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+    for (const ElementRule::Entry& entry : entries)
+      for (int k = 0; k < 3; ++k) d[k] += entry.gradient[k] * corners[entry.vertex];
+    for (int k = 0; k < 3; ++k) {
+      length[k] = std::max(d[k].norm(), least_length);
+      u[k] = d[k] / length[k];
+    }
+    cross12 = u[1].cross(u[2]);
+    s = u[0].dot(cross12);
+  }
+
+  /// ds/dd_k for k = 0, 1, 2.
+  std::array<Vec3, 3> derivative() const {
+    return {(cross12 - s * u[0]) / length[0], (u[2].cross(u[0]) - s * u[1]) / length[1],
+            (u[0].cross(u[1]) - s * u[2]) / length[2]};
+  }
+};
+
+}  // namespace
+
+/// Gradient and upper blocks of the Hessian of one cell, by pairs of corners a <= b.
+struct QualityEnergy::CellSums {
+  std::array<Vec3, kMaxCellVertices> gradient;
+  std::array<Mat3, kMaxCellVertices * kMaxCellVertices> blocks;
+
+  void clear(int corners) {
+    for (int a = 0; a < corners; ++a) {
+      gradient[a].setZero();
+      for (int b = a; b < corners; ++b) blocks[kMaxCellVertices * a + b].setZero();
+    }
+  }
+
+  /// Adds weight * residual^2, where the residual has the derivatives dr/dd_k by the directions at a point.
+  void add(std::span<const ElementRule::Entry> entries, double weight, double residual,
+           const std::array<Vec3, 3>& derivatives) {
+    std::array<Vec3, kMaxCellVertices> j;
+    for (std::size_t a = 0; a < entries.size(); ++a) {
+      const auto& g = entries[a].gradient;
+      j[a] = g[0] * derivatives[0] + g[1] * derivatives[1] + g[2] * derivatives[2];
+      gradient[entries[a].vertex] += (2 * weight * residual) * j[a];
+    }
+    for (std::size_t a = 0; a < entries.size(); ++a) {
+      const Vec3 scaled = (2 * weight) * j[a];
+      for (std::size_t b = a; b < entries.size(); ++b)
+        blocks[kMaxCellVertices * entries[a].vertex + entries[b].vertex].noalias() += scaled * j[b].transpose();
+    }
+  }
+};
+
+QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_direction) {
+  Points points{make_element_rule(kind, points_per_direction), {}, {}};
+  const double corner_weight = 1.0 / cell_topology(kind).num_vertices;
+  for (const Vec3& at : points.rule.points) {
+    const int corner = corner_at(kind, at);
+    points.corner.push_back(corner);
+    points.weights.push_back(kind == CellKind::tet ? 1 : corner >= 0 ? corner_weight : kInnerWeight);
+  }
+  return points;
+}
+
+QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths)
+    : mesh_(&mesh),
+      lengths_(lengths.begin(), lengths.end()),
+      dense_(mesh.num_cells(), 0),
+      corner_emphasis_(mesh.cell_vertices.size(), 1),
+      cell_emphasis_(mesh.num_cells(), 1),
+      blocks_(mesh) {
+  if (lengths.size() != mesh.num_cells())
+    throw InputError("QualityEnergy: lengths must hold one entry per cell (" + std::to_string(mesh.num_cells()) +
+                     "), got " + std::to_string(lengths.size()));
+  for (const Vec3& h : lengths)
+    if (!(h.minCoeff() > 0) || !h.allFinite())
+      throw InputError("QualityEnergy: lengths must be positive and finite");
+  for (int kind = 0; kind < kNumCellKinds; ++kind)
+    points_[kind] = {make_points(static_cast<CellKind>(kind), kPoints),
+                     make_points(static_cast<CellKind>(kind), kDensePoints)};
+  const std::vector<int> colors = color_cells(mesh);
+  const int num_colors = colors.empty() ? 0 : *std::max_element(colors.begin(), colors.end()) + 1;
+  color_offsets_.assign(num_colors + 1, 0);
+  for (const int color : colors) ++color_offsets_[color + 1];
+  for (int color = 0; color < num_colors; ++color) color_offsets_[color + 1] += color_offsets_[color];
+  std::vector<std::size_t> next(color_offsets_.begin(), color_offsets_.end() - 1);
+  order_.resize(colors.size());
+  for (std::size_t c = 0; c < colors.size(); ++c) order_[next[colors[c]]++] = static_cast<Index>(c);
+}
+
+void QualityEnergy::set_weights(const QualityWeights& weights) {
+  for (const double w : {weights.cosine, weights.hinge, weights.edge, weights.least_edge, weights.twist})
+    if (!(w >= 0) || !std::isfinite(w)) throw InputError("QualityWeights: weights must be >= 0 and finite");
+  if (!(weights.threshold <= 1)) throw InputError("QualityWeights: the threshold must be at most 1");
+  weights_ = weights;
+}
+
+/// Returns the cell's energy; with derivatives, also adds those to `sums`.
+template <bool kDerivatives>
+double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, CellSums& sums) const {
+  const auto vertices = mesh_->cell(cell);
+  const Points& points = points_of(cell);
+  std::array<Vec3, kMaxCellVertices> x;
+  for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
+  const Vec3& h = lengths_[cell];
+  const double least_length = kLeastLength * h.minCoeff();
+  double energy = 0;
+  const auto add = [&](std::size_t q, double weight, double residual, const std::array<Vec3, 3>& derivatives) {
+    energy += weight * residual * residual;
+    if constexpr (kDerivatives) sums.add(points.rule.point(q), weight, residual, derivatives);
+  };
+  for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
+    const Frame frame(points.rule.point(q), x.data(), least_length);
+    const int corner = points.corner[q];
+    const double below = weights_.threshold - frame.s;
+    if (below > 0) {
+      std::array<Vec3, 3> derivative;
+      if constexpr (kDerivatives) {
+        derivative = frame.derivative();
+        for (Vec3& d : derivative) d = -d;
+      }
+      add(q, weights_.hinge * points.weights[q] * emphasis(cell, corner), below, derivative);
+    }
+    if (corner < 0 && mesh_->kinds[cell] != CellKind::tet) continue;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3;
+      const double cosine = frame.u[i].dot(frame.u[j]);
+      std::array<Vec3, 3> derivative{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+      if constexpr (kDerivatives) {
+        derivative[i] = (frame.u[j] - cosine * frame.u[i]) / frame.length[i];
+        derivative[j] = (frame.u[i] - cosine * frame.u[j]) / frame.length[j];
+      }
+      add(q, weights_.cosine * points.weights[q], cosine, derivative);
+      const double least = weights_.least_edge * h[i], short_by = 1 - frame.length[i] / least;
+      if (!(short_by > 0)) continue;
+      derivative = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
+      if constexpr (kDerivatives) derivative[i] = -frame.u[i] / least;
+      add(q, weights_.edge * points.weights[q], short_by, derivative);
+    }
+  }
+  const CellTopology& topology = cell_topology(mesh_->kinds[cell]);
+  const double twist = weights_.twist / (6 * std::pow(h.prod(), 2.0 / 3));
+  for (int f = 0; f < topology.num_faces; ++f) {
+    if (topology.face_sizes[f] != 4) continue;
+    const auto& face = topology.faces[f];
+    const Vec3 residual = x[face[0]] - x[face[1]] + x[face[2]] - x[face[3]];
+    energy += twist * residual.squaredNorm();
+    if constexpr (kDerivatives)
+      for (int a = 0; a < 4; ++a) {
+        const double sign = a % 2 == 0 ? 1 : -1;
+        sums.gradient[face[a]] += (2 * twist * sign) * residual;
+        for (int b = 0; b < 4; ++b)
+          if (face[a] <= face[b])
+            sums.blocks[kMaxCellVertices * face[a] + face[b]].diagonal().array() +=
+                2 * twist * sign * (b % 2 == 0 ? 1 : -1);
+      }
+  }
+  return energy;
+}
+
+template <bool kHessian>
+double QualityEnergy::add_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                                      BlockSparse* hessian) const {
+  std::vector<double> energies(mesh_->num_cells());
+#pragma omp parallel
+  {
+    CellSums sums;
+    for (std::size_t color = 0; color + 1 < color_offsets_.size(); ++color) {
+#pragma omp for schedule(dynamic, 64)
+      for (std::size_t i = color_offsets_[color]; i < color_offsets_[color + 1]; ++i) {
+        const auto cell = static_cast<std::size_t>(order_[i]);
+        const auto vertices = mesh_->cell(cell);
+        const int n = static_cast<int>(vertices.size());
+        sums.clear(n);
+        energies[cell] = evaluate<true>(cell, nodes, sums);
+        for (int a = 0; a < n; ++a) gradient[vertices[a]] += scale * sums.gradient[a];
+        if constexpr (!kHessian) continue;
+        const Index* slots = blocks_.of_cell(cell);
+        for (int a = 0; a < n; ++a)
+          for (int b = a; b < n; ++b) {
+            const Mat3& block = sums.blocks[kMaxCellVertices * a + b];
+            float* upper = hessian->block(slots[a * n + b]);
+            for (int e = 0; e < 9; ++e) upper[e] += static_cast<float>(scale * block(e / 3, e % 3));
+            if (a == b) continue;
+            float* lower = hessian->block(slots[b * n + a]);
+            for (int e = 0; e < 9; ++e) lower[e] += static_cast<float>(scale * block(e % 3, e / 3));
+          }
+      }
+    }
+  }
+  double sum = 0;
+  for (const double energy : energies) sum += energy;
+  return sum;
+}
+
+double QualityEnergy::value(std::span<const Vec3> nodes) const {
+  std::vector<double> energies(mesh_->num_cells());
+#pragma omp parallel
+  {
+    CellSums unused;
+#pragma omp for schedule(static)
+    for (std::size_t c = 0; c < energies.size(); ++c) energies[c] = evaluate<false>(c, nodes, unused);
+  }
+  double sum = 0;
+  for (const double energy : energies) sum += energy;
+  return sum;
+}
+
+double QualityEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {
+  return add_derivatives<false>(nodes, scale, gradient, nullptr);
+}
+
+double QualityEnergy::linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
+  if (hessian_.blocks.empty()) hessian_ = blocks_.zero_matrix();
+  hessian_.set_zero();
+  return add_derivatives<true>(nodes, scale, gradient, &hessian_);
+}
+
+void QualityEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
+                                        std::span<Mat3> diagonal) const {
+  subvol::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
+}
+
+double QualityEnergy::least_scaled_jacobian(std::size_t cell, const Points& points,
+                                            std::span<const Vec3> nodes) const {
+  const auto vertices = mesh_->cell(cell);
+  std::array<Vec3, kMaxCellVertices> x;
+  for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
+  const double least_length = kLeastLength * lengths_[cell].minCoeff();
+  double least = 1;
+  for (std::size_t q = 0; q < points.rule.num_points(); ++q)
+    least = std::min(least, Frame(points.rule.point(q), x.data(), least_length).s);
+  return least;
+}
+
+void QualityEnergy::least_scaled_jacobians(std::span<const Vec3> nodes, std::span<double> least) const {
+  if (least.size() != mesh_->num_cells()) throw InputError("QualityEnergy: expected one place per cell");
+#pragma omp parallel for schedule(static)
+  for (std::size_t c = 0; c < least.size(); ++c) least[c] = least_scaled_jacobian(c, points_of(c), nodes);
+}
+
+std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> nodes, double goal) const {
+  std::vector<std::uint8_t> is_poor(mesh_->num_cells());
+#pragma omp parallel for schedule(static)
+  for (std::size_t c = 0; c < is_poor.size(); ++c) {
+    if (dense_[c] != 0) continue;
+    const Points& dense = points_[static_cast<std::size_t>(mesh_->kinds[c])][1];
+    is_poor[c] = least_scaled_jacobian(c, dense, nodes) < goal && least_scaled_jacobian(c, points_of(c), nodes) >= goal;
+  }
+  std::vector<Index> result;
+  for (std::size_t c = 0; c < is_poor.size(); ++c)
+    if (is_poor[c]) result.push_back(static_cast<Index>(c));
+  return result;
+}
+
+QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, double goal) {
+  std::vector<double> least(mesh_->num_cells());
+  const auto update = [goal](double s, double& emphasis) {
+    emphasis = s < goal ? std::min(kMostEmphasis, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
+  };
+#pragma omp parallel for schedule(static)
+  for (std::size_t c = 0; c < least.size(); ++c) {
+    const auto vertices = mesh_->cell(c);
+    const Points& points = points_of(c);
+    std::array<Vec3, kMaxCellVertices> x;
+    for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
+    double inner = 1, all = 1;
+    for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
+      const double s = Frame(points.rule.point(q), x.data(), kLeastLength * lengths_[c].minCoeff()).s;
+      all = std::min(all, s);
+      if (points.corner[q] >= 0)
+        update(s, corner_emphasis_[mesh_->cell_offsets[c] + points.corner[q]]);
+      else
+        inner = std::min(inner, s);
+    }
+    update(inner, cell_emphasis_[c]);
+    least[c] = all;
+  }
+  State state;
+  for (const double s : least) {
+    state.least = std::min(state.least, s);
+    if (s < goal) ++state.below;
+  }
+  return state;
+}
+
+void QualityEnergy::reset_emphasis() {
+  std::fill(corner_emphasis_.begin(), corner_emphasis_.end(), 1.0);
+  std::fill(cell_emphasis_.begin(), cell_emphasis_.end(), 1.0);
+}
+
+std::vector<Index> QualityEnergy::uncertified(std::span<const Vec3> nodes) const {
+  return certify(nodes, *mesh_).not_certified;
+}
+
+std::vector<Index> QualityEnergy::ruined(std::span<const Vec3> before, std::span<const Vec3> after) const {
+  constexpr double kAcceptable = 0.05, kKeptShare = 0.5, kMostLoss = 0.02;
+  std::vector<std::uint8_t> is_ruined(mesh_->num_cells());
+#pragma omp parallel for schedule(static)
+  for (std::size_t c = 0; c < is_ruined.size(); ++c) {
+    const double now = least_scaled_jacobian(c, points_of(c), after);
+    if (now >= kAcceptable) continue;
+    const double was = least_scaled_jacobian(c, points_of(c), before);
+    is_ruined[c] = was > 0 ? now < kKeptShare * was : now < was - kMostLoss;
+  }
+  std::vector<Index> result;
+  for (std::size_t c = 0; c < is_ruined.size(); ++c)
+    if (is_ruined[c]) result.push_back(static_cast<Index>(c));
+  return result;
+}
+
+std::vector<Index> QualityEnergy::nodes_of(std::span<const Index> cells) const {
+  std::vector<Index> nodes;
+  for (const Index c : cells) {
+    const auto vertices = mesh_->cell(c);
+    nodes.insert(nodes.end(), vertices.begin(), vertices.end());
+  }
+  return nodes;
+}
+
+void QualityEnergy::densify(std::span<const Index> cells, std::span<const Vec3>) {
+  for (const Index c : cells) {
+    if (c < 0 || static_cast<std::size_t>(c) >= dense_.size())
+      throw InputError("QualityEnergy: there is no cell " + std::to_string(c));
+    dense_[c] = 1;
+  }
+}
+
+}  // namespace subvol

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/elements/element_rule.h"
+#include "fit/energies/cell_blocks.h"
+#include "fit/energies/volume_term.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// Weights of the terms of `QualityEnergy`. All are >= 0 and dimensionless.
+struct QualityWeights {
+  double cosine = 1;        ///< w_c: right angles, which is what the mean scaled Jacobian rises with
+  double hinge = 50;        ///< w_h: no scaled Jacobian below the threshold
+  double threshold = 0.3;   ///< t, at most 1: must lie well above the scaled Jacobian that is wanted
+  double edge = 20;         ///< w_e: no edge dies. The scaled Jacobian does not see lengths
+  double least_edge = 0.25; ///< rho, as a share of the wanted length
+  double twist = 0.3;       ///< w_p: faces are parallelograms
+};
+
+/// A least-squares energy that raises the scaled Jacobians of linear cells, the lowest ones most.
+///
+///   E = sum over cells of  w_c sum over corners a_q sum over i < j cos^2(d_i, d_j)
+///                        + w_h sum over points  a_q omega max(0, t - s)^2
+///                        + w_e sum over corners a_q sum over i max(0, 1 - |d_i| / (rho h_i))^2
+///                        + w_p / (6 h^2) sum over quads |x_0 - x_1 + x_2 - x_3|^2
+///
+/// d_i  columns of the Jacobian in the coordinates of the ideal cell (`ElementRule`): edges, at the corners of a hex
+/// s    scaled Jacobian det(d_1, d_2, d_3) / (|d_1| |d_2| |d_3|), as `measure_quality` samples it
+/// h_i  wanted lengths of the cell;  h: their geometric mean
+/// a_q  1 / number of corners at the corners; 1/16 at the midpoints of edges, faces and cell
+/// omega >= 1: emphasis of poor corners and cells (`emphasize_poor`)
+///
+/// The energy is finite for inverted cells, too: nothing limits a step but `ruined`. The Hessian is that of
+/// Gauss-Newton, 2 sum of the squared residuals' derivatives, which is positive semidefinite.
+///
+/// Cells run in parallel color by color, and sums are made in the order of the cells: the results have the same bits for
+/// any number of threads. Nothing is allocated by the evaluations but one sum per cell.
+class QualityEnergy final : public VolumeTerm {
+ public:
+  /// mesh     must outlive the energy; its positions are not read. InputError: as for `CellBlocks`.
+  /// lengths  h_i of each cell: positive and finite, in the unit of the nodes, else InputError.
+  QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths);
+
+  /// InputError: a weight that is negative or not finite, a threshold above 1.
+  void set_weights(const QualityWeights& weights);
+
+  /// State of the cells against a goal.
+  struct State {
+    double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
+    std::size_t below = 0;   ///< number of cells below the goal
+  };
+  /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
+  /// below; elsewhere it falls back by 3 % towards 1. At most 1000.
+  State emphasize_poor(std::span<const Vec3> nodes, double goal);
+  /// Sets all emphasis to 1.
+  void reset_emphasis();
+
+  /// Writes the least scaled Jacobian of each cell over its points to `least`, one entry per cell (else InputError).
+  void least_scaled_jacobians(std::span<const Vec3> nodes, std::span<double> least) const;
+
+  /// Returns the cells, ascending, that are below the goal at the five points in each direction at which checks sample,
+  /// though not at their own.
+  std::vector<Index> poor_between_points(std::span<const Vec3> nodes, double goal) const;
+
+  double value(std::span<const Vec3> nodes) const override;
+  double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
+  double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
+  void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override { hessian_.multiply(in, out); }
+  void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
+                           std::span<Mat3> diagonal) const override;
+  double max_step(std::span<const Vec3>, std::span<const Vec3>, double limit = 1) const override { return limit; }
+  std::vector<Index> uncertified(std::span<const Vec3> nodes) const override;
+  /// Returns the cells whose least scaled Jacobian falls below 0.05 and to less than a half, or by 0.02 if it was not
+  /// positive, ascending.
+  std::vector<Index> ruined(std::span<const Vec3> before, std::span<const Vec3> after) const override;
+  std::vector<Index> nodes_of(std::span<const Index> cells) const override;
+  /// From then on, these cells have five points in each direction instead of three.
+  void densify(std::span<const Index> cells, std::span<const Vec3> nodes = {}) override;
+
+ private:
+  /// The points of one kind of cell.
+  struct Points {
+    ElementRule rule;
+    std::vector<int> corner;        ///< local vertex of each point that is a corner; -1 for the others
+    std::vector<double> weights;    ///< a_q
+  };
+  struct CellSums;
+
+  static Points make_points(CellKind kind, int points_per_direction);
+  const Points& points_of(std::size_t cell) const {
+    return points_[static_cast<std::size_t>(mesh_->kinds[cell])][dense_[cell]];
+  }
+  double emphasis(std::size_t cell, int corner) const {
+    return corner >= 0 ? corner_emphasis_[mesh_->cell_offsets[cell] + corner] : cell_emphasis_[cell];
+  }
+  template <bool kDerivatives>
+  double evaluate(std::size_t cell, std::span<const Vec3> nodes, CellSums& sums) const;
+  template <bool kHessian>
+  double add_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse* hessian) const;
+  double least_scaled_jacobian(std::size_t cell, const Points& points, std::span<const Vec3> nodes) const;
+
+  const VolumeMesh* mesh_;
+  std::vector<Vec3> lengths_;
+  QualityWeights weights_;
+  std::array<std::array<Points, 2>, kNumCellKinds> points_;  ///< by kind, with three and with five a direction
+  std::vector<std::uint8_t> dense_;                          ///< per cell: 1 if it has five points a direction
+  std::vector<double> corner_emphasis_, cell_emphasis_;      ///< omega, per corner of each cell and per cell
+  std::vector<Index> order_;                                 ///< cells by color
+  std::vector<std::size_t> color_offsets_;                   ///< first cell of each color in order_, and their number
+  CellBlocks blocks_;
+  BlockSparse hessian_;
+};
+
+}  // namespace subvol

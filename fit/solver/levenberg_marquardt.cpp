@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/solver/levenberg_marquardt.h"
+
+#include "fit/solver/reduced_hessian.h"
+#include "fit/solver/vector_math.h"
+#include "subvol/base/format.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-6, kMostDamping = 1e4;
+constexpr double kLess = 0.3, kMore = 6;  // factors on mu after a step that was taken at once, and one that was not
+constexpr int kMostTrials = 8;
+
+/// One minimization by the Levenberg-Marquardt method.
+class LevenbergMarquardtRun {
+ public:
+  LevenbergMarquardtRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+  MinimizerResult run();
+
+ private:
+  /// Returns mu after the steps that are recorded: it depends on their numbers of trials alone.
+  double damping_after(std::span<const IterationRecord> steps) const;
+  void damp(ReducedHessian& hessian, std::span<const Mat3> diagonal);
+  /// Finds a step d_ that decreases E. Returns false if there is none, or if the caller wants to stop.
+  bool find_step(IterationRecord& record);
+  /// Shortens d_ at the vertices of cells that it would ruin. Returns false if cells still lose their certificate.
+  bool shorten_where_harmful();
+  void shorten_at(std::span<const Index> cells, double factor);
+  void try_nodes();
+  bool is_done(const IterationRecord& record);
+
+  FitProblem& problem_;
+  std::vector<Vec3>& x_;
+  const MinimizerOptions& options_;
+  MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
+  double damping_ = kFirstDamping;
+  std::vector<Vec3> y_, z_, d_, dy_, dz_, y_trial_, z_trial_;
+  std::vector<Mat3> inverse_diagonal_;
+  Linearization linearized_;
+  std::vector<Index> uncertified_;
+  double energy_ = 0, trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
+};
+
+LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options)
+    : problem_(problem), x_(x), options_(options) {
+  if (options.begun) result_ = *options.begun;
+  result_.stop = MinimizerStop::iteration_limit;
+  damping_ = damping_after(result_.iterations);
+  for (auto* nodes : {&y_, &dy_, &y_trial_}) nodes->resize(problem.nodes.num_rows());
+  for (auto* samples : {&z_, &dz_, &z_trial_}) samples->resize(problem.samples.num_rows());
+  problem.apply_nodes(x, y_);
+  problem.apply_samples(x, z_);
+  uncertified_ = problem.volume->uncertified(y_);
+}
+
+double LevenbergMarquardtRun::damping_after(std::span<const IterationRecord> steps) const {
+  double damping = kFirstDamping;
+  for (const IterationRecord& step : steps) {
+    for (int trial = 1; trial < step.evaluations; ++trial) damping = std::min(kMostDamping, kMore * damping);
+    if (step.evaluations == 1) damping = std::max(kLeastDamping, kLess * damping);
+  }
+  return damping;
+}
+
+void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> diagonal) {
+  constexpr double kRounding = 1e-12;
+  std::vector<double> added(diagonal.size());
+  double mean = 0;
+  for (std::size_t j = 0; j < diagonal.size(); ++j) mean += added[j] = diagonal[j].trace() / 3;
+  mean /= static_cast<double>(std::max<std::size_t>(diagonal.size(), 1));
+  std::vector<Mat3> damped(diagonal.begin(), diagonal.end());
+  for (std::size_t j = 0; j < added.size(); ++j) {
+    added[j] = damping_ * 0.5 * (added[j] + mean) + kRounding * mean;
+    damped[j].diagonal().array() += added[j];
+  }
+  inverse_diagonal_ = inverse_blocks(damped);
+  hessian.add_diagonal(std::move(added));
+}
+
+void LevenbergMarquardtRun::try_nodes() {
+  problem_.nodes.apply(d_, dy_);
+  for (std::size_t i = 0; i < y_.size(); ++i) y_trial_[i] = y_[i] + dy_[i];
+}
+
+void LevenbergMarquardtRun::shorten_at(std::span<const Index> cells, double factor) {
+  std::vector<std::uint8_t> marked(d_.size(), 0);
+  for (const Index node : problem_.volume->nodes_of(cells))
+    for (const Index j : problem_.nodes.row_columns(node)) marked[j] = 1;
+  for (std::size_t j = 0; j < d_.size(); ++j)
+    if (marked[j]) d_[j] *= factor;
+}
+
+bool LevenbergMarquardtRun::shorten_where_harmful() {
+  constexpr int kHalvings = 10, kStops = 4;
+  for (int pass = 0; pass < kHalvings + kStops; ++pass) {
+    const std::vector<Index> ruined = problem_.volume->ruined(y_, y_trial_);
+    if (ruined.empty()) break;
+    shorten_at(ruined, pass < kHalvings ? 0.5 : 0);
+    try_nodes();
+  }
+  for (int pass = 0; pass < kStops; ++pass) {
+    const std::vector<Index> failed = newly_failed(uncertified_, problem_.volume->uncertified(y_trial_));
+    if (failed.empty()) return true;
+    shorten_at(failed, 0);
+    try_nodes();
+  }
+  return newly_failed(uncertified_, problem_.volume->uncertified(y_trial_)).empty();
+}
+
+bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
+  ReducedHessian hessian(problem_);
+  const std::vector<Mat3> diagonal = hessian.diagonal();
+  for (int trial = 0; trial < kMostTrials; ++trial) {
+    damp(hessian, diagonal);
+    record.linear_iterations += conjugate_gradients(hessian, inverse_diagonal_, linearized_.gradient(), options_, d_);
+    if (has_ended(options_, result_)) return false;
+    try_nodes();
+    double longest = 0;
+    for (const Vec3& d : dy_) longest = std::max(longest, d.norm());
+    if (options_.longest_move > 0 && longest > options_.longest_move) {
+      for (Vec3& d : d_) d *= options_.longest_move / longest;
+      try_nodes();
+    }
+    ++record.evaluations;
+    if (shorten_where_harmful()) {
+      problem_.multiply_samples(d_, dz_);
+      for (std::size_t i = 0; i < z_.size(); ++i) z_trial_[i] = z_[i] + dz_[i];
+      trial_surface_ = problem_.surface ? problem_.surface->value(z_trial_) : 0;
+      trial_volume_ = problem_.volume->value(y_trial_);
+      trial_ = trial_surface_ + problem_.lambda * trial_volume_;
+      if (trial_ < energy_) return true;
+    }
+    damping_ = std::min(kMostDamping, kMore * damping_);
+  }
+  return false;
+}
+
+bool LevenbergMarquardtRun::is_done(const IterationRecord& record) {
+  if (!record_step(record, options_, result_)) return true;
+  const double decrease = (energy_ - trial_) / energy_;
+  result_.small_steps = decrease < options_.relative_decrease ? result_.small_steps + 1 : 0;
+  if (result_.small_steps < 2) return false;
+  result_.stop = MinimizerStop::converged;
+  result_.explanation = formatted("relative decrease of the energy %.2g in two steps running", decrease);
+  return true;
+}
+
+MinimizerResult LevenbergMarquardtRun::run() {
+  constexpr int kStepsBetweenStates = 4;
+  const auto end = [&](MinimizerStop why, std::string explanation) {
+    result_.stop = why;
+    result_.explanation = std::move(explanation);
+    return std::move(result_);
+  };
+  for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
+    if (iteration > 0 && iteration % kStepsBetweenStates == 0) {
+      // From here on nothing but x and the result is used, so that the minimization can be resumed from them.
+      if (problem_.surface) problem_.surface->forget();
+      uncertified_ = problem_.volume->uncertified(y_);
+      if (options_.keep) options_.keep(x_, result_);
+    }
+    energy_ = linearized_.linearize(problem_, y_, z_);
+    if (!std::isfinite(energy_)) return end(MinimizerStop::infeasible_start, "the energy is not finite at the start");
+    if (energy_ == 0) return end(MinimizerStop::converged, "the energy vanishes");
+    IterationRecord record;
+    if (!find_step(record)) {
+      if (result_.stop == MinimizerStop::cancelled) return std::move(result_);
+      return end(MinimizerStop::no_step, "no step decreases the energy");
+    }
+    add_scaled(1, d_, x_);
+    problem_.apply_nodes(x_, y_);
+    problem_.apply_samples(x_, z_);
+    if (record.evaluations == 1) damping_ = std::max(kLeastDamping, kLess * damping_);
+    record.surface_energy = trial_surface_;
+    record.volume_energy = trial_volume_;
+    record.step_length = 1;
+    if (is_done(record)) return std::move(result_);
+  }
+  return end(MinimizerStop::iteration_limit, "iteration limit");
+}
+
+}  // namespace
+
+MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Vec3>& x,
+                                             const MinimizerOptions& options) {
+  return LevenbergMarquardtRun(problem, x, options).run();
+}
+
+}  // namespace subvol

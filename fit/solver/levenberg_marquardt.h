@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/solver/fit_problem.h"
+#include "fit/solver/minimizer.h"
+
+#include <vector>
+
+namespace subvol {
+
+/// The Levenberg-Marquardt method with frozen correspondences, for sums of squares whose Hessian is that of Gauss-Newton
+/// (`QualityEnergy`).
+///
+///   (H + mu D) d = -g,   D_j = (mean of all t + t_j) / 2,  t_j: mean diagonal entry of block j of H
+///
+/// A step that decreases E is taken, and mu falls to 0.3 mu; otherwise mu rises to 6 mu, and the step is found again.
+/// Before E is looked at, the step is shortened only where it does harm: at the vertices of cells that it ruins
+/// (`VolumeTerm::ruined`) it is halved, up to ten times, then set to 0; at those of cells that would lose their
+/// certificate it is set to 0. So one cell does not stop all others.
+///
+/// x  start, receives the result. E must be finite there, else `infeasible_start`. With `begun`, x as passed to `keep`.
+/// Converged if two steps in a row decrease E by less than `relative_decrease`; no_step: none of eight values of mu gives
+/// a step that decreases E. Same bits for any number of threads.
+MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+
+}  // namespace subvol
