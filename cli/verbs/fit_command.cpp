@@ -9,6 +9,7 @@
 #include "cli/runs/untangling.h"
 #include "cli/runs/writing.h"
 #include "cli/runs/written_result.h"
+#include "cli/verbs/automatic_fit_run.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/high_order_fit_run.h"
 #include "cli/verbs/long_run.h"
@@ -20,12 +21,22 @@
 #include "subvol/templates/auto_template.h"
 
 #include <algorithm>
+#include <array>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 namespace subvol::cli {
 namespace {
+
+constexpr const char *kAutomaticAngle = "auto", *kNoAngle = "none";
+
+constexpr std::size_t kMostCells = 8 * kMostTemplateCells;
+
+/// Options that ask for a subdivision volume.
+constexpr std::array kSubdivisionOptions{"--levels",     "--surface",      "--boundary", "--cage-only",
+                                         "--lambda-far", "--lambda-close", "--solver",   "--correspondence",
+                                         "--energy"};
 
 struct FitArguments {
   RunOptions run;
@@ -34,7 +45,10 @@ struct FitArguments {
   std::string target;
   TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
-  std::string point_weights = "equal", energy = "hencky";
+  std::string point_weights = "equal", energy = "hencky", crease_angle = kAutomaticAngle;
+  std::optional<std::size_t> cells;              ///< of the result, if the template is made
+  double quality = kUsualQuality;
+  std::optional<double> quality_floor, max_tolerance_percent;
   int order = 0;  ///< order of curved elements; 0: a subdivision volume is fitted
   std::string basis = to_string(HighOrderFitOptions{}.basis);
   bool adaptive = false;
@@ -58,7 +72,14 @@ Distortion distortion(const FitArguments& arguments) {
   return Distortion::hencky;
 }
 
-/// One run of `fit`, from its input files to its output files.
+/// The angle that --crease-angle gives; `automatic` for "auto".
+std::optional<double> crease_angle(const FitArguments& arguments, std::optional<double> automatic) {
+  if (arguments.crease_angle == kAutomaticAngle) return automatic;
+  if (arguments.crease_angle == kNoAngle) return std::nullopt;
+  return std::stod(arguments.crease_angle);
+}
+
+/// One run of `fit` that makes a subdivision volume, from its input files to its output files.
 class FitRun : public LongRun {
  public:
   FitRun(const FitArguments& arguments, const CLI::App& verb)
@@ -231,6 +252,19 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
           "Mean distance to reach, in per cent of the diagonal of the target's bounding box; exit status 4 if missed")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
+  verb.add_option("--max-tolerance", arguments.max_tolerance_percent,
+                  "The same for the largest distance; only without a template")
+      ->check(number_in(1e-9, 100.0))
+      ->type_name("PERCENT");
+  verb.add_option("--quality", arguments.quality,
+                  "Least scaled Jacobian to aim at; only without a template")
+      ->check(number_in(1e-3, 0.8))
+      ->type_name("Q")
+      ->capture_default_str();
+  verb.add_option("--quality-floor", arguments.quality_floor,
+                  "Exit status 4 if the least scaled Jacobian is below this; only without a template")
+      ->check(number_in(-1.0, 1.0))
+      ->type_name("Q");
   verb.add_option("--surface", arguments.surface,
                   "What is to agree with the target: the cage's limit surface, or the finest mesh itself")
       ->check(CLI::IsMember({"limit", "mesh"}))
@@ -241,11 +275,12 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("catmull-clark|averaging")
       ->capture_default_str();
   verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
-  verb.add_option("--crease-angle", fit.crease_angle_degrees,
-                  "Keep edges of the target sharper than this sharp: edges of the template that follow them become\n"
-                  "creases and are drawn to them (default: creases only where the template's file tags them)")
-      ->check(number_in(0.0, 180.0))
-      ->type_name("DEGREES");
+  verb.add_option("--crease-angle", arguments.crease_angle,
+                  "Keep edges of the target sharper than this sharp: edges of the mesh that follow them become creases\n"
+                  "and are drawn to them. auto: 40 without a template; with one, only the creases that its file tags")
+      ->check(number_in(0.0, 180.0) | CLI::IsMember({kAutomaticAngle, kNoAngle}))
+      ->type_name("DEGREES|auto|none")
+      ->capture_default_str();
 }
 
 void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
@@ -269,6 +304,44 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
     order->excludes(verb.get_option(other));
 }
 
+/// The number of cells to ask a template for that is subdivided `levels` times.
+std::optional<std::size_t> template_cells(const FitArguments& arguments, int levels) {
+  if (!arguments.cells) return std::nullopt;
+  return std::clamp(*arguments.cells >> (3 * levels), kLeastTemplateCells, kMostTemplateCells);
+}
+
+/// True if nothing on the command line asks for a template, a cage or curved elements: then every vertex is free.
+bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
+  if (!arguments.template_mesh.path.empty() || arguments.order > 0) return false;
+  for (const char* option : kSubdivisionOptions)
+    if (verb.count(option) > 0) return false;
+  const std::vector<std::string>& outputs = arguments.run.outputs;
+  return std::none_of(outputs.begin(), outputs.end(), [](const std::string& output) {
+    return output.starts_with("cage:") || output.starts_with("animation:");
+  });
+}
+
+/// UsageError: an option was given that has a meaning only for automatic fits.
+void refuse_automatic_options(const CLI::App& verb) {
+  for (const char* option : {"--quality", "--quality-floor", "--max-tolerance"})
+    if (verb.count(option) > 0)
+      throw UsageError(std::string(option) + ": only fits without a template, --order, a cage or --levels aim at it");
+}
+
+AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
+  AutomaticFitArguments result{arguments.run, arguments.writing, {}, arguments.fit.tolerance_percent,
+                               arguments.max_tolerance_percent, arguments.quality_floor, arguments.target};
+  AutomaticFitOptions& fit = result.fit;
+  fit.cells = arguments.cells;
+  fit.quality = arguments.quality;
+  fit.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
+  fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
+  fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
+  fit.max_iterations = arguments.fit.max_iterations;
+  fit.time_limit_seconds = arguments.fit.time_limit_seconds;
+  return result;
+}
+
 /// Arguments of the same run with curved elements, for which lambda has another default.
 HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
@@ -286,6 +359,16 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.time_limit_seconds = arguments.fit.time_limit_seconds;
   fit.memory_limit_bytes = static_cast<double>(arguments.run.memory_limit);
   return result;
+}
+
+int run_fit(const FitArguments& given, const CLI::App& verb) {
+  if (is_automatic(given, verb)) return run_automatic_fit(automatic_arguments(given), verb);
+  refuse_automatic_options(verb);
+  FitArguments arguments = given;
+  arguments.fit.crease_angle_degrees = crease_angle(given, std::nullopt);
+  arguments.template_mesh.cells = template_cells(given, given.order > 0 ? 0 : given.fit.levels);
+  return given.order > 0 ? run_high_order_fit(high_order_arguments(arguments, verb), verb)
+                         : FitRun(arguments, verb).run();
 }
 
 void add_solver_options(CLI::App& verb, FitArguments& arguments) {
@@ -354,9 +437,10 @@ void add_fit_command(CLI::App& app, Action& action) {
                                        "Coarse mesh to start from: " + volume_mesh_formats() +
                                            " (default: made from the target)")
                           ->type_name("MESH");
-  verb->add_option("--cells", arguments->template_mesh.cells,
-                   "About how many cells a template made from the target has (default: as many as it needs)")
-      ->check(CLI::Range(kLeastTemplateCells, kMostTemplateCells))
+  verb->add_option("--cells", arguments->cells,
+                   "How many cells the result has at most; about so many with --levels, --order or a cage\n"
+                   "(default: as many as it needs)")
+      ->check(CLI::Range(kLeastTemplateCells, kMostCells))
       ->type_name("N")
       ->excludes(file);
   add_references_option(*verb, arguments->run)->needs(file);
@@ -373,16 +457,14 @@ void add_fit_command(CLI::App& app, Action& action) {
   verb->footer(R"(Example:
   subvol fit bone.off --template bone.mesh --levels 3 -o bone.glb -o cage:bone_cage.usda -o bone_fine.mesh
 
-  subvol fit bone.off -o bone.glb                  (with a template made from the surface)
+  subvol fit bone.off -o bone.mesh -o bone.glb     (as good as possible, without a template)
+  subvol fit bone.off --levels 2 -o cage:bone.usda (with a template made from the surface)
   subvol fit bone.off --template bone.mesh --order 4 -o bone.vtu -o bone.glb
 
 Ctrl-C once ends the fit with the best result so far (exit status 130), twice ends the program.
 --config FILE.toml reads options from a file: key = value, keys being the long names above.)");
   verb->callback([arguments, verb, &action] {
-    action = [arguments, verb] {
-      return arguments->order > 0 ? run_high_order_fit(high_order_arguments(*arguments, *verb), *verb)
-                                  : FitRun(*arguments, *verb).run();
-    };
+    action = [arguments, verb] { return run_fit(*arguments, *verb); };
   });
 }
 

@@ -26,6 +26,9 @@ constexpr std::size_t kMostPoints = 6;
 /// Distance, as a share of the target's length, below which rounding makes the direction between two points arbitrary.
 constexpr double kLeastOffset = 1e-6;
 
+/// Least product of normals that agree, and the weight of points where they do not (`discount_disagreeing`).
+constexpr double kAgreement = 0.2, kDiscount = 0.02;
+
 /// The points of a triangle that correspond to the target, by their number: the centroid; three inside; these and the
 /// corners, which serve as points of the edges, where the surfaces are farthest apart.
 std::span<const std::array<double, 3>> triangle_points(std::size_t number) {
@@ -130,6 +133,8 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
     const auto& q = triangles()[t];
     const std::size_t begin = surface_offsets_[t], n = surface_offsets_[t + 1] - begin;
     const auto points = triangle_points(n);
+    const Vec3 own_normal =
+        discounts_ ? (samples[q[1]] - samples[q[0]]).cross(samples[q[2]] - samples[q[0]]).normalized() : Vec3::Zero();
     Index before = kNoIndex;
     for (std::size_t k = 0; k < n; ++k) {
       const std::array<double, 3>& l = points[k];
@@ -140,6 +145,7 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       Link& link = surface_links_[begin + k];
       link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
               emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n), tau_};
+      if (discounts_ && own_normal.dot(link.normal) < kAgreement) link.weight *= kDiscount;
       surface_distances_[begin + k] = hit.distance;
       if (!over_rim(hit)) {
         if (straight && hit.distance > kLeastOffset * target_->length()) link.normal = (x - hit.point) / hit.distance;

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
+#include <utility>
 
 namespace subvol {
 
@@ -17,17 +19,35 @@ namespace {
 constexpr int kPoints = 3, kDensePoints = 5;
 constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
 constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
+constexpr double kNoCap = 1;               // scaled Jacobians are at most 1
+constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this
 constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
+
+/// Canonical coordinates of a corner of a hex or a prism.
+Vec3 canonical_corner(CellKind kind, int corner) {
+  const int layer = kind == CellKind::hex ? 4 : 3, in_layer = corner % layer;
+  if (kind == CellKind::hex) return Vec3(in_layer == 1 || in_layer == 2, in_layer >= 2, corner >= layer);
+  return Vec3(in_layer == 1, in_layer == 2, corner >= layer);
+}
+
+constexpr double kSamePlace = 1e-12;  // in canonical coordinates
 
 /// Returns the corner of a hex or a prism at a place in canonical coordinates, -1 if there is none. A tet has one point
 /// only, which stands for the whole cell.
 int corner_at(CellKind kind, const Vec3& at) {
   if (kind == CellKind::tet) return -1;
-  for (int a = 0; a < cell_topology(kind).num_vertices; ++a) {
-    const int layer = kind == CellKind::hex ? 4 : 3, in_layer = a % layer;
-    const Vec3 corner = kind == CellKind::hex ? Vec3(in_layer == 1 || in_layer == 2, in_layer >= 2, a >= layer)
-                                              : Vec3(in_layer == 1, in_layer == 2, a >= layer);
-    if ((at - corner).norm() < 1e-12) return a;
+  for (int a = 0; a < cell_topology(kind).num_vertices; ++a)
+    if ((at - canonical_corner(kind, a)).norm() < kSamePlace) return a;
+  return -1;
+}
+
+/// Returns the edge on which a place lies, as above.
+int edge_at(CellKind kind, const Vec3& at) {
+  if (kind == CellKind::tet) return -1;
+  const CellTopology& topology = cell_topology(kind);
+  for (int e = 0; e < topology.num_edges; ++e) {
+    const Vec3 a = canonical_corner(kind, topology.edges[e][0]), b = canonical_corner(kind, topology.edges[e][1]);
+    if ((at - a).norm() + (at - b).norm() < (b - a).norm() + kSamePlace) return e;
   }
   return -1;
 }
@@ -90,11 +110,12 @@ struct QualityEnergy::CellSums {
 };
 
 QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_direction) {
-  Points points{make_element_rule(kind, points_per_direction), {}, {}};
+  Points points{make_element_rule(kind, points_per_direction), {}, {}, {}};
   const double corner_weight = 1.0 / cell_topology(kind).num_vertices;
   for (const Vec3& at : points.rule.points) {
     const int corner = corner_at(kind, at);
     points.corner.push_back(corner);
+    points.edge.push_back(corner >= 0 ? -1 : edge_at(kind, at));
     points.weights.push_back(kind == CellKind::tet ? 1 : corner >= 0 ? corner_weight : kInnerWeight);
   }
   return points;
@@ -133,6 +154,47 @@ void QualityEnergy::set_weights(const QualityWeights& weights) {
   weights_ = weights;
 }
 
+void QualityEnergy::set_caps(std::span<const EdgeCap> edges, std::span<const VertexCap> vertices) {
+  std::vector<double> of_vertex(mesh_->num_vertices(), kNoCap);
+  for (const VertexCap& v : vertices) of_vertex[v.vertex] = std::min(of_vertex[v.vertex], v.cap);
+  std::map<std::pair<Index, Index>, double> of_edge;
+  std::vector<std::uint8_t> has_cap(mesh_->num_vertices(), 0);
+  for (const EdgeCap& edge : edges) {
+    const auto [at, added] = of_edge.try_emplace(std::minmax(edge.ends[0], edge.ends[1]), edge.cap);
+    at->second = std::min(at->second, edge.cap);
+    for (const Index v : edge.ends) has_cap[v] = 1;
+  }
+  caps_.clear();
+  caps_of_cell_.assign(mesh_->num_cells(), kNoIndex);
+  for (std::size_t c = 0; c < mesh_->num_cells(); ++c) {
+    const auto cell = mesh_->cell(c);
+    const bool concerned =
+        std::any_of(cell.begin(), cell.end(), [&](Index v) { return has_cap[v] != 0 || of_vertex[v] < kNoCap; });
+    if (!concerned) continue;
+    CellCaps caps;
+    caps.edges.fill(kNoCap);
+    for (std::size_t a = 0; a < cell.size(); ++a) caps.corners[a] = of_vertex[cell[a]];
+    const CellTopology& topology = cell_topology(mesh_->kinds[c]);
+    for (int e = 0; e < topology.num_edges; ++e) {
+      const int a = topology.edges[e][0], b = topology.edges[e][1];
+      const auto at = of_edge.find(std::minmax(cell[a], cell[b]));
+      if (at == of_edge.end()) continue;
+      caps.edges[e] = at->second;
+      for (const int end : {a, b}) caps.corners[end] = std::min(caps.corners[end], at->second);
+    }
+    caps_of_cell_[c] = static_cast<Index>(caps_.size());
+    caps_.push_back(caps);
+  }
+}
+
+/// Returns the cap at a point of a cell.
+double QualityEnergy::cap(std::size_t cell, const Points& points, std::size_t q) const {
+  if (caps_of_cell_.empty() || caps_of_cell_[cell] == kNoIndex) return kNoCap;
+  const CellCaps& caps = caps_[caps_of_cell_[cell]];
+  if (points.corner[q] >= 0) return caps.corners[points.corner[q]];
+  return points.edge[q] >= 0 ? caps.edges[points.edge[q]] : kNoCap;
+}
+
 /// Returns the cell's energy; with derivatives, also adds those to `sums`.
 template <bool kDerivatives>
 double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, CellSums& sums) const {
@@ -150,7 +212,7 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
   for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
     const Frame frame(points.rule.point(q), x.data(), least_length);
     const int corner = points.corner[q];
-    const double below = weights_.threshold - frame.s;
+    const double below = std::min(weights_.threshold, cap(cell, points, q)) - frame.s;
     if (below > 0) {
       std::array<Vec3, 3> derivative;
       if constexpr (kDerivatives) {
@@ -281,7 +343,7 @@ std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> node
   std::vector<std::uint8_t> is_poor(mesh_->num_cells());
 #pragma omp parallel for schedule(static)
   for (std::size_t c = 0; c < is_poor.size(); ++c) {
-    if (dense_[c] != 0) continue;
+    if (dense_[c] != 0 || (!caps_of_cell_.empty() && caps_of_cell_[c] != kNoIndex)) continue;
     const Points& dense = points_[static_cast<std::size_t>(mesh_->kinds[c])][1];
     is_poor[c] = least_scaled_jacobian(c, dense, nodes) < goal && least_scaled_jacobian(c, points_of(c), nodes) >= goal;
   }
@@ -292,9 +354,9 @@ std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> node
 }
 
 QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, double goal) {
-  std::vector<double> least(mesh_->num_cells());
-  const auto update = [goal](double s, double& emphasis) {
-    emphasis = s < goal ? std::min(kMostEmphasis, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
+  std::vector<double> least(mesh_->num_cells()), shares(mesh_->num_cells());
+  const auto update = [](double share, double& emphasis) {
+    emphasis = share < 1 ? std::min(kMostEmphasis, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
   };
 #pragma omp parallel for schedule(static)
   for (std::size_t c = 0; c < least.size(); ++c) {
@@ -303,21 +365,26 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
     std::array<Vec3, kMaxCellVertices> x;
     for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
     double inner = 1, all = 1;
+    least[c] = 1;
     for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
       const double s = Frame(points.rule.point(q), x.data(), kLeastLength * lengths_[c].minCoeff()).s;
-      all = std::min(all, s);
+      const double at_cap = cap(c, points, q), own_goal = at_cap < kNoCap ? std::min(goal, at_cap - kBelowCap) : goal;
+      const double share = std::min(1.0, s / own_goal);
+      least[c] = std::min(least[c], s);
+      all = std::min(all, share);
       if (points.corner[q] >= 0)
-        update(s, corner_emphasis_[mesh_->cell_offsets[c] + points.corner[q]]);
+        update(share, corner_emphasis_[mesh_->cell_offsets[c] + points.corner[q]]);
       else
-        inner = std::min(inner, s);
+        inner = std::min(inner, share);
     }
     update(inner, cell_emphasis_[c]);
-    least[c] = all;
+    shares[c] = all;
   }
   State state;
-  for (const double s : least) {
-    state.least = std::min(state.least, s);
-    if (s < goal) ++state.below;
+  for (std::size_t c = 0; c < least.size(); ++c) {
+    state.least = std::min(state.least, least[c]);
+    state.least_share = std::min(state.least_share, shares[c]);
+    if (shares[c] < 1) ++state.below;
   }
   return state;
 }

@@ -24,6 +24,18 @@ struct QualityWeights {
   double twist = 0.3;       ///< w_p: faces are parallelograms
 };
 
+/// Upper bound of the scaled Jacobian that cells can have along an edge of the mesh: where the surface is sharp, the
+/// cells there share its angle.
+struct EdgeCap {
+  std::array<Index, 2> ends;
+  double cap;
+};
+/// The same at a vertex of the mesh.
+struct VertexCap {
+  Index vertex;
+  double cap;
+};
+
 /// A least-squares energy that raises the scaled Jacobians of linear cells, the lowest ones most.
 ///
 ///   E = sum over cells of  w_c sum over corners a_q sum over i < j cos^2(d_i, d_j)
@@ -51,10 +63,15 @@ class QualityEnergy final : public VolumeTerm {
   /// InputError: a weight that is negative or not finite, a threshold above 1.
   void set_weights(const QualityWeights& weights);
 
+  /// Lowers the threshold t at points on these edges and at these vertices to the cap, and the goal of
+  /// `emphasize_poor` to slightly less. Edges that are none of the mesh have no effect; replaces earlier caps.
+  void set_caps(std::span<const EdgeCap> edges, std::span<const VertexCap> vertices);
+
   /// State of the cells against a goal.
   struct State {
     double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
-    std::size_t below = 0;   ///< number of cells below the goal
+    double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached; <= 1
+    std::size_t below = 0;   ///< number of cells with a point below its goal
   };
   /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
   /// below; elsewhere it falls back by 3 % towards 1. At most 1000.
@@ -66,7 +83,7 @@ class QualityEnergy final : public VolumeTerm {
   void least_scaled_jacobians(std::span<const Vec3> nodes, std::span<double> least) const;
 
   /// Returns the cells, ascending, that are below the goal at the five points in each direction at which checks sample,
-  /// though not at their own.
+  /// though not at their own; without cells that have caps.
   std::vector<Index> poor_between_points(std::span<const Vec3> nodes, double goal) const;
 
   double value(std::span<const Vec3> nodes) const override;
@@ -89,6 +106,7 @@ class QualityEnergy final : public VolumeTerm {
   struct Points {
     ElementRule rule;
     std::vector<int> corner;        ///< local vertex of each point that is a corner; -1 for the others
+    std::vector<int> edge;          ///< local edge of each point inside one; -1 for the others
     std::vector<double> weights;    ///< a_q
   };
   struct CellSums;
@@ -100,6 +118,7 @@ class QualityEnergy final : public VolumeTerm {
   double emphasis(std::size_t cell, int corner) const {
     return corner >= 0 ? corner_emphasis_[mesh_->cell_offsets[cell] + corner] : cell_emphasis_[cell];
   }
+  double cap(std::size_t cell, const Points& points, std::size_t q) const;
   template <bool kDerivatives>
   double evaluate(std::size_t cell, std::span<const Vec3> nodes, CellSums& sums) const;
   template <bool kHessian>
@@ -111,6 +130,13 @@ class QualityEnergy final : public VolumeTerm {
   QualityWeights weights_;
   std::array<std::array<Points, 2>, kNumCellKinds> points_;  ///< by kind, with three and with five a direction
   std::vector<std::uint8_t> dense_;                          ///< per cell: 1 if it has five points a direction
+  /// Caps of the corners of a cell, and of its edges.
+  struct CellCaps {
+    std::array<double, kMaxCellVertices> corners;
+    std::array<double, kMaxCellEdges> edges;
+  };
+  std::vector<Index> caps_of_cell_;                          ///< place in caps_, or kNoIndex; empty: no caps
+  std::vector<CellCaps> caps_;
   std::vector<double> corner_emphasis_, cell_emphasis_;      ///< omega, per corner of each cell and per cell
   std::vector<Index> order_;                                 ///< cells by color
   std::vector<std::size_t> color_offsets_;                   ///< first cell of each color in order_, and their number

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/fits/fit_level.h"
 
+#include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
 
 #include <algorithm>
-#include <map>
 #include <optional>
 
 namespace subvol {
@@ -40,25 +40,6 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
   level.samples = select_rows(nodes, rows);
   for (const CreaseEdge& crease : mesh.tags.creases)
     level.crease_edges.push_back({sample_of[crease.v0], sample_of[crease.v1]});
-}
-
-/// Returns for each crease of the refined mesh its parent's position in control.creases. Both children of a crease end
-/// at its midpoint, which no other crease contains.
-std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags& control) {
-  std::map<Index, std::array<Index, 2>> ends_of_middle;
-  for (const CreaseEdge& crease : fine.creases) {
-    const auto [at, added] = ends_of_middle.try_emplace(crease.v1, std::array{crease.v0, crease.v0});
-    if (!added) at->second = {std::min(at->second[0], crease.v0), std::max(at->second[1], crease.v0)};
-  }
-  std::vector<Index> parents;
-  for (const CreaseEdge& crease : fine.creases) {
-    const auto& [v0, v1] = ends_of_middle[crease.v1];
-    const auto at = std::lower_bound(
-        control.creases.begin(), control.creases.end(), std::pair(v0, v1),
-        [](const CreaseEdge& c, const std::pair<Index, Index>& ends) { return std::pair(c.v0, c.v1) < ends; });
-    parents.push_back(static_cast<Index>(at - control.creases.begin()));
-  }
-  return parents;
 }
 
 /// Maps boundary nodes to the vertices of the boundary refined once, by bilinear interpolation in its quads.

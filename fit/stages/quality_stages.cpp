@@ -33,6 +33,10 @@ QualitySchedule coarse_quality_schedule(double goal) {
           goal - kCoarseMargin};
 }
 
+QualitySchedule smooth_quality_schedule() {
+  return {{{1, {.hinge = 50, .threshold = 0.3}, 12}, {10, {.hinge = 50, .threshold = 0.4}, 10}}, {100, {}, 0}, 0.1};
+}
+
 QualitySchedule fine_quality_schedule(double goal) {
   const auto weights = [](double hinge, double threshold) {
     return QualityWeights{.hinge = hinge, .threshold = threshold};
@@ -81,14 +85,14 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
   constexpr double kNoEnd = 1e-9;  // two steps must not end a stage
   energy_->reset_emphasis();
   std::vector<Vec3> nodes(problem_.nodes.num_rows()), best;
-  State best_state{-2, 0};
+  State best_state{-2, -2, 0};
   bool going = true;
   for (int done = 0;; done += kSteps) {
     problem_.apply_nodes(x, nodes);
     const std::vector<Index> between = energy_->poor_between_points(nodes, schedule.goal);
     energy_->densify(between);
     state_ = energy_->emphasize_poor(nodes, schedule.goal);
-    if (state_.least > best_state.least) {
+    if (state_.least_share > best_state.least_share) {
       best_state = state_;
       best = x;
     }

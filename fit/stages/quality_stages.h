@@ -33,6 +33,8 @@ struct QualitySchedule {
 /// Schedules for a template of a few hundred cells or more at the surface's place: its cells are drawn to the surface
 /// first and are lifted then; and for the refinement of a mesh that was fitted so.
 /// goal  least scaled Jacobian wanted, in (0, 1).
+/// A schedule of a few steps without a lift brings a template near the surface, to find out what lies where.
+QualitySchedule smooth_quality_schedule();
 QualitySchedule coarse_quality_schedule(double goal);
 QualitySchedule fine_quality_schedule(double goal);
 
@@ -59,7 +61,7 @@ class QualityStages {
            std::vector<Vec3>& x, FitReport& report);
 
   const State& state() const { return state_; }
-  FitProblem& problem() { return problem_; }
+  QualityEnergy& energy() { return *energy_; }
 
  private:
   bool run_stage(const QualityStage& stage, const std::string& name, double relative_decrease, std::vector<Vec3>& x);

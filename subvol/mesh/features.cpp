@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 namespace subvol {
@@ -103,6 +104,24 @@ FeatureTags merge_tags(const FeatureTags& a, const FeatureTags& b) {
   unify(merged.creases, [](const CreaseEdge& c) { return std::pair(c.v0, c.v1); });
   unify(merged.corners, [](const CornerVertex& c) { return c.vertex; });
   return merged;
+}
+
+std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags& control) {
+  // Both children of a crease end at its midpoint, which no other crease contains.
+  std::map<Index, std::array<Index, 2>> ends_of_middle;
+  for (const CreaseEdge& crease : fine.creases) {
+    const auto [at, added] = ends_of_middle.try_emplace(crease.v1, std::array{crease.v0, crease.v0});
+    if (!added) at->second = {std::min(at->second[0], crease.v0), std::max(at->second[1], crease.v0)};
+  }
+  std::vector<Index> parents;
+  for (const CreaseEdge& crease : fine.creases) {
+    const auto& [v0, v1] = ends_of_middle[crease.v1];
+    const auto at = std::lower_bound(
+        control.creases.begin(), control.creases.end(), std::pair(v0, v1),
+        [](const CreaseEdge& c, const std::pair<Index, Index>& ends) { return std::pair(c.v0, c.v1) < ends; });
+    parents.push_back(static_cast<Index>(at - control.creases.begin()));
+  }
+  return parents;
 }
 
 }  // namespace subvol

@@ -4,6 +4,8 @@
 #include "subvol/mesh/feature_tags.h"
 #include "subvol/mesh/volume_mesh.h"
 
+#include <vector>
+
 namespace subvol {
 
 /// Finds the creases and corners of a mesh's boundary by one angle; all of them are infinitely sharp.
@@ -22,5 +24,9 @@ FeatureTags features_by_angle(const VolumeMesh& mesh, double angle_degrees);
 /// Returns the union of two sets of tags; if both name an edge or vertex, the larger sharpness counts. The inputs need
 /// not be sorted.
 FeatureTags merge_tags(const FeatureTags& a, const FeatureTags& b);
+
+/// Returns, for each crease of a mesh that was subdivided once, its parent's position in the creases of the control mesh.
+/// Both must be sorted; every fine crease must be half of one of the control mesh.
+std::vector<Index> parents_of_creases(const FeatureTags& fine, const FeatureTags& control);
 
 }  // namespace subvol

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/verbs/automatic_fit_run.h"
+
+#include "cli/runs/check_report.h"
+#include "cli/runs/checkpointing.h"
+#include "cli/runs/exit_status.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/report.h"
+#include "cli/runs/written_result.h"
+#include "cli/verbs/long_run.h"
+#include "cli/verbs/verb_options.h"
+#include "subvol/base/format.h"
+#include "subvol/base/version.h"
+
+#include <iostream>
+#include <optional>
+
+namespace subvol::cli {
+namespace {
+
+Json trials_json(const AutomaticFitResult& result) {
+  Json trials = Json::array();
+  for (const AutomaticFitTrial& trial : result.trials)
+    trials.push_back({{"template_cells", trial.template_cells},
+                      {"level", trial.level},
+                      {"cells", trial.cells},
+                      {"mean_percent", trial.mean_percent},
+                      {"max_percent", trial.max_percent},
+                      {"min_scaled_jacobian", trial.least_scaled_jacobian},
+                      {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
+                      {"self_intersections", trial.self_intersections},
+                      {"uncertified_cells", trial.uncertified},
+                      {"merit", trial.merit}});
+  return {{"components", result.topology.components},
+          {"handles", result.topology.handles},
+          {"cavities", result.topology.cavities},
+          {"trials", std::move(trials)},
+          {"chosen", result.chosen}};
+}
+
+/// One run, from its input file to its output files.
+class AutomaticFitRun : public LongRun {
+ public:
+  AutomaticFitRun(const AutomaticFitArguments& arguments, const CLI::App& verb)
+      : LongRun(arguments.run, verb), arguments_(arguments) {}
+  int run();
+
+ private:
+  void load();
+  void fit();
+  void write();
+  void check();
+  Json report() const;
+  void summarise() const;
+
+  const AutomaticFitArguments& arguments_;
+  TriangleMesh target_;
+  std::optional<Checkpointing> checkpointing_;
+  AutomaticFitResult result_;
+  MeshCheck mesh_check_;
+};
+
+void AutomaticFitRun::load() {
+  target_ = load_surface(arguments_.target, warnings_);
+  tell_warnings();
+}
+
+void AutomaticFitRun::fit() {
+  AutomaticFitOptions options = arguments_.fit;
+  checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
+  options.log = checkpointing_->log();
+  result_ = followed([&](auto progress) {
+    options.progress = progress;
+    options.cancelled = interrupted;
+    return fit_automatically(target_, options);
+  });
+  checkpointing_->finish(result_.report.warnings);
+  add_warnings(result_.report.warnings);
+}
+
+void AutomaticFitRun::write() {
+  WritingOptions writing = arguments_.writing;
+  writing.source = arguments_.target;
+  writing.options = options_of_result(verb_);
+  write_each([&](const Output& output) { write_output(output, result_.mesh, writing); });
+}
+
+void AutomaticFitRun::check() {
+  const std::optional<VolumeMesh> written = written_cells(outputs_);
+  const VolumeMesh& mesh = written ? *written : result_.mesh;
+  mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target_, {.progress = progress}); });
+  hold_to({arguments_.mean_tolerance_percent, arguments_.max_tolerance_percent}, mesh_check_, result_.report);
+  if (!arguments_.least_quality || !mesh_check_.quality || result_.report.stop_reason != StopReason::converged) return;
+  const double least = mesh_check_.quality->min_scaled_jacobian;
+  if (least >= *arguments_.least_quality) return;
+  result_.report.stop_reason = StopReason::tolerance_missed;
+  result_.report.explanation =
+      formatted("the least scaled Jacobian, %.3f, is below the %.3f asked for", least, *arguments_.least_quality);
+}
+
+Json AutomaticFitRun::report() const {
+  Json json{{"subvol", version()},
+            {"command", "fit"},
+            {"options", options_in_force(verb_)},
+            {"input", {{"target", describe(arguments_.target, target_)}}},
+            {"template", trials_json(result_)}};
+  json.update(fit_json(result_.report));
+  json.update(check_json(mesh_check_));
+  if (result_.report.creases) json["creases"] = creases_json(*result_.report.creases);
+  checkpointing_->describe(json);
+  return json;
+}
+
+void AutomaticFitRun::summarise() const {
+  std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
+            << to_text(mesh_check_);
+  if (result_.report.creases) std::cerr << to_text(*result_.report.creases);
+  tell_outputs();
+}
+
+int AutomaticFitRun::run() {
+  prepare({Part::cutaway});
+  timed("read", &AutomaticFitRun::load);
+  timed("fit", &AutomaticFitRun::fit);
+  if (result_.mesh.num_cells() == 0)  // nothing has been fitted yet
+    throw EndedEarly("nothing to write: " + result_.report.explanation,
+                     result_.report.stop_reason == StopReason::cancelled ? kInterrupted : kNotConverged);
+  timed("write", &AutomaticFitRun::write);
+  timed("check", &AutomaticFitRun::check);
+  write_report(report(), seconds_json(result_.report));
+  if (!run_.quiet) summarise();
+  require_outputs();
+  return status(result_.report, mesh_check_.valid());
+}
+
+}  // namespace
+
+int run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb) {
+  return AutomaticFitRun(arguments, verb).run();
+}
+
+}  // namespace subvol::cli

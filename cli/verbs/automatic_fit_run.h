@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/runs/run_options.h"
+#include "cli/runs/writing.h"
+#include "fit/automatic_fit.h"
+
+#include <CLI/CLI.hpp>
+
+#include <optional>
+#include <string>
+
+namespace subvol::cli {
+
+/// Arguments of `fit` without a template, for a mesh whose vertices are all free.
+struct AutomaticFitArguments {
+  RunOptions run;
+  WritingOptions writing;
+  AutomaticFitOptions fit;
+  /// Distances that cost the exit status if they are missed, in percent of the diagonal.
+  std::optional<double> mean_tolerance_percent, max_tolerance_percent;
+  std::optional<double> least_quality;  ///< the same for the least scaled Jacobian
+  std::string target;
+};
+
+/// Fills a surface with hexes from files to files; returns an ExitStatus.
+int run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb);
+
+}  // namespace subvol::cli

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/features/followed_creases.h"
+#include "fit/stages/fit_report.h"
+#include "fit/stages/quality_stages.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/solid_topology.h"
+#include "subvol/surface/triangle_mesh.h"
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+namespace subvol {
+
+class StageLog;
+
+/// Distances that an automatic fit aims at, in percent of the diagonal.
+inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
+/// Numbers of cells that are tried if none is given, in this order until a fit is good.
+inline constexpr std::size_t kFirstAutomaticCells = 5000, kSecondAutomaticCells = 15000, kLastAutomaticCells = 40000;
+
+struct AutomaticFitOptions {
+  /// Largest number of cells of the result, at least 8 kLeastTemplateCells; empty: as few as make the fit good, up to
+  /// kLastAutomaticCells.
+  std::optional<std::size_t> cells;
+  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in (0, 0.8]
+  /// Edges of the target sharper than this angle stay sharp. In [0, 180]; empty: none.
+  std::optional<double> crease_angle_degrees = kUsualCreaseAngle;
+  double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
+  int max_iterations = 0;          ///< per stage; 0: as the schedule says
+  double time_limit_seconds = 0;   ///< 0: no limit
+  std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
+  /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
+  std::function<bool()> cancelled;
+  StageLog* log = nullptr;         ///< supplies the results of earlier minimizations and records new ones; null: no log
+};
+
+/// One template that was fitted, and what came out.
+struct AutomaticFitTrial {
+  std::size_t template_cells = 0, cells = 0;
+  int level = 0;                   ///< times the template was subdivided
+  double mean_percent = 0, max_percent = 0;  ///< distance, percent of the target's diagonal
+  double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
+  std::size_t self_intersections = 0, uncertified = 0;
+  double merit = 0;                ///< 0: good; lower is better
+};
+
+struct AutomaticFitResult {
+  VolumeMesh mesh;                 ///< hexes, with tags on the creases that follow edges of the target
+  FitReport report;
+  BettiNumbers topology;           ///< of the solid
+  std::vector<AutomaticFitTrial> trials;
+  std::size_t chosen = 0;          ///< position in trials
+};
+
+/// Fills the solid inside a surface with hexes that one can compute on: no template is given, and every vertex of the
+/// result is free.
+///
+/// A pillowed template of about an eighth of the cells (`auto_templates`) is fitted by `QualityStages`, refined once
+/// (`smooth_refinement`) and fitted again. Edges of the target are looked for on the fitted template, where the cells
+/// already lie in their places. If the result is too far from the target, too poor or meets itself, a larger template is
+/// tried if the number of cells is free; otherwise one with as many cells as allowed, which is not refined. The best
+/// trial is kept:
+///
+///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
+///         + 5 max(0, 1 - least scaled Jacobian / quality) + 1 if the boundary meets itself + 10 if cells are uncertified
+///
+/// InputError: options out of range, a surface that `auto_templates` refuses or whose topology no grid reproduces.
+/// Same bits for any number of threads, except under a time limit.
+AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options = {});
+
+}  // namespace subvol
