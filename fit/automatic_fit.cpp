@@ -3,7 +3,6 @@
 
 #include "fit/certificate/certificate.h"
 #include "fit/elements/boundary_samples.h"
-#include "fit/energies/closest_point_energy.h"
 #include "fit/fits/smooth_refinement.h"
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/quality/quality.h"
@@ -29,6 +28,8 @@ namespace {
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
 constexpr double kMostQuality = 0.8;
+/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
+constexpr double kMaxMargin = 0.8;
 
 void check(const AutomaticFitOptions& options) {
   const auto in_range = [](const char* name, double value, double low, double high) {
@@ -88,6 +89,7 @@ class AutomaticFit {
   FollowedCreases creases_;
   AutomaticFitResult result_;
   double fraction_ = 0;
+  double least_share_ = 1;         ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
 
@@ -139,7 +141,6 @@ void AutomaticFit::set_caps(QualityEnergy& energy, int) const {
 
 /// Fits the present mesh. Returns false if the fit must end.
 bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what) {
-  constexpr double kTangentialWeight = 0.02, kCreaseEdges = 5;
   constexpr int kIntervals = 2, kSamplesPerQuad = 4;
   const std::size_t faces = MeshTopology(mesh_).boundary_faces().size();
   const double h = std::sqrt(target_.surface.area() / static_cast<double>(faces));
@@ -147,21 +148,20 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1);
-  const std::size_t num_samples = samples.points.size();
-  auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples.triangles, num_samples,
-                                                      kTangentialWeight, 1, SurfacePull::straight_both_ways);
-  if (!mesh_.tags.creases.empty()) {
-    surface->discount_disagreeing();
-    surface->add_creases(creases_.energy(samples.crease_edges, num_samples, kCreaseEdges * h, kTangentialWeight));
-  }
-  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), std::move(samples.positions),
-                       std::move(surface), target_.surface.length());
+  const auto creases = [&](double width) {
+    return creases_.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
+  };
+  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {},
+                       {std::move(samples.positions), samples.triangles, samples.triangle_faces}, target_.surface,
+                       mesh_.tags.creases.empty() ? std::function<CreaseEnergy(double)>{} : creases);
   set_caps(stages.energy(), level);
   StageRecord record;
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
   record.cells = mesh_.num_cells();
-  return stages.run(schedule, runner_, record, fraction_, mesh_.positions, result_.report);
+  const bool going = stages.run(schedule, runner_, record, fraction_, mesh_.positions, result_.report);
+  least_share_ = stages.state().cells.least_share;
+  return going;
 }
 
 /// Looks for the sharp edges of the target on a mesh that was fitted without them. Returns false if the fit must end.
@@ -179,6 +179,7 @@ void AutomaticFit::refine() {
 
 /// Measures the present mesh and keeps it if it is the best.
 void AutomaticFit::judge(AutomaticFitTrial trial) {
+  constexpr double kQualityWeight = 5;
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
@@ -187,11 +188,12 @@ void AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.max_percent = 100 * distance.max();
   trial.least_scaled_jacobian = quality.min_scaled_jacobian;
   trial.mean_scaled_jacobian = quality.mean_scaled_jacobian;
+  trial.least_share = least_share_;
   trial.uncertified = quality.certificate.not_certified.size();
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report).value_or(0);
   trial.merit = std::max(0.0, trial.max_percent / options_.max_tolerance_percent - 1) +
                 std::max(0.0, trial.mean_percent / options_.mean_tolerance_percent - 1) +
-                5 * std::max(0.0, 1 - trial.least_scaled_jacobian / options_.quality) +
+                kQualityWeight * (1 - trial.least_share) +
                 (trial.self_intersections > 0 ? 1 : 0) + (trial.uncertified > 0 ? 10 : 0);
   result_.trials.push_back(trial);
   if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return;
@@ -210,8 +212,10 @@ bool AutomaticFit::run_attempt(const Attempt& attempt) {
   for (int level = 0; going && level <= attempt.levels; ++level) {
     if (level > 0) refine();
     trial.level = level;
-    going = fit_level(level, level == 0 ? coarse_quality_schedule(options_.quality)
-                                        : fine_quality_schedule(options_.quality), "");
+    QualitySchedule schedule =
+        level == 0 ? coarse_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
+    if (level == attempt.levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+    going = fit_level(level, schedule, "");
   }
   if (going || result_.trials.empty()) judge(trial);
   return going;

@@ -44,6 +44,7 @@ struct AutomaticFitTrial {
   int level = 0;                   ///< times the template was subdivided
   double mean_percent = 0, max_percent = 0;  ///< distance, percent of the target's diagonal
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
+  double least_share = 0;          ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t self_intersections = 0, uncertified = 0;
   double merit = 0;                ///< 0: good; lower is better
 };
@@ -66,7 +67,7 @@ struct AutomaticFitResult {
 /// trial is kept:
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
-///         + 5 max(0, 1 - least scaled Jacobian / quality) + 1 if the boundary meets itself + 10 if cells are uncertified
+///         + 5 (1 - least share of the quality that a cell reaches) + 1 if the boundary meets itself + 10 if cells are uncertified
 ///
 /// InputError: options out of range, a surface that `auto_templates` refuses or whose topology no grid reproduces.
 /// Same bits for any number of threads, except under a time limit.

@@ -5,9 +5,11 @@
 #include "fit/elements/ideal_boxes.h"
 #include "fit/energies/closest_point_energy.h"
 #include "fit/geometry/boundary_triangles.h"
+#include "fit/geometry/self_intersection.h"
 #include "fit/geometry/surface_distance.h"
 #include "fit/quality/quality.h"
 #include "fit/solver/free_nodes.h"
+#include "fit/stages/quality_stages.h"
 #include "fit/stages/stage_runner.h"
 #include "fit/stages/untangle.h"
 #include "fit/target/fit_target.h"
@@ -64,6 +66,7 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
+  in_range("quality", options.quality, 1e-3, 0.8);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (has_target && options.fixed_boundary)
     throw InputError("OptimizeOptions: a boundary that is fixed cannot be drawn to a target");
@@ -117,6 +120,10 @@ class MeshOptimizer {
   bool untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options);
   bool improve();
   bool run_stage(const std::string& name, double lambda, int steps, double fraction);
+  struct Measured;
+  Measured measure() const;
+  bool is_better(const Measured& now, const Measured& before) const;
+  bool raise_quality();
   void relieve_far_cells(std::span<const double> triangle_distances);
   void weigh_cells(std::span<const double> least_jacobians);
   void measure_start();
@@ -353,6 +360,71 @@ bool MeshOptimizer::improve() {
   return true;
 }
 
+/// Properties of a state that the quality stages must not spoil.
+struct MeshOptimizer::Measured {
+  double least_jacobian = -1, mean_jacobian = -1, mean_percent = 0, max_percent = 0;
+  std::size_t uncertified = 0, intersections = 0;
+};
+
+MeshOptimizer::Measured MeshOptimizer::measure() const {
+  const QualityReport quality = measure_quality(mesh_);
+  Measured result{quality.min_scaled_jacobian, quality.mean_scaled_jacobian};
+  result.uncertified = quality.certificate.not_certified.size();
+  if (options_.fixed_boundary) return result;
+  const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, topology_));
+  const SurfaceDistance distance = target_.distance(surface);
+  result.mean_percent = 100 * distance.mean();
+  result.max_percent = 100 * distance.max();
+  result.intersections = count_intersecting_pairs(surface, [this] { return runner_.is_to_end(); });
+  return result;
+}
+
+bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const {
+  return now.uncertified <= before.uncertified && now.intersections <= before.intersections &&
+         now.least_jacobian > before.least_jacobian &&
+         now.mean_percent <= std::max(before.mean_percent, kMeanMargin * options_.mean_tolerance_percent) &&
+         now.max_percent <= std::max(before.max_percent, options_.max_tolerance_percent);
+}
+
+/// Raises the lowest scaled Jacobians; if the surface suffers, it counts more in another attempt. Returns false if the
+/// work must end.
+bool MeshOptimizer::raise_quality() {
+  constexpr double kFraction = 0.9, kMoreSurface = 10;
+  constexpr int kAttempts = 2;
+  const Measured before = measure();
+  if (before.least_jacobian >= options_.quality) return true;
+  const std::vector<Vec3> start = mesh_.positions;
+  const bool slides = !options_.fixed_boundary;
+  QualitySchedule schedule = fine_quality_schedule(options_.quality);
+  schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    FreeNodes free = free_nodes(fixed_vertices(slides ? Boundary::sliding : Boundary::fixed), start);
+    std::vector<Vec3> x = std::move(free.unknowns);
+    const auto creases = [&](double width) {
+      return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
+    };
+    const bool has_creases = slides && !creases_.curves().empty();
+    QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed,
+                         slides ? QualityBoundary{samples_.positions, samples_.triangles, samples_.triangle_faces}
+                                : QualityBoundary{},
+                         target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+    const std::size_t stages_before = report_.stages.size();
+    const bool going = stages.run(schedule, runner_, record("quality"), kFraction, x, report_);
+    mesh_.positions = std::move(free.fixed);
+    const std::vector<Vec3> moved = free.map.apply(x);
+    for (std::size_t v = 0; v < moved.size(); ++v) mesh_.positions[v] += moved[v];
+    const Measured now_ = measure(); if (getenv("DBG")) fprintf(stderr,"quality: %g %g %g %g %zu %zu -> %g %g %g %g %zu %zu\n",before.least_jacobian,before.mean_jacobian,before.mean_percent,before.max_percent,before.uncertified,before.intersections,now_.least_jacobian,now_.mean_jacobian,now_.mean_percent,now_.max_percent,now_.uncertified,now_.intersections);
+    if (is_better(now_, before)) return going;
+    mesh_.positions = start;
+    report_.undo_stages(stages_before, report_.stages.size());
+    if (!going) return false;
+    for (QualityStage& stage : schedule.stages) stage.surface *= kMoreSurface;
+    schedule.lift.surface *= kMoreSurface;
+    if (!slides) break;
+  }
+  return true;
+}
+
 /// There is nothing to measure if the target is the mesh's own boundary.
 void MeshOptimizer::measure_start() {
   if (own_boundary_) return;
@@ -405,7 +477,7 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   uncertified_ = certify(mesh_).not_certified;
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
-  going = going && improve();
+  going = going && improve() && raise_quality();
   OptimizeResult result{original, {}, {}};
   result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);
   if (options_.fixed_boundary)

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
 
 namespace subvol {
 
@@ -65,6 +66,15 @@ void ClosestPointEnergy::emphasize_far(double length) {
   inverse_far_ = 1 / length;
 }
 
+void ClosestPointEnergy::weigh(std::vector<double> factors) {
+  if (factors.size() != triangles().size())
+    throw InputError("ClosestPointEnergy: one factor is expected for each sample triangle");
+  for (const double factor : factors)
+    if (!(factor > 0) || !std::isfinite(factor))
+      throw InputError("ClosestPointEnergy: factors must be positive and finite");
+  factors_ = std::move(factors);
+}
+
 void ClosestPointEnergy::refine(std::span<const std::uint8_t> refined) {
   if (refined.size() != triangles().size())
     throw InputError("ClosestPointEnergy: one entry is expected for each sample triangle");
@@ -103,7 +113,7 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
                                 points[j],
                                 has_direction ? Vec3((points[j] - target_hits_[j].point) / distance)
                                               : target_->sample_normals()[j],
-                                emphasis(distance) * target_->sample_areas()[j],
+                                factor(t) * emphasis(distance) * target_->sample_areas()[j],
                                 tau_};
   }
 }
@@ -144,7 +154,7 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       hint = before = hit.triangle;
       Link& link = surface_links_[begin + k];
       link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
-              emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n), tau_};
+              factor(static_cast<Index>(t)) * emphasis(hit.distance) * triangle_area(t) / static_cast<double>(n), tau_};
       if (discounts_ && own_normal.dot(link.normal) < kAgreement) link.weight *= kDiscount;
       surface_distances_[begin + k] = hit.distance;
       if (!over_rim(hit)) {
@@ -222,6 +232,20 @@ std::vector<double> ClosestPointEnergy::triangle_distances() const {
     largest = std::max(largest, surface_distances_[q]);
   }
   for (const ClosestPoint::Hit& hit : target_hits_) result[hit.triangle] = std::max(result[hit.triangle], hit.distance);
+  return result;
+}
+
+std::vector<double> ClosestPointEnergy::triangle_distances_with_corners() const {
+  std::vector<double> result = triangle_distances();
+  if (!target_tree_) return result;
+  std::vector<double> of_sample(num_samples());
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < of_sample.size(); ++i) {
+    const ClosestPoint::Hit hit = target_tree_->closest(assigned()[i]);
+    of_sample[i] = over_rim(hit) ? 0 : hit.distance;
+  }
+  for (std::size_t t = 0; t < result.size(); ++t)
+    for (const Index corner : triangles()[t]) result[t] = std::max(result[t], of_sample[corner]);
   return result;
 }
 

@@ -57,6 +57,10 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// where it is closest counts only 0.02 times: next to a sharp edge, the closest point may lie on the wrong side.
   void discount_disagreeing() { discounts_ = true; }
 
+  /// From the next `assign` on, correspondences at each sample triangle count so many times. One positive factor per
+  /// sample triangle, else InputError.
+  void weigh(std::vector<double> factors);
+
   /// Uses six points, including the corners, on each sample triangle with a nonzero entry, instead of
   /// `points_per_triangle`: S~ is farthest from the target on its edges. One entry per sample triangle, else
   /// InputError; must be called before `assign`.
@@ -75,6 +79,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
   Distance assigned_distance() const;
   /// Returns the largest of these distances at each sample triangle.
   std::vector<double> triangle_distances() const;
+  /// The same, but the distances of the triangles' corners from the target count, too. Cost: a query per sample.
+  std::vector<double> triangle_distances_with_corners() const;
 
  private:
   /// A correspondence between a point of the target and a point of one sample triangle.
@@ -101,6 +107,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
   double tau_, scale_, inverse_far_ = 0;
   SurfacePull pull_;
   bool discounts_ = false;
+  std::vector<double> factors_;              ///< per sample triangle; empty: all 1
+  double factor(Index triangle) const { return factors_.empty() ? 1 : factors_[triangle]; }
   std::vector<Link> target_links_;           ///< ordered by sample triangle
   std::vector<std::size_t> target_offsets_;  ///< where each sample triangle begins in target_links_
   std::vector<Link> surface_links_;          ///< ordered by sample triangle

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/energies/closest_point_energy.h"
 #include "fit/energies/quality_energy.h"
+#include "fit/features/crease_energy.h"
 #include "fit/solver/fit_problem.h"
 #include "fit/stages/stage_runner.h"
+#include "fit/target/target_surface.h"
 #include "subvol/mesh/volume_mesh.h"
 
-#include <cstddef>
+#include <array>
+#include <functional>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,6 +31,9 @@ struct QualitySchedule {
   /// The lift: this stage is repeated, two steps at a time, with rising emphasis on what is still poor.
   QualityStage lift;
   double goal;       ///< least scaled Jacobian at which the lift ends
+  /// Largest distance to aim at in the lift, as a share of the diagonal; 0: none. Where the surfaces are farther apart
+  /// than most of it, they draw each other more and more, as poor cells are emphasized more and more.
+  double most_distance = 0;
 };
 
 /// Schedules for a template of a few hundred cells or more at the surface's place: its cells are drawn to the surface
@@ -38,24 +44,41 @@ QualitySchedule smooth_quality_schedule();
 QualitySchedule coarse_quality_schedule(double goal);
 QualitySchedule fine_quality_schedule(double goal);
 
+/// Share of the pull along the target's tangents and creases.
+inline constexpr double kQualityTangentialWeight = 0.02;
+
 /// Least scaled Jacobian that fits aim at.
 inline constexpr double kUsualQuality = 0.65;
+
+/// The boundary of a mesh as it is compared with the target: sample triangles on its faces.
+struct QualityBoundary {
+  SparseMap samples;                              ///< vertices of the mesh -> samples; no rows: the surface does not matter
+  std::vector<std::array<Index, 3>> triangles;    ///< of samples
+  std::vector<Index> triangle_faces;              ///< face of the mesh of each triangle, by `MeshTopology`
+};
 
 /// Runs the minimizations of one level on one problem.
 class QualityStages {
  public:
   /// mesh     the level's mesh; must outlive this. Its positions are not read.
   /// lengths  wanted lengths of each cell (`QualityEnergy`), in shares of the target's diagonal.
-  /// nodes, samples  as in `FitProblem`.  surface  over these samples; null: the surface does not matter.
-  /// target_length   L of the target (`TargetSurface::length`).
-  QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, SparseMap nodes, SparseMap samples,
-                std::unique_ptr<SurfaceTerm> surface, double target_length);
+  /// nodes    degrees of freedom -> vertices of the mesh.  fixed  positions of vertices without entries in `nodes`, 0
+  ///          for the others; empty: none is fixed.
+  /// target   must outlive this; sampled about four times for each boundary face.
+  /// creases  energy(width) of the creases that follow edges of the target, over the samples; empty: there are none.
+  QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, const SparseMap& nodes,
+                std::vector<Vec3> fixed, const QualityBoundary& boundary, const TargetSurface& target,
+                const std::function<CreaseEnergy(double width)>& creases = {});
 
-  /// State of the cells at the last check.
-  using State = QualityEnergy::State;
+  /// A state that the lift reached.
+  struct State {
+    QualityEnergy::State cells;
+    double distance = 0;   ///< largest distance at the samples, as a share of the diagonal; 0 if none is aimed at
+    double merit = -2;     ///< least share of the goal less the share by which the distance exceeds the largest; <= 1
+  };
 
   /// Runs all stages, then the lift. name  of the level, for reports.  record  level and number of cells are set.
-  /// x  the degrees of freedom; after the lift, those of the state with the highest least scaled Jacobian.
+  /// x  the degrees of freedom; after the lift, those of the state with the highest merit.
   /// returns  false if the fit must end, with its reason in the report.
   bool run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record, double fraction,
            std::vector<Vec3>& x, FitReport& report);
@@ -66,11 +89,15 @@ class QualityStages {
  private:
   bool run_stage(const QualityStage& stage, const std::string& name, double relative_decrease, std::vector<Vec3>& x);
   bool lift(const QualitySchedule& schedule, std::vector<Vec3>& x);
+  State inspect(const QualitySchedule& schedule, std::span<const Vec3> x);
+  double emphasize_far(double most_distance, std::span<const Vec3> x);
 
-  double mean_length_;    ///< wanted, of the cells at the boundary
-  double lambda_one_;     ///< lambda for w_s = 1
-  QualityEnergy* energy_; ///< owned by the problem
-  FitProblem problem_;
+  double mean_length_ = 0;  ///< wanted, of the cells at the boundary
+  double lambda_one_ = 1;   ///< lambda for w_s = 1
+  std::unique_ptr<FitProblem> problem_;
+  QualityEnergy* energy_ = nullptr;  ///< owned by the problem, as is the next
+  ClosestPointEnergy* surface_ = nullptr;
+  std::vector<double> factors_, far_emphasis_;  ///< of each sample triangle
   State state_;
   // Of the call of `run` in progress.
   const StageRunner* runner_ = nullptr;
