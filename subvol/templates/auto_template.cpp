@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
 #include "subvol/templates/pillow.h"
+#include "subvol/templates/plane_grid.h"
 #include "subvol/templates/solid_fraction.h"
 #include "subvol/templates/template_frames.h"
 #include "subvol/templates/voxel_evolution.h"
@@ -14,9 +15,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 namespace subvol {
 
@@ -32,6 +35,8 @@ struct Placement {
 /// Edge lengths to try, relative to the length that follows from the count and the volume.
 constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
 constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
+/// Layers of cells on each side of a grid: the outer one stays empty, the inner one leaves room for handles.
+constexpr int kSpare = 2;
 /// Largest number of cells of one grid, including the empty and spare ones, if `cells` are requested in the solid: half
 /// a gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
@@ -45,9 +50,8 @@ Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
 }
 
 /// Number of cells, along each axis, of the grid around a box; a whole number that may exceed the range of int. On
-/// every side the grid has two spare layers: the outer one stays empty, the inner one leaves room for handles.
+/// every side the grid has its spare layers.
 Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
-  constexpr int kSpare = 2;
   return (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
 }
 
@@ -80,11 +84,28 @@ VoxelGrid placed_grid(const TriangleMesh& surface, const Placement& placement) {
 
 /// A carved grid with the right topology and count.
 struct Candidate {
-  Placement placement;
+  Mat3 frame;
   VoxelGrid grid;
   std::vector<char> kept;
   double score = 0;
+  double share = 0;  ///< number of cells of the template, as a multiple of the requested one
 };
+
+/// Range of the numbers of cells that a search accepts, as multiples of the requested one.
+struct ShareRange {
+  double least = 0, most = std::numeric_limits<double>::infinity();
+  bool holds(double share) const { return share >= least && share <= most; }
+};
+
+/// Adds the spare layers around the lines of a grid, `size` wide.
+std::array<std::vector<double>, 3> with_spare(std::array<std::vector<double>, 3> lines, double size) {
+  for (std::vector<double>& at : lines)
+    for (int layer = 0; layer < kSpare; ++layer) {
+      at.insert(at.begin(), at.front() - size);
+      at.push_back(at.back() + size);
+    }
+  return lines;
+}
 
 std::size_t num_boundary_faces(const VoxelSolid& solid) {
   std::size_t count = 0;
@@ -100,6 +121,10 @@ class Search {
   Search(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t cells, std::vector<Mat3> frames)
       : solid_(solid), options_(options), cells_(static_cast<double>(cells)), frames_(std::move(frames)) {}
 
+  /// Tries grids through the planes of the surface with cells of several sizes; returns the best candidate, if any.
+  /// result  receives the numbers of grids and of candidates, and whether the search was cancelled.
+  std::optional<Candidate> best_through(const AxisPlanes& planes, double most_cells, AutoTemplateResult& result) const;
+
   /// Returns false if cancelled. Candidates are in the order of their grids.
   bool run(std::vector<Candidate>& candidates, AutoTemplateResult& result, double fraction_before,
            double fraction_share);
@@ -107,7 +132,13 @@ class Search {
  private:
   std::vector<Placement> placements() const;
   double pillowed_size(const Mat3& frame) const;
-  std::optional<Candidate> best_of(const Placement& placement, std::size_t& num_right) const;
+  double size_through(const AxisPlanes& planes) const;
+  std::optional<Candidate> best_of(const Placement& placement, std::size_t& num_right) const {
+    constexpr ShareRange kAccepted{kLeastCellShare, kMostCellShare};
+    return best_in(placement.frame, placed_grid(solid_.surface, placement), kAccepted, num_right);
+  }
+  std::optional<Candidate> best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
+                                   std::size_t& num_right) const;
   double count_of(const VoxelSolid& solid) const {
     return static_cast<double>(solid.num_filled() + (options_.pillow ? num_boundary_faces(solid) : 0));
   }
@@ -148,11 +179,14 @@ std::vector<Placement> Search::placements() const {
   return result;
 }
 
-std::optional<Candidate> Search::best_of(const Placement& placement, std::size_t& num_right) const {
+/// Returns the best solid in a grid.
+std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
+                                         std::size_t& num_right) const {
   constexpr double kWanted = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
   constexpr std::array<double, 9> kThresholds{0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.12, 0.9};
-  Candidate best{placement, placed_grid(solid_.surface, placement), {}, 0};
+  Candidate best{frame, std::move(grid), {}, 0, 0};
   const std::vector<double> fractions = solid_fractions(solid_.surface, best.grid);
+  const std::vector<double> volumes = cell_volumes(best.grid);
   const auto look_at = [&](VoxelStart start, double threshold) {
     VoxelGoal goal{fractions, threshold, solid_.topology};
     std::optional<VoxelSolid> solid = start_solid(start, best.grid.cells, VertexRule::pillowable, goal);
@@ -161,18 +195,97 @@ std::optional<Candidate> Search::best_of(const Placement& placement, std::size_t
     evolve(*solid, goal);
     reach_thin_parts(*solid, goal);
     const double share = count_of(*solid) / cells_;
-    if (share < kLeastCellShare || share > kMostCellShare) return;
+    if (!range.holds(share)) return;
     ++num_right;
     const double score =
-        voxel_score(*solid, fractions) + kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
+        voxel_score(*solid, fractions, volumes) + kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
     if (!best.kept.empty() && score >= best.score) return;
     best.score = score;
+    best.share = share;
     best.kept.assign(solid->filled().begin(), solid->filled().end());
   };
   for (double threshold : kThresholds) look_at(VoxelStart::cut, threshold);
   look_at(VoxelStart::grown, kWanted);
   look_at(VoxelStart::shrunk, kWanted);
   if (best.kept.empty()) return std::nullopt;
+  return best;
+}
+
+/// Estimated cell size for which a grid through planes has the requested count: volume / size^3 cells fill a thick
+/// solid, and area / size^2 / 2 a thin one. A pillow adds about area / size^2.
+double Search::size_through(const AxisPlanes& planes) const {
+  constexpr double kThin = 4;  // twice what flat cells alone need, so that a solid of a few cells across is not thin
+  const auto count = [&](double size) {
+    const double flat = planes.area / (size * size);
+    return std::max(solid_.volume / (size * size * size), flat / kThin) + (options_.pillow ? flat : 0);
+  };
+  double low = std::cbrt(solid_.volume / cells_), high = low + 2 * std::sqrt(planes.area / cells_);
+  if (options_.pillow) high *= 2;
+  for (int i = 0; i < 40; ++i) {
+    const double size = std::sqrt(low * high);
+    (count(size) > cells_ ? low : high) = size;
+  }
+  return high;
+}
+
+/// The size of cells of a grid through planes, corrected until the count is right. The count does not change smoothly
+/// with the size, so a size between two that are known is their mean.
+class SizeSearch {
+ public:
+  explicit SizeSearch(double first) : size_(first) {}
+  double size() const { return size_; }
+  /// The count is `share` times the requested one.
+  void correct(double share) {
+    constexpr double kMost = 8;  // largest share that is believed
+    step(share > 1, std::cbrt(std::clamp(share, 1 / kMost, kMost)));
+  }
+  void be_finer() { step(false, 0.85); }   ///< the topology is out of reach
+  void be_coarser() { step(true, 1.25); }  ///< the grid has too many cells
+
+ private:
+  void step(bool too_fine, double factor) {
+    (too_fine ? finer_ : coarser_) = size_;
+    size_ = finer_ > 0 && coarser_ > 0 ? std::sqrt(finer_ * coarser_) : factor * size_;
+  }
+
+  double size_, finer_ = 0, coarser_ = 0;  ///< the last ones that were too fine and too coarse; 0: none
+};
+
+std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double most_cells,
+                                              AutoTemplateResult& result) const {
+  constexpr int kGrids = 5;
+  constexpr double kLeastAligned = 0.03;  // share of the area on planes below which these are no help
+  constexpr ShareRange kNear{0.8, 1.25}, kAccepted{kLeastShareThroughPlanes, kMostShareThroughPlanes};
+  std::optional<Candidate> best;
+  SizeSearch search(size_through(planes));
+  for (int attempt = 0; attempt < kGrids; ++attempt) {
+    if (options_.progress && !options_.progress(static_cast<double>(attempt) / kGrids)) {
+      result.cancelled = true;
+      return std::nullopt;
+    }
+    const double size = search.size();
+    std::array<std::vector<double>, 3> lines = lines_through_planes(solid_.surface, planes, size, kSpare, most_cells);
+    if (lines[0].empty()) {
+      search.be_coarser();
+      continue;
+    }
+    if (share_on_lines(planes, lines) < kLeastAligned) break;
+    ++result.grids;
+    std::size_t num_right = 0;
+    std::optional<Candidate> found =
+        best_in(planes.frame, grid_through(planes.frame, with_spare(std::move(lines), size)), {}, num_right);
+    if (!found) {
+      search.be_finer();
+      continue;
+    }
+    const double share = found->share;
+    if (kAccepted.holds(share)) {
+      result.candidates += num_right;
+      if (!best || std::abs(std::log(share)) < std::abs(std::log(best->share))) best = std::move(found);
+    }
+    if (kNear.holds(share)) break;
+    search.correct(share);
+  }
   return best;
 }
 
@@ -202,10 +315,32 @@ bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result,
   return true;
 }
 
+/// The lines of a grid from the first to the last that a kept cell touches.
+std::array<std::vector<double>, 3> used_lines(const VoxelGrid& grid, std::span<const char> kept) {
+  std::array<int, 3> first = grid.cells, last{};
+  for (std::size_t c = 0; c < kept.size(); ++c) {
+    if (!kept[c]) continue;
+    const std::array<int, 3> at = grid.place(static_cast<Index>(c));
+    for (std::size_t a = 0; a < 3; ++a) {
+      first[a] = std::min(first[a], at[a]);
+      last[a] = std::max(last[a], at[a] + 1);
+    }
+  }
+  std::array<std::vector<double>, 3> lines;
+  for (std::size_t a = 0; a < 3; ++a)
+    if (!grid.lines[a].empty()) lines[a].assign(grid.lines[a].begin() + first[a], grid.lines[a].begin() + last[a] + 1);
+  return lines;
+}
+
 AutoTemplate finished(const Candidate& candidate, const AutoTemplateOptions& options, const BettiNumbers& topology,
                       std::size_t cells) {
-  AutoTemplate result{voxel_mesh(candidate.grid, candidate.kept), topology, cells, options.pillow,
-                      candidate.placement.frame, candidate.score};
+  AutoTemplate result{.mesh = voxel_mesh(candidate.grid, candidate.kept),
+                      .topology = topology,
+                      .cells_asked = cells,
+                      .pillowed = options.pillow,
+                      .axes = candidate.frame,
+                      .score = candidate.score,
+                      .lines = used_lines(candidate.grid, candidate.kept)};
   if (options.pillow) result.mesh = pillow(result.mesh);
   return result;
 }
@@ -223,20 +358,31 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   AutoTemplateResult result;
   result.wanted = solid.topology;
   const double most_cells = most_grid_cells(options.cells);
+  std::optional<AxisPlanes> planes;
+  if (options.through_planes) planes = axis_planes(solid.surface, frame_along_planes(solid.surface));
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
     std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_cells, frames);
-    if (usable.empty() && rung == 0)
+    const bool none_usable = usable.empty();
+    Search search(solid, options, cells, std::move(usable));
+    if (planes) {
+      const std::optional<Candidate> best = search.best_through(*planes, most_cells, result);
+      if (best) {
+        result.templates.push_back(finished(*best, options, solid.topology, cells));
+        result.templates.back().aligned_share = share_on_lines(*planes, result.templates.back().lines);
+      }
+      if (best || result.cancelled) return result;
+    }
+    if (none_usable && rung == 0)
       throw InputError("surface: a grid with " + std::to_string(cells) + " cells in its solid would have more than " +
                        std::to_string(std::lround(most_cells)) +
                        " in all, so far apart are its parts or so thin its walls; ask for fewer, or take the parts one "
                        "by one");
-    if (usable.empty()) break;
+    if (none_usable) break;
     std::vector<Candidate> candidates;
     const double done = static_cast<double>(rung) / kLadder.size();
     // Most often only the first count is needed.
-    if (!Search(solid, options, cells, std::move(usable))
-             .run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
+    if (!search.run(candidates, result, rung == 0 ? 0 : done, rung == 0 ? 1 : 1.0 / kLadder.size())) {
       result.cancelled = true;
       return result;
     }

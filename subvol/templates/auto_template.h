@@ -4,6 +4,7 @@
 #include "subvol/surface/solid_topology.h"
 #include "subvol/templates/voxel_grid.h"
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <vector>
@@ -11,16 +12,19 @@
 namespace subvol {
 
 struct AutoTemplateOptions {
-  std::size_t cells = 300;  ///< approximate number, in [kLeastTemplateCells, kMostTemplateCells]
-  bool pillow = false;      ///< adds a layer of cells inside the whole boundary; they count toward `cells`
-  /// Called with the estimated progress in [0, 1], which falls back if a larger count must be tried; returns false to
-  /// cancel. Empty: none.
+  std::size_t cells = 300;      ///< approximate number, in [kLeastTemplateCells, kMostTemplateCells]
+  bool pillow = false;          ///< adds a layer of cells inside the whole boundary; they count toward `cells`
+  bool through_planes = false;  ///< grid lines pass through the surface's planes, see `auto_templates`
+  /// Called with the estimated progress in [0, 1], which falls back if a larger count must be tried, or other grids
+  /// than the one through the planes; returns false to cancel. Empty: none.
   std::function<bool(double fraction)> progress;
 };
 
 inline constexpr std::size_t kLeastTemplateCells = 8, kMostTemplateCells = 200'000;
 /// The number of cells of a template lies between these multiples of `AutoTemplate::cells_asked`.
 inline constexpr double kLeastCellShare = 0.8, kMostCellShare = 1.4;
+/// The same for a template whose grid passes through planes: these leave little choice of sizes.
+inline constexpr double kLeastShareThroughPlanes = 0.5, kMostShareThroughPlanes = 2;
 
 /// A template carved from a grid, and its properties.
 struct AutoTemplate {
@@ -30,6 +34,10 @@ struct AutoTemplate {
   bool pillowed = false;
   Mat3 axes = Mat3::Identity(); ///< columns: directions of the grid's axes
   double score = 0;             ///< dissimilarity to the shape, >= 0; comparable between templates of the same count
+  /// For each axis the positions x . axis of the grid lines from the first to the last that the cells touch, length,
+  /// increasing; empty if the cells are equal cubes.
+  std::array<std::vector<double>, 3> lines;
+  double aligned_share = 0;     ///< share of the surface's area on planes through `lines`, in [0, 1]
 };
 
 struct AutoTemplateResult {
@@ -48,6 +56,13 @@ struct AutoTemplateResult {
 /// surplus ones removed one by one (`voxel_evolution.h`). Among the results with the right Betti numbers, the ones that
 /// cover the solid best are returned.
 ///
+/// With `through_planes`, a grid whose lines pass through the surface's large planes is tried first for each count
+/// (`plane_grid.h`). Its cells are boxes, flat ones in thin walls and gaps. Its size is corrected up to four times
+/// until the number of cells comes near the count. If one such grid has the right topology and a count within
+/// `kLeastShareThroughPlanes` and `kMostShareThroughPlanes`, the result is the best template of these grids, and no
+/// other grids are tried. Else, or if less than 3 % of the area would lie on the grid's planes, the result is as
+/// without the option.
+///
 /// surface  any surface that `solid_boundary` accepts. Handles are counted over all components together.
 /// most     largest number of templates to return, >= 1.
 /// If no grid with the requested count has the right topology, counts 1.3, 1.7, 2.2, 3, ... 20 times as large are
@@ -55,7 +70,7 @@ struct AutoTemplateResult {
 ///
 /// InputError: as `solid_boundary`; options out of range; a solid whose parts are so far apart, or whose walls are so
 /// thin, that every grid would have more than a million plus 64 times the requested number of cells, most of them
-/// empty. (Larger counts that would need such grids are not tried.)
+/// empty. (Larger counts that would need such grids are not tried. A grid through planes has flat cells in thin walls.)
 /// Deterministic and parallel; the result has the same bits for any number of threads. Cost: seconds; it grows with the
 /// numbers of cells and triangles.
 AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplateOptions& options = {},

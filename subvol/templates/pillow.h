@@ -23,8 +23,8 @@ namespace subvol {
 /// new vertices are appended. A new cell gets the reference of its neighbor in the set.
 ///
 /// A new vertex moves inward by 0.15 of the shortest edge that its old vertex has in the set, times the sum of the
-/// distinct unit normals there; less if a cell would be inverted. In a mesh of equal cubes no cell can be inverted if
-/// some direction sees all boundary faces around the vertex from their front (`VertexRule::pillowable`).
+/// distinct unit normals there; less if a cell would be inverted. In a mesh of cubes or boxes from a grid no cell can
+/// be inverted if some direction sees all boundary faces around the vertex from their front (`VertexRule::pillowable`).
 ///
 /// InputError: an invalid mesh; a cell number out of range or given twice; a set whose boundary is not a manifold (it
 /// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid.

@@ -16,7 +16,7 @@ constexpr double kShift = 0.0141421356237;
 
 struct Crossing {
   Index line;
-  double height;
+  double height;  ///< lattice coordinate
   int winding;  ///< +1: the line enters the solid on its way up
 };
 
@@ -29,13 +29,13 @@ double side_of(const Vec3& a, const Vec3& b, double x, double y) {
 class LineCrossings {
  public:
   LineCrossings(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines)
-      : lines_{grid.cells[0] * num_lines, grid.cells[1] * num_lines} {
+      : grid_(grid), axes_{Axis(grid, 0, num_lines), Axis(grid, 1, num_lines)} {
     const Mat3 to_grid = grid.edges.inverse();
     points_.reserve(surface.positions.size());
     for (const Vec3& p : surface.positions) {
       Vec3 q = to_grid * (p - grid.origin);
-      q.x() *= num_lines;
-      q.y() *= num_lines;
+      q.x() *= axes_[0].scale;
+      q.y() *= axes_[1].scale;
       points_.push_back(q);
     }
     for (const auto& t : surface.triangles) add(t);
@@ -50,30 +50,47 @@ class LineCrossings {
   }
 
  private:
-  static double coordinate(int line) { return line + 0.5 + kShift; }
+  /// Places of the lines along one axis.
+  struct Axis {
+    double scale = 1;            ///< factor from positions of the grid to places
+    bool equal = true;           ///< true: line i is at i + 1/2 + kShift
+    std::vector<double> places;  ///< increasing
 
-  /// Range of the lines with low <= coordinate <= high.
-  static std::pair<int, int> range(double low, double high, int count) {
-    const double first = std::ceil(low - 0.5 - kShift), last = std::floor(high - 0.5 - kShift);
-    return {static_cast<int>(std::clamp(first, 0.0, double(count))),
-            static_cast<int>(std::clamp(last, -1.0, count - 1.0))};
-  }
+    Axis(const VoxelGrid& grid, std::size_t axis, int num_lines)
+        : scale(grid.lines[axis].empty() ? num_lines : 1), equal(grid.lines[axis].empty()) {
+      const int count = grid.cells[axis] * num_lines;
+      places.reserve(static_cast<std::size_t>(count));
+      for (int i = 0; i < count; ++i)
+        places.push_back(equal ? i + 0.5 + kShift : grid.position(axis, (i + 0.5 + kShift) / num_lines));
+    }
+
+    /// Range of the lines with low <= place <= high.
+    std::pair<int, int> range(double low, double high) const {
+      if (!equal)
+        return {static_cast<int>(std::lower_bound(places.begin(), places.end(), low) - places.begin()),
+                static_cast<int>(std::upper_bound(places.begin(), places.end(), high) - places.begin()) - 1};
+      const double first = std::ceil(low - 0.5 - kShift), last = std::floor(high - 0.5 - kShift);
+      const auto count = static_cast<double>(places.size());
+      return {static_cast<int>(std::clamp(first, 0.0, count)), static_cast<int>(std::clamp(last, -1.0, count - 1))};
+    }
+  };
 
   void add(const std::array<Index, 3>& t) {
     const Vec3 &a = points_[t[0]], &b = points_[t[1]],
                &c = points_[t[2]];
-    const auto [x0, x1] = range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), lines_[0]);
+    const auto [x0, x1] = axes_[0].range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}));
     if (x0 > x1) return;
-    const auto [y0, y1] = range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), lines_[1]);
+    const auto [y0, y1] = axes_[1].range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}));
     if (y0 > y1) return;
     const Vec3 normal = (b - a).cross(c - a);
+    const auto num_along_x = static_cast<Index>(axes_[0].places.size());
     for (int j = y0; j <= y1; ++j)
       for (int i = x0; i <= x1; ++i) {
-        const double x = coordinate(i), y = coordinate(j);
+        const double x = axes_[0].places[i], y = axes_[1].places[j];
         const int side = common_side(t, x, y);
         if (side == 0 || normal.z() == 0) continue;
         const double height = a.z() - (normal.x() * (x - a.x()) + normal.y() * (y - a.y())) / normal.z();
-        crossings_.push_back({i + lines_[0] * j, height, -side});
+        crossings_.push_back({i + num_along_x * j, grid_.coordinate(2, height), -side});
       }
   }
 
@@ -89,7 +106,8 @@ class LineCrossings {
     return sum == 3 ? 1 : sum == -3 ? -1 : 0;
   }
 
-  std::array<int, 2> lines_;
+  const VoxelGrid& grid_;
+  std::array<Axis, 2> axes_;
   std::vector<Vec3> points_;
   std::vector<Crossing> crossings_;
 };

@@ -14,10 +14,11 @@ namespace subvol {
 ///
 /// w(x) is the number of times the surface winds around x: the signed sum of the crossings along the line up to x. Both
 /// triangles at an edge decide on which side of it a line passes by the same number, so a line near the edge crosses
-/// exactly one of them.
+/// exactly one of them. The lines of a cell are equally spaced between the grid's own.
 ///
 /// surface    closed: every edge occurs as often in one direction as in the other; normals point outward. If the
 ///            surface is not closed, a line may end inside; such lines contribute nothing.
+/// grid       equal cells, or those between given lines (`VoxelGrid::lines`).
 /// num_lines  n >= 1, lines per cell along each of its first two edges.
 /// returns    one number in [0, 1] per cell.
 /// Cost: linear in the numbers of triangles and lines. Serial.

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace subvol {
@@ -20,18 +21,29 @@ void check_box(const Vec3& low, const Vec3& high) {
     throw InputError("grid: the box must be finite, and its high corner above its low one along every axis");
 }
 
+/// Throws if a grid with so many lines has more cells than can be numbered.
+void check_lines(const std::array<double, 3>& num_lines) {
+  // Lattice points are numbered with 32 bits, and a hex mesh has about three times as many faces.
+  if (num_lines[0] * num_lines[1] * num_lines[2] > std::numeric_limits<Index>::max() / 4.0)
+    throw InputError("grid: more cells than can be numbered");
+}
+
 }  // namespace
+
+double VoxelGrid::coordinate(std::size_t axis, double position) const {
+  const std::vector<double>& at = lines[axis];
+  if (at.empty()) return position;
+  const auto above = std::upper_bound(at.begin() + 1, at.end() - 1, position);
+  const double low = above[-1], high = above[0];
+  return static_cast<double>(above - at.begin() - 1) + (position - low) / (high - low);
+}
 
 VoxelGrid box_grid(const Vec3& low, const Vec3& high, const std::array<int, 3>& counts) {
   check_box(low, high);
-  double total = 1;
-  for (int count : counts) {
+  for (int count : counts)
     if (count < 1) throw InputError("grid: each count must be at least 1, got " + std::to_string(count));
-    total *= count + 1.0;
-  }
-  // Lattice points are numbered with 32 bits, and a hex mesh has about three times as many faces.
-  if (total > std::numeric_limits<Index>::max() / 4.0) throw InputError("grid: more cells than can be numbered");
-  VoxelGrid grid{counts, low, Mat3::Zero()};
+  check_lines({counts[0] + 1.0, counts[1] + 1.0, counts[2] + 1.0});
+  VoxelGrid grid{counts, low, Mat3::Zero(), {}};
   for (int a = 0; a < 3; ++a) grid.edges(a, a) = (high[a] - low[a]) / counts[a];
   return grid;
 }
@@ -44,6 +56,32 @@ VoxelGrid box_grid(const Vec3& low, const Vec3& high, double size) {
     counts[a] = static_cast<int>(
         std::clamp(std::round((high[a] - low[a]) / size), 1.0, double(std::numeric_limits<int>::max() - 1)));
   return box_grid(low, high, counts);
+}
+
+VoxelGrid grid_through(const Mat3& frame, std::array<std::vector<double>, 3> lines) {
+  for (const std::vector<double>& at : lines) {
+    if (at.size() < 2) throw InputError("grid: along each axis there must be at least 2 lines");
+    for (std::size_t i = 0; i < at.size(); ++i)
+      if (!std::isfinite(at[i]) || (i > 0 && !(at[i - 1] < at[i])))
+        throw InputError("grid: the positions of lines must be finite and increase, at line " + std::to_string(i));
+  }
+  check_lines({double(lines[0].size()), double(lines[1].size()), double(lines[2].size())});
+  VoxelGrid grid;
+  for (std::size_t a = 0; a < 3; ++a) grid.cells[a] = static_cast<int>(lines[a].size()) - 1;
+  grid.edges = frame;
+  grid.lines = std::move(lines);
+  return grid;
+}
+
+std::vector<double> cell_volumes(const VoxelGrid& grid) {
+  if (std::all_of(grid.lines.begin(), grid.lines.end(), [](const auto& at) { return at.empty(); })) return {};
+  std::vector<double> volumes;
+  volumes.reserve(grid.num_cells());
+  const auto width = [&](std::size_t axis, int i) { return grid.position(axis, i + 1) - grid.position(axis, i); };
+  for (int k = 0; k < grid.cells[2]; ++k)
+    for (int j = 0; j < grid.cells[1]; ++j)
+      for (int i = 0; i < grid.cells[0]; ++i) volumes.push_back(width(0, i) * width(1, j) * width(2, k));
+  return volumes;
 }
 
 std::array<Vec3, 2> box_around(const TriangleMesh& surface, double margin_percent) {

@@ -16,7 +16,7 @@ constexpr double kExtremeWeight = 0.15;
 
 }  // namespace
 
-double voxel_score(const VoxelSolid& solid, std::span<const double> fractions) {
+double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, std::span<const double> volumes) {
   const auto anywhere = [](Index) { return true; };
   const std::vector<int> cover = voxel_steps(solid, [&](Index c) { return solid.filled(c); }, anywhere);
   const std::vector<int> stray = voxel_steps(solid, [&](Index c) { return fractions[c] > kMostlyInShape; }, anywhere);
@@ -24,9 +24,10 @@ double voxel_score(const VoxelSolid& solid, std::span<const double> fractions) {
   int max_cover = 0, max_stray = 0;
   for (std::size_t c = 0; c < fractions.size(); ++c) {
     const bool filled = solid.filled(static_cast<Index>(c));
-    volume += fractions[c];
-    wrong += std::abs(fractions[c] - (filled ? 1 : 0));
-    mean_cover += fractions[c] * cover[c];
+    const double weight = volumes.empty() ? 1 : volumes[c];
+    volume += weight * fractions[c];
+    wrong += weight * std::abs(fractions[c] - (filled ? 1 : 0));
+    mean_cover += weight * (fractions[c] * cover[c]);
     if (fractions[c] > kInShape) max_cover = std::max(max_cover, cover[c]);
     if (filled) max_stray = std::max(max_stray, stray[c]);
   }
