@@ -413,8 +413,7 @@ bool MeshOptimizer::raise_quality() {
     mesh_.positions = std::move(free.fixed);
     const std::vector<Vec3> moved = free.map.apply(x);
     for (std::size_t v = 0; v < moved.size(); ++v) mesh_.positions[v] += moved[v];
-    const Measured now_ = measure(); if (getenv("DBG")) fprintf(stderr,"quality: %g %g %g %g %zu %zu -> %g %g %g %g %zu %zu\n",before.least_jacobian,before.mean_jacobian,before.mean_percent,before.max_percent,before.uncertified,before.intersections,now_.least_jacobian,now_.mean_jacobian,now_.mean_percent,now_.max_percent,now_.uncertified,now_.intersections);
-    if (is_better(now_, before)) return going;
+    if (is_better(measure(), before)) return going;
     mesh_.positions = start;
     report_.undo_stages(stages_before, report_.stages.size());
     if (!going) return false;

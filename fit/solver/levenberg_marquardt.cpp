@@ -15,7 +15,7 @@ namespace subvol {
 
 namespace {
 
-constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-6, kMostDamping = 1e4;
+constexpr double kLeastDamping = 1e-6, kMostDamping = 1e4;
 constexpr double kLess = 0.3, kMore = 6;  // factors on mu after a step that was taken at once, and one that was not
 constexpr int kMostTrials = 8;
 
@@ -26,8 +26,6 @@ class LevenbergMarquardtRun {
   MinimizerResult run();
 
  private:
-  /// Returns mu after the steps that are recorded: it depends on their numbers of trials alone.
-  double damping_after(std::span<const IterationRecord> steps) const;
   void damp(ReducedHessian& hessian, std::span<const Mat3> diagonal);
   /// Finds a step d_ that decreases E. Returns false if there is none, or if the caller wants to stop.
   bool find_step(IterationRecord& record);
@@ -41,7 +39,7 @@ class LevenbergMarquardtRun {
   std::vector<Vec3>& x_;
   const MinimizerOptions& options_;
   MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
-  double damping_ = kFirstDamping;
+  double damping_ = 0;
   std::vector<Vec3> y_, z_, d_, dy_, dz_, y_trial_, z_trial_;
   std::vector<Mat3> inverse_diagonal_;
   Linearization linearized_;
@@ -53,21 +51,12 @@ LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Ve
     : problem_(problem), x_(x), options_(options) {
   if (options.begun) result_ = *options.begun;
   result_.stop = MinimizerStop::iteration_limit;
-  damping_ = damping_after(result_.iterations);
+  damping_ = damping_after(options.first_damping, result_.iterations);
   for (auto* nodes : {&y_, &dy_, &y_trial_}) nodes->resize(problem.nodes.num_rows());
   for (auto* samples : {&z_, &dz_, &z_trial_}) samples->resize(problem.samples.num_rows());
   problem.apply_nodes(x, y_);
   problem.apply_samples(x, z_);
   uncertified_ = problem.volume->uncertified(y_);
-}
-
-double LevenbergMarquardtRun::damping_after(std::span<const IterationRecord> steps) const {
-  double damping = kFirstDamping;
-  for (const IterationRecord& step : steps) {
-    for (int trial = 1; trial < step.evaluations; ++trial) damping = std::min(kMostDamping, kMore * damping);
-    if (step.evaluations == 1) damping = std::max(kLeastDamping, kLess * damping);
-  }
-  return damping;
 }
 
 void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> diagonal) {
@@ -192,6 +181,15 @@ MinimizerResult LevenbergMarquardtRun::run() {
 MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Vec3>& x,
                                              const MinimizerOptions& options) {
   return LevenbergMarquardtRun(problem, x, options).run();
+}
+
+double damping_after(double first, std::span<const IterationRecord> steps) {
+  double damping = first;
+  for (const IterationRecord& step : steps) {
+    for (int trial = 1; trial < step.evaluations; ++trial) damping = std::min(kMostDamping, kMore * damping);
+    if (step.evaluations == 1) damping = std::max(kLeastDamping, kLess * damping);
+  }
+  return damping;
 }
 
 }  // namespace subvol

@@ -4,6 +4,7 @@
 #include "fit/solver/fit_problem.h"
 #include "fit/solver/minimizer.h"
 
+#include <span>
 #include <vector>
 
 namespace subvol {
@@ -13,7 +14,7 @@ namespace subvol {
 ///
 ///   (H + mu D) d = -g,   D_j = (mean of all t + t_j) / 2,  t_j: mean diagonal entry of block j of H
 ///
-/// A step that decreases E is taken, and mu falls to 0.3 mu; otherwise mu rises to 6 mu, and the step is found again.
+/// mu begins as the options say. A step that decreases E is taken, and mu falls to 0.3 mu; otherwise mu rises to 6 mu, and the step is found again.
 /// Before E is looked at, the step is shortened only where it does harm: at the vertices of cells that it ruins
 /// (`VolumeTerm::ruined`) it is halved, up to ten times, then set to 0; at those of cells that would lose their
 /// certificate it is set to 0. So one cell does not stop all others.
@@ -22,5 +23,8 @@ namespace subvol {
 /// Converged if two steps in a row decrease E by less than `relative_decrease`; no_step: none of eight values of mu gives
 /// a step that decreases E. Same bits for any number of threads.
 MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
+
+/// Returns mu after these steps of a minimization that began with mu = `first`.
+double damping_after(double first, std::span<const IterationRecord> steps);
 
 }  // namespace subvol

@@ -36,6 +36,9 @@ struct MinimizerResult {
 /// InputError: `densified` and `densified_at` do not fit the problem.
 void densify_again(FitProblem& problem, const MinimizerResult& result);
 
+/// Damping with which the Levenberg-Marquardt method usually begins.
+inline constexpr double kFirstDamping = 1e-3;
+
 struct MinimizerOptions {
   int max_iterations = 20;
   double relative_decrease = 1e-3;  ///< converged if two steps in a row decrease E by less than this share of E
@@ -43,6 +46,7 @@ struct MinimizerOptions {
   int cg_max_iterations = 200;
   /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
   double longest_move = 0;
+  double first_damping = kFirstDamping;  ///< the same: mu of the first step, > 0
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
   /// Asked many times within a step, which may take long. If it returns true, the step is abandoned, and the

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/stages/quality_stages.h"
 
+#include "fit/solver/levenberg_marquardt.h"
 #include "subvol/base/format.h"
 #include "subvol/mesh/mesh_topology.h"
 
@@ -90,13 +91,15 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   problem_->lambda = lambda;
   StageRecord record = record_;
   record.name = name;
-  const Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_};
-  return runner_->run(*problem_, settings, std::move(record), fraction_, x, *report_);
+  const Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_, damping_};
+  const bool going = runner_->run(*problem_, settings, std::move(record), fraction_, x, *report_);
+  damping_ = damping_after(damping_, report_->stages.back().iterations);
+  return going;
 }
 
 /// Raises the emphasis of sample triangles that are too far from the target. Returns the largest distance.
 double QualityStages::emphasize_far(double most_distance, std::span<const Vec3> x) {
-  constexpr double kMargin = 0.8, kRaise = 2, kFallBack = 0.97, kMost = 1000;
+  constexpr double kMargin = 0.5, kRaise = 3, kFallBack = 0.97, kMost = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
   surface_->forget();
@@ -124,7 +127,7 @@ QualityStages::State QualityStages::inspect(const QualitySchedule& schedule, std
   const bool minds_distance = surface_ && schedule.most_distance > 0;
   if (minds_distance) state.distance = emphasize_far(schedule.most_distance, x);
   const double excess = minds_distance ? std::max(0.0, state.distance / schedule.most_distance - 1) : 0;
-  state.merit = state.cells.least_share - excess;
+  state.merit = excess > 0 ? -excess : state.cells.least_share;
   return state;
 }
 
@@ -162,6 +165,7 @@ bool QualityStages::run(const QualitySchedule& schedule, const StageRunner& runn
   record_ = record;
   fraction_ = fraction;
   report_ = &report;
+  damping_ = kFirstDamping;
   energy_->reset_emphasis();
   for (const QualityStage& stage : schedule.stages)
     if (!run_stage(stage, formatted("%s, surface %g, threshold %.2f", record.name.c_str(), stage.surface,

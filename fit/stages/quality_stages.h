@@ -74,7 +74,8 @@ class QualityStages {
   struct State {
     QualityEnergy::State cells;
     double distance = 0;   ///< largest distance at the samples, as a share of the diagonal; 0 if none is aimed at
-    double merit = -2;     ///< least share of the goal less the share by which the distance exceeds the largest; <= 1
+    /// Least share of the goal, at most 1; if the distance is too large, minus the share by which it is.
+    double merit = -1e300;
   };
 
   /// Runs all stages, then the lift. name  of the level, for reports.  record  level and number of cells are set.
@@ -92,6 +93,7 @@ class QualityStages {
   State inspect(const QualitySchedule& schedule, std::span<const Vec3> x);
   double emphasize_far(double most_distance, std::span<const Vec3> x);
 
+  double damping_ = kFirstDamping;  ///< for the next stage
   double mean_length_ = 0;  ///< wanted, of the cells at the boundary
   double lambda_one_ = 1;   ///< lambda for w_s = 1
   std::unique_ptr<FitProblem> problem_;

@@ -11,6 +11,7 @@ struct Stage {
   /// Longest move of a node in one step, as a share of the target's diagonal, if the energy of the cells is a sum of
   /// squares, which the Levenberg-Marquardt method minimizes. 0: the fit's own solver does.
   double longest_move = 0;
+  double first_damping = 1e-3;  ///< of that method
 };
 
 /// Number of L-BFGS steps that replace one Newton step of a stage.

@@ -35,6 +35,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
     minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
   minimizer.longest_move = stage.longest_move;
+  minimizer.first_damping = stage.first_damping;
   if (stage.longest_move > 0) minimizer.cg_tolerance = kLeastSquaresTolerance;
   int iteration = 0;
   minimizer.ended = [this] { return is_to_end(); };
