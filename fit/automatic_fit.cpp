@@ -152,7 +152,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
     return creases_.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
   };
   QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {},
-                       {std::move(samples.positions), samples.triangles, samples.triangle_faces}, target_.surface,
+                       {std::move(samples.positions), {}, samples.triangles, samples.triangle_faces}, target_.surface,
                        mesh_.tags.creases.empty() ? std::function<CreaseEnergy(double)>{} : creases);
   set_caps(stages.energy(), level);
   StageRecord record;

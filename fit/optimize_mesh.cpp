@@ -404,10 +404,11 @@ bool MeshOptimizer::raise_quality() {
       return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
     };
     const bool has_creases = slides && !creases_.curves().empty();
-    QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed,
-                         slides ? QualityBoundary{samples_.positions, samples_.triangles, samples_.triangle_faces}
-                                : QualityBoundary{},
-                         target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+    QualityBoundary boundary;
+    if (slides)
+      boundary = {compose(samples_.positions, free.map), samples_.positions.apply(free.fixed), samples_.triangles,
+                  samples_.triangle_faces};
+    QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed, boundary, target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
     const std::size_t stages_before = report_.stages.size();
     const bool going = stages.run(schedule, runner_, record("quality"), kFraction, x, report_);
     mesh_.positions = std::move(free.fixed);

@@ -11,6 +11,7 @@
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/quality/quality.h"
 #include "fit/stages/memory_budget.h"
+#include "fit/stages/quality_stages.h"
 #include "fit/stages/stage_runner.h"
 #include "fit/stages/staged_fit.h"
 #include "fit/target/fit_target.h"
@@ -24,6 +25,7 @@
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -43,6 +45,7 @@ void check_options(const FitOptions& options) {
   in_range("levels", options.levels, 1, 6);
   in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
   in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
+  in_range("quality", options.quality, 0, 0.8);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
@@ -76,6 +79,10 @@ class SubdivisionFit : StagedFit {
   bool run_final_stage(double lambda) override { return run_stage(schedule_.final_stage(lambda)); }
   bool run_stages();
   bool lower_lambda(std::size_t pairs);
+  struct Measured;
+  std::optional<Measured> measure();
+  bool raise_quality();
+  bool run_quality_stages(const QualitySchedule& schedule);
   TriangleMesh limit_triangles();
   double measured_mean();
   VolumeMesh current_mesh() const;
@@ -306,6 +313,73 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
   return true;
 }
 
+/// Properties of a state that the quality stages must not spoil.
+struct SubdivisionFit::Measured {
+  double least_jacobian, mean_percent, max_percent;
+  std::size_t uncertified, pairs;
+
+  bool gains_on(const Measured& before) const {
+    constexpr double kFarther = 1.05;  // distances may rise by 5 %
+    return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs &&
+           mean_percent <= kFarther * before.mean_percent && max_percent <= kFarther * before.max_percent;
+  }
+};
+
+/// Returns nothing if the fit must end.
+std::optional<SubdivisionFit::Measured> SubdivisionFit::measure() {
+  const VolumeMesh mesh = current_mesh();
+  const QualityReport quality = measure_quality(mesh);
+  const TriangleMesh surface = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
+  const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, result_.report);
+  if (!pairs) return std::nullopt;
+  double max = target_.distance(surface).max();
+  if (options_.surface == FittedSurface::limit) max = std::max(max, target_.distance(limit_triangles()).max());
+  return Measured{quality.min_scaled_jacobian, measured_mean(), 100 * max, quality.certificate.not_certified.size(),
+                  *pairs};
+}
+
+bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
+  const auto creases = [&](double width) {
+    return creases_.energy(level_.crease_edges, level_.samples.num_rows(), width, kQualityTangentialWeight);
+  };
+  const bool has_creases = !creases_.curves().empty();
+  QualityStages stages(level_.mesh, ideal_boxes_, level_.nodes, {},
+                       {level_.samples, {}, level_.sample_triangles, level_.sample_faces}, target_.surface,
+                       has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+  StageRecord record;
+  record.name = formatted("level %d, quality", number_);
+  record.level = number_;
+  record.cells = level_.mesh.num_cells();
+  const bool going = stages.run(schedule, runner_, record, schedule_.fraction(number_), unknowns_, result_.report);
+  mean_.reset();
+  return going;
+}
+
+/// Raises the lowest scaled Jacobians of the finest mesh; if the distances suffer, the surface counts more in another
+/// attempt. Rolls back if they suffer still. Returns false if the fit must end.
+bool SubdivisionFit::raise_quality() {
+  // A cage has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free.
+  constexpr std::array<double, 2> kMoreSurface{100, 1000};
+  constexpr double kMaxMargin = 0.8;  // samples miss the farthest places
+  if (options_.quality == 0) return true;
+  const std::optional<Measured> before = measure();
+  if (!before) return false;
+  if (before->least_jacobian >= options_.quality) return true;
+  for (const double more : kMoreSurface) {
+    QualitySchedule schedule = fine_quality_schedule(options_.quality);
+    schedule.most_distance = kMaxMargin * before->max_percent / 100;
+    for (QualityStage& stage : schedule.stages) stage.surface *= more;
+    schedule.lift.surface *= more;
+    FitSnapshot start = snapshot();
+    const bool going = or_back(start, [&] { return run_quality_stages(schedule); });
+    const std::optional<Measured> now = going ? measure() : std::nullopt;
+    if (now && now->gains_on(*before)) return true;
+    go_back(std::move(start));
+    if (!now) return false;
+  }
+  return true;
+}
+
 bool SubdivisionFit::run_stages() {
   const FitSnapshot start = snapshot();
   for (const Stage& stage : schedule_.stages(number_)) {
@@ -314,7 +388,7 @@ bool SubdivisionFit::run_stages() {
   }
   if (!finest()) return true;
   std::optional<std::size_t> pairs = intersecting_pairs();
-  return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs);
+  return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs) && raise_quality();
 }
 
 /// Stores the whole state or nothing, since memory may run out here.

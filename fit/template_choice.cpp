@@ -94,6 +94,7 @@ Chooser::ShortFit Chooser::fit_subdivided(const VolumeMesh& mesh) {
   constexpr int kMostSteps = 10;  // enough to distinguish templates; the fit itself starts afresh
   int steps = 0;
   FitOptions options{.levels = 1, .crease_angle_degrees = options_.crease_angle_degrees};
+  options.quality = 0;  // it would cost more than the trial and tells little about the template
   options.time_limit_seconds = time_left();
   options.progress = trial_progress([&] { return ++steps <= kMostSteps; });
   options.cancelled = options_.cancelled;

@@ -36,6 +36,7 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
     }
     level.sample_triangles.push_back({quad[0], quad[1], quad[2]});
     level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
+    level.sample_faces.insert(level.sample_faces.end(), 2, f);
   }
   level.samples = select_rows(nodes, rows);
   for (const CreaseEdge& crease : mesh.tags.creases)
@@ -88,7 +89,8 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   }
   const SparseMap limit = limit_map(level.mesh);
   level.nodes = compose(limit, fine_from_unknowns);
-  std::size_t boundary_faces = MeshTopology(level.mesh).boundary_faces().size();
+  const MeshTopology topology(level.mesh);
+  std::size_t boundary_faces = topology.boundary_faces().size();
   int refinements = 0;
   while (boundary_faces < min_samples && refinements < kMaxSampleRefinements) {
     boundary_faces *= 4;
@@ -111,9 +113,11 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   level.samples = compose(boundary.positions, fine_from_unknowns);
   if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, kMeshShare);
   level.crease_edges = std::move(boundary.crease_edges);
-  for (const auto& q : boundary.quads) {
+  for (std::size_t k = 0; k < boundary.quads.size(); ++k) {
+    const auto& q = boundary.quads[k];
     level.sample_triangles.push_back({q[0], q[1], q[2]});
     level.sample_triangles.push_back({q[0], q[2], q[3]});
+    level.sample_faces.insert(level.sample_faces.end(), 2, topology.boundary_faces()[boundary.face_of_quad[k]]);
   }
   return level;
 }

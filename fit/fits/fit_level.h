@@ -28,6 +28,7 @@ struct FitLevel {
   SparseMap safe_nodes;          ///< linear split of the previous level's nodes: valid if that mesh is certified
   SparseMap samples;             ///< N
   std::vector<std::array<Index, 3>> sample_triangles;
+  std::vector<Index> sample_faces;  ///< face of the mesh of each of these triangles, as MeshTopology numbers it
   /// Edges between samples along the creases of the mesh, in the order of its tags, with the same number for each
   /// crease.
   std::vector<std::array<Index, 2>> crease_edges;

@@ -14,6 +14,9 @@ namespace subvol {
 
 class StageLog;
 
+/// Least scaled Jacobian that fits aim at.
+inline constexpr double kUsualQuality = 0.65;
+
 /// The surface that is compared with the target.
 enum class FittedSurface {
   limit,  ///< the Catmull-Clark limit surface of the cage, as modeling tools show it at any level (default)
@@ -41,6 +44,8 @@ struct FitOptions {
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< weights of a point cloud's points
   Distortion distortion = Distortion::hencky;    ///< the distortion e in E_W
+  /// Least scaled Jacobian to aim at on the finest level, in [0, 0.8], as far as the distances allow; 0: none.
+  double quality = kUsualQuality;
   int max_iterations = 0;                        ///< per stage; 0: as the schedule says
   double time_limit_seconds = 0;                 ///< 0: no limit
   double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit

@@ -77,10 +77,9 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
       surface->add_creases(creases(kCreaseEdges * mean_length_));
     }
   }
-  SparseMap samples = surface ? compose(boundary.samples, nodes) : SparseMap{nodes.num_cols, {0}, {}, {}};
+  SparseMap samples = surface ? boundary.samples : SparseMap{nodes.num_cols, {0}, {}, {}};
   problem_ = std::make_unique<FitProblem>(nodes, std::move(samples), std::move(volume), std::move(surface), 1.0);
-  if (fixed.empty()) return;
-  if (problem_->surface) problem_->fixed_samples = boundary.samples.apply(fixed);
+  problem_->fixed_samples = boundary.fixed;
   problem_->fixed_nodes = std::move(fixed);
 }
 

@@ -47,12 +47,10 @@ QualitySchedule fine_quality_schedule(double goal);
 /// Share of the pull along the target's tangents and creases.
 inline constexpr double kQualityTangentialWeight = 0.02;
 
-/// Least scaled Jacobian that fits aim at.
-inline constexpr double kUsualQuality = 0.65;
-
 /// The boundary of a mesh as it is compared with the target: sample triangles on its faces.
 struct QualityBoundary {
-  SparseMap samples;                              ///< vertices of the mesh -> samples; no rows: the surface does not matter
+  SparseMap samples;                              ///< degrees of freedom -> samples; no rows: the surface does not matter
+  std::vector<Vec3> fixed;                        ///< what is added to the samples if vertices are fixed; else empty
   std::vector<std::array<Index, 3>> triangles;    ///< of samples
   std::vector<Index> triangle_faces;              ///< face of the mesh of each triangle, by `MeshTopology`
 };
