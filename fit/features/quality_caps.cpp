@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/quality_caps.h"
+
+#include "subvol/base/error.h"
+#include "subvol/mesh/mesh_topology.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+/// Share of the best possible scaled Jacobian that is asked for.
+constexpr double kReachable = 0.93;
+/// Bound at corners of several cells; with 0.55 a pyramid got 0.53, with this 0.66.
+constexpr double kCornerCap = 0.8;
+/// Distance, as a share of a curve's length, at which its direction at a corner is measured.
+constexpr double kDirectionShare = 0.05;
+
+void require_curves(const PatchedMesh& patched, const SignedFeatures& features) {
+  for (const CreasePath& path : patched.paths)
+    if (path.curve < 0 || static_cast<std::size_t>(path.curve) >= features.segment_angles.size())
+      throw InputError("quality_caps: there is no curve " + std::to_string(path.curve));
+}
+
+/// Mean angle of the target along an edge of a path, by the closest points of its curve.
+double angle_along(std::span<const double> segment_angles, const ClosestPoint& tree, const Vec3& a, const Vec3& b) {
+  constexpr int kPoints = 5;
+  double sum = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    const ClosestPoint::Hit hit = tree.closest(a + (b - a) * ((i + 0.5) / kPoints));
+    sum += hit.triangle == kNoIndex ? 180 : segment_angles[hit.triangle];
+  }
+  return sum / kPoints;
+}
+
+double edge_cap(double angle, int cells) {
+  const double part = std::min(180.0, angle / cells);
+  return kReachable * std::max(0.0, std::sin(part * std::numbers::pi / 180));
+}
+
+std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features,
+                               const MeshTopology& topology) {
+  std::vector<EdgeCap> caps;
+  for (const CreasePath& path : patched.paths) {
+    const ClosestPoint tree = polyline_tree(features.curves.curves[path.curve].points);
+    for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i) {
+      const auto [v, w] = std::minmax(path.vertices[i], path.vertices[i + 1]);
+      const bool exist = v >= 0 && static_cast<std::size_t>(w) < topology.num_vertices();
+      const Index edge = exist ? topology.find_edge(v, w) : kNoIndex;
+      if (edge == kNoIndex)
+        throw InputError("quality_caps: there is no edge between vertices " + std::to_string(v) + " and " +
+                         std::to_string(w));
+      const double angle =
+          angle_along(features.segment_angles[path.curve], tree, patched.fitted[v], patched.fitted[w]);
+      caps.push_back({{v, w}, edge_cap(angle, topology.num_edge_cells(edge))});
+    }
+  }
+  std::ranges::sort(caps, {}, &EdgeCap::ends);
+  return caps;
+}
+
+/// Directions of the curves whose paths end at each vertex.
+std::map<Index, std::vector<Vec3>> directions_at_ends(const PatchedMesh& patched, const SignedFeatures& features) {
+  std::map<Index, std::vector<Vec3>> directions;
+  for (const CreasePath& path : patched.paths) {
+    const FeatureCurve& curve = features.curves.curves[path.curve];
+    const double reach = kDirectionShare * curve.length();
+    directions[path.vertices.front()].push_back(direction_at_end(curve, true, reach));
+    directions[path.vertices.back()].push_back(direction_at_end(curve, false, reach));
+  }
+  return directions;
+}
+
+std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+  std::vector<int> cells(patched.mesh.num_vertices(), 0);
+  for (Index v : patched.mesh.cell_vertices) ++cells[v];
+  const auto directions = directions_at_ends(patched, features);
+  std::vector<VertexCap> caps;
+  for (const PlacedCorner& corner : patched.corners) {
+    const auto at = directions.find(corner.vertex);
+    if (at == directions.end() || at->second.size() < 3) continue;
+    const auto& t = at->second;
+    const double best = std::abs(t[0].dot(t[1].cross(t[2])));
+    caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? kReachable * best : kCornerCap});
+  }
+  return caps;
+}
+
+}  // namespace
+
+QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+  require_curves(patched, features);
+  const MeshTopology topology(patched.mesh);
+  return {edge_caps(patched, features, topology), corner_caps(patched, features)};
+}
+
+}  // namespace subvol
