@@ -60,13 +60,7 @@ std::vector<Index> one_each(std::size_t n) {
 std::vector<std::uint8_t> path_edges(const MeshTopology& topology, std::span<const CreasePath> paths) {
   std::vector<std::uint8_t> on_path(topology.num_edges(), 0);
   for (const CreasePath& path : paths)
-    for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i) {
-      const Index edge = topology.find_edge(path.vertices[i], path.vertices[i + 1]);
-      if (edge == kNoIndex || !topology.is_boundary_edge(edge))
-        throw InputError("a path runs along vertices " + std::to_string(path.vertices[i]) + " and " +
-                         std::to_string(path.vertices[i + 1]) + ", which is no boundary edge of the mesh");
-      on_path[edge] = 1;
-    }
+    for (Index edge : edges_of_path(topology, path.vertices)) on_path[edge] = 1;
   return on_path;
 }
 
@@ -79,8 +73,10 @@ std::vector<std::array<Index, 2>> faces_at_edges(const MeshTopology& topology) {
     const auto face = topology.face(boundary[i]);
     for (std::size_t j = 0; j < face.size(); ++j) {
       auto& pair = faces[topology.find_edge(face[j], face[(j + 1) % face.size()])];
-      if (pair[0] == kNoIndex) pair[0] = static_cast<Index>(i);
-      else if (pair[1] == kNoIndex) pair[1] = static_cast<Index>(i);
+      if (pair[0] == kNoIndex)
+        pair[0] = static_cast<Index>(i);
+      else if (pair[1] == kNoIndex)
+        pair[1] = static_cast<Index>(i);
     }
   }
   return faces;
@@ -207,6 +203,20 @@ Vec3 unit_normal(const TriangleMesh& mesh, Index triangle) {
 
 }  // namespace
 
+std::vector<Index> edges_of_path(const MeshTopology& topology, std::span<const Index> path) {
+  const auto exists = [&](Index v) { return v >= 0 && static_cast<std::size_t>(v) < topology.num_vertices(); };
+  std::vector<Index> edges;
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    const Index v = path[i], w = path[i + 1];
+    const Index edge = exists(v) && exists(w) ? topology.find_edge(v, w) : kNoIndex;
+    if (edge == kNoIndex || !topology.is_boundary_edge(edge))
+      throw InputError("a path runs along vertices " + std::to_string(v) + " and " + std::to_string(w) +
+                       ", which have no boundary edge of the mesh in common");
+    edges.push_back(edge);
+  }
+  return edges;
+}
+
 BoundaryPatches boundary_patches(const MeshTopology& topology, std::span<const CreasePath> paths) {
   const std::vector<std::uint8_t> on_path = path_edges(topology, paths);
   const auto pairs = faces_at_edges(topology);
@@ -257,8 +267,8 @@ std::vector<EdgeAngle> smooth_edge_angles(const MeshTopology& topology, std::spa
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const auto &a = hits[2 * i], &b = hits[2 * i + 1];
     if (a.triangle == kNoIndex || b.triangle == kNoIndex) continue;
-    angles[i].angle = angle_between_planes(unit_normal(target, a.triangle), unit_normal(target, b.triangle),
-                                           b.point - a.point);
+    angles[i].angle =
+        angle_between_planes(unit_normal(target, a.triangle), unit_normal(target, b.triangle), b.point - a.point);
   }
   std::ranges::sort(angles, {}, &EdgeAngle::ends);
   return angles;

@@ -21,10 +21,14 @@ struct BoundaryPatches {
   std::size_t count = 0;
 };
 
-/// Finds the patches: boundary faces connected across edges that belong to no path. A path that ends inside a patch does
-/// not divide it. Patches are numbered by their first faces. InputError: a path along something that is not a boundary
-/// edge. Cost: linear but for a sort of the paths' edges.
+/// Finds the patches: boundary faces connected across edges that belong to no path. A path that ends inside a patch
+/// does not divide it. Patches are numbered by their first faces. InputError: a path along something that is not a
+/// boundary edge. Cost: linear but for a sort of the paths' edges.
 BoundaryPatches boundary_patches(const MeshTopology& topology, std::span<const CreasePath> paths);
+
+/// Returns the edges of a path, as the topology numbers them. InputError: a vertex out of range, or two in a row that
+/// have no boundary edge in common.
+std::vector<Index> edges_of_path(const MeshTopology& topology, std::span<const Index> path);
 
 /// Patches of a mesh and regions of the target that belong to each other.
 struct PatchGroups {
@@ -35,7 +39,8 @@ struct PatchGroups {
 /// Matches patches with regions by votes: four points of each boundary face vote for the region of the closest triangle
 /// of the target. A patch and a region belong to one group if the region gets at least 20 % of the patch's votes, or
 /// the patch gives more than half of the region's votes. Every group has a patch and a region: a patch without a match
-/// goes with the region of most of its votes, and a region without one with the patch of the face nearest to its center.
+/// goes with the region of most of its votes, and a region without one with the patch of the face nearest to its
+/// center.
 ///
 /// positions        of the mesh's vertices, near the target and in its coordinates; one per vertex.
 /// target, regions  as in `SignedFeatures::regions`.
@@ -55,7 +60,8 @@ struct EdgeAngle {
 /// It finds roundings about as narrow as a face, whatever their number of triangles.
 ///
 /// positions  of the mesh's vertices, near the target and in its coordinates; one per vertex.
-/// returns    one angle in [0, 360] per edge, ascending by their ends. InputError: as `patch_groups`, `boundary_patches`.
+/// returns    one angle in [0, 360] per edge, ascending by their ends. InputError: as `patch_groups`,
+/// `boundary_patches`.
 std::vector<EdgeAngle> smooth_edge_angles(const MeshTopology& topology, std::span<const CreasePath> paths,
                                           std::span<const Vec3> positions, const TriangleMesh& target);
 

@@ -33,12 +33,15 @@ constexpr double kFollowDistance = 1.1, kJoinDistance = 2.2;
 constexpr double kMostStretch = 1.8;
 /// Distance that one end which joins another path counts as, in the choice among joins.
 constexpr double kJoinPenalty = 0.3;
-/// Number of edges along another path within which a path may join it.
+/// Number of edges along another path, from their corner, within which a path may join it; no farther than its middle.
 constexpr std::size_t kJoinEdges = 3;
 constexpr int kRounds = 8;
 /// Curves at which the solid is thinner than this angle, in degrees, are left alone: 0.93 sin(19) = 0.3 is the scaled
 /// Jacobian at which cells are given up.
 constexpr double kLeastAngle = 19;
+/// Shorter curves are left alone, in units of h: no path is as short, and their corners would take vertices that other
+/// curves need.
+constexpr double kLeastLength = 0.5;
 /// Convex edges below this angle, in degrees, want one cell; up to 180, one or two do equally well.
 constexpr double kSharpAngle = 125;
 
@@ -168,8 +171,12 @@ class Router {
         throw InputError("route_features: options need one entry for each of the " + std::to_string(curves_.size()) +
                          " curves");
     for (std::size_t c = 0; c < curves_.size(); ++c) {
-      if (!options.excluded.empty() && options.excluded[c]) reasons_[c] = NotFollowed::excluded;
-      else if (features_.angles[c] < kLeastAngle) reasons_[c] = NotFollowed::too_acute;
+      if (!options.excluded.empty() && options.excluded[c])
+        reasons_[c] = NotFollowed::excluded;
+      else if (features_.angles[c] < kLeastAngle)
+        reasons_[c] = NotFollowed::too_acute;
+      else if (curves_[c].length() < kLeastLength * h_)
+        reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }
   }
@@ -240,7 +247,8 @@ class Router {
     if (polyline_length(points) > kMostStretch * curves_[c].length()) return std::nullopt;
     const double spacing = h_ / 4;
     const double gap = std::max(farthest(sampled(points, spacing), trees_[c]),
-                                farthest(sampled(curves_[c].points, spacing), polyline_tree(points))) / h_;
+                                farthest(sampled(curves_[c].points, spacing), polyline_tree(points))) /
+                       h_;
     if (!(gap <= most)) return std::nullopt;
     return Found{std::move(path), gap};
   }
@@ -438,7 +446,7 @@ class Router {
     std::vector<End> ends = {{vertex, false}};
     for (const auto& path : best_) {
       if (path.empty() || path.front() == path.back()) continue;
-      for (std::size_t i = 1; i <= kJoinEdges && i + 1 < path.size(); ++i) {
+      for (std::size_t i = 1; i <= kJoinEdges && 2 * i < path.size(); ++i) {
         if (path.front() == vertex) ends.push_back({path[i], true});
         if (path.back() == vertex) ends.push_back({path[path.size() - 1 - i], true});
       }
@@ -526,13 +534,13 @@ class Router {
   double h_;
   std::vector<std::optional<NotFollowed>> reasons_;  ///< why a curve is not even tried
   std::vector<std::uint8_t> joinable_;
-  std::vector<std::vector<Course>> courses_;         ///< by curve, made when first needed
-  Occupied base_;                                    ///< the vertices of corners
+  std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed
+  Occupied base_;                             ///< the vertices of corners
   Paths best_;
   double best_length_ = 0;
-  std::vector<ClosestPoint> trees_;                  ///< of the curves
+  std::vector<ClosestPoint> trees_;  ///< of the curves
   std::map<Index, Index> vertex_of_corner_;
-  std::vector<Index> alone_;                         ///< curves that have a path if no other one has
+  std::vector<Index> alone_;  ///< curves that have a path if no other one has
 };
 
 /// A path that another one joins, and how far from the corner, as a share of its length.

@@ -14,13 +14,13 @@ namespace subvol {
 
 /// Reasons why no path of a mesh follows a curve.
 enum class NotFollowed {
-  excluded,                 ///< the caller excluded it
-  too_acute,                ///< the solid is so thin along it that no cell there has a good scaled Jacobian
-  shorter_than_cell,        ///< it is shorter than an edge of the mesh
-  no_vertex_at_corner,      ///< one of its corners has no vertex nearby, or another corner took it
-  too_many_edges_at_corner, ///< the vertex at one of its corners has fewer edges than curves that end there
-  no_path_nearby,           ///< no path of edges stays close to it
-  lost_to_neighbor          ///< paths of other curves are in its way
+  excluded,                  ///< the caller excluded it
+  too_acute,                 ///< the solid is so thin along it that no cell there has a good scaled Jacobian
+  shorter_than_cell,         ///< it is shorter than an edge of the mesh
+  no_vertex_at_corner,       ///< one of its corners has no vertex nearby, or another corner took it
+  too_many_edges_at_corner,  ///< the vertex at one of its corners has fewer edges than curves that end there
+  no_path_nearby,            ///< no path of edges stays close to it
+  lost_to_neighbor           ///< paths of other curves are in its way
 };
 
 /// Returns text for people, such as "shorter than a cell".
@@ -67,10 +67,10 @@ struct FeatureRouting {
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;
 ///       1.5, and 1 at edges of 3 cells, in between
 ///
-/// Closed curves pass through the vertices nearest to three of their points. A path is accepted if it and the curve stay
-/// within 1.1 h of one another. No two paths share an edge, or a vertex but corners and joins. Up to eight rounds start
-/// with the curves that failed in the round before; the round that follows the greatest length counts. A curve that is
-/// still lost may start up to three edges along the path of another curve of the same corner ("join").
+/// Closed curves pass through the vertices nearest to three of their points. A path is accepted if it and the curve
+/// stay within 1.1 h of one another. No two paths share an edge, or a vertex but corners and joins. Up to eight rounds
+/// start with the curves that failed in the round before; the round that follows the greatest length counts. A curve
+/// that is still lost may start up to three edges along the path of another curve of the same corner ("join").
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.
@@ -80,7 +80,8 @@ struct FeatureRouting {
 ///
 /// Limits: a corner at which five or more curves meet gets only as many paths as its vertex has edges, plus joins. Only
 /// curves joined at their corner help; curves that run closer than an edge to each other exclude each other.
-FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options = {});
+FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features,
+                              const RoutingOptions& options = {});
 
 /// Returns the curves as far as their paths can follow them: the curve of a joined path starts on the curve whose path
 /// it joins, as far from the corner as the two paths part, and goes on along its own; all others are unchanged.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/patch_fans.h"
 #include "fit/features/pads.h"
+#include "fit/features/patch_fans.h"
 
 #include "subvol/base/error.h"
 
@@ -62,7 +62,11 @@ class PatchSets {
 class PadScores {
  public:
   PadScores(const PatchedMesh& patched, const SignedFeatures& features, const PatchSets& sets, double reach)
-      : patched_(patched), features_(features), sets_(sets), reach_(reach), fans_(patched),
+      : patched_(patched),
+        features_(features),
+        sets_(sets),
+        reach_(reach),
+        fans_(patched),
         scores_(patched.patches.count, 0.0) {
     for (std::size_t e = 0; e < fans_.path_of_edge.size(); ++e) score_edge(static_cast<Index>(e));
     std::vector<PatchFans::Place> fan;
@@ -174,7 +178,10 @@ double diagonal_of(const FeatureCurves& curves) {
 class PadChoice {
  public:
   PadChoice(PatchedMesh& patched, const SignedFeatures& features)
-      : patched_(patched), features_(features), sets_(patched.patches.count), done_(patched.patches.count, 0),
+      : patched_(patched),
+        features_(features),
+        sets_(patched.patches.count),
+        done_(patched.patches.count, 0),
         reach_(kDirectionReach * diagonal_of(features.curves)) {}
 
   PadReport run() {
@@ -229,10 +236,13 @@ class PadChoice {
   Index neighbor_to_add(const PadScores& scores, Index vertex, std::span<const std::uint8_t> is_padded) const {
     const PatchFans& fans = scores.fans();
     std::vector<PatchFans::Place> fan;
-    const auto surface_vertex = std::ranges::lower_bound(fans.boundary.vertices, vertex) - fans.boundary.vertices.begin();
+    const auto surface_vertex =
+        std::ranges::lower_bound(fans.boundary.vertices, vertex) - fans.boundary.vertices.begin();
     fans.fan_at(static_cast<Index>(surface_vertex), fan);
     const bool anywhere = fan_state(fans, patched_, fan, is_padded).changes > 2;
-    const auto padded = [&](std::size_t i) { return is_padded[patched_.patches.of_face[fan[i % fan.size()].face]] != 0; };
+    const auto padded = [&](std::size_t i) {
+      return is_padded[patched_.patches.of_face[fan[i % fan.size()].face]] != 0;
+    };
     Index best = kNoIndex;
     for (std::size_t i = 0; i < fan.size(); ++i) {
       if (padded(i) || !(anywhere || padded(i + 1) || padded(i + fan.size() - 1))) continue;

@@ -17,7 +17,8 @@ namespace subvol {
 
 namespace {
 
-/// Depth of a pad in units of the shortest edge. Three perpendicular steps of a corner stay clear of the opposite edges.
+/// Depth of a pad in units of the shortest edge. Three perpendicular steps of a corner stay clear of the opposite
+/// edges.
 constexpr double kDepth = 0.2;
 /// Cosine above which two faces count as one plane: those of a grid are along its axes.
 constexpr double kSameNormal = 0.9;
@@ -44,7 +45,10 @@ std::size_t local_face(const MeshTopology& topology, Index face) {
 class PadBuilder {
  public:
   PadBuilder(const PatchedMesh& patched, std::vector<std::uint8_t> is_padded)
-      : old_(patched), fans_(patched), is_padded_(std::move(is_padded)), new_vertex_(patched.mesh.num_vertices(), kNoIndex) {}
+      : old_(patched),
+        fans_(patched),
+        is_padded_(std::move(is_padded)),
+        new_vertex_(patched.mesh.num_vertices(), kNoIndex) {}
 
   std::optional<PadRefusal> refusal() const { return topological_refusal(fans_, old_, is_padded_); }
 

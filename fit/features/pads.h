@@ -22,15 +22,15 @@ struct PatchedMesh {
   std::vector<CreasePath> paths;      ///< ascending by curve
   std::vector<PlacedCorner> corners;  ///< ascending by vertex
   BoundaryPatches patches;
-  std::vector<EdgeAngle> angles;      ///< of the boundary edges on no path; edges that are missing count as flat
+  std::vector<EdgeAngle> angles;  ///< of the boundary edges on no path; edges that are missing count as flat
 };
 
 /// Divides the boundary of a mesh along the paths of a routing.
 ///
 /// mesh     passes `validate` except for unused vertices; its tags are dropped.
 /// fitted   the positions that were routed: one per vertex, near the target and in its coordinates.
-/// InputError: sizes that do not agree; a path that leaves the boundary; a boundary that is not a manifold; otherwise as
-/// `boundary_patches` and `smooth_edge_angles`.
+/// InputError: sizes that do not agree; a path that leaves the boundary; a boundary that is not a manifold; otherwise
+/// as `boundary_patches` and `smooth_edge_angles`.
 PatchedMesh patched_mesh(VolumeMesh mesh, std::vector<Vec3> fitted, const FeatureRouting& routing,
                          const TriangleMesh& target);
 
@@ -59,8 +59,8 @@ struct PadRefusal {
 ///
 /// At the border of the patches the sides of the new cells are faces of the boundary; they belong to the patch beyond.
 /// So an edge there gets one cell, and the edge that it moves from, one more than before. Paths at the border or among
-/// the patches keep their old vertices. A path that ends at the border from outside is continued by the edge between the
-/// new and the old vertex, so that corners of the target stay where they are. Smooth angles move alike.
+/// the patches keep their old vertices. A path that ends at the border from outside is continued by the edge between
+/// the new and the old vertex, so that corners of the target stay where they are. Smooth angles move alike.
 ///
 /// New vertices lie 0.2 of the shortest edge of their old vertex, times the sum of its distinct normals, under the
 /// patches; less if a cell would be inverted. Their fitted positions are those of the old ones.
@@ -91,8 +91,8 @@ struct PadReport {
 
 /// Pads patches, one set after the other, where angles of the boundary do not suit the number of cells there.
 ///
-/// Patches on both sides of a path with an angle above 150 degrees belong together, since no pad may end there. A set of
-/// patches that belong together is wanted for each
+/// Patches on both sides of a path with an angle above 150 degrees belong together, since no pad may end there. A set
+/// of patches that belong together is wanted for each
 ///
 ///   - edge inside it at which the angle of the target over the number of cells is above 140 or below 42 degrees; half
 ///     as much for an edge at its border;

@@ -15,18 +15,9 @@ std::vector<Index> paths_of_edges(const PatchedMesh& patched, const MeshTopology
   std::vector<Index> surface_edge(topology.num_edges(), kNoIndex);
   for (std::size_t e = 0; e < boundary.edges.size(); ++e) surface_edge[boundary.edges[e]] = static_cast<Index>(e);
   std::vector<Index> path_of_edge(boundary.edges.size(), kNoIndex);
-  for (std::size_t p = 0; p < patched.paths.size(); ++p) {
-    const std::vector<Index>& path = patched.paths[p].vertices;
-    for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-      const bool exist = std::max(path[i], path[i + 1]) < static_cast<Index>(topology.num_vertices()) &&
-                         std::min(path[i], path[i + 1]) >= 0;
-      const Index edge = exist ? topology.find_edge(path[i], path[i + 1]) : kNoIndex;
-      if (edge == kNoIndex || surface_edge[edge] == kNoIndex)
-        throw InputError("pads: a path runs along vertices " + std::to_string(path[i]) + " and " +
-                         std::to_string(path[i + 1]) + ", which is no boundary edge");
+  for (std::size_t p = 0; p < patched.paths.size(); ++p)
+    for (Index edge : edges_of_path(topology, patched.paths[p].vertices))
       path_of_edge[surface_edge[edge]] = static_cast<Index>(p);
-    }
-  }
   return path_of_edge;
 }
 

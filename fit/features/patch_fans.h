@@ -33,9 +33,7 @@ struct PatchFans {
   /// Returns the two faces at a surface edge.
   std::array<Index, 2> faces_at(Index edge) const;
   /// Returns the volume vertex at the other end of the edge of a corner.
-  Index other_end(Index corner) const {
-    return boundary.vertices[surface().corner_vertices[surface().next(corner)]];
-  }
+  Index other_end(Index corner) const { return boundary.vertices[surface().corner_vertices[surface().next(corner)]]; }
 };
 
 /// Returns why a set of patches, given by a mark for each, cannot be padded, at the vertex of the smallest number.

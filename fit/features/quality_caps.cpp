@@ -50,16 +50,11 @@ std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures&
   std::vector<EdgeCap> caps;
   for (const CreasePath& path : patched.paths) {
     const ClosestPoint tree = polyline_tree(features.curves.curves[path.curve].points);
-    for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i) {
-      const auto [v, w] = std::minmax(path.vertices[i], path.vertices[i + 1]);
-      const bool exist = v >= 0 && static_cast<std::size_t>(w) < topology.num_vertices();
-      const Index edge = exist ? topology.find_edge(v, w) : kNoIndex;
-      if (edge == kNoIndex)
-        throw InputError("quality_caps: there is no edge between vertices " + std::to_string(v) + " and " +
-                         std::to_string(w));
+    for (Index edge : edges_of_path(topology, path.vertices)) {
+      const std::array<Index, 2>& ends = topology.edge(edge);
       const double angle =
-          angle_along(features.segment_angles[path.curve], tree, patched.fitted[v], patched.fitted[w]);
-      caps.push_back({{v, w}, edge_cap(angle, topology.num_edge_cells(edge))});
+          angle_along(features.segment_angles[path.curve], tree, patched.fitted[ends[0]], patched.fitted[ends[1]]);
+      caps.push_back({ends, edge_cap(angle, topology.num_edge_cells(edge))});
     }
   }
   std::ranges::sort(caps, {}, &EdgeCap::ends);

@@ -21,7 +21,7 @@ namespace {
 struct Side {
   std::array<Index, 2> ends;  ///< the smaller number first
   Index triangle;
-  bool rising;                ///< the triangle runs from ends[0] to ends[1]
+  bool rising;  ///< the triangle runs from ends[0] to ends[1]
 };
 
 void require_triangles(const TriangleMesh& mesh) {
@@ -106,8 +106,8 @@ void find_regions(const TriangleMesh& mesh, std::span<const Side> sides, SignedF
   features.regions.resize(parent.size());
   for (std::size_t t = 0; t < parent.size(); ++t) {
     const Index first = root(parent, static_cast<Index>(t));
-    features.regions[t] = static_cast<std::size_t>(first) == t ? static_cast<Index>(features.num_regions++)
-                                                                : features.regions[first];
+    features.regions[t] =
+        static_cast<std::size_t>(first) == t ? static_cast<Index>(features.num_regions++) : features.regions[first];
   }
 }
 
