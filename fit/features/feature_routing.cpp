@@ -25,6 +25,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kCornerReach = 1.6;
 /// Costs of a corner's vertex: for each curve without an edge of the wanted number of cells; if edges are missing.
 constexpr double kWrongEdgePenalty = 0.15, kFewEdgesPenalty = 3;
+/// Cost of a vertex so far from the corner that only joining paths may end there: more than that of missing edges.
+constexpr double kFarPenalty = 4;
 /// Keeps paths short where the distance says nothing; and the distance at which edges are not looked at.
 constexpr double kSoftness = 0.12, kSearchReach = 3;
 /// Largest distance between a path and its curve; for paths that join another one, which start beside their curve.
@@ -65,9 +67,6 @@ class ArcLength {
       along_.push_back(along_.back() + (points[i] - points[i - 1]).norm());
   }
   double length() const { return along_.back(); }
-  double place_of(const ClosestPoint::Hit& hit) const {
-    return along_[hit.triangle] + (hit.point - points_[hit.triangle]).norm();
-  }
   Vec3 at(double place) const {
     const std::size_t i = segment(place);
     const double l = along_[i + 1] - along_[i];
@@ -91,14 +90,16 @@ class ArcLength {
   std::vector<double> along_;
 };
 
+/// Returns points along a polyline, its vertices among them, about `spacing` apart; farther if there were too many.
 std::vector<Vec3> sampled(std::span<const Vec3> points, double spacing) {
-  constexpr double kMostParts = 1e4;
+  constexpr double kMostSamples = 1e5;
+  const double step = std::max(spacing, polyline_length(points) / kMostSamples);
   std::vector<Vec3> samples = {points[0]};
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const double parts = std::ceil((points[i + 1] - points[i]).norm() / spacing);
-    const int n = parts < kMostParts ? std::max(1, static_cast<int>(parts)) : static_cast<int>(kMostParts);
-    for (int k = 1; k <= n; ++k)
-      samples.push_back(points[i] + (points[i + 1] - points[i]) * (static_cast<double>(k) / n));
+    const double length = (points[i + 1] - points[i]).norm();
+    const int parts = length > step ? static_cast<int>(std::ceil(length / step)) : 1;
+    for (int k = 1; k <= parts; ++k)
+      samples.push_back(points[i] + (points[i + 1] - points[i]) * (static_cast<double>(k) / parts));
   }
   return samples;
 }
@@ -149,10 +150,10 @@ class Router {
   FeatureRouting run() {
     std::vector<Index> order = order_by_gap();
     for (int round = 0; round < kRounds && !order.empty(); ++round) {
-      std::vector<Index> failed = run_round(order);
-      if (failed.empty()) break;
-      std::stable_partition(order.begin(), order.end(),
-                            [&](Index c) { return std::find(failed.begin(), failed.end(), c) != failed.end(); });
+      const std::vector<std::uint8_t> failed = run_round(order);
+      const auto has_failed = [&](Index c) { return failed[c] != 0; };
+      if (std::ranges::none_of(order, has_failed)) break;
+      std::stable_partition(order.begin(), order.end(), has_failed);
     }
     fill_gaps();
     join_lost();
@@ -217,7 +218,8 @@ class Router {
     const int wrong = std::max(0, needs.convex - of_one) + std::max(0, needs.curves - needs.convex - of_three);
     const double distance = (graph_.position(v) - needs.position).norm() / h_;
     const bool few = std::ssize(graph_.edges_at(v)) < needs.curves;
-    return distance * distance + kWrongEdgePenalty * wrong + (few ? kFewEdgesPenalty : 0);
+    return distance * distance + kWrongEdgePenalty * wrong + (few ? kFewEdgesPenalty : 0) +
+           (distance > kFollowDistance ? kFarPenalty : 0);
   }
 
   void place_corners() {
@@ -295,13 +297,14 @@ class Router {
     return course;
   }
 
+  /// Returns the place along a curve that is about as near to a vertex as any.
   double place_nearest_to_vertex(Index c) const {
-    double distance = kInfinity, place = 0;
-    const ArcLength arc(curves_[c].points);
-    for (Index v : graph_.vertices()) {
-      if (base_.vertices[v]) continue;
-      const ClosestPoint::Hit hit = trees_[c].closest(graph_.position(v));
-      if (hit.distance < distance) distance = hit.distance, place = arc.place_of(hit);
+    const std::vector<Vec3> samples = sampled(curves_[c].points, h_ / 8);
+    double distance = kInfinity, place = 0, along = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      if (i > 0) along += (samples[i] - samples[i - 1]).norm();
+      const double d = (graph_.position(graph_.nearest_vertex(samples[i])) - samples[i]).norm();
+      if (d < distance) distance = d, place = along;
     }
     return place;
   }
@@ -359,7 +362,7 @@ class Router {
   }
 
   std::optional<Found> find(Index c, const Occupied& occupied) {
-    if (lacks_corner(c)) return std::nullopt;
+    if (!(h_ > 0) || lacks_corner(c)) return std::nullopt;
     for (Course& course : courses(c))
       if (auto found = judged(path_on(course, curves_[c].closed(), occupied), c, kFollowDistance)) return found;
     return std::nullopt;
@@ -389,17 +392,15 @@ class Router {
     return length;
   }
 
-  /// Routes all curves in an order and keeps the result if it is longer than the best one. Returns what failed.
-  std::vector<Index> run_round(std::span<const Index> order) {
+  /// Routes all curves in an order and keeps the result if it is longer than the best one. Marks those that failed.
+  std::vector<std::uint8_t> run_round(std::span<const Index> order) {
     Paths paths(curves_.size());
     Occupied occupied = base_;
-    std::vector<Index> failed;
+    std::vector<std::uint8_t> failed(curves_.size(), 0);
     for (Index c : order) {
       auto found = find(c, occupied);
-      if (!found) {
-        failed.push_back(c);
-        continue;
-      }
+      failed[c] = !found;
+      if (!found) continue;
       occupied.add(graph_, found->path);
       paths[c] = std::move(found->path);
     }
@@ -439,27 +440,35 @@ class Router {
 
   // Joins
 
-  /// Returns the vertex of a curve's corner, and those near it on paths of other curves from the same corner.
-  std::vector<End> possible_ends(Index c, int end) const {
-    const Index vertex = vertex_of(corner_at(c, end));
-    if (vertex == kNoIndex) return {};
-    std::vector<End> ends = {{vertex, false}};
+  /// Returns, for each vertex at which a path starts or ends, the vertices along it within reach of a join.
+  std::map<Index, std::vector<Index>> joinable_vertices() const {
+    std::map<Index, std::vector<Index>> vertices;
     for (const auto& path : best_) {
       if (path.empty() || path.front() == path.back()) continue;
       for (std::size_t i = 1; i <= kJoinEdges && 2 * i < path.size(); ++i) {
-        if (path.front() == vertex) ends.push_back({path[i], true});
-        if (path.back() == vertex) ends.push_back({path[path.size() - 1 - i], true});
+        vertices[path.front()].push_back(path[i]);
+        vertices[path.back()].push_back(path[path.size() - 1 - i]);
       }
     }
+    return vertices;
+  }
+
+  std::vector<End> possible_ends(Index c, int end, const std::map<Index, std::vector<Index>>& joinable) const {
+    const Index vertex = vertex_of(corner_at(c, end));
+    if (vertex == kNoIndex) return {};
+    std::vector<End> ends = {{vertex, false}};
+    if (const auto at = joinable.find(vertex); at != joinable.end())
+      for (Index v : at->second) ends.push_back({v, true});
     return ends;
   }
 
-  std::vector<Index> joining_path(Index c, const Occupied& occupied) {
+  std::vector<Index> joining_path(Index c, const Occupied& occupied,
+                                  const std::map<Index, std::vector<Index>>& joinable) const {
     FollowingCost cost = cost_along(c, curves_[c].points);
     double least = kInfinity;
     std::vector<Index> best;
-    for (const End& from : possible_ends(c, 0))
-      for (const End& to : possible_ends(c, 1)) {
+    for (const End& from : possible_ends(c, 0, joinable))
+      for (const End& to : possible_ends(c, 1, joinable)) {
         if (from.vertex == to.vertex) continue;
         auto found = judged(cheapest_path(graph_, cost, from.vertex, to.vertex, occupied), c, kJoinDistance);
         if (!found) continue;
@@ -471,10 +480,13 @@ class Router {
 
   void join_lost() {
     Occupied occupied = occupied_by_best();
+    auto joinable = joinable_vertices();
     for (Index c : lost_by_length()) {
-      if (!joinable_[c] || curves_[c].closed()) continue;
-      best_[c] = joining_path(c, occupied);
+      if (!joinable_[c] || curves_[c].closed() || !(h_ > 0)) continue;
+      best_[c] = joining_path(c, occupied, joinable);
+      if (best_[c].empty()) continue;
       occupied.add(graph_, best_[c]);
+      joinable = joinable_vertices();
     }
   }
 

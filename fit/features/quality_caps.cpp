@@ -25,19 +25,8 @@ constexpr double kDirectionShare = 0.05;
 
 void require_curves(const PatchedMesh& patched, const SignedFeatures& features) {
   for (const CreasePath& path : patched.paths)
-    if (path.curve < 0 || static_cast<std::size_t>(path.curve) >= features.segment_angles.size())
+    if (path.curve < 0 || static_cast<std::size_t>(path.curve) >= features.angles.size())
       throw InputError("quality_caps: there is no curve " + std::to_string(path.curve));
-}
-
-/// Mean angle of the target along an edge of a path, by the closest points of its curve.
-double angle_along(std::span<const double> segment_angles, const ClosestPoint& tree, const Vec3& a, const Vec3& b) {
-  constexpr int kPoints = 5;
-  double sum = 0;
-  for (int i = 0; i < kPoints; ++i) {
-    const ClosestPoint::Hit hit = tree.closest(a + (b - a) * ((i + 0.5) / kPoints));
-    sum += hit.triangle == kNoIndex ? 180 : segment_angles[hit.triangle];
-  }
-  return sum / kPoints;
 }
 
 double edge_cap(double angle, int cells) {
@@ -45,18 +34,12 @@ double edge_cap(double angle, int cells) {
   return kReachable * std::max(0.0, std::sin(part * std::numbers::pi / 180));
 }
 
-std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features,
-                               const MeshTopology& topology) {
+std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+  const MeshTopology topology(patched.mesh);
   std::vector<EdgeCap> caps;
-  for (const CreasePath& path : patched.paths) {
-    const ClosestPoint tree = polyline_tree(features.curves.curves[path.curve].points);
-    for (Index edge : edges_of_path(topology, path.vertices)) {
-      const std::array<Index, 2>& ends = topology.edge(edge);
-      const double angle =
-          angle_along(features.segment_angles[path.curve], tree, patched.fitted[ends[0]], patched.fitted[ends[1]]);
-      caps.push_back({ends, edge_cap(angle, topology.num_edge_cells(edge))});
-    }
-  }
+  for (const CreasePath& path : patched.paths)
+    for (Index edge : edges_of_path(topology, path.vertices))
+      caps.push_back({topology.edge(edge), edge_cap(features.angles[path.curve], topology.num_edge_cells(edge))});
   std::ranges::sort(caps, {}, &EdgeCap::ends);
   return caps;
 }
@@ -92,8 +75,7 @@ std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatu
 
 QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features) {
   require_curves(patched, features);
-  const MeshTopology topology(patched.mesh);
-  return {edge_caps(patched, features, topology), corner_caps(patched, features)};
+  return {edge_caps(patched, features), corner_caps(patched, features)};
 }
 
 }  // namespace subvol

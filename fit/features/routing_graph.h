@@ -41,7 +41,8 @@ class RoutingGraph {
 
   /// Returns the boundary vertices within a distance of a point, ascending.
   std::vector<Index> vertices_near(const Vec3& point, double distance) const;
-  std::span<const Index> vertices() const { return vertices_; }
+  /// Returns the boundary vertex nearest to a point; there must be one.
+  Index nearest_vertex(const Vec3& point) const { return vertices_[tree_.site(tree_.nearest(point).place)]; }
 
  private:
   const VolumeMesh* mesh_;

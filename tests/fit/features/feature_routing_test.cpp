@@ -34,6 +34,9 @@ void require_apart(const FeatureRouting& routing) {
       CHECK(edges.insert({v, w}).second);
       if (i > 0) CHECK(inner.insert(path.vertices[i]).second);
     }
+  for (const CreasePath& path : routing.paths)
+    if (!std::ranges::binary_search(routing.joined, path.curve) && path.vertices.front() != path.vertices.back())
+      for (Index end : {path.vertices.front(), path.vertices.back()}) CHECK_FALSE(inner.contains(end));
 }
 
 }  // namespace
@@ -117,26 +120,41 @@ TEST_CASE("curves that are not followed have a reason and a place") {
 }
 
 TEST_CASE("where a vertex has fewer edges than its corner, a curve joins its neighbor") {
-  // A pyramid's apex at the corner of a lattice, which has three edges.
-  VolumeMesh mesh = lattice(6, 6, 6);
-  const TriangleMesh target{{{0, 0, 0}, {6, 0, 0}, {6, 6, 0}, {0, 6, 0}, {0, 0, 6}},
-                            {{0, 3, 2}, {0, 2, 1}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}}};
+  // A cube whose top has a ridge from corner to corner; the corner vertices of its lattice have three edges.
+  const auto ridged = [](VolumeMesh mesh) {
+    for (Vec3& p : mesh.positions)
+      if (p.z() > -1) p.z() -= (p.z() + 1) / 4 * std::abs(p.x() - p.y());
+    return mesh;
+  };
+  const VolumeMesh fitted = ridged(centred_lattice(6));
+  TriangleMesh target = surface_of(ridged(centred_lattice(1)));
   const SignedFeatures features = features_of(target);
-  // Only the cells near the apex at (0, 0, 0) are like the target; its diagonal of the base is no feature.
-  CHECK(features.angles.size() == 8);
-  FeatureRouting routing = route_features(mesh, features);
-  for (Index c : routing.joined) {
-    const auto path = std::ranges::find(routing.paths, c, &CreasePath::curve);
-    REQUIRE(path != routing.paths.end());
-  }
-  const FeatureCurves parts = followed_parts(mesh, features, routing);
-  REQUIRE(parts.curves.size() == features.curves.curves.size());
+  REQUIRE(features.angles.size() == 13);
+  const FeatureRouting routing = route_features(fitted, features);
+  CHECK(routing.paths.size() == 13);
+  REQUIRE(routing.joined.size() == 1);
+  require_apart(routing);
+  const FeatureCurves parts = followed_parts(fitted, features, routing);
   for (std::size_t c = 0; c < parts.curves.size(); ++c) {
-    const bool joined = std::ranges::binary_search(routing.joined, static_cast<Index>(c));
-    CHECK((parts.curves[c].points == features.curves.curves[c].points) == !joined);
-    CHECK(parts.curves[c].closed() == features.curves.curves[c].closed());
-    CHECK(parts.curves[c].vertices.size() == parts.curves[c].points.size());
+    const FeatureCurve &part = parts.curves[c], &whole = features.curves.curves[c];
+    const bool is_joined = static_cast<Index>(c) == routing.joined[0];
+    CHECK((part.points == whole.points) == !is_joined);
+    CHECK_FALSE(part.closed());
+    CHECK(part.vertices.size() == part.points.size());
+    if (!is_joined) continue;
+    // Both ends are on curves whose paths it joins.
+    double nearest = 1;
+    for (std::size_t other = 0; other < parts.curves.size(); ++other)
+      if (other != c)
+        nearest = std::min(nearest, polyline_tree(parts.curves[other].points).closest(part.points[0]).distance);
+    CHECK(nearest < 1e-12);
+    CHECK(part.length() < whole.length() + 0.5);
   }
+  RoutingOptions options;
+  options.not_joined.assign(13, 1);
+  const FeatureRouting apart = route_features(fitted, features, options);
+  REQUIRE(apart.unfollowed.size() == 1);
+  CHECK(apart.unfollowed[0].reason == NotFollowed::too_many_edges_at_corner);
 }
 
 TEST_CASE("routing is the same for any number of threads") {
