@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/features/feature_routing.h"
 
+#include "fit/features/polyline.h"
 #include "fit/features/routing_graph.h"
 #include "subvol/base/error.h"
 
@@ -51,63 +52,6 @@ std::array<double, 3> edge_factors(double angle) {
   if (angle < kSharpAngle) return {1, 1.5, 3};
   if (angle < 180) return {1.5, 1.5, 1};
   return {3, 1.5, 1};
-}
-
-double polyline_length(std::span<const Vec3> points) {
-  double length = 0;
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) length += (points[i + 1] - points[i]).norm();
-  return length;
-}
-
-/// A polyline by its arc length.
-class ArcLength {
- public:
-  explicit ArcLength(std::span<const Vec3> points) : points_(points), along_{0} {
-    for (std::size_t i = 1; i < points.size(); ++i)
-      along_.push_back(along_.back() + (points[i] - points[i - 1]).norm());
-  }
-  double length() const { return along_.back(); }
-  Vec3 at(double place) const {
-    const std::size_t i = segment(place);
-    const double l = along_[i + 1] - along_[i];
-    return l > 0 ? Vec3(points_[i] + (points_[i + 1] - points_[i]) * ((place - along_[i]) / l)) : points_[i];
-  }
-  /// Returns the part between two places, 0 <= from <= to <= length.
-  std::vector<Vec3> part(double from, double to) const {
-    std::vector<Vec3> result = {at(from)};
-    for (std::size_t i = 0; i < along_.size(); ++i)
-      if (along_[i] > from && along_[i] < to) result.push_back(points_[i]);
-    result.push_back(at(to));
-    return result;
-  }
-
- private:
-  std::size_t segment(double place) const {
-    const auto above = std::upper_bound(along_.begin(), along_.end(), place) - along_.begin();
-    return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(above - 1, 0, std::ssize(along_) - 2));
-  }
-  std::span<const Vec3> points_;
-  std::vector<double> along_;
-};
-
-/// Returns points along a polyline, its vertices among them, about `spacing` apart; farther if there were too many.
-std::vector<Vec3> sampled(std::span<const Vec3> points, double spacing) {
-  constexpr double kMostSamples = 1e5;
-  const double step = std::max(spacing, polyline_length(points) / kMostSamples);
-  std::vector<Vec3> samples = {points[0]};
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const double length = (points[i + 1] - points[i]).norm();
-    const int parts = length > step ? static_cast<int>(std::ceil(length / step)) : 1;
-    for (int k = 1; k <= parts; ++k)
-      samples.push_back(points[i] + (points[i + 1] - points[i]) * (static_cast<double>(k) / parts));
-  }
-  return samples;
-}
-
-double farthest(std::span<const Vec3> points, const ClosestPoint& tree) {
-  double distance = 0;
-  for (const Vec3& p : points) distance = std::max(distance, tree.closest(p).distance);
-  return distance;
 }
 
 /// A place that a path passes through, at a vertex that is chosen anew for each search.
@@ -248,8 +192,8 @@ class Router {
     for (Index v : path) points.push_back(graph_.position(v));
     if (polyline_length(points) > kMostStretch * curves_[c].length()) return std::nullopt;
     const double spacing = h_ / 4;
-    const double gap = std::max(farthest(sampled(points, spacing), trees_[c]),
-                                farthest(sampled(curves_[c].points, spacing), polyline_tree(points))) /
+    const double gap = std::max(farthest(sampled_polyline(points, spacing), trees_[c]),
+                                farthest(sampled_polyline(curves_[c].points, spacing), polyline_tree(points))) /
                        h_;
     if (!(gap <= most)) return std::nullopt;
     return Found{std::move(path), gap};
@@ -299,7 +243,7 @@ class Router {
 
   /// Returns the place along a curve that is about as near to a vertex as any.
   double place_nearest_to_vertex(Index c) const {
-    const std::vector<Vec3> samples = sampled(curves_[c].points, h_ / 8);
+    const std::vector<Vec3> samples = sampled_polyline(curves_[c].points, h_ / 8);
     double distance = kInfinity, place = 0, along = 0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (i > 0) along += (samples[i] - samples[i - 1]).norm();
