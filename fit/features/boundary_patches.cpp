@@ -235,6 +235,12 @@ PatchGroups patch_groups(const MeshTopology& topology, const BoundaryPatches& pa
     throw InputError("patch_groups: one patch is needed for each boundary face");
   if (features.regions.size() != target.triangles.size())
     throw InputError("patch_groups: one region is needed for each triangle of the target");
+  for (Index p : patches.of_face)
+    if (p < 0 || static_cast<std::size_t>(p) >= patches.count)
+      throw InputError("patch_groups: there is no patch " + std::to_string(p));
+  for (Index r : features.regions)
+    if (r < 0 || static_cast<std::size_t>(r) >= features.num_regions)
+      throw InputError("patch_groups: there is no region " + std::to_string(r));
   Matching matching(patches.count, features.num_regions);
   const Votes votes = count_votes(topology, patches, positions, ClosestPoint(target), features);
   match_by_shares(votes, matching);

@@ -55,9 +55,9 @@ struct EdgeAngle {
   double angle;
 };
 
-/// Measures how the target bends at the boundary edges of a mesh that belong to no path: the angle between the planes
-/// of the target at the closest points of two points, each halfway between the edge's middle and the center of a face.
-/// It finds roundings about as narrow as a face, whatever their number of triangles.
+/// Measures how the target bends at the boundary edges of a mesh that belong to no path. For each of the edge's faces,
+/// the point halfway from the edge's middle to the face's center has a closest triangle; the angle is that between the
+/// two triangles' planes. So a rounding counts if it is narrower than a face.
 ///
 /// positions  of the mesh's vertices, near the target and in its coordinates; one per vertex.
 /// returns    one angle in [0, 360] per edge, ascending by their ends. InputError: as `patch_groups`,

@@ -111,6 +111,9 @@ class Router {
   };
 
   void take(const RoutingOptions& options) {
+    if (features_.angles.size() != curves_.size())
+      throw InputError("route_features: features need one angle for each of the " + std::to_string(curves_.size()) +
+                       " curves");
     for (const auto* list : {&options.excluded, &options.not_joined})
       if (!list->empty() && list->size() != curves_.size())
         throw InputError("route_features: options need one entry for each of the " + std::to_string(curves_.size()) +

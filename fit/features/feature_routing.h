@@ -59,9 +59,11 @@ struct FeatureRouting {
 /// Corners get vertices one to one, those of the least cost first:
 ///
 ///   (distance / h)^2 + 0.15 times the number of curves there without an edge of the wanted number of cells
-///                    + 3 if the vertex has fewer edges than the corner has curves,          distance < 1.6 h
+///                    + 3 if the vertex has fewer edges than the corner has curves
+///                    + 4 if distance > 1.1 h,                                              distance < 1.6 h
 ///
-/// h is the mean length of the boundary's edges. The path between two of them minimizes
+/// h is the mean length of the boundary's edges. Curves shorter than h / 2, or with an angle below 19 degrees, are left
+/// alone, and so are corners without other curves. The path between two of them minimizes
 ///
 ///   integral of (d^2 + (0.12 h)^2) f ds,   d: distance to the curve,
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;
@@ -70,16 +72,17 @@ struct FeatureRouting {
 /// Closed curves pass through the vertices nearest to three of their points. A path is accepted if it and the curve
 /// stay within 1.1 h of one another. No two paths share an edge, or a vertex but corners and joins. Up to eight rounds
 /// start with the curves that failed in the round before; the round that follows the greatest length counts. A curve
-/// that is still lost may start up to three edges along the path of another curve of the same corner ("join").
+/// that is still lost may then stray up to 2.2 h, and start up to three edges along the path of another curve of the
+/// same corner, in its first half ("join").
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.
-/// Deterministic, serial. InputError: an entry of options that is not empty and has not one value per curve; a mesh
-/// position that is not finite. Without curves, everything is empty. Cost: some shortest-path searches near each curve
-/// and in each round; one search for the nearest of all boundary vertices per closed curve.
+/// Deterministic, serial. InputError: options of another size; features without one angle per curve; a position on the
+/// boundary that is not finite. Without curves, everything is empty. Cost: some shortest-path searches near each curve
+/// in each round.
 ///
-/// Limits: a corner at which five or more curves meet gets only as many paths as its vertex has edges, plus joins. Only
-/// curves joined at their corner help; curves that run closer than an edge to each other exclude each other.
+/// Limits: curves that run closer than an edge to each other exclude each other. At corners of five or more curves,
+/// joins leave paths far from their curves: an icosahedron of 1,000 cells has 74 % of its edges within 0.1 %.
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features,
                               const RoutingOptions& options = {});
 

@@ -276,7 +276,8 @@ class PadChoice {
 
 PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features) {
   for (const CreasePath& path : patched.paths)
-    if (path.curve < 0 || static_cast<std::size_t>(path.curve) >= features.angles.size())
+    if (path.curve < 0 ||
+        static_cast<std::size_t>(path.curve) >= std::min(features.angles.size(), features.curves.curves.size()))
       throw InputError("add_pads: there is no curve " + std::to_string(path.curve));
   return PadChoice(patched, features).run();
 }

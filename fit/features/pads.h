@@ -49,21 +49,22 @@ struct PadRefusal {
   Index vertex;  ///< of the mesh
 };
 
-/// Puts a layer of cells under some patches: each face of them becomes a cell between its old vertices and new ones, to
-/// which all other cells move.
+/// Puts a layer of cells under some patches: each face of theirs becomes a cell between its old vertices and new ones,
+/// to which all other cells move.
 ///
-///      ----o-----o----  the patch        o-----o-----o
-///          |     |            ->         |     |     |      the new layer
-///          |     |                       o-----o-----o
-///                                              |
+///        o---o---o---o  the patch        o---o---o---o  the patch, on its old vertices
+///        |   |   |   |                   |   |   |   |  new cells
+///        |   |   |   |         ->        o---o---o---o  new vertices
+///        |   |   |   |                   |   |   |   |
+///        o---o---o---o                   o---o---o---o
 ///
 /// At the border of the patches the sides of the new cells are faces of the boundary; they belong to the patch beyond.
-/// So an edge there gets one cell, and the edge that it moves from, one more than before. Paths at the border or among
-/// the patches keep their old vertices. A path that ends at the border from outside is continued by the edge between
-/// the new and the old vertex, so that corners of the target stay where they are. Smooth angles move alike.
+/// So an edge of the border has one cell afterwards, and the edge between its new vertices one more than it had before.
+/// Paths at the border or inside the patches keep their old vertices; others get new ones. A path that ends at the
+/// border from outside is continued by the edge from the new to the old vertex, so that corners stay where they are.
 ///
-/// New vertices lie 0.2 of the shortest edge of their old vertex, times the sum of its distinct normals, under the
-/// patches; less if a cell would be inverted. Their fitted positions are those of the old ones.
+/// From its old vertex, a new one lies 0.2 of the shortest edge there times the sum of the distinct normals away,
+/// inward; less if a cell would be inverted. Their fitted positions are the same.
 ///
 /// patched  from `patched_mesh`, or padded before. New vertices and cells are appended; old ones keep their numbers. A
 ///          quad gives a hex, a triangle a prism, with the reference of the cell behind it.
@@ -91,23 +92,23 @@ struct PadReport {
 
 /// Pads patches, one set after the other, where angles of the boundary do not suit the number of cells there.
 ///
-/// Patches on both sides of a path with an angle above 150 degrees belong together, since no pad may end there. A set
-/// of patches that belong together is wanted for each
+/// Patches on both sides of a path with an angle above 150 degrees belong to one set, since no pad may end there. These
+/// are reasons to pad a set:
 ///
-///   - edge inside it at which the angle of the target over the number of cells is above 140 or below 42 degrees; half
-///     as much for an edge at its border;
-///   - vertex of a path at which another patch has an angle, over its number of faces there, above 140 or below 40
-///     degrees: a pad beside it leaves that patch with one face there at the edge that stays.
+///   - an edge inside it at which the target's angle divided by the number of cells is above 140 or below 42 degrees;
+///     an edge at its border counts half, for both sets;
+///   - a vertex of a path at which another patch's angle divided by its number of faces there is above 140 or below 40
+///     degrees: after the pad, that patch has one more face there, or one only. Neighbors share this reason evenly.
 ///
-/// The set that is wanted most is padded, together with neighbors that it cannot be padded without; each patch at most
-/// once, until none is wanted.
+/// The set with the most reasons is padded, together with neighbors without which it cannot be. This is repeated, with
+/// each set at most once, until no reason is left.
 ///
 /// features  those that were routed.
 /// Deterministic, serial. InputError: as `pad`. Cost: one pass over the mesh per pad.
 ///
-/// Limits: a pad over both sides of a reflex edge leaves two cells there, with angles of 135 degrees (a scaled Jacobian
-/// of 0.707 at most), where three would be better. At a corner of four or more paths two patches are padded together,
-/// and the edge between them keeps its cells.
+/// Limits: a pad over both sides of a reflex edge leaves two cells there, with angles of 135 degrees and a scaled
+/// Jacobian of 0.707 at most, even if there were three before. At a corner of four or more paths, neighbors are padded
+/// together, and the edges between them keep their numbers of cells.
 PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features);
 
 }  // namespace subvol

@@ -25,7 +25,8 @@ constexpr double kDirectionShare = 0.05;
 
 void require_curves(const PatchedMesh& patched, const SignedFeatures& features) {
   for (const CreasePath& path : patched.paths)
-    if (path.curve < 0 || static_cast<std::size_t>(path.curve) >= features.angles.size())
+    if (path.curve < 0 ||
+        static_cast<std::size_t>(path.curve) >= std::min(features.angles.size(), features.curves.curves.size()))
       throw InputError("quality_caps: there is no curve " + std::to_string(path.curve));
 }
 
