@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit/features/crease_paths.h"
 
+#include "fit/features/polyline.h"
 #include "fit/geometry/site_tree.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -47,30 +48,6 @@ struct BoundaryGraph {
   }
   Index other_end(Index e, Index v) const { return edges[e][0] == v ? edges[e][1] : edges[e][0]; }
 };
-
-/// Returns points along a polyline, including its vertices, at most `spacing` apart.
-std::vector<Vec3> sampled(std::span<const Vec3> points, double spacing) {
-  std::vector<Vec3> samples = {points[0]};
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const double length = (points[i + 1] - points[i]).norm();
-    const int parts = std::max(1, static_cast<int>(std::min(1e4, std::ceil(length / spacing))));
-    for (int k = 1; k <= parts; ++k)
-      samples.push_back(points[i] + (points[i + 1] - points[i]) * (static_cast<double>(k) / parts));
-  }
-  return samples;
-}
-
-double farthest(std::span<const Vec3> points, const ClosestPoint& tree) {
-  double distance = 0;
-  for (const Vec3& p : points) distance = std::max(distance, tree.closest(p).distance);
-  return distance;
-}
-
-double polyline_length(std::span<const Vec3> points) {
-  double length = 0;
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) length += (points[i + 1] - points[i]).norm();
-  return length;
-}
 
 class PathFinder {
  public:
@@ -192,8 +169,8 @@ class PathFinder {
     for (Index v : path) points.push_back(mesh_.positions[v]);
     const double edge = polyline_length(points) / static_cast<double>(path.size() - 1);
     if (!(edge > 0)) return std::nullopt;
-    const double gap = std::max(farthest(sampled(points, edge / 8), polyline_tree(curve)),
-                                farthest(sampled(curve, edge / 8), polyline_tree(points))) / edge;
+    const double gap = std::max(farthest(sampled_polyline(points, edge / 8), polyline_tree(curve)),
+                                farthest(sampled_polyline(curve, edge / 8), polyline_tree(points))) / edge;
     if (!(gap < kFollowShare)) return std::nullopt;
     return Found{std::move(path), gap};
   }

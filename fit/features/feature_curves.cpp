@@ -123,11 +123,7 @@ class EdgeWalk {
 
 }  // namespace
 
-double FeatureCurve::length() const {
-  double length = 0;
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) length += (points[i + 1] - points[i]).norm();
-  return length;
-}
+double FeatureCurve::length() const { return polyline_length(points); }
 
 FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
                              std::span<const std::array<Index, 2>> tagged) {
@@ -138,13 +134,6 @@ FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
   std::sort(sharp.begin(), sharp.end());
   sharp.erase(std::unique(sharp.begin(), sharp.end()), sharp.end());
   return EdgeWalk(mesh, sharp, angle_degrees).curves();
-}
-
-ClosestPoint polyline_tree(std::span<const Vec3> points) {
-  TriangleMesh segments;
-  segments.positions.assign(points.begin(), points.end());
-  for (Index i = 0; i + 1 < static_cast<Index>(points.size()); ++i) segments.triangles.push_back({i, i + 1, i + 1});
-  return ClosestPoint(segments);
 }
 
 }  // namespace subvol

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
+#include "fit/features/polyline.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -44,8 +44,5 @@ struct CreaseSegment {
 /// Each sharp edge is in exactly one curve. Cost: linear except for one sort of the edges.
 FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
                              std::span<const std::array<Index, 2>> tagged = {});
-
-/// Returns a tree over the segments of a polyline, numbered in its order. points: at least 2, finite.
-ClosestPoint polyline_tree(std::span<const Vec3> points);
 
 }  // namespace subvol

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/curve_choice.h"
+
+#include "subvol/base/error.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+/// One in so many of the curves at fault is given up at once: a smaller share takes many more fits, a larger one gives
+/// up curves that are well without the others.
+constexpr std::size_t kOneIn = 3;
+
+void require_sizes(const PatchedMesh& patched, const SignedFeatures& features, std::span<const double> faults,
+                   RoutingOptions& options) {
+  const std::size_t curves = features.curves.curves.size();
+  if (faults.size() != patched.mesh.num_cells())
+    throw InputError("give_up_poor_curves: one fault is needed for each of the " +
+                     std::to_string(patched.mesh.num_cells()) + " cells");
+  for (const CreasePath& path : patched.paths)
+    if (path.curve < 0 || static_cast<std::size_t>(path.curve) >= curves)
+      throw InputError("give_up_poor_curves: there is no curve " + std::to_string(path.curve));
+  for (auto* list : {&options.excluded, &options.not_joined}) {
+    if (list->empty()) list->assign(curves, 0);
+    if (list->size() != curves) throw InputError("give_up_poor_curves: options need one entry for each curve");
+  }
+}
+
+/// Returns the fault of each vertex: the sum over its cells.
+std::vector<double> vertex_faults(const VolumeMesh& mesh, std::span<const double> faults) {
+  std::vector<double> sums(mesh.num_vertices(), 0.0);
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    for (Index v : mesh.cell(c)) sums[v] += faults[c];
+  return sums;
+}
+
+/// Returns the curves at fault with their faults, the worst first.
+std::vector<std::pair<double, Index>> curves_at_fault(const PatchedMesh& patched, const SignedFeatures& features,
+                                                      std::span<const double> faults) {
+  const std::vector<double> at_vertex = vertex_faults(patched.mesh, faults);
+  std::vector<std::pair<double, Index>> curves;
+  for (const CreasePath& path : patched.paths) {
+    double sum = 0;
+    for (Index v : path.vertices) sum += at_vertex[v];
+    const double length = features.curves.curves[path.curve].length();
+    if (sum > 0 && length > 0) curves.push_back({sum / length, path.curve});
+  }
+  std::ranges::stable_sort(curves, [](const auto& a, const auto& b) { return a.first > b.first; });
+  return curves;
+}
+
+}  // namespace
+
+bool give_up_poor_curves(const PatchedMesh& patched, const SignedFeatures& features, const FeatureRouting& routing,
+                         std::span<const double> faults, RoutingOptions& options) {
+  require_sizes(patched, features, faults, options);
+  const auto curves = curves_at_fault(patched, features, faults);
+  bool any_joined = false;
+  for (const auto& [fault, c] : curves) {
+    if (options.not_joined[c] || !std::ranges::binary_search(routing.joined, c)) continue;
+    options.not_joined[c] = 1;
+    any_joined = true;
+  }
+  if (any_joined) return true;
+  const std::size_t count = curves.empty() ? 0 : std::max<std::size_t>(1, curves.size() / kOneIn);
+  for (const auto& [fault, c] : std::span(curves).first(count)) options.excluded[c] = 1;
+  return count > 0;
+}
+
+}  // namespace subvol

@@ -1,0 +1,582 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/feature_routing.h"
+
+#include "fit/features/polyline.h"
+#include "fit/features/routing_graph.h"
+#include "subvol/base/error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Found on twelve CAD parts, as all constants here without another reason. Lengths are in units of h.
+/// Corners farther from a vertex get none: the smooth fit rounds them off by about half an edge.
+constexpr double kCornerReach = 1.6;
+/// Costs of a corner's vertex: for each curve without an edge of the wanted number of cells; if edges are missing.
+constexpr double kWrongEdgePenalty = 0.15, kFewEdgesPenalty = 3;
+/// Cost of a vertex so far from the corner that only joining paths may end there: more than that of missing edges.
+constexpr double kFarPenalty = 4;
+/// Keeps paths short where the distance says nothing; and the distance at which edges are not looked at.
+constexpr double kSoftness = 0.12, kSearchReach = 3;
+/// Largest distance between a path and its curve; for paths that join another one, which start beside their curve.
+constexpr double kFollowDistance = 1.1, kJoinDistance = 2.2;
+/// Largest length of a path in units of its curve's: longer ones go to and fro.
+constexpr double kMostStretch = 1.8;
+/// Distance that one end which joins another path counts as, in the choice among joins.
+constexpr double kJoinPenalty = 0.3;
+/// Number of edges along another path, from their corner, within which a path may join it; no farther than its middle.
+constexpr std::size_t kJoinEdges = 3;
+constexpr int kRounds = 8;
+/// Curves at which the solid is thinner than this angle, in degrees, are left alone: 0.93 sin(19) = 0.3 is the scaled
+/// Jacobian at which cells are given up.
+constexpr double kLeastAngle = 19;
+/// Shorter curves are left alone, in units of h: no path is as short, and their corners would take vertices that other
+/// curves need.
+constexpr double kLeastLength = 0.5;
+/// Convex edges below this angle, in degrees, want one cell; up to 180, one or two do equally well.
+constexpr double kSharpAngle = 125;
+
+std::array<double, 3> edge_factors(double angle) {
+  if (angle < kSharpAngle) return {1, 1.5, 3};
+  if (angle < 180) return {1.5, 1.5, 1};
+  return {3, 1.5, 1};
+}
+
+/// A place that a path passes through, at a vertex that is chosen anew for each search.
+struct Anchor {
+  Vec3 point;
+  Index fixed;  ///< the vertex, or kNoIndex if any vertex nearby will do
+};
+
+/// Anchors, and the costs between each and the next one.
+struct Course {
+  std::vector<Anchor> anchors;
+  std::vector<FollowingCost> legs;
+};
+
+/// A path and how well it follows its curve.
+struct Found {
+  std::vector<Index> path;
+  double gap;  ///< largest distance between the path and the curve, either way, in units of h
+};
+
+using Paths = std::vector<std::vector<Index>>;  ///< by curve; empty: none
+
+class Router {
+ public:
+  Router(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options)
+      : features_(features),
+        curves_(features.curves.curves),
+        graph_(mesh),
+        h_(graph_.edge_length()),
+        reasons_(curves_.size()),
+        joinable_(curves_.size(), 1),
+        courses_(curves_.size()),
+        base_{std::vector<std::uint8_t>(mesh.num_vertices(), 0), std::vector<std::uint8_t>(graph_.edges().size(), 0)},
+        best_(curves_.size()) {
+    take(options);
+    for (std::size_t c = 0; c < curves_.size(); ++c) trees_.push_back(polyline_tree(curves_[c].points));
+    place_corners();
+  }
+
+  FeatureRouting run() {
+    std::vector<Index> order = order_by_gap();
+    for (int round = 0; round < kRounds && !order.empty(); ++round) {
+      const std::vector<std::uint8_t> failed = run_round(order);
+      const auto has_failed = [&](Index c) { return failed[c] != 0; };
+      if (std::ranges::none_of(order, has_failed)) break;
+      std::stable_partition(order.begin(), order.end(), has_failed);
+    }
+    fill_gaps();
+    join_lost();
+    return result();
+  }
+
+ private:
+  struct End {
+    Index vertex;
+    bool joins;
+  };
+
+  void take(const RoutingOptions& options) {
+    if (features_.angles.size() != curves_.size())
+      throw InputError("route_features: features need one angle for each of the " + std::to_string(curves_.size()) +
+                       " curves");
+    for (const auto* list : {&options.excluded, &options.not_joined})
+      if (!list->empty() && list->size() != curves_.size())
+        throw InputError("route_features: options need one entry for each of the " + std::to_string(curves_.size()) +
+                         " curves");
+    for (std::size_t c = 0; c < curves_.size(); ++c) {
+      if (!options.excluded.empty() && options.excluded[c])
+        reasons_[c] = NotFollowed::excluded;
+      else if (features_.angles[c] < kLeastAngle)
+        reasons_[c] = NotFollowed::too_acute;
+      else if (curves_[c].length() < kLeastLength * h_)
+        reasons_[c] = NotFollowed::shorter_than_cell;
+      if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
+    }
+  }
+
+  bool is_eligible(Index c) const { return !reasons_[c]; }
+  bool is_corner(Index v) const { return std::ranges::binary_search(features_.curves.corners, v); }
+  Index corner_at(Index c, int end) const {
+    return end == 0 ? curves_[c].vertices.front() : curves_[c].vertices.back();
+  }
+
+  // Corners
+
+  struct CornerNeeds {
+    Vec3 position = Vec3::Zero();
+    int curves = 0, convex = 0;
+  };
+
+  std::map<Index, CornerNeeds> corner_needs() const {
+    std::map<Index, CornerNeeds> needs;
+    for (std::size_t c = 0; c < curves_.size(); ++c)
+      for (int end = 0; end < 2; ++end) {
+        const Index corner = corner_at(static_cast<Index>(c), end);
+        if (!is_eligible(static_cast<Index>(c)) || !is_corner(corner)) continue;
+        CornerNeeds& n = needs[corner];
+        n.position = end == 0 ? curves_[c].points.front() : curves_[c].points.back();
+        ++n.curves;
+        n.convex += features_.is_convex(static_cast<Index>(c));
+      }
+    return needs;
+  }
+
+  double corner_cost(const CornerNeeds& needs, Index v) const {
+    int of_one = 0, of_three = 0;
+    for (Index e : graph_.edges_at(v)) {
+      of_one += graph_.edges()[e].cells == 1;
+      of_three += graph_.edges()[e].cells == 3;
+    }
+    const int wrong = std::max(0, needs.convex - of_one) + std::max(0, needs.curves - needs.convex - of_three);
+    const double distance = (graph_.position(v) - needs.position).norm() / h_;
+    const bool few = std::ssize(graph_.edges_at(v)) < needs.curves;
+    return distance * distance + kWrongEdgePenalty * wrong + (few ? kFewEdgesPenalty : 0) +
+           (distance > kFollowDistance ? kFarPenalty : 0);
+  }
+
+  void place_corners() {
+    std::vector<std::tuple<double, Index, Index>> pairs;  // cost, corner, vertex
+    for (const auto& [corner, needs] : corner_needs())
+      for (Index v : graph_.vertices_near(needs.position, kCornerReach * h_))
+        pairs.push_back({corner_cost(needs, v), corner, v});
+    std::sort(pairs.begin(), pairs.end());
+    for (const auto& [cost, corner, v] : pairs) {
+      if (base_.vertices[v] || vertex_of_corner_.contains(corner)) continue;
+      vertex_of_corner_[corner] = v;
+      base_.vertices[v] = 1;
+    }
+  }
+
+  Index vertex_of(Index corner) const {
+    const auto at = vertex_of_corner_.find(corner);
+    return at == vertex_of_corner_.end() ? kNoIndex : at->second;
+  }
+
+  // One curve
+
+  std::optional<Found> judged(std::vector<Index> path, Index c, double most) const {
+    if (path.size() < 2) return std::nullopt;
+    std::vector<Vec3> points;
+    for (Index v : path) points.push_back(graph_.position(v));
+    if (polyline_length(points) > kMostStretch * curves_[c].length()) return std::nullopt;
+    const double spacing = h_ / 4;
+    const double gap = std::max(farthest(sampled_polyline(points, spacing), trees_[c]),
+                                farthest(sampled_polyline(curves_[c].points, spacing), polyline_tree(points))) /
+                       h_;
+    if (!(gap <= most)) return std::nullopt;
+    return Found{std::move(path), gap};
+  }
+
+  FollowingCost cost_along(Index c, std::span<const Vec3> points) const {
+    return {points, edge_factors(features_.angles[c]), kSoftness * h_, kSearchReach * h_};
+  }
+
+  Course straight_course(Index c) const {
+    const FeatureCurve& curve = curves_[c];
+    Course course;
+    course.anchors = {{curve.points.front(), vertex_of(curve.vertices.front())},
+                      {curve.points.back(), vertex_of(curve.vertices.back())}};
+    course.legs.push_back(cost_along(c, curve.points));
+    return course;
+  }
+
+  /// For curves whose ends are so close that the cheapest path is a short cut.
+  Course course_by_middle(Index c) const {
+    Course course = straight_course(c);
+    const ArcLength arc(curves_[c].points);
+    course.anchors.insert(course.anchors.begin() + 1, {arc.at(arc.length() / 2), kNoIndex});
+    course.legs.clear();
+    course.legs.push_back(cost_along(c, arc.part(0, arc.length() / 2)));
+    course.legs.push_back(cost_along(c, arc.part(arc.length() / 2, arc.length())));
+    return course;
+  }
+
+  /// Around a closed curve in three legs, from its corner or its point nearest to a vertex.
+  Course round_course(Index c) const {
+    constexpr int kLegs = 3;
+    const FeatureCurve& curve = curves_[c];
+    const Index corner = curve.vertices.front(), fixed = is_corner(corner) ? vertex_of(corner) : kNoIndex;
+    std::vector<Vec3> twice = curve.points;
+    twice.insert(twice.end(), curve.points.begin() + 1, curve.points.end());
+    const ArcLength arc(twice);
+    const double length = arc.length() / 2, start = fixed == kNoIndex ? place_nearest_to_vertex(c) : 0;
+    Course course;
+    for (int k = 0; k < kLegs; ++k) {
+      const double from = start + length * k / kLegs, to = start + length * (k + 1) / kLegs;
+      course.anchors.push_back({arc.at(from), k == 0 ? fixed : kNoIndex});
+      course.legs.push_back(cost_along(c, arc.part(from, std::min(to, arc.length()))));
+    }
+    return course;
+  }
+
+  /// Returns the place along a curve that is about as near to a vertex as any.
+  double place_nearest_to_vertex(Index c) const {
+    const std::vector<Vec3> samples = sampled_polyline(curves_[c].points, h_ / 8);
+    double distance = kInfinity, place = 0, along = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      if (i > 0) along += (samples[i] - samples[i - 1]).norm();
+      const double d = (graph_.position(graph_.nearest_vertex(samples[i])) - samples[i]).norm();
+      if (d < distance) distance = d, place = along;
+    }
+    return place;
+  }
+
+  /// Returns the courses to try for a curve, in this order.
+  std::vector<Course>& courses(Index c) {
+    if (courses_[c].empty()) {
+      if (curves_[c].closed()) {
+        courses_[c].push_back(round_course(c));
+      } else {
+        courses_[c].push_back(straight_course(c));
+        courses_[c].push_back(course_by_middle(c));
+      }
+    }
+    return courses_[c];
+  }
+
+  /// Returns a vertex for each anchor: none of them twice, none occupied but fixed ones. Empty if there is none.
+  std::vector<Index> anchor_vertices(const Course& course, const Occupied& occupied) const {
+    std::vector<Index> chosen;
+    for (const Anchor& anchor : course.anchors) chosen.push_back(anchor.fixed);
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      double distance = kInfinity;
+      if (course.anchors[i].fixed != kNoIndex) continue;
+      for (Index v : graph_.vertices_near(course.anchors[i].point, kCornerReach * h_)) {
+        if (occupied.vertices[v] || std::ranges::find(chosen, v) != chosen.end()) continue;
+        const double d = (graph_.position(v) - course.anchors[i].point).norm();
+        if (d < distance) distance = d, chosen[i] = v;
+      }
+      if (chosen[i] == kNoIndex) return {};
+    }
+    return chosen;
+  }
+
+  std::vector<Index> path_on(Course& course, bool closed, const Occupied& occupied) const {
+    const std::vector<Index> anchors = anchor_vertices(course, occupied);
+    if (anchors.empty()) return {};
+    Occupied taken = occupied;
+    for (Index v : anchors) taken.vertices[v] = 1;
+    std::vector<Index> path = {anchors[0]};
+    for (std::size_t k = 0; k < course.legs.size(); ++k) {
+      const Index to = closed ? anchors[(k + 1) % anchors.size()] : anchors[k + 1];
+      const std::vector<Index> leg = cheapest_path(graph_, course.legs[k], path.back(), to, taken);
+      if (leg.size() < 2) return {};
+      taken.add(graph_, leg);
+      path.insert(path.end(), leg.begin() + 1, leg.end());
+    }
+    return path;
+  }
+
+  bool lacks_corner(Index c) const {
+    const FeatureCurve& curve = curves_[c];
+    if (curve.closed()) return false;
+    return vertex_of(curve.vertices.front()) == kNoIndex || vertex_of(curve.vertices.back()) == kNoIndex;
+  }
+
+  std::optional<Found> find(Index c, const Occupied& occupied) {
+    if (!(h_ > 0) || lacks_corner(c)) return std::nullopt;
+    for (Course& course : courses(c))
+      if (auto found = judged(path_on(course, curves_[c].closed(), occupied), c, kFollowDistance)) return found;
+    return std::nullopt;
+  }
+
+  // All curves
+
+  std::vector<Index> order_by_gap() {
+    std::vector<std::pair<double, Index>> order;
+    for (std::size_t i = 0; i < curves_.size(); ++i) {
+      const auto c = static_cast<Index>(i);
+      if (!is_eligible(c)) continue;
+      const auto found = find(c, base_);
+      if (found) alone_.push_back(c);
+      order.push_back({found ? found->gap : kInfinity, c});
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<Index> curves;
+    for (const auto& [gap, c] : order) curves.push_back(c);
+    return curves;
+  }
+
+  double total_length(const Paths& paths) const {
+    double length = 0;
+    for (std::size_t c = 0; c < paths.size(); ++c)
+      if (!paths[c].empty()) length += curves_[c].length();
+    return length;
+  }
+
+  /// Routes all curves in an order and keeps the result if it is longer than the best one. Marks those that failed.
+  std::vector<std::uint8_t> run_round(std::span<const Index> order) {
+    Paths paths(curves_.size());
+    Occupied occupied = base_;
+    std::vector<std::uint8_t> failed(curves_.size(), 0);
+    for (Index c : order) {
+      auto found = find(c, occupied);
+      failed[c] = !found;
+      if (!found) continue;
+      occupied.add(graph_, found->path);
+      paths[c] = std::move(found->path);
+    }
+    const double length = total_length(paths);
+    if (length > best_length_ + 1e-9 * h_) {
+      best_length_ = length;
+      best_ = std::move(paths);
+    }
+    return failed;
+  }
+
+  Occupied occupied_by_best() const {
+    Occupied occupied = base_;
+    for (const auto& path : best_) occupied.add(graph_, path);
+    return occupied;
+  }
+
+  std::vector<Index> lost_by_length() const {
+    std::vector<std::pair<double, Index>> lost;
+    for (std::size_t c = 0; c < curves_.size(); ++c)
+      if (best_[c].empty() && is_eligible(static_cast<Index>(c)))
+        lost.push_back({curves_[c].length(), static_cast<Index>(c)});
+    std::sort(lost.begin(), lost.end());
+    std::vector<Index> curves;
+    for (const auto& [length, c] : lost) curves.push_back(c);
+    return curves;
+  }
+
+  void fill_gaps() {
+    Occupied occupied = occupied_by_best();
+    for (Index c : lost_by_length())
+      if (auto found = find(c, occupied)) {
+        occupied.add(graph_, found->path);
+        best_[c] = std::move(found->path);
+      }
+  }
+
+  // Joins
+
+  /// Returns, for each vertex at which a path starts or ends, the vertices along it within reach of a join.
+  std::map<Index, std::vector<Index>> joinable_vertices() const {
+    std::map<Index, std::vector<Index>> vertices;
+    for (const auto& path : best_) {
+      if (path.empty() || path.front() == path.back()) continue;
+      for (std::size_t i = 1; i <= kJoinEdges && 2 * i < path.size(); ++i) {
+        vertices[path.front()].push_back(path[i]);
+        vertices[path.back()].push_back(path[path.size() - 1 - i]);
+      }
+    }
+    return vertices;
+  }
+
+  std::vector<End> possible_ends(Index c, int end, const std::map<Index, std::vector<Index>>& joinable) const {
+    const Index vertex = vertex_of(corner_at(c, end));
+    if (vertex == kNoIndex) return {};
+    std::vector<End> ends = {{vertex, false}};
+    if (const auto at = joinable.find(vertex); at != joinable.end())
+      for (Index v : at->second) ends.push_back({v, true});
+    return ends;
+  }
+
+  std::vector<Index> joining_path(Index c, const Occupied& occupied,
+                                  const std::map<Index, std::vector<Index>>& joinable) const {
+    FollowingCost cost = cost_along(c, curves_[c].points);
+    double least = kInfinity;
+    std::vector<Index> best;
+    for (const End& from : possible_ends(c, 0, joinable))
+      for (const End& to : possible_ends(c, 1, joinable)) {
+        if (from.vertex == to.vertex) continue;
+        auto found = judged(cheapest_path(graph_, cost, from.vertex, to.vertex, occupied), c, kJoinDistance);
+        if (!found) continue;
+        const double judgment = found->gap + kJoinPenalty * (from.joins + to.joins);
+        if (judgment < least) least = judgment, best = std::move(found->path);
+      }
+    return best;
+  }
+
+  void join_lost() {
+    Occupied occupied = occupied_by_best();
+    auto joinable = joinable_vertices();
+    for (Index c : lost_by_length()) {
+      if (!joinable_[c] || curves_[c].closed() || !(h_ > 0)) continue;
+      best_[c] = joining_path(c, occupied, joinable);
+      if (best_[c].empty()) continue;
+      occupied.add(graph_, best_[c]);
+      joinable = joinable_vertices();
+    }
+  }
+
+  // Report
+
+  UnfollowedCurve explained(Index c) const {
+    const FeatureCurve& curve = curves_[c];
+    const ArcLength arc(curve.points);
+    const Vec3 middle = arc.at(arc.length() / 2);
+    if (!is_eligible(c)) return {c, *reasons_[c], middle};
+    for (int end = 0; end < 2 && lacks_corner(c) && curve.length() >= h_; ++end)
+      if (vertex_of(corner_at(c, end)) == kNoIndex)
+        return {c, NotFollowed::no_vertex_at_corner, end == 0 ? curve.points.front() : curve.points.back()};
+    if (curve.length() < h_) return {c, NotFollowed::shorter_than_cell, middle};
+    if (!std::ranges::binary_search(alone_, c)) return {c, NotFollowed::no_path_nearby, middle};
+    for (int end = 0; end < 2; ++end)
+      if (is_crowded(corner_at(c, end)))
+        return {c, NotFollowed::too_many_edges_at_corner, end == 0 ? curve.points.front() : curve.points.back()};
+    return {c, NotFollowed::lost_to_neighbor, middle};
+  }
+
+  bool is_crowded(Index corner) const {
+    const Index v = vertex_of(corner);
+    const auto at = std::ranges::lower_bound(features_.curves.corners, corner);
+    if (v == kNoIndex || at == features_.curves.corners.end() || *at != corner) return false;
+    return std::ssize(graph_.edges_at(v)) < features_.curves.corner_edges[at - features_.curves.corners.begin()];
+  }
+
+  /// Records the corner at one end of a path. Returns false if the path joins another one there.
+  bool note_corner(Index c, int end, std::vector<PlacedCorner>& corners) const {
+    const Index corner = corner_at(c, end), v = end == 0 ? best_[c].front() : best_[c].back();
+    if (is_corner(corner) && vertex_of(corner) == v) corners.push_back({corner, v});
+    return curves_[c].closed() || vertex_of(corner) == v;
+  }
+
+  FeatureRouting result() const {
+    FeatureRouting routing;
+    for (std::size_t i = 0; i < curves_.size(); ++i) {
+      const auto c = static_cast<Index>(i);
+      if (best_[c].empty()) {
+        routing.unfollowed.push_back(explained(c));
+        continue;
+      }
+      routing.paths.push_back({c, best_[c]});
+      const bool front = note_corner(c, 0, routing.corners), back = note_corner(c, 1, routing.corners);
+      if (!front || !back) routing.joined.push_back(c);
+    }
+    std::ranges::sort(routing.corners, {}, &PlacedCorner::vertex);
+    const auto repeated = std::ranges::unique(routing.corners);
+    routing.corners.erase(repeated.begin(), repeated.end());
+    return routing;
+  }
+
+  const SignedFeatures& features_;
+  const std::vector<FeatureCurve>& curves_;
+  RoutingGraph graph_;
+  double h_;
+  std::vector<std::optional<NotFollowed>> reasons_;  ///< why a curve is not even tried
+  std::vector<std::uint8_t> joinable_;
+  std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed
+  Occupied base_;                             ///< the vertices of corners
+  Paths best_;
+  double best_length_ = 0;
+  std::vector<ClosestPoint> trees_;  ///< of the curves
+  std::map<Index, Index> vertex_of_corner_;
+  std::vector<Index> alone_;  ///< curves that have a path if no other one has
+};
+
+/// A path that another one joins, and how far from the corner, as a share of its length.
+struct Junction {
+  Index curve;
+  bool at_front;
+  double share;
+};
+
+std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting& routing, Index joined, Index vertex,
+                                    Index corner) {
+  for (const CreasePath& path : routing.paths) {
+    if (path.curve == joined) continue;
+    const auto at = std::ranges::find(path.vertices, vertex);
+    if (at == path.vertices.begin() || at == path.vertices.end()) continue;
+    std::vector<Vec3> points;
+    for (Index v : path.vertices) points.push_back(mesh.positions[v]);
+    const double length = polyline_length(points);
+    const double before = polyline_length(std::span(points).first(at - path.vertices.begin() + 1));
+    const auto corner_vertex = std::ranges::find(routing.corners, corner, &PlacedCorner::corner);
+    const bool at_front = corner_vertex == routing.corners.end() || corner_vertex->vertex == path.vertices.front();
+    const double share = length > 0 ? before / length : 0;
+    return Junction{path.curve, at_front, at_front ? share : 1 - share};
+  }
+  return std::nullopt;
+}
+
+/// Replaces the beginning of a curve, as far as the junction lies from the corner, by the junction.
+void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, const Junction& junction) {
+  const ArcLength arc(other.points), own(curve.points);
+  const double before = junction.share * arc.length();
+  const double most = 0.5 * own.length();  // the rest must not vanish
+  std::vector<Vec3> points = own.part(std::min(before, most), own.length());
+  points.front() = arc.at(junction.at_front ? before : arc.length() - before);
+  curve.points = std::move(points);
+}
+
+}  // namespace
+
+std::string to_string(NotFollowed reason) {
+  switch (reason) {
+    case NotFollowed::excluded: return "excluded";
+    case NotFollowed::too_acute: return "too acute";
+    case NotFollowed::shorter_than_cell: return "shorter than a cell";
+    case NotFollowed::no_vertex_at_corner: return "no vertex near its corner";
+    case NotFollowed::too_many_edges_at_corner: return "too many sharp edges at its corner";
+    case NotFollowed::no_path_nearby: return "no path nearby";
+    case NotFollowed::lost_to_neighbor: return "lost to a neighbor";
+  }
+  return "unknown";
+}
+
+FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options) {
+  return Router(mesh, features, options).run();
+}
+
+FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing) {
+  FeatureCurves result = features.curves;
+  for (Index c : routing.joined) {
+    const auto path = std::ranges::lower_bound(routing.paths, c, {}, &CreasePath::curve);
+    FeatureCurve& curve = result.curves[c];
+    for (int end = 0; end < 2; ++end) {
+      const Index vertex = end == 0 ? path->vertices.front() : path->vertices.back();
+      const Index corner = end == 0 ? curve.vertices.front() : curve.vertices.back();
+      const bool at_corner = std::ranges::find(routing.corners, PlacedCorner{corner, vertex}) != routing.corners.end();
+      const auto junction = at_corner ? std::nullopt : junction_at(mesh, routing, c, vertex, corner);
+      if (!junction) continue;
+      if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
+      start_at_junction(curve, features.curves.curves[junction->curve], *junction);
+      if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
+    }
+    // Only the ends' numbers still matter: they tell open curves from closed ones.
+    const Index last = curve.vertices.back();
+    curve.vertices.resize(curve.points.size(), last);
+    curve.vertices.back() = last;
+  }
+  return result;
+}
+
+}  // namespace subvol

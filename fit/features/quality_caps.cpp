@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/quality_caps.h"
+
+#include "subvol/base/error.h"
+#include "subvol/mesh/mesh_topology.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+/// Share of the best possible scaled Jacobian that is asked for.
+constexpr double kReachable = 0.93;
+/// Bound at corners of several cells; with 0.55 a pyramid got 0.53, with this 0.66.
+constexpr double kCornerCap = 0.8;
+/// Distance, as a share of a curve's length, at which its direction at a corner is measured.
+constexpr double kDirectionShare = 0.05;
+
+void require_curves(const PatchedMesh& patched, const SignedFeatures& features) {
+  for (const CreasePath& path : patched.paths)
+    if (path.curve < 0 ||
+        static_cast<std::size_t>(path.curve) >= std::min(features.angles.size(), features.curves.curves.size()))
+      throw InputError("quality_caps: there is no curve " + std::to_string(path.curve));
+}
+
+double edge_cap(double angle, int cells) {
+  const double part = std::min(180.0, angle / cells);
+  return kReachable * std::max(0.0, std::sin(part * std::numbers::pi / 180));
+}
+
+std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+  const MeshTopology topology(patched.mesh);
+  std::vector<EdgeCap> caps;
+  for (const CreasePath& path : patched.paths)
+    for (Index edge : edges_of_path(topology, path.vertices))
+      caps.push_back({topology.edge(edge), edge_cap(features.angles[path.curve], topology.num_edge_cells(edge))});
+  std::ranges::sort(caps, {}, &EdgeCap::ends);
+  return caps;
+}
+
+/// Directions of the curves whose paths end at each vertex.
+std::map<Index, std::vector<Vec3>> directions_at_ends(const PatchedMesh& patched, const SignedFeatures& features) {
+  std::map<Index, std::vector<Vec3>> directions;
+  for (const CreasePath& path : patched.paths) {
+    const FeatureCurve& curve = features.curves.curves[path.curve];
+    const double reach = kDirectionShare * curve.length();
+    directions[path.vertices.front()].push_back(direction_at_end(curve, true, reach));
+    directions[path.vertices.back()].push_back(direction_at_end(curve, false, reach));
+  }
+  return directions;
+}
+
+std::vector<VertexCap> corner_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+  std::vector<int> cells(patched.mesh.num_vertices(), 0);
+  for (Index v : patched.mesh.cell_vertices) ++cells[v];
+  const auto directions = directions_at_ends(patched, features);
+  std::vector<VertexCap> caps;
+  for (const PlacedCorner& corner : patched.corners) {
+    const auto at = directions.find(corner.vertex);
+    if (at == directions.end() || at->second.size() < 3) continue;
+    const auto& t = at->second;
+    const double best = std::abs(t[0].dot(t[1].cross(t[2])));
+    caps.push_back({corner.vertex, cells[corner.vertex] == 1 ? kReachable * best : kCornerCap});
+  }
+  return caps;
+}
+
+}  // namespace
+
+QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features) {
+  require_curves(patched, features);
+  return {edge_caps(patched, features), corner_caps(patched, features)};
+}
+
+}  // namespace subvol

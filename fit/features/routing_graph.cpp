@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/routing_graph.h"
+
+#include "fit/features/feature_curves.h"
+#include "subvol/base/error.h"
+#include "subvol/mesh/mesh_topology.h"
+
+#include <algorithm>
+#include <cassert>
+#include <limits>
+#include <queue>
+#include <string>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+RoutingGraph::RoutingGraph(const VolumeMesh& mesh) : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0) {
+  const MeshTopology topology(mesh);
+  for (std::size_t e = 0; e < topology.num_edges(); ++e)
+    if (const auto edge = static_cast<Index>(e); topology.is_boundary_edge(edge))
+      edges_.push_back({topology.edge(edge), topology.num_edge_cells(edge)});
+  for (const Edge& edge : edges_)
+    for (Index v : edge.ends) ++offsets_[v + 1];
+  for (std::size_t v = 0; v + 1 < offsets_.size(); ++v) {
+    if (offsets_[v + 1] > 0) vertices_.push_back(static_cast<Index>(v));
+    offsets_[v + 1] += offsets_[v];
+  }
+  around_.resize(2 * edges_.size());
+  std::vector<std::size_t> next(offsets_.begin(), offsets_.end() - 1);
+  for (std::size_t e = 0; e < edges_.size(); ++e)
+    for (Index v : edges_[e].ends) around_[next[v]++] = static_cast<Index>(e);
+  std::vector<Vec3> sites;
+  for (Index v : vertices_) {
+    if (!position(v).allFinite())
+      throw InputError("route_features: the position of vertex " + std::to_string(v) + " is not finite");
+    sites.push_back(position(v));
+  }
+  for (const Edge& edge : edges_) edge_length_ += (position(edge.ends[1]) - position(edge.ends[0])).norm();
+  if (!edges_.empty()) edge_length_ /= static_cast<double>(edges_.size());
+  if (!sites.empty()) tree_ = SiteTree(sites);
+}
+
+Index RoutingGraph::edge_between(Index v, Index w) const {
+  for (Index e : edges_at(v))
+    if (other_end(e, v) == w) return e;
+  assert(false);
+  return kNoIndex;
+}
+
+std::vector<Index> RoutingGraph::vertices_near(const Vec3& point, double distance) const {
+  constexpr double kRoom = 1.01;  // the tree rounds differently
+  std::vector<Index> places, found;
+  const SiteTree::Ball ball{point, kRoom * distance * distance};
+  if (!vertices_.empty()) tree_.gather({&ball, 1}, vertices_.size(), places);
+  for (Index place : places)
+    if (const Index v = vertices_[tree_.site(place)]; (position(v) - point).norm() <= distance) found.push_back(v);
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+void Occupied::add(const RoutingGraph& graph, std::span<const Index> path) {
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    vertices[path[i]] = 1;
+    if (i > 0) edges[graph.edge_between(path[i - 1], path[i])] = 1;
+  }
+}
+
+FollowingCost::FollowingCost(std::span<const Vec3> points, std::array<double, 3> factors, double softness, double reach)
+    : tree_(polyline_tree(points)), factors_(factors), softness_(softness), reach_(reach) {}
+
+double FollowingCost::squared_distance(const Vec3& p) const {
+  const double distance = tree_.closest(p).distance;
+  return distance * distance;
+}
+
+double FollowingCost::operator()(const RoutingGraph& graph, Index edge) {
+  const auto [at, added] = costs_.try_emplace(edge, kInfinity);
+  if (!added) return at->second;
+  const RoutingGraph::Edge& e = graph.edges()[edge];
+  const Vec3 &a = graph.position(e.ends[0]), &b = graph.position(e.ends[1]);
+  const double da = squared_distance(a), db = squared_distance(b), middle = squared_distance(0.5 * (a + b));
+  if (std::max(da, db) > reach_ * reach_) return kInfinity;
+  const double mean = (da + 2 * middle + db) / 4 + softness_ * softness_;
+  at->second = (b - a).norm() * mean * factors_[std::clamp(e.cells, 1, 3) - 1];
+  return at->second;
+}
+
+std::vector<Index> cheapest_path(const RoutingGraph& graph, FollowingCost& cost, Index from, Index to,
+                                 const Occupied& occupied) {
+  struct Reached {
+    double cost;
+    Index from;
+  };
+  std::unordered_map<Index, Reached> reached = {{from, {0, kNoIndex}}};
+  using Entry = std::pair<double, Index>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
+  queue.push({0, from});
+  while (!queue.empty()) {
+    const auto [so_far, v] = queue.top();
+    queue.pop();
+    if (v == to) break;
+    if (so_far > reached.at(v).cost) continue;
+    for (Index e : graph.edges_at(v)) {
+      const Index w = graph.other_end(e, v);
+      if (occupied.edges[e] || (w != to && occupied.vertices[w])) continue;
+      const double next = so_far + cost(graph, e);
+      if (next == kInfinity) continue;
+      const auto [at, added] = reached.try_emplace(w, Reached{kInfinity, kNoIndex});
+      if (next >= at->second.cost) continue;
+      at->second = {next, v};
+      queue.push({next, w});
+    }
+  }
+  if (!reached.contains(to)) return {};
+  std::vector<Index> path = {to};
+  while (path.back() != from) path.push_back(reached.at(path.back()).from);
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
+}  // namespace subvol

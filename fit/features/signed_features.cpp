@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/signed_features.h"
+
+#include "subvol/base/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <tuple>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// One side of one triangle.
+struct Side {
+  std::array<Index, 2> ends;  ///< the smaller number first
+  Index triangle;
+  bool rising;  ///< the triangle runs from ends[0] to ends[1]
+};
+
+void require_triangles(const TriangleMesh& mesh) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (Index v : mesh.triangles[t])
+      if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size())
+        throw InputError("signed_features: triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
+                         " of " + std::to_string(mesh.positions.size()));
+}
+
+std::vector<Side> sorted_sides(const TriangleMesh& mesh) {
+  std::vector<Side> sides;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int i = 0; i < 3; ++i) {
+      const Index v = mesh.triangles[t][i], w = mesh.triangles[t][(i + 1) % 3];
+      sides.push_back({{std::min(v, w), std::max(v, w)}, static_cast<Index>(t), v < w});
+    }
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.ends, a.triangle, a.rising) < std::tie(b.ends, b.triangle, b.rising);
+  });
+  return sides;
+}
+
+std::span<const Side> sides_at(std::span<const Side> sides, Index v, Index w) {
+  const std::array<Index, 2> ends = {std::min(v, w), std::max(v, w)};
+  const auto found = std::ranges::equal_range(sides, ends, {}, &Side::ends);
+  return {found.begin(), found.end()};
+}
+
+Vec3 unit_normal(const TriangleMesh& mesh, Index triangle) {
+  const auto& [a, b, c] = mesh.triangles[triangle];
+  return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
+}
+
+double interior_angle(const TriangleMesh& mesh, std::span<const Side> pair) {
+  const Side &left = pair[0].rising ? pair[0] : pair[1], &right = pair[0].rising ? pair[1] : pair[0];
+  const Vec3 along = mesh.positions[left.ends[1]] - mesh.positions[left.ends[0]];
+  const Vec3 n0 = unit_normal(mesh, left.triangle), n1 = unit_normal(mesh, right.triangle);
+  const Vec3 axis = n0.cross(n1);
+  const double turn = std::atan2(axis.norm(), n0.dot(n1)) * 180 / std::numbers::pi;
+  return axis.dot(along) >= 0 ? 180 - turn : 180 + turn;
+}
+
+std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const Side> sides, const FeatureCurve& curve) {
+  std::vector<double> angles;
+  for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
+    const Index v = curve.vertices[i], w = curve.vertices[i + 1];
+    const std::span<const Side> pair = sides_at(sides, v, w);
+    if (pair.size() != 2 || pair[0].rising == pair[1].rising)
+      throw InputError("signed_features: a curve runs along vertices " + std::to_string(v) + " and " +
+                       std::to_string(w) + ", which is no edge of two consistently oriented triangles");
+    angles.push_back(interior_angle(mesh, pair));
+  }
+  return angles;
+}
+
+std::vector<std::array<Index, 2>> sorted_curve_edges(const FeatureCurves& curves) {
+  std::vector<std::array<Index, 2>> edges;
+  for (const FeatureCurve& curve : curves.curves)
+    for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
+      const auto [low, high] = std::minmax(curve.vertices[i], curve.vertices[i + 1]);
+      edges.push_back({low, high});
+    }
+  std::sort(edges.begin(), edges.end());
+  return edges;
+}
+
+Index root(std::vector<Index>& parent, Index t) {
+  while (parent[t] != t) t = parent[t] = parent[parent[t]];
+  return t;
+}
+
+void find_regions(const TriangleMesh& mesh, std::span<const Side> sides, SignedFeatures& features) {
+  std::vector<Index> parent(mesh.triangles.size());
+  for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = static_cast<Index>(t);
+  const auto cuts = sorted_curve_edges(features.curves);
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    if (sides[i].ends != sides[i + 1].ends || std::binary_search(cuts.begin(), cuts.end(), sides[i].ends)) continue;
+    const Index a = root(parent, sides[i].triangle), b = root(parent, sides[i + 1].triangle);
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  features.regions.resize(parent.size());
+  for (std::size_t t = 0; t < parent.size(); ++t) {
+    const Index first = root(parent, static_cast<Index>(t));
+    features.regions[t] =
+        static_cast<std::size_t>(first) == t ? static_cast<Index>(features.num_regions++) : features.regions[first];
+  }
+}
+
+/// Length-weighted mean; the plain one if all segments are points.
+double mean_of(const FeatureCurve& curve, std::span<const double> angles) {
+  double sum = 0, length = 0, plain = 0;
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    const double l = (curve.points[i + 1] - curve.points[i]).norm();
+    sum += l * angles[i];
+    length += l;
+    plain += angles[i] / static_cast<double>(angles.size());
+  }
+  return length > 0 ? sum / length : plain;
+}
+
+}  // namespace
+
+SignedFeatures signed_features(const TriangleMesh& target, FeatureCurves curves) {
+  require_triangles(target);
+  const std::vector<Side> sides = sorted_sides(target);
+  SignedFeatures features;
+  features.curves = std::move(curves);
+  for (const FeatureCurve& curve : features.curves.curves) {
+    features.segment_angles.push_back(angles_along(target, sides, curve));
+    features.angles.push_back(mean_of(curve, features.segment_angles.back()));
+  }
+  find_regions(target, sides, features);
+  return features;
+}
+
+Vec3 direction_at_end(const FeatureCurve& curve, bool from_front, double reach) {
+  const std::size_t last = curve.points.size() - 1;
+  const Vec3& origin = curve.points[from_front ? 0 : last];
+  for (std::size_t i = 1; i <= last; ++i) {
+    const Vec3 step = curve.points[from_front ? i : last - i] - origin;
+    if (step.norm() > reach || i == last) return step.normalized();
+  }
+  return Vec3::Zero();
+}
+
+}  // namespace subvol

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/features/feature_routing.h"
+#include "subvol/base/error.h"
+#include "tests/support/feature_fixtures.h"
+
+#include <omp.h>
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <set>
+
+using namespace subvol;
+using namespace subvol::test;
+
+namespace {
+
+/// A block of n^3 cells with a smaller one of half the width and the given height on its top, both in one piece.
+TriangleMesh block_with_step(double height) {
+  VolumeMesh mesh = voxels(4, 4, 5, [](int i, int j, int k) { return k < 4 || (i < 2 && j < 2); });
+  for (Vec3& p : mesh.positions) p = Vec3(p.x() / 2 - 1, p.y() / 2 - 1, p.z() > 4 ? 1 + height : p.z() / 2 - 1);
+  return surface_of(mesh);
+}
+
+/// No edge, and no vertex but the ends, is in two paths.
+void require_apart(const FeatureRouting& routing) {
+  std::set<Index> inner;
+  std::set<std::array<Index, 2>> edges;
+  for (const CreasePath& path : routing.paths)
+    for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i) {
+      const auto [v, w] = std::minmax(path.vertices[i], path.vertices[i + 1]);
+      CHECK(edges.insert({v, w}).second);
+      if (i > 0) CHECK(inner.insert(path.vertices[i]).second);
+    }
+  for (const CreasePath& path : routing.paths)
+    if (!std::ranges::binary_search(routing.joined, path.curve) && path.vertices.front() != path.vertices.back())
+      for (Index end : {path.vertices.front(), path.vertices.back()}) CHECK_FALSE(inner.contains(end));
+}
+
+}  // namespace
+
+TEST_CASE("a lattice in a cube follows all of its edges, corner to corner") {
+  const TriangleMesh target = cube_surface(2, false);
+  const RoutedLattice cube(target, 4);
+  REQUIRE(cube.routing.paths.size() == 12);
+  CHECK(cube.routing.unfollowed.empty());
+  CHECK(cube.routing.joined.empty());
+  CHECK(cube.routing.corners.size() == 8);
+  require_apart(cube.routing);
+  for (const CreasePath& path : cube.routing.paths) {
+    CHECK(path.vertices.size() == 5);
+    const FeatureCurve& curve = cube.features.curves.curves[path.curve];
+    CHECK(cube.fitted.positions[path.vertices.front()].isApprox(curve.points.front()));
+    CHECK(cube.fitted.positions[path.vertices.back()].isApprox(curve.points.back()));
+  }
+  for (const PlacedCorner& placed : cube.routing.corners)
+    CHECK(cube.fitted.positions[placed.vertex].isApprox(target.positions[placed.corner]));
+}
+
+TEST_CASE("paths follow the edges of a prism, a tetrahedron and the rims of a cylinder") {
+  CHECK(RoutedLattice(prism_surface(3, 0.2), 6).routing.unfollowed.empty());
+  CHECK(RoutedLattice(tetrahedron_surface(), 6).routing.unfollowed.empty());
+  const RoutedLattice cylinder(prism_surface(32), 4);
+  REQUIRE(cylinder.features.angles.size() == 2);
+  REQUIRE(cylinder.routing.paths.size() == 2);
+  CHECK(cylinder.routing.corners.empty());
+  for (const CreasePath& path : cylinder.routing.paths) {
+    CHECK(path.vertices.size() == 17);
+    CHECK(path.vertices.front() == path.vertices.back());
+  }
+  require_apart(cylinder.routing);
+}
+
+TEST_CASE("the reflex edge of an L prefers the edge of three cells") {
+  // The target's reflex edge lies halfway between that edge and those of two cells beside it.
+  VolumeMesh mesh = voxels(6, 6, 6, [](int i, int j, int) { return i < 3 || j < 3; });
+  TriangleMesh target = surface_of(mesh);
+  for (Vec3& p : target.positions)
+    if (p.x() == 3 && p.y() >= 3) p.x() = 2.5;
+  const SignedFeatures features = features_of(target);
+  const FeatureRouting routing = route_features(mesh, features);
+  CHECK(routing.unfollowed.empty());
+  const MeshTopology topology(mesh);
+  for (const CreasePath& path : routing.paths)
+    for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i)
+      CHECK(topology.num_edge_cells(topology.find_edge(path.vertices[i], path.vertices[i + 1])) ==
+            (features.is_convex(path.curve) ? 1 : 3));
+}
+
+TEST_CASE("curves that are not followed have a reason and a place") {
+  const VolumeMesh mesh = centred_lattice(4);
+  const auto reasons = [&](const TriangleMesh& target, const RoutingOptions& options = {}) {
+    std::map<NotFollowed, int> count;
+    const SignedFeatures features = features_of(target);
+    const FeatureRouting routing = route_features(mesh, features, options);
+    CHECK(routing.paths.size() + routing.unfollowed.size() == features.angles.size());
+    for (const UnfollowedCurve& lost : routing.unfollowed) {
+      ++count[lost.reason];
+      const ClosestPoint tree = polyline_tree(features.curves.curves[lost.curve].points);
+      CHECK(tree.closest(lost.place).distance < 1e-12);
+      CHECK_FALSE(to_string(lost.reason).empty());
+    }
+    return count;
+  };
+  CHECK(reasons(cube_surface(2, false)).empty());
+  CHECK(reasons(block_with_step(0.1)).count(NotFollowed::shorter_than_cell) == 1);
+  TriangleMesh far = cube_surface(2, false);
+  for (Vec3& p : far.positions) p.x() += 10;
+  CHECK(reasons(far) == std::map<NotFollowed, int>{{NotFollowed::no_vertex_at_corner, 12}});
+  RoutingOptions options;
+  options.excluded.assign(12, 0);
+  options.excluded[3] = 1;
+  CHECK(reasons(cube_surface(2, false), options) == std::map<NotFollowed, int>{{NotFollowed::excluded, 1}});
+  // A wedge of 10 degrees.
+  TriangleMesh wedge = prism_surface(3);
+  for (Vec3& p : wedge.positions) p.y() *= 0.15;
+  CHECK(reasons(wedge)[NotFollowed::too_acute] == 1);
+}
+
+TEST_CASE("where a vertex has fewer edges than its corner, a curve joins its neighbor") {
+  // A cube whose top has a ridge from corner to corner; the corner vertices of its lattice have three edges.
+  const auto ridged = [](VolumeMesh mesh) {
+    for (Vec3& p : mesh.positions)
+      if (p.z() > -1) p.z() -= (p.z() + 1) / 4 * std::abs(p.x() - p.y());
+    return mesh;
+  };
+  const VolumeMesh fitted = ridged(centred_lattice(6));
+  TriangleMesh target = surface_of(ridged(centred_lattice(1)));
+  const SignedFeatures features = features_of(target);
+  REQUIRE(features.angles.size() == 13);
+  const FeatureRouting routing = route_features(fitted, features);
+  CHECK(routing.paths.size() == 13);
+  REQUIRE(routing.joined.size() == 1);
+  require_apart(routing);
+  const FeatureCurves parts = followed_parts(fitted, features, routing);
+  for (std::size_t c = 0; c < parts.curves.size(); ++c) {
+    const FeatureCurve &part = parts.curves[c], &whole = features.curves.curves[c];
+    const bool is_joined = static_cast<Index>(c) == routing.joined[0];
+    CHECK((part.points == whole.points) == !is_joined);
+    CHECK_FALSE(part.closed());
+    CHECK(part.vertices.size() == part.points.size());
+    if (!is_joined) continue;
+    // Both ends are on curves whose paths it joins.
+    double nearest = 1;
+    for (std::size_t other = 0; other < parts.curves.size(); ++other)
+      if (other != c)
+        nearest = std::min(nearest, polyline_tree(parts.curves[other].points).closest(part.points[0]).distance);
+    CHECK(nearest < 1e-12);
+    CHECK(part.length() < whole.length() + 0.5);
+  }
+  RoutingOptions options;
+  options.not_joined.assign(13, 1);
+  const FeatureRouting apart = route_features(fitted, features, options);
+  CHECK(apart.joined.empty());
+  REQUIRE(apart.unfollowed.size() == 1);
+  CHECK(apart.unfollowed[0].curve == routing.joined[0]);
+}
+
+TEST_CASE("routing is the same for any number of threads") {
+  const int threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const FeatureRouting one = RoutedLattice(tetrahedron_surface(), 5).routing;
+  omp_set_num_threads(3);
+  const FeatureRouting three = RoutedLattice(tetrahedron_surface(), 5).routing;
+  omp_set_num_threads(threads);
+  REQUIRE(one.paths.size() == three.paths.size());
+  for (std::size_t i = 0; i < one.paths.size(); ++i) CHECK(one.paths[i].vertices == three.paths[i].vertices);
+  CHECK(one.corners == three.corners);
+}
+
+TEST_CASE("routing refuses options of another size and positions that are not finite") {
+  const SignedFeatures features = features_of(cube_surface(2, false));
+  VolumeMesh mesh = centred_lattice(2);
+  RoutingOptions options;
+  options.excluded.assign(11, 0);
+  CHECK_THROWS_AS(route_features(mesh, features, options), InputError);
+  mesh.positions[0].x() = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(route_features(mesh, features), InputError);
+  CHECK(route_features(centred_lattice(2), {}).paths.empty());
+}
