@@ -3,21 +3,25 @@
 
 #include "fit/certificate/certificate.h"
 #include "fit/elements/boundary_samples.h"
+#include "fit/features/crisp_edges.h"
+#include "fit/features/edge_layout.h"
 #include "fit/fits/smooth_refinement.h"
 #include "fit/geometry/boundary_triangles.h"
+#include "fit/geometry/self_intersection.h"
 #include "fit/quality/quality.h"
 #include "fit/target/fit_target.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
-#include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/auto_template.h"
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <functional>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -28,6 +32,9 @@ namespace {
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
 constexpr double kMostQuality = 0.8;
+constexpr double kGoodMerit = 0.1;           // no other template is tried below it
+/// Numbers of cells that are tried for parts with edges if none is given.
+constexpr std::size_t kFirstEdgeCells = 3000, kSecondEdgeCells = 10000, kLastEdgeCells = 30000;
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
 constexpr double kMaxMargin = 0.8;
 
@@ -45,18 +52,49 @@ void check(const AutomaticFitOptions& options) {
     in_range("cells", static_cast<double>(*options.cells), kChildren * kLeastTemplateCells, 1e9);
 }
 
+/// The state of the sharp edges of a target.
+struct Edges {
+  TriangleMesh mesh;        ///< the target's triangles, oriented outward, in normalized coordinates
+  SignedFeatures features;  ///< no curves: there is nothing to follow
+};
+
 /// One attempt: a template of at most so many cells, and the number of times it is subdivided.
 struct Attempt {
+  enum class Kind {
+    smooth,    ///< a pillowed template
+    edges,     ///< a padded grid
+    aligned    ///< a padded grid through the target's planes
+  };
+  Kind kind;
   std::size_t template_cells;
   int levels;
 };
 
-std::vector<Attempt> attempts_of(const AutomaticFitOptions& options) {
-  if (options.cells) return {{*options.cells / kChildren, 1}, {*options.cells, 0}};
+std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
+  using Kind = Attempt::Kind;
+  if (has_edges) {
+    std::vector<std::size_t> counts{kFirstEdgeCells, kSecondEdgeCells, kLastEdgeCells};
+    if (options.cells) counts = {*options.cells};
+    std::vector<Attempt> attempts;
+    for (const std::size_t cells : counts)
+      for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0});
+    return attempts;
+  }
+  if (options.cells)
+    return {{Kind::smooth, *options.cells / kChildren, 1}, {Kind::smooth, *options.cells, 0}};
   std::vector<Attempt> attempts;
   for (const std::size_t cells : {kFirstAutomaticCells, kSecondAutomaticCells, kLastAutomaticCells})
-    attempts.push_back({cells / kChildren, 1});
+    attempts.push_back({Kind::smooth, cells / kChildren, 1});
   return attempts;
+}
+
+/// Returns the surface to fit: where edges are to be followed, the solid's boundary, whose triangles agree about what is
+/// inside.
+TriangleMesh surface_to_fit(const TriangleMesh& target, const AutomaticFitOptions& options) {
+  if (!options.crease_angle_degrees) return target;
+  const FeatureCurves curves = feature_curves(target, *options.crease_angle_degrees);
+  const bool follows = options.follows_all_edges ? !curves.empty() : edge_crispness(target, curves).is_designed();
+  return follows ? solid_boundary(target).surface : target;
 }
 
 /// An automatic fit, in normalized coordinates.
@@ -64,79 +102,80 @@ class AutomaticFit {
  public:
   AutomaticFit(const TriangleMesh& target, const AutomaticFitOptions& options)
       : options_((check(options), options)),
-        original_(target),
-        target_(target),
+        original_(surface_to_fit(target, options)),
+        target_(original_),
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
                  options.cancelled, options.log}) {}
   AutomaticFitResult run();
 
  private:
+  void find_edges();
   bool run_attempt(const Attempt& attempt);
-  bool make_template(const Attempt& attempt);
-  std::optional<VolumeMesh> make_pillowed(std::size_t cells);
+  bool run_smooth(const Attempt& attempt);
+  bool run_edges(const Attempt& attempt);
+  bool route_and_fit(const VolumeMesh& grid, std::span<const Vec3> fitted, AutomaticFitTrial trial);
+  std::vector<double> faults_of_cells() const;
+  std::optional<VolumeMesh> make_template(AutoTemplateOptions options);
+  std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
   bool fit_level(int level, const QualitySchedule& schedule, const char* what);
-  bool find_creases(int level);
-  void set_caps(QualityEnergy& energy, int level) const;
-  void refine();
   void judge(AutomaticFitTrial trial);
+  void note_missed_edges();
   void conclude();
-  bool is_good() const { return !result_.trials.empty() && result_.trials[result_.chosen].merit == 0; }
+  bool is_good() const { return !result_.trials.empty() && result_.trials[result_.chosen].merit < kGoodMerit; }
 
   AutomaticFitOptions options_;
-  const TriangleMesh& original_;
+  TriangleMesh original_;
   FitTarget target_;
+  Edges edges_;
   VolumeMesh mesh_;
-  FollowedCreases creases_;
+  std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
   AutomaticFitResult result_;
   double fraction_ = 0;
-  double least_share_ = 1;         ///< of the goal that the last level reached, at caps of the lower goal there
+  double least_share_ = 1;            ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
 
-std::optional<VolumeMesh> AutomaticFit::make_pillowed(std::size_t cells) {
-  AutoTemplateOptions options{.cells = cells, .pillow = true};
+void AutomaticFit::find_edges() {
+  edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
+  if (!options_.crease_angle_degrees) return;
+  FeatureCurves curves = feature_curves(edges_.mesh, *options_.crease_angle_degrees);
+  if (curves.empty()) return;
+  if (!options_.follows_all_edges && !edge_crispness(edges_.mesh, curves).is_designed()) return;
+  edges_.features = signed_features(edges_.mesh, std::move(curves));
+}
+
+/// Returns nothing if the fit must end.
+std::optional<VolumeMesh> AutomaticFit::make_template(AutoTemplateOptions options) {
   options.progress = [this](double fraction) {
     return !runner_.is_to_end() && (!options_.progress || options_.progress({"template", 0, 0, fraction, fraction_}));
   };
   AutoTemplateResult made = auto_templates(original_, options, 1);
   result_.topology = made.wanted;
-  if (made.cancelled) return std::nullopt;
+  if (made.cancelled) {
+    if (runner_.in_time("the template", result_.report)) {
+      result_.report.stop_reason = StopReason::cancelled;
+      result_.report.explanation = "cancelled in the template";
+    }
+    return std::nullopt;
+  }
   if (made.templates.empty())
-    throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(cells) + " cells, has its " +
-                     to_string(made.wanted) + "; give a --template");
+    throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(options.cells) +
+                     " cells, has its " + to_string(made.wanted) + "; give a --template");
+  target_.normalisation.take_in(made.templates.front().mesh);
   return std::move(made.templates.front().mesh);
 }
 
-/// Makes a template of at most as many cells as the attempt allows, if there is one. Returns false if the fit must end.
-bool AutomaticFit::make_template(const Attempt& attempt) {
+/// Makes a pillowed template of at most so many cells, if there is one. Returns nothing if the fit must end.
+std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cells) {
   constexpr int kTries = 3;
-  double asked = kRoomForTemplates * static_cast<double>(attempt.template_cells);
-  for (int trial = 0; trial < kTries; ++trial) {
+  constexpr double kLess = 0.97;
+  double asked = kRoomForTemplates * static_cast<double>(cells);
+  for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
-    std::optional<VolumeMesh> made = make_pillowed(count);
-    if (!made) {
-      if (runner_.in_time("the template", result_.report)) {
-        result_.report.stop_reason = StopReason::cancelled;
-        result_.report.explanation = "cancelled in the template";
-      }
-      return false;
-    }
-    mesh_ = std::move(*made);
-    if (mesh_.num_cells() <= attempt.template_cells || count == kLeastTemplateCells) break;
-    asked *= 0.97 * static_cast<double>(attempt.template_cells) / static_cast<double>(mesh_.num_cells());
+    std::optional<VolumeMesh> made = make_template({.cells = count, .pillow = true});
+    if (!made || made->num_cells() <= cells || count == kLeastTemplateCells || trial == kTries) return made;
+    asked *= kLess * static_cast<double>(cells) / static_cast<double>(made->num_cells());
   }
-  target_.normalisation.take_in(mesh_);
-  return true;
-}
-
-void AutomaticFit::set_caps(QualityEnergy& energy, int) const {
-  // A pillow puts every sharp edge between two cells, and every corner of a cube between three.
-  constexpr double kEdgeCap = 0.6, kCornerCap = 0.55;
-  std::vector<EdgeCap> edges;
-  std::vector<VertexCap> corners;
-  for (const CreaseEdge& crease : mesh_.tags.creases) edges.push_back({{crease.v0, crease.v1}, kEdgeCap});
-  for (const CornerVertex& corner : mesh_.tags.corners) corners.push_back({corner.vertex, kCornerCap});
-  energy.set_caps(edges, corners);
 }
 
 /// Fits the present mesh. Returns false if the fit must end.
@@ -148,13 +187,18 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1);
-  const auto creases = [&](double width) {
-    return creases_.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
-  };
-  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {},
-                       {std::move(samples.positions), {}, samples.triangles, samples.triangle_faces}, target_.surface,
-                       mesh_.tags.creases.empty() ? std::function<CreaseEnergy(double)>{} : creases);
-  set_caps(stages.energy(), level);
+  QualityBoundary boundary{std::move(samples.positions), {}, samples.triangles, samples.triangle_faces};
+  std::function<CreaseEnergy(double)> creases;
+  if (layout_) {
+    boundary.group_of_face = layout_->group_of_face;
+    boundary.group_of_triangle = layout_->group_of_triangle;
+    if (!mesh_.tags.creases.empty())
+      creases = [&](double width) {
+        return layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
+      };
+  }
+  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
+  if (layout_) stages.energy().set_caps(layout_->caps.edges, layout_->caps.vertices);
   StageRecord record;
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
@@ -164,22 +208,9 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   return going;
 }
 
-/// Looks for the sharp edges of the target on a mesh that was fitted without them. Returns false if the fit must end.
-bool AutomaticFit::find_creases(int level) {
-  if (!fit_level(level, smooth_quality_schedule(), ", without creases")) return false;
-  creases_ = FollowedCreases(target_.mesh, *options_.crease_angle_degrees, mesh_);
-  return true;
-}
-
-void AutomaticFit::refine() {
-  VolumeMesh fine = smooth_refinement(mesh_);
-  creases_.refine(parents_of_creases(fine.tags, mesh_.tags));
-  mesh_ = std::move(fine);
-}
-
 /// Measures the present mesh and keeps it if it is the best.
 void AutomaticFit::judge(AutomaticFitTrial trial) {
-  constexpr double kQualityWeight = 5;
+  constexpr double kQualityWeight = 5, kEdgeWeight = 3, kMeets = 1, kUncertified = 10;
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
@@ -191,34 +222,121 @@ void AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.least_share = least_share_;
   trial.uncertified = quality.certificate.not_certified.size();
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report).value_or(0);
+  std::optional<CreaseDistance> creases;
+  if (!edges_.features.curves.empty()) {
+    const std::vector<CreaseSegment> none;
+    creases = crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
+    creases->farthest = target_.normalisation.from_unit({creases->farthest})[0];
+    trial.curves = creases->num_curves;
+    trial.followed_curves = creases->num_followed;
+    trial.within_share = creases->within_share();
+  }
   trial.merit = std::max(0.0, trial.max_percent / options_.max_tolerance_percent - 1) +
                 std::max(0.0, trial.mean_percent / options_.mean_tolerance_percent - 1) +
-                kQualityWeight * (1 - trial.least_share) +
-                (trial.self_intersections > 0 ? 1 : 0) + (trial.uncertified > 0 ? 10 : 0);
+                kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
+                (trial.self_intersections > 0 ? kMeets : 0) + (trial.uncertified > 0 ? kUncertified : 0);
   result_.trials.push_back(trial);
   if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return;
   result_.chosen = result_.trials.size() - 1;
   result_.mesh = mesh_;
+  result_.report.creases = creases;
+  note_missed_edges();
 }
 
-/// Returns false if the fit must end.
-bool AutomaticFit::run_attempt(const Attempt& attempt) {
-  creases_ = {};
-  if (!make_template(attempt)) return false;
+void AutomaticFit::note_missed_edges() {
+  result_.missed_edges.clear();
+  if (!layout_) return;
+  for (const UnfollowedCurve& curve : layout_->routing.unfollowed)
+    result_.missed_edges.push_back({curve.reason, target_.normalisation.from_unit({curve.place})[0],
+                                    100 * edges_.features.curves.curves[curve.curve].length()});
+  std::stable_sort(result_.missed_edges.begin(), result_.missed_edges.end(),
+                   [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
+}
+
+/// Fits a pillowed template. Returns false if the fit must end.
+bool AutomaticFit::run_smooth(const Attempt& attempt) {
+  std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
+  if (!made) return false;
+  mesh_ = std::move(*made);
   AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
-  const bool has_edges = options_.crease_angle_degrees &&
-                         !feature_curves(target_.mesh, *options_.crease_angle_degrees).empty();
-  bool going = !has_edges || find_creases(0);
+  bool going = true;
   for (int level = 0; going && level <= attempt.levels; ++level) {
-    if (level > 0) refine();
+    if (level > 0) mesh_ = smooth_refinement(mesh_);
     trial.level = level;
-    QualitySchedule schedule =
-        level == 0 ? coarse_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
+    QualitySchedule schedule = attempt.levels == 0 ? single_quality_schedule(options_.quality)
+                               : level == 0        ? coarse_quality_schedule(options_.quality)
+                                                   : fine_quality_schedule(options_.quality);
     if (level == attempt.levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
     going = fit_level(level, schedule, "");
   }
   if (going || result_.trials.empty()) judge(trial);
   return going;
+}
+
+/// Returns how poor each cell of the present mesh is, 0 for good ones.
+std::vector<double> AutomaticFit::faults_of_cells() const {
+  constexpr double kAcceptable = 0.3, kMeets = 1;
+  std::vector<double> faults;
+  for (const double least : measure_quality(mesh_).cell_minima) faults.push_back(std::max(0.0, kAcceptable - least));
+  const MeshTopology topology(mesh_);
+  std::vector<Index> face_of_triangle;
+  const TriangleMesh surface = fan_triangles(boundary_surface(mesh_, topology), &face_of_triangle);
+  for (const auto& pair : self_intersections(surface, [this] { return runner_.is_to_end(); }).pairs)
+    for (const Index t : pair)
+      faults[topology.face_cells(topology.boundary_faces()[face_of_triangle[t]])[0]] += kMeets;
+  return faults;
+}
+
+/// Routes, pads and fits, again and again while edges have to be given up. Returns false if the fit must end.
+bool AutomaticFit::route_and_fit(const VolumeMesh& grid, std::span<const Vec3> fitted, AutomaticFitTrial trial) {
+  constexpr int kMostRoutings = 5;
+  RoutingOptions routing;
+  for (int round = 0; round < kMostRoutings; ++round) {
+    layout_ = edge_layout(grid, fitted, edges_.mesh, edges_.features, routing);
+    mesh_ = layout_->tagged_mesh;
+    QualitySchedule schedule = single_quality_schedule(options_.quality);
+    schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+    const bool going = fit_level(0, schedule, ", edges");
+    trial.pads = layout_->pads.pads.size();
+    if (going || result_.trials.empty()) judge(trial);
+    if (!going) return false;
+    if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults_of_cells(), routing)) break;
+  }
+  return true;
+}
+
+/// Fits a padded grid. Returns false if the fit must end.
+bool AutomaticFit::run_edges(const Attempt& attempt) {
+  constexpr double kRoomForPads = 0.5;
+  constexpr int kTries = 3;
+  double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
+  for (int trial = 1;; ++trial) {
+    const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
+    std::optional<VolumeMesh> grid =
+        make_template({.cells = count, .through_planes = attempt.kind == Attempt::Kind::aligned});
+    if (!grid) return false;
+    layout_.reset();
+    mesh_ = *grid;
+    if (!fit_level(0, smooth_quality_schedule(), ", smooth")) {
+      if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});
+      return false;
+    }
+    const std::size_t padded =
+        edge_layout(*grid, mesh_.positions, edges_.mesh, edges_.features, {}).patched.mesh.num_cells();
+    if (padded > attempt.template_cells && options_.cells && trial < kTries && count > kLeastTemplateCells) {
+      asked *= 0.95 * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
+      continue;
+    }
+    const std::vector<Vec3> fitted = mesh_.positions;
+    return route_and_fit(*grid, fitted,
+                         {.template_cells = grid->num_cells(),
+                          .through_planes = attempt.kind == Attempt::Kind::aligned});
+  }
+}
+
+bool AutomaticFit::run_attempt(const Attempt& attempt) {
+  layout_.reset();
+  return attempt.kind == Attempt::Kind::smooth ? run_smooth(attempt) : run_edges(attempt);
 }
 
 void AutomaticFit::conclude() {
@@ -228,14 +346,24 @@ void AutomaticFit::conclude() {
       formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%", best.least_scaled_jacobian,
                 best.mean_percent, best.max_percent);
   report.explanation = found;
-  if (best.merit > 0)
+  if (best.max_percent > options_.max_tolerance_percent || best.mean_percent > options_.mean_tolerance_percent ||
+      best.least_share < 1)
     report.warnings.push_back(formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ",
                                         options_.quality, options_.mean_tolerance_percent,
                                         options_.max_tolerance_percent) + found);
+  if (!result_.missed_edges.empty()) {
+    const MissedEdge& longest = result_.missed_edges.front();
+    report.warnings.push_back(formatted("%zu of %zu sharp edges are not followed; the longest, %.3g %% of the diagonal, "
+                                        "at (%.6g, %.6g, %.6g): %s",
+                                        result_.missed_edges.size(), best.curves, longest.length_percent,
+                                        longest.place.x(), longest.place.y(), longest.place.z(),
+                                        to_string(longest.reason).c_str()));
+  }
 }
 
 AutomaticFitResult AutomaticFit::run() {
-  const std::vector<Attempt> attempts = attempts_of(options_);
+  find_edges();
+  const std::vector<Attempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
     fraction_ = static_cast<double>(i) / static_cast<double>(attempts.size());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "fit/features/feature_routing.h"
 #include "fit/features/followed_creases.h"
 #include "fit/stages/fit_report.h"
 #include "fit/stages/quality_stages.h"
@@ -29,6 +30,8 @@ struct AutomaticFitOptions {
   double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in (0, 0.8]
   /// Edges of the target sharper than this angle stay sharp. In [0, 180]; empty: none.
   std::optional<double> crease_angle_degrees = kUsualCreaseAngle;
+  /// False: edges are followed only on surfaces of designed parts (`EdgeCrispness::is_designed`), not on scans.
+  bool follows_all_edges = false;
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
   int max_iterations = 0;          ///< per stage; 0: as the schedule says
   double time_limit_seconds = 0;   ///< 0: no limit
@@ -38,21 +41,33 @@ struct AutomaticFitOptions {
   StageLog* log = nullptr;         ///< supplies the results of earlier minimizations and records new ones; null: no log
 };
 
+/// A sharp edge of the target that no edges of the mesh follow.
+struct MissedEdge {
+  NotFollowed reason;
+  Vec3 place;                      ///< a point of it, in the target's coordinates
+  double length_percent = 0;       ///< percent of the diagonal
+};
+
 /// One template that was fitted, and what came out.
 struct AutomaticFitTrial {
   std::size_t template_cells = 0, cells = 0;
+  bool through_planes = false;     ///< the template's grid lines pass through planes of the target
+  std::size_t pads = 0;            ///< layers of cells under patches between sharp edges
+  std::size_t curves = 0, followed_curves = 0;  ///< of the target's sharp edges
+  double within_share = 1;         ///< share of their length within `kSharpPercent` of edges of the mesh
   int level = 0;                   ///< times the template was subdivided
   double mean_percent = 0, max_percent = 0;  ///< distance, percent of the target's diagonal
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
   double least_share = 0;          ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t self_intersections = 0, uncertified = 0;
-  double merit = 0;                ///< 0: good; lower is better
+  double merit = 0;                ///< 0: all aims are reached; lower is better
 };
 
 struct AutomaticFitResult {
   VolumeMesh mesh;                 ///< hexes, with tags on the creases that follow edges of the target
   FitReport report;
   BettiNumbers topology;           ///< of the solid
+  std::vector<MissedEdge> missed_edges;  ///< the longest first
   std::vector<AutomaticFitTrial> trials;
   std::size_t chosen = 0;          ///< position in trials
 };
@@ -60,14 +75,21 @@ struct AutomaticFitResult {
 /// Fills the solid inside a surface with hexes that one can compute on: no template is given, and every vertex of the
 /// result is free.
 ///
-/// A pillowed template of about an eighth of the cells (`auto_templates`) is fitted by `QualityStages`, refined once
-/// (`smooth_refinement`) and fitted again. Edges of the target are looked for on the fitted template, where the cells
-/// already lie in their places. If the result is too far from the target, too poor or meets itself, a larger template is
-/// tried if the number of cells is free; otherwise one with as many cells as allowed, which is not refined. The best
-/// trial is kept:
+/// Without sharp edges: a pillowed template of about an eighth of the cells (`auto_templates`) is fitted by
+/// `QualityStages`, refined once (`smooth_refinement`) and fitted again. If the result is too far from the target, too
+/// poor or meets itself, a larger template is tried if the number of cells is free; otherwise one with as many cells as
+/// allowed, which is not refined.
+///
+/// With sharp edges: a grid, through the target's planes where it has any, is fitted smoothly, only to find out what lies
+/// where. The edges are routed on it, and patches between them are padded (`edge_layout`). That mesh is fitted from the
+/// grid's positions, with creases, each patch against its own regions of the target. Edges at which cells stay poor are
+/// given up, and the rest is routed anew.
+///
+/// The best trial is kept:
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
-///         + 5 (1 - least share of the quality that a cell reaches) + 1 if the boundary meets itself + 10 if cells are uncertified
+///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
+///         + 1 if the boundary meets itself + 10 if cells are uncertified
 ///
 /// InputError: options out of range, a surface that `auto_templates` refuses or whose topology no grid reproduces.
 /// Same bits for any number of threads, except under a time limit.

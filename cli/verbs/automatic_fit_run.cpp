@@ -24,6 +24,11 @@ Json trials_json(const AutomaticFitResult& result) {
     trials.push_back({{"template_cells", trial.template_cells},
                       {"level", trial.level},
                       {"cells", trial.cells},
+                      {"through_planes", trial.through_planes},
+                      {"pads", trial.pads},
+                      {"sharp_edges", trial.curves},
+                      {"followed_edges", trial.followed_curves},
+                      {"edges_within_share", trial.within_share},
                       {"mean_percent", trial.mean_percent},
                       {"max_percent", trial.max_percent},
                       {"min_scaled_jacobian", trial.least_scaled_jacobian},
@@ -36,6 +41,15 @@ Json trials_json(const AutomaticFitResult& result) {
           {"cavities", result.topology.cavities},
           {"trials", std::move(trials)},
           {"chosen", result.chosen}};
+}
+
+Json missed_edges_json(const AutomaticFitResult& result) {
+  Json edges = Json::array();
+  for (const MissedEdge& edge : result.missed_edges)
+    edges.push_back({{"why", to_string(edge.reason)},
+                     {"at", {edge.place.x(), edge.place.y(), edge.place.z()}},
+                     {"length_percent", edge.length_percent}});
+  return edges;
 }
 
 /// One run, from its input file to its output files.
@@ -107,6 +121,7 @@ Json AutomaticFitRun::report() const {
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
   if (result_.report.creases) json["creases"] = creases_json(*result_.report.creases);
+  if (result_.report.creases) json["edges_not_followed"] = missed_edges_json(result_);
   checkpointing_->describe(json);
   return json;
 }

@@ -277,7 +277,8 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
   verb.add_option("--crease-angle", arguments.crease_angle,
                   "Keep edges of the target sharper than this sharp: edges of the mesh that follow them become creases\n"
-                  "and are drawn to them. auto: 40 without a template; with one, only the creases that its file tags")
+                  "and are drawn to them. auto: 40 without a template, if the target is a designed part and no scan; with one,\n"
+                  "only the creases that its file tags")
       ->check(number_in(0.0, 180.0) | CLI::IsMember({kAutomaticAngle, kNoAngle}))
       ->type_name("DEGREES|auto|none")
       ->capture_default_str();
@@ -335,6 +336,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
   fit.cells = arguments.cells;
   fit.quality = arguments.quality;
   fit.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
+  fit.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
   fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
   fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
   fit.max_iterations = arguments.fit.max_iterations;

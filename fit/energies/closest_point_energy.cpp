@@ -66,6 +66,16 @@ void ClosestPointEnergy::emphasize_far(double length) {
   inverse_far_ = 1 / length;
 }
 
+void ClosestPointEnergy::set_groups(std::vector<Index> of_triangle, std::span<const Index> of_target) {
+  if (target_->is_cloud() || of_triangle.size() != triangles().size() || of_target.size() != target_->triangles().size())
+    throw InputError("ClosestPointEnergy: one group is expected for each triangle of both surfaces");
+  groups_ = std::move(of_triangle);
+  sample_groups_.clear();
+  for (const Index t : target_->sample_triangles()) sample_groups_.push_back(of_target[t]);
+  target_tree_.emplace(TriangleMesh{target_->positions(), target_->triangles()}, of_target);
+  surface_tree_.reset();
+}
+
 void ClosestPointEnergy::weigh(std::vector<double> factors) {
   if (factors.size() != triangles().size())
     throw InputError("ClosestPointEnergy: one factor is expected for each sample triangle");
@@ -94,10 +104,11 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   if (surface_tree_) {
     surface_tree_->move(samples);
   } else {
-    surface_tree_.emplace(TriangleMesh{{samples.begin(), samples.end()}, {triangles().begin(), triangles().end()}});
+    surface_tree_.emplace(TriangleMesh{{samples.begin(), samples.end()}, {triangles().begin(), triangles().end()}},
+                          groups_);
     target_hits_.resize(points.size());
   }
-  surface_tree_->closest(points, target_hits_);
+  surface_tree_->closest(points, sample_groups_, target_hits_);
   target_offsets_.assign(triangles().size() + 1, 0);
   for (const auto& hit : target_hits_) ++target_offsets_[hit.triangle + 1];
   for (std::size_t t = 0; t < triangles().size(); ++t) target_offsets_[t + 1] += target_offsets_[t];
@@ -150,7 +161,7 @@ void ClosestPointEnergy::link_surface(std::span<const Vec3> samples) {
       const std::array<double, 3>& l = points[k];
       const Vec3 x = l[0] * samples[q[0]] + l[1] * samples[q[1]] + l[2] * samples[q[2]];
       Index& hint = surface_hints_[begin + k];
-      const ClosestPoint::Hit hit = target_tree_->closest(x, hint == kNoIndex ? before : hint);
+      const ClosestPoint::Hit hit = target_tree_->closest(x, group(t), hint == kNoIndex ? before : hint);
       hint = before = hit.triangle;
       Link& link = surface_links_[begin + k];
       link = {static_cast<Index>(t), l, hit.point, target_->normals()[hit.triangle],
@@ -241,7 +252,7 @@ std::vector<double> ClosestPointEnergy::triangle_distances_with_corners() const 
   std::vector<double> of_sample(num_samples());
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < of_sample.size(); ++i) {
-    const ClosestPoint::Hit hit = target_tree_->closest(assigned()[i]);
+    const ClosestPoint::Hit hit = target_tree_->closest(assigned()[i], groups_.empty() ? 0 : kNoIndex);
     of_sample[i] = over_rim(hit) ? 0 : hit.distance;
   }
   for (std::size_t t = 0; t < result.size(); ++t)

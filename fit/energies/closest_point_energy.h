@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fit/energies/surface_term.h"
-#include "fit/geometry/closest_point.h"
+#include "fit/geometry/grouped_closest_point.h"
 #include "fit/target/target_surface.h"
 
 #include <optional>
@@ -61,6 +61,13 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// sample triangle, else InputError.
   void weigh(std::vector<double> factors);
 
+  /// Lets only parts of the same group correspond: patches of the fitted surface, and the regions of the target between
+  /// sharp edges that they are to reproduce.
+  /// of_triangle, of_target  group of each sample triangle and of each of the target's triangles, >= 0; parts of a group
+  ///                         that the other surface lacks correspond to all of it. InputError: other numbers of them,
+  ///                         or a cloud.
+  void set_groups(std::vector<Index> of_triangle, std::span<const Index> of_target);
+
   /// Uses six points, including the corners, on each sample triangle with a nonzero entry, instead of
   /// `points_per_triangle`: S~ is farthest from the target on its edges. One entry per sample triangle, else
   /// InputError; must be called before `assign`.
@@ -99,8 +106,10 @@ class ClosestPointEnergy final : public SurfaceTerm {
   void add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const;
 
   const TargetSurface* target_;
-  std::optional<ClosestPoint> target_tree_;        ///< empty for a cloud
-  std::optional<ClosestPoint> surface_tree_;       ///< tree over S~
+  std::optional<GroupedClosestPoint> target_tree_;   ///< empty for a cloud
+  std::optional<GroupedClosestPoint> surface_tree_;  ///< tree over S~
+  std::vector<Index> groups_, sample_groups_;        ///< of each sample triangle and target sample; empty: no groups
+  Index group(std::size_t triangle) const { return groups_.empty() ? 0 : groups_[triangle]; }
   std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 

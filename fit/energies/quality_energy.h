@@ -4,6 +4,7 @@
 #include "fit/elements/element_rule.h"
 #include "fit/energies/cell_blocks.h"
 #include "fit/energies/volume_term.h"
+#include "fit/features/quality_caps.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
@@ -22,18 +23,6 @@ struct QualityWeights {
   double edge = 20;         ///< w_e: no edge dies. The scaled Jacobian does not see lengths
   double least_edge = 0.25; ///< rho, as a share of the wanted length
   double twist = 0.3;       ///< w_p: faces are parallelograms
-};
-
-/// Upper bound of the scaled Jacobian that cells can have along an edge of the mesh: where the surface is sharp, the
-/// cells there share its angle.
-struct EdgeCap {
-  std::array<Index, 2> ends;
-  double cap;
-};
-/// The same at a vertex of the mesh.
-struct VertexCap {
-  Index vertex;
-  double cap;
 };
 
 /// A least-squares energy that raises the scaled Jacobians of linear cells, the lowest ones most.

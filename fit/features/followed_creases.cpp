@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 namespace subvol {
 
@@ -22,11 +23,21 @@ FollowedCreases::FollowedCreases(const TriangleMesh& target, std::optional<doubl
     : curves_(feature_curves(target, angle_degrees.value_or(kUsualCreaseAngle), tagged)),
       paths_(follow_curves(template_mesh, curves_, angle_degrees ? PathEdges::all : PathEdges::creases)) {
   if (angle_degrees) tag(template_mesh);
+  find_curves_of_creases(template_mesh);
+}
+
+FollowedCreases::FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh)
+    : curves_(std::move(curves)), paths_(std::move(paths)) {
+  mesh.tags = tags_of_paths(paths_, curves_);
+  find_curves_of_creases(mesh);
+}
+
+void FollowedCreases::find_curves_of_creases(const VolumeMesh& mesh) {
   std::map<std::pair<Index, Index>, Index> curve_of_edge;
   for (const CreasePath& path : paths_)
     for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i)
       curve_of_edge[std::minmax(path.vertices[i], path.vertices[i + 1])] = path.curve;
-  for (const CreaseEdge& crease : template_mesh.tags.creases) {
+  for (const CreaseEdge& crease : mesh.tags.creases) {
     const auto at = curve_of_edge.find({crease.v0, crease.v1});
     curve_of_crease_.push_back(at == curve_of_edge.end() ? kNoIndex : at->second);
   }

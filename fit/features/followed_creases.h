@@ -34,6 +34,9 @@ class FollowedCreases {
   FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees, VolumeMesh& template_mesh,
                   std::span<const std::array<Index, 2>> tagged = {});
 
+  /// With paths that are known: tags the mesh along them, with no other tags.
+  FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh);
+
   const FeatureCurves& curves() const { return curves_; }
   /// True if most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
   bool hold_the_surface() const;
@@ -53,6 +56,7 @@ class FollowedCreases {
 
  private:
   void tag(VolumeMesh& template_mesh) const;
+  void find_curves_of_creases(const VolumeMesh& mesh);
   std::vector<CreaseSegment> segments(std::span<const std::array<Index, 2>> edges) const;
 
   FeatureCurves curves_;

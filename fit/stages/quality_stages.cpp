@@ -49,6 +49,14 @@ QualitySchedule fine_quality_schedule(double goal) {
           goal};
 }
 
+QualitySchedule single_quality_schedule(double goal) {
+  QualitySchedule schedule = coarse_quality_schedule(goal);
+  const QualitySchedule fine = fine_quality_schedule(goal);
+  schedule.lift = fine.lift;
+  schedule.goal = fine.goal;
+  return schedule;
+}
+
 QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengths, const SparseMap& nodes,
                              std::vector<Vec3> fixed, const QualityBoundary& boundary, const TargetSurface& target,
                              const std::function<CreaseEnergy(double width)>& creases) {
@@ -71,6 +79,11 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
                                                    kQualityTangentialWeight, 1, SurfacePull::straight_both_ways);
     for (const Index f : boundary.triangle_faces) factors_.push_back(std::pow(mean_square / square(f), 2));
     surface->weigh(factors_);
+    if (!boundary.group_of_face.empty()) {
+      std::vector<Index> groups;
+      for (const Index f : boundary.triangle_faces) groups.push_back(boundary.group_of_face[f]);
+      surface->set_groups(std::move(groups), boundary.group_of_triangle);
+    }
     surface_ = surface.get();
     if (creases) {
       surface->discount_disagreeing();

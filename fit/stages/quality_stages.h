@@ -36,6 +36,9 @@ struct QualitySchedule {
   double most_distance = 0;
 };
 
+/// A schedule for a mesh that is not refined afterwards: the stages of the first, the lift of the second of these.
+QualitySchedule single_quality_schedule(double goal);
+
 /// Schedules for a template of a few hundred cells or more at the surface's place: its cells are drawn to the surface
 /// first and are lifted then; and for the refinement of a mesh that was fitted so.
 /// goal  least scaled Jacobian wanted, in (0, 1).
@@ -53,6 +56,9 @@ struct QualityBoundary {
   std::vector<Vec3> fixed;                        ///< what is added to the samples if vertices are fixed; else empty
   std::vector<std::array<Index, 3>> triangles;    ///< of samples
   std::vector<Index> triangle_faces;              ///< face of the mesh of each triangle, by `MeshTopology`
+  /// Groups of each face of the mesh and of each of the target's triangles (`ClosestPointEnergy::set_groups`); empty:
+  /// none.
+  std::vector<Index> group_of_face, group_of_triangle;
 };
 
 /// Runs the minimizations of one level on one problem.

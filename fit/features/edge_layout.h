@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/features/curve_choice.h"
+#include "fit/features/feature_routing.h"
+#include "fit/features/followed_creases.h"
+#include "fit/features/pads.h"
+#include "fit/features/quality_caps.h"
+#include "fit/features/signed_features.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
+
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// A grid prepared to follow the sharp edges of a target: routed, divided into patches and padded.
+struct EdgeLayout {
+  FeatureRouting routing;
+  PatchedMesh patched;                ///< its mesh is the one to fit, from its positions; without tags
+  PadReport pads;
+  QualityCaps caps;
+  FollowedCreases creases;            ///< of the patched mesh
+  std::vector<CreaseSegment> segments;  ///< edges of the paths between the mesh's vertices, and the curves they follow
+  std::vector<Index> group_of_face;   ///< of each face of the mesh, by `MeshTopology`; 0 for faces inside
+  std::vector<Index> group_of_triangle;  ///< of each triangle of the target
+
+  /// The mesh with tags on the edges of the paths.
+  VolumeMesh tagged_mesh;
+};
+
+/// Routes the features (`route_features`), divides the boundary (`patched_mesh`), pads it (`add_pads`), and prepares what
+/// a fit needs.
+///
+/// grid     hexes; passes `validate` except for unused vertices.
+/// fitted   positions of its vertices near the target.
+/// target   oriented outward, in the coordinates of the fitted positions; features: its own.
+/// InputError: as the functions named.
+EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
+                       const SignedFeatures& features, const RoutingOptions& options);
+
+}  // namespace subvol
