@@ -115,12 +115,17 @@ class AutomaticFit {
   bool run_edges(const Attempt& attempt);
   bool route_and_fit(const VolumeMesh& grid, std::span<const Vec3> fitted, AutomaticFitTrial trial);
   std::vector<double> faults_of_cells() const;
-  std::optional<VolumeMesh> make_template(AutoTemplateOptions options);
+  std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
   bool fit_level(int level, const QualitySchedule& schedule, const char* what);
   void judge(AutomaticFitTrial trial);
   void note_missed_edges();
   void conclude();
+  bool is_worth_trying(const Attempt& attempt) const {
+    // A grid without planes is the grid of the attempt before; with many of them, grids not through them are worse.
+    constexpr double kMany = 0.4;
+    return attempt.kind != Attempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
+  }
   bool is_good() const { return !result_.trials.empty() && result_.trials[result_.chosen].merit < kGoodMerit; }
 
   AutomaticFitOptions options_;
@@ -131,6 +136,7 @@ class AutomaticFit {
   std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
   AutomaticFitResult result_;
   double fraction_ = 0;
+  double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes; 0: there is none
   double least_share_ = 1;            ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
@@ -145,7 +151,7 @@ void AutomaticFit::find_edges() {
 }
 
 /// Returns nothing if the fit must end.
-std::optional<VolumeMesh> AutomaticFit::make_template(AutoTemplateOptions options) {
+std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions options) {
   options.progress = [this](double fraction) {
     return !runner_.is_to_end() && (!options_.progress || options_.progress({"template", 0, 0, fraction, fraction_}));
   };
@@ -162,7 +168,7 @@ std::optional<VolumeMesh> AutomaticFit::make_template(AutoTemplateOptions option
     throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(options.cells) +
                      " cells, has its " + to_string(made.wanted) + "; give a --template");
   target_.normalisation.take_in(made.templates.front().mesh);
-  return std::move(made.templates.front().mesh);
+  return std::move(made.templates.front());
 }
 
 /// Makes a pillowed template of at most so many cells, if there is one. Returns nothing if the fit must end.
@@ -172,9 +178,11 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
   double asked = kRoomForTemplates * static_cast<double>(cells);
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
-    std::optional<VolumeMesh> made = make_template({.cells = count, .pillow = true});
-    if (!made || made->num_cells() <= cells || count == kLeastTemplateCells || trial == kTries) return made;
-    asked *= kLess * static_cast<double>(cells) / static_cast<double>(made->num_cells());
+    std::optional<AutoTemplate> made = make_template({.cells = count, .pillow = true});
+    if (!made) return std::nullopt;
+    const std::size_t got = made->mesh.num_cells();
+    if (got <= cells || count == kLeastTemplateCells || trial == kTries) return std::move(made->mesh);
+    asked *= kLess * static_cast<double>(cells) / static_cast<double>(got);
   }
 }
 
@@ -312,24 +320,26 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
   double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
-    std::optional<VolumeMesh> grid =
+    std::optional<AutoTemplate> made =
         make_template({.cells = count, .through_planes = attempt.kind == Attempt::Kind::aligned});
-    if (!grid) return false;
+    if (!made) return false;
+    if (attempt.kind == Attempt::Kind::aligned) aligned_share_ = made->aligned_share;
+    const VolumeMesh grid = std::move(made->mesh);
     layout_.reset();
-    mesh_ = *grid;
+    mesh_ = grid;
     if (!fit_level(0, smooth_quality_schedule(), ", smooth")) {
-      if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});
+      if (result_.trials.empty()) judge({.template_cells = grid.num_cells()});
       return false;
     }
     const std::size_t padded =
-        edge_layout(*grid, mesh_.positions, edges_.mesh, edges_.features, {}).patched.mesh.num_cells();
+        edge_layout(grid, mesh_.positions, edges_.mesh, edges_.features, {}).patched.mesh.num_cells();
     if (padded > attempt.template_cells && options_.cells && trial < kTries && count > kLeastTemplateCells) {
       asked *= 0.95 * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
       continue;
     }
     const std::vector<Vec3> fitted = mesh_.positions;
-    return route_and_fit(*grid, fitted,
-                         {.template_cells = grid->num_cells(),
+    return route_and_fit(grid, fitted,
+                         {.template_cells = grid.num_cells(),
                           .through_planes = attempt.kind == Attempt::Kind::aligned});
   }
 }
@@ -367,7 +377,7 @@ AutomaticFitResult AutomaticFit::run() {
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
     fraction_ = static_cast<double>(i) / static_cast<double>(attempts.size());
-    going = run_attempt(attempts[i]);
+    if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
   }
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));

@@ -135,4 +135,12 @@ void hold_to(std::optional<double> most_percent, const char* which, double perce
       formatted("%s distance of %.6g %% is above the tolerance of %.6g %%", which, percent, *most_percent);
 }
 
+void hold_to_quality(std::optional<double> least, const MeshCheck& found, FitReport& report) {
+  if (!least || !found.quality || report.stop_reason != StopReason::converged) return;
+  if (found.quality->min_scaled_jacobian >= *least) return;
+  report.stop_reason = StopReason::tolerance_missed;
+  report.explanation = formatted("the least scaled Jacobian, %.3f, is below the %.3f asked for",
+                                 found.quality->min_scaled_jacobian, *least);
+}
+
 }  // namespace subvol::cli

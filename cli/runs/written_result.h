@@ -70,4 +70,7 @@ void hold_to(const DistancesAsked& asked, const MeshCheck& found, FitReport& rep
 /// Does the same for one distance. which: its name, such as "the mean". most_percent: none means no requirement.
 void hold_to(std::optional<double> most_percent, const char* which, double percent, FitReport& report);
 
+/// Does the same for the least scaled Jacobian, which must be at least `least`; empty means no requirement.
+void hold_to_quality(std::optional<double> least, const MeshCheck& found, FitReport& report);
+
 }  // namespace subvol::cli

@@ -9,7 +9,6 @@
 #include "cli/runs/written_result.h"
 #include "cli/verbs/long_run.h"
 #include "cli/verbs/verb_options.h"
-#include "subvol/base/format.h"
 #include "subvol/base/version.h"
 
 #include <iostream>
@@ -104,12 +103,7 @@ void AutomaticFitRun::check() {
   const VolumeMesh& mesh = written ? *written : result_.mesh;
   mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target_, {.progress = progress}); });
   hold_to({arguments_.mean_tolerance_percent, arguments_.max_tolerance_percent}, mesh_check_, result_.report);
-  if (!arguments_.least_quality || !mesh_check_.quality || result_.report.stop_reason != StopReason::converged) return;
-  const double least = mesh_check_.quality->min_scaled_jacobian;
-  if (least >= *arguments_.least_quality) return;
-  result_.report.stop_reason = StopReason::tolerance_missed;
-  result_.report.explanation =
-      formatted("the least scaled Jacobian, %.3f, is below the %.3f asked for", least, *arguments_.least_quality);
+  hold_to_quality(arguments_.least_quality, mesh_check_, result_.report);
 }
 
 Json AutomaticFitRun::report() const {

@@ -189,6 +189,7 @@ void FitRun::check() {
       },
       target_);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
+  hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
   if (arguments_.surface == "limit")
     hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
             100 * limit_distance_.mean() / mesh_check_.target_diagonal, result_.report);
@@ -257,12 +258,12 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
   verb.add_option("--quality", arguments.quality,
-                  "Least scaled Jacobian to aim at; only without a template")
+                  "Least scaled Jacobian to aim at, as far as distances allow; not with --order")
       ->check(number_in(1e-3, 0.8))
       ->type_name("Q")
       ->capture_default_str();
   verb.add_option("--quality-floor", arguments.quality_floor,
-                  "Exit status 4 if the least scaled Jacobian is below this; only without a template")
+                  "Exit status 4 if the least scaled Jacobian is below this; not with --order")
       ->check(number_in(-1.0, 1.0))
       ->type_name("Q");
   verb.add_option("--surface", arguments.surface,
@@ -301,7 +302,8 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
       ->needs(order)
       ->group(group);
-  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far"})
+  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far",
+                            "--quality", "--quality-floor"})
     order->excludes(verb.get_option(other));
 }
 
@@ -324,9 +326,8 @@ bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
 
 /// UsageError: an option was given that has a meaning only for automatic fits.
 void refuse_automatic_options(const CLI::App& verb) {
-  for (const char* option : {"--quality", "--quality-floor", "--max-tolerance"})
-    if (verb.count(option) > 0)
-      throw UsageError(std::string(option) + ": only fits without a template, --order, a cage or --levels aim at it");
+  if (verb.count("--max-tolerance") > 0)
+    throw UsageError("--max-tolerance: only fits without a template, --order, a cage or --levels aim at it");
 }
 
 AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
@@ -368,6 +369,7 @@ int run_fit(const FitArguments& given, const CLI::App& verb) {
   refuse_automatic_options(verb);
   FitArguments arguments = given;
   arguments.fit.crease_angle_degrees = crease_angle(given, std::nullopt);
+  arguments.fit.quality = given.quality;
   arguments.template_mesh.cells = template_cells(given, given.order > 0 ? 0 : given.fit.levels);
   return given.order > 0 ? run_high_order_fit(high_order_arguments(arguments, verb), verb)
                          : FitRun(arguments, verb).run();

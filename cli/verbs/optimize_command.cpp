@@ -185,6 +185,11 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
           ->check(number_in(1e-9, 100.0))
           ->type_name("PERCENT")
           ->capture_default_str();
+  CLI::Option* quality = verb.add_option("--quality", optimize.quality,
+                                         "Least scaled Jacobian to aim at, as far as distances allow")
+                             ->check(number_in(1e-3, 0.8))
+                             ->type_name("Q")
+                             ->capture_default_str();
   verb.add_option("--lambda", optimize.lambda,
                   "Weight of the cells' shape against the distance; lowered while distances are above the tolerances\n"
                   "(with --order: 0.0025)")
@@ -212,7 +217,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->needs(order)
       ->group(group);
   add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
-  for (CLI::Option* other : {fixed, sizes, angle, max}) order->excludes(other);
+  for (CLI::Option* other : {fixed, sizes, angle, max, quality}) order->excludes(other);
 }
 
 }  // namespace
