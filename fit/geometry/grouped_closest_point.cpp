@@ -9,11 +9,8 @@
 namespace subvol {
 
 GroupedClosestPoint::GroupedClosestPoint(const TriangleMesh& mesh, std::span<const Index> groups)
-    : group_(groups.begin(), groups.end()), place_(groups.size()), is_one_(groups.empty()) {
-  if (is_one_) {
-    trees_.emplace_back(std::in_place, mesh);
-    return;
-  }
+    : all_(mesh), group_(groups.begin(), groups.end()), place_(groups.size()), is_one_(groups.empty()) {
+  if (is_one_) return;
   if (groups.size() != mesh.triangles.size())
     throw InputError("GroupedClosestPoint: one group is expected for each triangle");
   triangles_.resize(*std::max_element(groups.begin(), groups.end()) + 1);
@@ -30,32 +27,24 @@ GroupedClosestPoint::GroupedClosestPoint(const TriangleMesh& mesh, std::span<con
 }
 
 void GroupedClosestPoint::move(std::span<const Vec3> positions) {
+  all_.move(positions);
   for (std::optional<ClosestPoint>& tree : trees_)
     if (tree) tree->move(positions);
 }
 
 ClosestPoint::Hit GroupedClosestPoint::closest(const Vec3& p, Index group, Index hint) const {
-  if (is_one_) return trees_[0]->closest(p, hint);
-  const auto in_group = [&](Index g) {
-    const bool helps = hint != kNoIndex && group_[hint] == g;
-    ClosestPoint::Hit hit = trees_[g]->closest(p, helps ? place_[hint] : kNoIndex);
-    if (hit.triangle != kNoIndex) hit.triangle = triangles_[g][hit.triangle];
-    return hit;
-  };
-  if (static_cast<std::size_t>(group) < trees_.size() && trees_[group]) return in_group(group);
-  ClosestPoint::Hit best;
-  for (std::size_t g = 0; g < trees_.size(); ++g) {
-    if (!trees_[g]) continue;
-    const ClosestPoint::Hit hit = in_group(static_cast<Index>(g));
-    if (best.triangle == kNoIndex || hit.distance < best.distance) best = hit;
-  }
-  return best;
+  const bool has_tree = static_cast<std::size_t>(group) < trees_.size() && trees_[group];
+  if (!has_tree) return all_.closest(p, hint);
+  const bool helps = hint != kNoIndex && group_[hint] == group;
+  ClosestPoint::Hit hit = trees_[group]->closest(p, helps ? place_[hint] : kNoIndex);
+  if (hit.triangle != kNoIndex) hit.triangle = triangles_[group][hit.triangle];
+  return hit;
 }
 
 void GroupedClosestPoint::closest(std::span<const Vec3> points, std::span<const Index> groups,
                                   std::span<ClosestPoint::Hit> hits) const {
   if (is_one_) {
-    trees_[0]->closest(points, hits);
+    all_.closest(points, hits);
     return;
   }
   if (points.size() != hits.size() || groups.size() != points.size())

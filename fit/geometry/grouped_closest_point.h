@@ -9,7 +9,7 @@
 
 namespace subvol {
 
-/// Finds closest points on those triangles of a mesh that belong to a group: one tree for each group.
+/// Finds closest points on those triangles of a mesh that belong to a group: one tree for each group, and one for all.
 ///
 /// Where a sharp edge is near, the closest point of the whole surface may lie on the wrong side of it; that of the group
 /// does not.
@@ -22,15 +22,16 @@ class GroupedClosestPoint {
   /// As `ClosestPoint::move`.
   void move(std::span<const Vec3> positions);
 
-  /// As `ClosestPoint::closest`, on the triangles of a group. A group without triangles: on all of them. Triangles of
-  /// hints and hits are numbered as in the mesh; a hint from another group is ignored.
+  /// As `ClosestPoint::closest`, on the triangles of a group; on all of them if the group has none, or is kNoIndex.
+  /// Triangles of hints and hits are numbered as in the mesh; a hint from another group is ignored.
   ClosestPoint::Hit closest(const Vec3& p, Index group, Index hint = kNoIndex) const;
   /// The same for many points, in parallel. groups: of each point; empty: all in group 0. Hits as for
   /// `ClosestPoint::closest`.
   void closest(std::span<const Vec3> points, std::span<const Index> groups, std::span<ClosestPoint::Hit> hits) const;
 
  private:
-  std::vector<std::optional<ClosestPoint>> trees_;  // none: a group without triangles
+  ClosestPoint all_;
+  std::vector<std::optional<ClosestPoint>> trees_;  // of each group; none: a group without triangles, or no groups
   std::vector<std::vector<Index>> triangles_;       // of each tree, as the mesh numbers them
   std::vector<Index> group_, place_;                // of each triangle: its group, its number in the group's tree
   bool is_one_;                                     // all triangles are in one group

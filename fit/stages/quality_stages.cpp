@@ -145,20 +145,22 @@ QualityStages::State QualityStages::inspect(const QualitySchedule& schedule, std
 
 /// Raises the emphasis on poor cells and far places every two steps until none is left, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
-  constexpr int kSteps = 2;
+  constexpr int kSteps = 2, kPatience = 8;
   constexpr double kNoEnd = 1e-9;  // two steps must not end a stage
   energy_->reset_emphasis();
   far_emphasis_.assign(factors_.size(), 1);
   std::vector<Vec3> best;
   state_ = {};
   bool going = true;
+  int since_best = 0;
   for (int done = 0;; done += kSteps) {
     const State now = inspect(schedule, x);
     if (now.merit > state_.merit) {
       state_ = now;
       best = x;
+      since_best = 0;
     }
-    if (!going || now.merit >= 1 || done >= schedule.lift.steps) break;
+    if (!going || now.merit >= 1 || ++since_best > kPatience || done >= schedule.lift.steps) break;
     QualityStage stage = schedule.lift;
     stage.steps = kSteps;
     going = run_stage(stage, formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(), done / kSteps + 1,
