@@ -33,23 +33,25 @@ constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivide
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
 constexpr double kMostQuality = 0.8;
 constexpr double kGoodMerit = 0.1;           // no other template is tried below it
-/// Numbers of cells that are tried for parts with edges if none is given.
-constexpr std::size_t kFirstEdgeCells = 3000, kSecondEdgeCells = 10000, kLastEdgeCells = 30000;
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
 constexpr double kMaxMargin = 0.8;
 
-void check(const AutomaticFitOptions& options) {
+/// Returns the options, with the least goal that the stages can use in place of none.
+AutomaticFitOptions checked(AutomaticFitOptions options) {
+  constexpr double kLeastQuality = 0.1;
   const auto in_range = [](const char* name, double value, double low, double high) {
     require_in_range("AutomaticFitOptions", name, value, low, high);
   };
-  in_range("quality", options.quality, 1e-3, kMostQuality);
+  in_range("quality", options.quality, 0, kMostQuality);
   if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (options.cells)
-    in_range("cells", static_cast<double>(*options.cells), kChildren * kLeastTemplateCells, 1e9);
+    in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
+  options.quality = std::max(options.quality, kLeastQuality);
+  return options;
 }
 
 /// The state of the sharp edges of a target.
@@ -72,19 +74,19 @@ struct Attempt {
 
 std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
   using Kind = Attempt::Kind;
+  std::vector<Attempt> attempts;
   if (has_edges) {
-    std::vector<std::size_t> counts{kFirstEdgeCells, kSecondEdgeCells, kLastEdgeCells};
+    std::vector<std::size_t> counts(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
     if (options.cells) counts = {*options.cells};
-    std::vector<Attempt> attempts;
     for (const std::size_t cells : counts)
       for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0});
-    return attempts;
+  } else if (options.cells) {
+    if (*options.cells >= kChildren * kLeastTemplateCells)
+      attempts.push_back({Kind::smooth, *options.cells / kChildren, 1});
+    attempts.push_back({Kind::smooth, *options.cells, 0});
+  } else {
+    for (const std::size_t cells : kAutomaticCells) attempts.push_back({Kind::smooth, cells / kChildren, 1});
   }
-  if (options.cells)
-    return {{Kind::smooth, *options.cells / kChildren, 1}, {Kind::smooth, *options.cells, 0}};
-  std::vector<Attempt> attempts;
-  for (const std::size_t cells : {kFirstAutomaticCells, kSecondAutomaticCells, kLastAutomaticCells})
-    attempts.push_back({Kind::smooth, cells / kChildren, 1});
   return attempts;
 }
 
@@ -101,7 +103,7 @@ TriangleMesh surface_to_fit(const TriangleMesh& target, const AutomaticFitOption
 class AutomaticFit {
  public:
   AutomaticFit(const TriangleMesh& target, const AutomaticFitOptions& options)
-      : options_((check(options), options)),
+      : options_(checked(options)),
         original_(surface_to_fit(target, options)),
         target_(original_),
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
@@ -167,7 +169,10 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
   if (made.templates.empty())
     throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(options.cells) +
                      " cells, has its " + to_string(made.wanted) + "; give a --template");
-  target_.normalisation.take_in(made.templates.front().mesh);
+  VolumeMesh& mesh = made.templates.front().mesh;
+  target_.normalisation.take_in(mesh);
+  if (result_.report.stages.empty())
+    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
   return std::move(made.templates.front());
 }
 

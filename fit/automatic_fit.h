@@ -9,6 +9,7 @@
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -20,14 +21,15 @@ class StageLog;
 
 /// Distances that an automatic fit aims at, in percent of the diagonal.
 inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
-/// Numbers of cells that are tried if none is given, in this order until a fit is good.
-inline constexpr std::size_t kFirstAutomaticCells = 5000, kSecondAutomaticCells = 15000, kLastAutomaticCells = 40000;
+/// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp edges,
+/// and of parts with them.
+inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000}, kAutomaticEdgeCells{3000, 10000, 30000};
 
 struct AutomaticFitOptions {
-  /// Largest number of cells of the result, at least 8 kLeastTemplateCells; empty: as few as make the fit good, up to
-  /// kLastAutomaticCells.
+  /// Number of cells that the result may have, at least kLeastTemplateCells; more only if no smaller template has the
+  /// solid's topology. Empty: as few as make the fit good, of the counts above.
   std::optional<std::size_t> cells;
-  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in (0, 0.8]
+  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in [0, 0.8]
   /// Edges of the target sharper than this angle stay sharp. In [0, 180]; empty: none.
   std::optional<double> crease_angle_degrees = kUsualCreaseAngle;
   /// False: edges are followed only on surfaces of designed parts (`EdgeCrispness::is_designed`), not on scans.
@@ -83,7 +85,8 @@ struct AutomaticFitResult {
 /// With sharp edges: a grid, through the target's planes where it has any, is fitted smoothly, only to find out what lies
 /// where. The edges are routed on it, and patches between them are padded (`edge_layout`). That mesh is fitted from the
 /// grid's positions, with creases, each patch against its own regions of the target. Edges at which cells stay poor are
-/// given up, and the rest is routed anew.
+/// given up, and the rest is routed anew. A grid that is not through planes is tried, too, if less than 40 % of the
+/// target's area lies on them.
 ///
 /// The best trial is kept:
 ///

@@ -66,7 +66,7 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("quality", options.quality, 1e-3, 0.8);
+  in_range("quality", options.quality, 0, 0.8);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (has_target && options.fixed_boundary)
     throw InputError("OptimizeOptions: a boundary that is fixed cannot be drawn to a target");
@@ -444,8 +444,9 @@ void MeshOptimizer::measure_distance() {
 /// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
 bool MeshOptimizer::steps_ran_out() const {
   return options_.max_iterations > 0 &&
-         std::any_of(report_.stages.begin(), report_.stages.end(), [](const StageRecord& stage) {
-           return stage.kept && stage.ended == MinimizerStop::iteration_limit;
+         std::any_of(report_.stages.begin(), report_.stages.end(), [this](const StageRecord& stage) {
+           return stage.kept && stage.ended == MinimizerStop::iteration_limit &&
+                  stage.iterations.size() >= static_cast<std::size_t>(options_.max_iterations);
          });
 }
 

@@ -29,7 +29,7 @@ struct OptimizeOptions {
   /// Weight of the cells' shape, > 0. It is lowered while the mean distance between the boundary and its surface is too
   /// large. If the largest distance is too large, only the cells beside such places get less weight.
   double lambda = 0.1;
-  double quality = kUsualQuality;        ///< least scaled Jacobian to aim at, in (0, 0.8]
+  double quality = kUsualQuality;        ///< least scaled Jacobian to aim at, in [0, 0.8]; 0: none
   /// Largest acceptable distances, in per cent of the diagonal, > 0.
   double mean_tolerance_percent = 0.05, max_tolerance_percent = 0.5;
   int max_iterations = 0;                ///< per stage; 0: as the schedule says
@@ -53,8 +53,9 @@ struct OptimizeResult {
 /// question. Then E = E_S + lambda E_W is minimized with the Hencky barrier, as in the fits: no step makes a cell lose
 /// its certificate. Between rounds, each cell's ideal box takes the cell's present proportions (for
 /// `CellSizes::local`), and its weight becomes the reciprocal of its least scaled Jacobian, reduced beside places that
-/// are too far from the surface. At last, `QualityStages` raise the lowest scaled Jacobians; the state before is kept if
-/// that gains nothing or costs the surface too much.
+/// are too far from the surface. At last, `QualityStages` raise the lowest scaled Jacobians; the state before is kept
+/// unless the least one is higher, no more cells are uncertified, no more faces meet, and the distances are within
+/// nine tenths of the mean tolerance and the largest, or no larger than before.
 ///
 /// mesh    must pass `validate` except for inverted cells and unused vertices, else InputError. Without a target, the
 ///         vertices where its sharp edges meet (`FollowedCreases`) stay fixed, except those of cells that are badly

@@ -315,13 +315,24 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
 
 /// Properties of a state that the quality stages must not spoil.
 struct SubdivisionFit::Measured {
-  double least_jacobian, mean_percent, max_percent;
+  double least_jacobian;
   std::size_t uncertified, pairs;
+  std::vector<SurfaceDistance> distances;  ///< of the finest mesh, and of the limit surface if it matters
 
-  bool gains_on(const Measured& before) const {
-    constexpr double kFarther = 1.05;  // distances may rise by 5 %
-    return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs &&
-           mean_percent <= kFarther * before.mean_percent && max_percent <= kFarther * before.max_percent;
+  double largest() const {
+    double largest = 0;
+    for (const SurfaceDistance& distance : distances) largest = std::max(largest, distance.max());
+    return largest;
+  }
+  bool gains_on(const Measured& before, std::optional<double> tolerance_percent) const {
+    constexpr double kFarther = 1.05;  // distances may rise by 5 %, but not past the tolerance
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      const double mean = distances[i].mean(), mean_before = before.distances[i].mean();
+      const bool misses = tolerance_percent && 100 * mean > *tolerance_percent && mean > mean_before;
+      if (misses || mean > kFarther * mean_before || distances[i].max() > kFarther * before.distances[i].max())
+        return false;
+    }
+    return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;
   }
 };
 
@@ -332,10 +343,10 @@ std::optional<SubdivisionFit::Measured> SubdivisionFit::measure() {
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
   const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, result_.report);
   if (!pairs) return std::nullopt;
-  double max = target_.distance(surface).max();
-  if (options_.surface == FittedSurface::limit) max = std::max(max, target_.distance(limit_triangles()).max());
-  return Measured{quality.min_scaled_jacobian, measured_mean(), 100 * max, quality.certificate.not_certified.size(),
-                  *pairs};
+  Measured result{quality.min_scaled_jacobian, quality.certificate.not_certified.size(), *pairs, {}};
+  result.distances.push_back(target_.distance(surface));
+  if (options_.surface == FittedSurface::limit) result.distances.push_back(target_.distance(limit_triangles()));
+  return result;
 }
 
 bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
@@ -361,19 +372,20 @@ bool SubdivisionFit::raise_quality() {
   // A cage has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free.
   constexpr std::array<double, 2> kMoreSurface{100, 1000};
   constexpr double kMaxMargin = 0.8;  // samples miss the farthest places
-  if (options_.quality == 0) return true;
+  const StageRecord* last = result_.report.last_kept_stage();
+  if (options_.quality == 0 || (last && last->ended == MinimizerStop::infeasible_start)) return true;
   const std::optional<Measured> before = measure();
   if (!before) return false;
   if (before->least_jacobian >= options_.quality) return true;
   for (const double more : kMoreSurface) {
     QualitySchedule schedule = fine_quality_schedule(options_.quality);
-    schedule.most_distance = kMaxMargin * before->max_percent / 100;
+    schedule.most_distance = kMaxMargin * before->largest();
     for (QualityStage& stage : schedule.stages) stage.surface *= more;
     schedule.lift.surface *= more;
     FitSnapshot start = snapshot();
     const bool going = or_back(start, [&] { return run_quality_stages(schedule); });
     const std::optional<Measured> now = going ? measure() : std::nullopt;
-    if (now && now->gains_on(*before)) return true;
+    if (now && now->gains_on(*before, options_.tolerance_percent)) return true;
     go_back(std::move(start));
     if (!now) return false;
   }

@@ -13,6 +13,8 @@
 
 #include <iostream>
 #include <optional>
+#include <utility>
+#include <variant>
 
 namespace subvol::cli {
 namespace {
@@ -74,7 +76,11 @@ class AutomaticFitRun : public LongRun {
 };
 
 void AutomaticFitRun::load() {
-  target_ = load_surface(arguments_.target, warnings_);
+  Target target = load_target(arguments_.target, warnings_);
+  require_fitting_options(verb_, is_cloud(target));
+  if (is_cloud(target))
+    throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
+  target_ = std::get<TriangleMesh>(std::move(target));
   tell_warnings();
 }
 

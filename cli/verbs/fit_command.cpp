@@ -258,8 +258,8 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
   verb.add_option("--quality", arguments.quality,
-                  "Least scaled Jacobian to aim at, as far as distances allow; not with --order")
-      ->check(number_in(1e-3, 0.8))
+                  "Least scaled Jacobian to aim at, as far as distances allow; 0: none; not with --order")
+      ->check(number_in(0.0, 0.8))
       ->type_name("Q")
       ->capture_default_str();
   verb.add_option("--quality-floor", arguments.quality_floor,
@@ -430,7 +430,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
 }  // namespace
 
 void add_fit_command(CLI::App& app, Action& action) {
-  CLI::App* verb = app.add_subcommand("fit", "Deform a template until its boundary reproduces a surface");
+  CLI::App* verb = app.add_subcommand("fit", "Fill a surface with cells, or deform a template until its boundary reproduces it");
   const auto arguments = std::make_shared<FitArguments>();
   verb->add_option("TARGET", arguments->target,
                    "Surface to reproduce: " + surface_formats() + "; a volume mesh, for its boundary; or points: " +

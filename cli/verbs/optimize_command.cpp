@@ -186,8 +186,8 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
           ->type_name("PERCENT")
           ->capture_default_str();
   CLI::Option* quality = verb.add_option("--quality", optimize.quality,
-                                         "Least scaled Jacobian to aim at, as far as distances allow")
-                             ->check(number_in(1e-3, 0.8))
+                                         "Least scaled Jacobian to aim at, as far as distances allow; 0: none")
+                             ->check(number_in(0.0, 0.8))
                              ->type_name("Q")
                              ->capture_default_str();
   verb.add_option("--lambda", optimize.lambda,

@@ -35,7 +35,9 @@ struct QualityWeights {
 /// d_i  columns of the Jacobian in the coordinates of the ideal cell (`ElementRule`): edges, at the corners of a hex
 /// s    scaled Jacobian det(d_1, d_2, d_3) / (|d_1| |d_2| |d_3|), as `measure_quality` samples it
 /// h_i  wanted lengths of the cell;  h: their geometric mean
-/// a_q  1 / number of corners at the corners; 1/16 at the midpoints of edges, faces and cell
+/// t    the threshold, or the cap of the point if that is lower (`set_caps`)
+/// a_q  1 / number of corners at the corners; 1/16 at other points: the midpoints of edges, faces and cell, or more of
+///      them in cells that were refined (`densify`). A tet has one point only, which stands for all and has a_q = 1
 /// omega >= 1: emphasis of poor corners and cells (`emphasize_poor`)
 ///
 /// The energy is finite for inverted cells, too: nothing limits a step but `ruined`. The Hessian is that of

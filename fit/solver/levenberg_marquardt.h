@@ -14,7 +14,9 @@ namespace subvol {
 ///
 ///   (H + mu D) d = -g,   D_j = (mean of all t + t_j) / 2,  t_j: mean diagonal entry of block j of H
 ///
-/// mu begins as the options say. A step that decreases E is taken, and mu falls to 0.3 mu; otherwise mu rises to 6 mu, and the step is found again.
+/// mu begins as the options say. A step that decreases E is taken; otherwise mu rises to 6 mu, and the step is found
+/// again. If the first one was taken, mu falls to 0.3 mu. A step is scaled down if a node would move farther than
+/// `longest_move`.
 /// Before E is looked at, the step is shortened only where it does harm: at the vertices of cells that it ruins
 /// (`VolumeTerm::ruined`) it is halved, up to ten times, then set to 0; at those of cells that would lose their
 /// certificate it is set to 0. So one cell does not stop all others.

@@ -52,7 +52,7 @@ struct MinimizerOptions {
   /// Asked many times within a step, which may take long. If it returns true, the step is abandoned, and the
   /// minimization ends as cancelled with the result of the step before.
   std::function<bool()> ended;
-  /// Newton's method only: called every few steps with x and the result so far. These suffice to resume the
+  /// Not for L-BFGS: called every few steps with x and the result so far. These suffice to resume the
   /// minimization from there (`begun`).
   std::function<void(std::span<const Vec3> x, const MinimizerResult& so_far)> keep;
   const MinimizerResult* begun = nullptr;  ///< the result so far, as passed to `keep`; null: a new start

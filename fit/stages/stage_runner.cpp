@@ -8,6 +8,8 @@
 #include "subvol/base/fingerprint.h"
 #include "subvol/base/format.h"
 
+#include <algorithm>
+
 namespace subvol {
 
 namespace {
@@ -31,6 +33,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   record.unknowns = x.size();
   MinimizerOptions minimizer;
   minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
+  if (stage.longest_move > 0) minimizer.max_iterations = std::min(minimizer.max_iterations, stage.max_iterations);
   if (options_.solver == SolverKind::lbfgs && options_.max_iterations == 0 && stage.longest_move == 0)
     minimizer.max_iterations *= kLbfgsSteps;
   minimizer.relative_decrease = stage.relative_decrease;
@@ -106,7 +109,8 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
     report.explanation =
         formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
   } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit &&
-             options_.max_iterations > 0) {
+             options_.max_iterations > 0 &&
+             last->iterations.size() >= static_cast<std::size_t>(options_.max_iterations)) {
     report.stop_reason = StopReason::iteration_limit;
     report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
                                    options_.max_iterations, mean_percent);

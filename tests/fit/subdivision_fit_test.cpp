@@ -47,9 +47,11 @@ double limit_percent(const VolumeMesh& cage, const TriangleMesh& target) {
   return 100 * surface_distance(limit, target).mean() / bounding_box_diagonal(target);
 }
 
+/// Options for fits whose schedule is looked at, without the quality stages that end other fits.
 FitOptions quick(int levels = 2) {
   FitOptions options;
   options.levels = levels;
+  options.quality = 0;
   return options;
 }
 
@@ -175,6 +177,22 @@ TEST_CASE(
   CHECK(stages.back().lambda == Approx(4 * stages[stages.size() - 2].lambda));
   const auto kept = std::find_if(stages.rbegin(), stages.rend(), [](const StageRecord& stage) { return stage.kept; });
   CHECK((stages.back().kept || kept->lambda < stages.back().lambda));
+}
+
+TEST_CASE("Quality stages raise the least scaled Jacobian of a fit, the cage stays one, distances stay as they are") {
+  const samples::Sample sample = samples::ball_sample();
+  FitOptions options = quick(1);
+  const FitResult plain = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  options.quality = 0.6;
+  const FitResult lifted = fit_subdivision_volume(sample.target, sample.template_mesh, options);
+  const QualityReport before = measure_quality(plain.mesh), after = measure_quality(lifted.mesh);
+  CHECK(after.certificate.all_certified());
+  CHECK(after.min_scaled_jacobian >= before.min_scaled_jacobian);
+  CHECK(mesh_percent(lifted.mesh, sample.target) <= 1.05 * mesh_percent(plain.mesh, sample.target) + 1e-9);
+  const std::vector<Vec3> refined = subdivide(lifted.cage).matrix.apply(lifted.cage.positions);
+  CHECK(refined.size() == lifted.mesh.positions.size());
+  options.quality = 0.9;
+  CHECK_THROWS_AS(fit_subdivision_volume(sample.target, sample.template_mesh, options), InputError);
 }
 
 TEST_CASE("A tolerance that is met ends the fit, one out of reach is said to be missed") {
