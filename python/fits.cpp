@@ -41,6 +41,7 @@ FitOptions subdivision_options(Keywords& keywords) {
   keywords.take("cage_only", options.cage_only);
   keywords.take("crease_angle", options.crease_angle_degrees);
   keywords.take("lambda_far", options.lambda_far);
+  keywords.take("quality", options.quality);
   take_solver_options(keywords, options);
   take_fit_options(keywords, options);
   return options;
@@ -79,7 +80,7 @@ class Fit {
     else
       keywords_.take("cells", choice_options_.cells);
     if (curved_) {
-      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "lambda_far"},
+      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "lambda_far", "quality"},
                        "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
@@ -204,7 +205,7 @@ class Fit {
 
 constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
-    boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, lambda_close=None,
+    boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, quality=0.65, lambda_close=None,
     correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
     time_limit=0.0, order=None, basis='legendre', adaptive=False, keep_states=False, checkpoint=None, every=60.0,
     resume=None, chord=0.005, progress=None, threads=None)
@@ -222,6 +223,7 @@ boundary      'catmull-clark' or 'averaging'
 cage_only     only the points of the template move
 crease_angle  degrees: keep edges of the target sharper than this sharp
 lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
+quality       least scaled Jacobian to aim at, as far as distances allow; 0: none
 
 With order, 1 .. 16, curved cells:
 basis     'legendre' or 'fourier'

@@ -75,6 +75,7 @@ PYBIND11_MODULE(_subvol, module) {
   add_high_order_mesh(module);
   add_maps(module);
   add_fits(module);
+  add_fill(module);
   add_optimize(module);
   add_shell(module);
   add_templates(module);

@@ -11,6 +11,7 @@ void add_high_order_mesh(pybind11::module_& module);
 void add_maps(pybind11::module_& module);
 void add_files(pybind11::module_& module);
 void add_fits(pybind11::module_& module);
+void add_fill(pybind11::module_& module);
 void add_optimize(pybind11::module_& module);
 void add_shell(pybind11::module_& module);
 void add_templates(pybind11::module_& module);

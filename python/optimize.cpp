@@ -57,6 +57,7 @@ class Optimization {
     keywords_.take("crease_angle", options_.crease_angle_degrees);
     keywords_.take("tolerance", options_.mean_tolerance_percent);
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
+    keywords_.take("quality", options_.quality);
     keywords_.take("lambda_", options_.lambda);
     keywords_.take("max_iterations", options_.max_iterations);
     keywords_.take("time_limit", options_.time_limit_seconds);
@@ -64,7 +65,7 @@ class Optimization {
   }
 
   void read_curved_options() {
-    keywords_.refuse({"fixed_boundary", "sizes", "crease_angle", "max_tolerance"}, "does not go with order");
+    keywords_.refuse({"fixed_boundary", "sizes", "crease_angle", "max_tolerance", "quality"}, "does not go with order");
     curving_.lambda_close = kCurvingLambda;
     curving_.tolerance_percent = options_.mean_tolerance_percent;
     keywords_.take("order", curving_.order);
@@ -145,8 +146,8 @@ class Optimization {
 
 constexpr const char* kHelp =
     R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
-    max_tolerance=0.5, lambda_=None, order=None, basis='legendre', max_iterations=0, time_limit=0.0, checkpoint=None,
-    every=60.0, resume=None, chord=0.005, progress=None, threads=None)
+    max_tolerance=0.5, quality=0.65, lambda_=None, order=None, basis='legendre', max_iterations=0, time_limit=0.0,
+    checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Untangles a mesh and improves its cells, or curves it: OptimizeResult.
@@ -158,6 +159,7 @@ sizes           ideal sizes of the cells: 'uniform', or as they are, 'local'
 crease_angle    degrees: edges of the surface sharper than this stay sharp
 tolerance       mean distance from the surface to keep within, per cent of its diagonal
 max_tolerance   the same for the largest distance
+quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
 lambda_         weight of the cells' shape; None: 0.1, with order 0.0025
 order           curve the cells to this order, 2 .. 16; needs a target, and straight cells' options do not go with it
 basis           of curved cells: 'legendre' or 'fourier'

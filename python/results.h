@@ -24,6 +24,11 @@ struct Fitted : Reported {
   std::vector<FitState> states;
 };
 
+/// Result of `fill`.
+struct Filled : Reported {
+  std::shared_ptr<VolumeMesh> mesh;
+};
+
 /// Result of `optimize`: a mesh, or one of curved cells.
 struct Optimized : Reported {
   std::shared_ptr<VolumeMesh> mesh;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/verbs/automatic_fit_run.h"
 
+#include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
@@ -18,40 +19,6 @@
 
 namespace subvol::cli {
 namespace {
-
-Json trials_json(const AutomaticFitResult& result) {
-  Json trials = Json::array();
-  for (const AutomaticFitTrial& trial : result.trials)
-    trials.push_back({{"template_cells", trial.template_cells},
-                      {"level", trial.level},
-                      {"cells", trial.cells},
-                      {"through_planes", trial.through_planes},
-                      {"pads", trial.pads},
-                      {"sharp_edges", trial.curves},
-                      {"followed_edges", trial.followed_curves},
-                      {"edges_within_share", trial.within_share},
-                      {"mean_percent", trial.mean_percent},
-                      {"max_percent", trial.max_percent},
-                      {"min_scaled_jacobian", trial.least_scaled_jacobian},
-                      {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
-                      {"self_intersections", trial.self_intersections},
-                      {"uncertified_cells", trial.uncertified},
-                      {"merit", trial.merit}});
-  return {{"components", result.topology.components},
-          {"handles", result.topology.handles},
-          {"cavities", result.topology.cavities},
-          {"trials", std::move(trials)},
-          {"chosen", result.chosen}};
-}
-
-Json missed_edges_json(const AutomaticFitResult& result) {
-  Json edges = Json::array();
-  for (const MissedEdge& edge : result.missed_edges)
-    edges.push_back({{"why", to_string(edge.reason)},
-                     {"at", {edge.place.x(), edge.place.y(), edge.place.z()}},
-                     {"length_percent", edge.length_percent}});
-  return edges;
-}
 
 /// One run, from its input file to its output files.
 class AutomaticFitRun : public LongRun {
@@ -116,12 +83,10 @@ Json AutomaticFitRun::report() const {
   Json json{{"subvol", version()},
             {"command", "fit"},
             {"options", options_in_force(verb_)},
-            {"input", {{"target", describe(arguments_.target, target_)}}},
-            {"template", trials_json(result_)}};
+            {"input", {{"target", describe(arguments_.target, target_)}}}};
+  json.update(automatic_fit_json(result_));
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
-  if (result_.report.creases) json["creases"] = creases_json(*result_.report.creases);
-  if (result_.report.creases) json["edges_not_followed"] = missed_edges_json(result_);
   checkpointing_->describe(json);
   return json;
 }

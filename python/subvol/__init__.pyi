@@ -166,6 +166,10 @@ class FitResult(Result):
     @property
     def states(self) -> List[Tuple[str, Floats]]: ...
 
+class FillResult(Result):
+    @property
+    def mesh(self) -> VolumeMesh: ...
+
 class OptimizeResult(Result):
     @property
     def mesh(self) -> Any: ...  # VolumeMesh; with order HighOrderMesh
@@ -198,6 +202,7 @@ def fit(
     cage_only: bool = False,
     crease_angle: Optional[float] = None,
     lambda_far: float = 1.0,
+    quality: float = 0.65,
     lambda_close: Optional[float] = None,
     correspondence: Literal["closest", "voronoi"] = "closest",
     solver: Literal["newton", "lbfgs"] = "newton",
@@ -216,6 +221,22 @@ def fit(
     progress: Optional[Callback] = None,
     threads: Optional[int] = None,
 ) -> FitResult: ...
+def fill(
+    target: Surface,
+    *,
+    cells: Optional[int] = None,
+    quality: float = 0.65,
+    crease_angle: Optional[float] = None,
+    tolerance: float = 0.02,
+    max_tolerance: float = 0.5,
+    max_iterations: int = 0,
+    time_limit: float = 0.0,
+    checkpoint: Optional[Path] = None,
+    every: float = 60.0,
+    resume: Optional[Path] = None,
+    progress: Optional[Callback] = None,
+    threads: Optional[int] = None,
+) -> FillResult: ...
 def optimize(
     mesh: Volume,
     *,
@@ -225,6 +246,7 @@ def optimize(
     crease_angle: float = 40.0,
     tolerance: float = 0.05,
     max_tolerance: float = 0.5,
+    quality: float = 0.65,
     lambda_: Optional[float] = None,
     order: Optional[int] = None,
     basis: Basis = "legendre",

@@ -62,6 +62,24 @@ class Subdivision(InFolder):
                 subvol.subdivide(cube(), levels=levels)
 
 
+class Filling(InFolder):
+    def test_a_surface_is_filled_as_with_the_program(self):
+        result = subvol.fill("ball_target.off", cells=800, max_iterations=4)
+        self.assertTrue(result.report["valid"])
+        self.assertGreater(len(result.mesh.hexes), 0)
+        self.assertEqual(result.report["template"]["trials"][result.report["template"]["chosen"]]["cells"],
+                         len(result.mesh.hexes))
+        subvol.write("b.mesh", result)
+        self.run_program("fit", "ball_target.off", "--cells", "800", "--max-iterations", "4", "-o", "a.mesh")
+        self.assert_same_file("a.mesh", "b.mesh")
+
+    def test_options_out_of_range(self):
+        with self.assertRaisesRegex(subvol.InputError, "quality must be in"):
+            subvol.fill("ball_target.off", quality=0.95)
+        with self.assertRaisesRegex(subvol.InputError, "cells must be in"):
+            subvol.fill("ball_target.off", cells=2)
+
+
 class Optimizing(InFolder):
     def test_a_tangled_mesh_becomes_valid_as_with_the_program(self):
         mesh = subvol.template.grid(box=[0, 0, 0, 1, 1, 1], counts=[2, 2, 2])

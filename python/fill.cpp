@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/automatic_fit_report.h"
+#include "cli/runs/check_report.h"
+#include "cli/runs/report.h"
+#include "fit/automatic_fit.h"
+#include "fit/mesh_check.h"
+#include "python/arrays.h"
+#include "python/checkpoints.h"
+#include "python/module.h"
+#include "python/results.h"
+#include "subvol/base/error.h"
+
+namespace subvol::python {
+namespace {
+
+/// One call of `fill`, from its arguments to its result.
+class Filling {
+ public:
+  Filling(const py::object& target, const py::kwargs& given)
+      : keywords_("fill", given), work_(keywords_), checkpoints_(keywords_) {
+    keywords_.take("cells", options_.cells);
+    keywords_.take("quality", options_.quality);
+    take_crease_angle();
+    keywords_.take("tolerance", options_.mean_tolerance_percent);
+    keywords_.take("max_tolerance", options_.max_tolerance_percent);
+    keywords_.take("max_iterations", options_.max_iterations);
+    keywords_.take("time_limit", options_.time_limit_seconds);
+    keywords_.finish();
+    target_ = triangles_from(target, "target");
+    checkpoints_.begin("fill", keywords_, {{"target", cli::fingerprint(target_)}});
+  }
+
+  std::shared_ptr<Filled> run() {
+    options_.progress = work_.progress();
+    options_.cancelled = work_.cancelled();
+    std::vector<std::string> warnings;
+    AutomaticFitResult found = checkpoints_.run(work_, "fit", warnings, [&](StageLog* log) {
+      options_.log = log;
+      return fit_automatically(target_, options_);
+    });
+    if (found.mesh.num_cells() == 0) throw InputError("fill: ended before there was a mesh");
+    const MeshCheck checked = work_.run("check", [&] { return check_mesh(found.mesh, &target_); });
+    Json json{{"input", {{"target", cli::describe("", target_)}}}};
+    json.update(cli::automatic_fit_json(found));
+    json.update(cli::fit_json(found.report));
+    json.update(cli::check_json(checked));
+    checkpoints_.describe(json);
+    warnings.insert(warnings.end(), found.report.warnings.begin(), found.report.warnings.end());
+    const auto result = std::make_shared<Filled>();
+    result->report = make_report("fill", json, keywords_, work_, warnings);
+    result->mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));
+    return result;
+  }
+
+ private:
+  /// An angle is followed on every surface, "auto" on designed parts only; a negative one means none.
+  void take_crease_angle() {
+    std::optional<double> angle;
+    keywords_.take("crease_angle", angle);
+    if (!angle) return;
+    options_.follows_all_edges = true;
+    options_.crease_angle_degrees = *angle < 0 ? std::nullopt : angle;
+  }
+
+  Keywords keywords_;
+  Work work_;
+  Checkpoints checkpoints_;
+  AutomaticFitOptions options_;
+  TriangleMesh target_;
+};
+
+constexpr const char* kHelp =
+    R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, tolerance=0.02, max_tolerance=0.5, max_iterations=0,
+    time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
+--
+
+Fills a surface with hexes that one can compute on, without a template: FillResult.
+
+target         what bounds the solid: SurfaceMesh, VolumeMesh (its boundary) or path
+cells          number of cells that the result may have; None: as few as make it good
+quality        least scaled Jacobian to aim at, at most 0.8
+crease_angle   degrees: edges of the target sharper than this stay sharp; negative: none; None: 40, if the target is a
+               designed part and no scan
+tolerance      mean distance to aim at, per cent of the diagonal of the target's bounding box
+max_tolerance  the same for the largest distance
+
+max_iterations, time_limit, checkpoint, every, resume, progress and threads as of `fit`.)";
+
+}  // namespace
+
+void add_fill(py::module_& module) {
+  using Type = py::class_<Filled, Reported, std::shared_ptr<Filled>>;
+  Type type(module, "FillResult", "What `fill` returns.");
+  type.def_property_readonly("mesh", [](const Filled& filled) { return filled.mesh; }, "The mesh, a VolumeMesh.");
+  module.def("fill", [](const py::object& target, const py::kwargs& given) { return Filling(target, given).run(); },
+             py::arg("target"), kHelp);
+}
+
+}  // namespace subvol::python
