@@ -21,6 +21,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace subvol {
 
@@ -124,6 +125,7 @@ class MeshOptimizer {
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
   bool raise_quality();
+  bool is_worth_keeping(const Measured& now, const Measured& start) const;
   void relieve_far_cells(std::span<const double> triangle_distances);
   void weigh_cells(std::span<const double> least_jacobians);
   void measure_start();
@@ -375,7 +377,8 @@ MeshOptimizer::Measured MeshOptimizer::measure() const {
   const SurfaceDistance distance = target_.distance(surface);
   result.mean_percent = 100 * distance.mean();
   result.max_percent = 100 * distance.max();
-  result.intersections = count_intersecting_pairs(surface, [this] { return runner_.is_to_end(); });
+  // Not to be interrupted: a fraction of a second, without which two states cannot be compared.
+  result.intersections = count_intersecting_pairs(surface);
   return result;
 }
 
@@ -384,6 +387,21 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
          now.least_jacobian > before.least_jacobian &&
          now.mean_percent <= std::max(before.mean_percent, kMeanMargin * options_.mean_tolerance_percent) &&
          now.max_percent <= std::max(before.max_percent, options_.max_tolerance_percent);
+}
+
+/// Returns true if a result is better than a start whose cells are all certified: closer to a surface that the start
+/// was too far from, or of better cells at distances that are within the tolerances or no larger.
+bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
+  constexpr double kLeastGain = 1e-6;
+  const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
+  if (now.uncertified > 0 || now.intersections > start.intersections ||
+      now.mean_percent > std::max(start.mean_percent, mean_limit) ||
+      now.max_percent > std::max(start.max_percent, max_limit))
+    return false;
+  const bool was_too_far = start.mean_percent > mean_limit || start.max_percent > max_limit;
+  if (was_too_far) return now.mean_percent < start.mean_percent || now.max_percent < start.max_percent;
+  const double gain = now.least_jacobian - start.least_jacobian;
+  return gain > kLeastGain || (gain > -kLeastGain && now.mean_jacobian > start.mean_jacobian + kLeastGain);
 }
 
 /// Raises the lowest scaled Jacobians; if the surface suffers, it counts more in another attempt. Returns false if the
@@ -473,6 +491,8 @@ void MeshOptimizer::finish(bool going) {
 
 OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   measure_start();
+  const Measured start = measure();
+  std::vector<Vec3> start_positions = mesh_.positions;
   find_features();
   find_sizes();
   uncertified_ = certify(mesh_).not_certified;
@@ -480,7 +500,13 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
   OptimizeResult result{original, {}, {}};
-  result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);
+  if (start.uncertified > 0 || is_worth_keeping(measure(), start)) {
+    result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);
+  } else {
+    mesh_.positions = std::move(start_positions);
+    report_.undo_stages(0, report_.stages.size());
+    gains_ended_ = true;
+  }
   if (options_.fixed_boundary)
     for (std::size_t v = 0; v < original.num_vertices(); ++v)
       if (topology_.is_boundary_vertex(static_cast<Index>(v))) result.mesh.positions[v] = original.positions[v];

@@ -60,6 +60,10 @@ struct OptimizeResult {
 /// mesh    must pass `validate` except for inverted cells and unused vertices, else InputError. Without a target, the
 ///         vertices where its sharp edges meet (`FollowedCreases`) stay fixed, except those of cells that are badly
 ///         shaped or cannot be untangled.
+/// A mesh whose cells are all certified comes back as it is, bit for bit, unless the result is better: of a higher least
+/// scaled Jacobian, or of the same and a higher mean, with distances within the tolerances or no larger than before; or
+/// closer to a target that it was too far from.
+///
 /// target  the surface that the boundary must reproduce; null: the present boundary.
 /// returns the last state. Unless the work was ended early, report.stop_reason is `stalled` if cells are left that are
 /// not certified, which are then listed, and `tolerance_missed` if the distances are too large.

@@ -221,3 +221,19 @@ TEST_CASE("Most cells of a real mesh inverted: all become valid, and the boundar
   CHECK(check.mean_distance_percent() <= 0.05);
   CHECK(check.max_distance_percent() <= 0.5);
 }
+
+TEST_CASE("A mesh that cannot be made better comes back bit for bit, a valid one never gets worse") {
+  const VolumeMesh perfect = test::lattice(4, 3, 2);
+  for (const bool fixed : {false, true}) {
+    OptimizeOptions options;
+    options.fixed_boundary = fixed;
+    CHECK(optimize_mesh(perfect, nullptr, options).mesh.positions == perfect.positions);
+  }
+  // A slanted box: its planar faces hold its cells in their shape.
+  VolumeMesh slanted = perfect;
+  for (Vec3& p : slanted.positions) p.x() += 0.4 * p.y();
+  const QualityReport before = measure_quality(slanted);
+  const QualityReport after = measure_quality(optimize_mesh(slanted, nullptr, {}).mesh);
+  CHECK(after.min_scaled_jacobian >= before.min_scaled_jacobian - 1e-6);
+  CHECK(after.certificate.all_certified());
+}
