@@ -500,7 +500,8 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
   OptimizeResult result{original, {}, {}};
-  if (start.uncertified > 0 || is_worth_keeping(measure(), start)) {
+  const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
+  if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {
     result.mesh.positions = target_.normalisation.from_unit(mesh_.positions);
   } else {
     mesh_.positions = std::move(start_positions);
