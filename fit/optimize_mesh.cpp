@@ -462,9 +462,8 @@ void MeshOptimizer::measure_distance() {
 /// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
 bool MeshOptimizer::steps_ran_out() const {
   return options_.max_iterations > 0 &&
-         std::any_of(report_.stages.begin(), report_.stages.end(), [this](const StageRecord& stage) {
-           return stage.kept && stage.ended == MinimizerStop::iteration_limit &&
-                  stage.iterations.size() >= static_cast<std::size_t>(options_.max_iterations);
+         std::any_of(report_.stages.begin(), report_.stages.end(), [](const StageRecord& stage) {
+           return stage.kept && !stage.raises_quality && stage.ended == MinimizerStop::iteration_limit;
          });
 }
 

@@ -357,6 +357,7 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
   QualityStages stages(level_.mesh, ideal_boxes_, level_.nodes, {},
                        {level_.samples, {}, level_.sample_triangles, level_.sample_faces}, target_.surface,
                        has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+  stages.before_stage = [this] { keep_state(); };
   StageRecord record;
   record.name = formatted("level %d, quality", number_);
   record.level = number_;

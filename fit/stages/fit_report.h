@@ -52,6 +52,7 @@ struct StageRecord {
   /// False if the stage was rolled back (it caused more self-intersections, cost too much of the cells' shape, or was
   /// an optional stage that was interrupted) or belongs to an attempt that was given up.
   bool kept = true;
+  bool raises_quality = false;     ///< it minimized the quality energy (`QualityStages`)
   double seconds = 0;
   double mean_distance_percent = -1;  ///< after the stage, per cent of the diagonal; negative: not measured
 };

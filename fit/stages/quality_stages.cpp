@@ -98,6 +98,7 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
 
 bool QualityStages::run_stage(const QualityStage& stage, const std::string& name, double relative_decrease,
                               std::vector<Vec3>& x) {
+  if (before_stage) before_stage();
   energy_->set_weights(stage.weights);
   const double lambda = lambda_one_ / stage.surface;
   problem_->lambda = lambda;

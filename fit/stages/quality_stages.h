@@ -88,6 +88,9 @@ class QualityStages {
   bool run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record, double fraction,
            std::vector<Vec3>& x, FitReport& report);
 
+  /// Called before each minimization; x then holds the state that it starts from. Empty: nothing is called.
+  std::function<void()> before_stage;
+
   const State& state() const { return state_; }
   QualityEnergy& energy() { return *energy_; }
 

@@ -31,6 +31,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   record.lambda = stage.lambda;
   record.tangential_weight = stage.tangential_weight;
   record.unknowns = x.size();
+  record.raises_quality = stage.longest_move > 0;
   MinimizerOptions minimizer;
   minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : stage.max_iterations;
   if (stage.longest_move > 0) minimizer.max_iterations = std::min(minimizer.max_iterations, stage.max_iterations);
@@ -100,7 +101,10 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
   if (mean_percent > kFarPercent)
     report.warnings.push_back(formatted(
         "the result is far from its target, %.3g %% on the mean: is the template roughly in place?", mean_percent));
-  const StageRecord* last = report.last_kept_stage();
+  // Quality stages end after a few steps by themselves; what comes before them tells whether steps ran out.
+  const auto found = std::find_if(report.stages.rbegin(), report.stages.rend(),
+                                  [](const StageRecord& stage) { return stage.kept && !stage.raises_quality; });
+  const StageRecord* last = found == report.stages.rend() ? nullptr : &*found;
   if (last && last->ended == MinimizerStop::infeasible_start) {
     report.stop_reason = StopReason::stalled;
     report.explanation = last->name + " could not begin: " + last->stop;
@@ -109,8 +113,7 @@ void StageRunner::conclude(double mean_percent, std::optional<double> tolerance_
     report.explanation =
         formatted("mean distance %.4g %% is above the tolerance of %.4g %%", mean_percent, *tolerance_percent);
   } else if (!tolerance_percent && last && last->ended == MinimizerStop::iteration_limit &&
-             options_.max_iterations > 0 &&
-             last->iterations.size() >= static_cast<std::size_t>(options_.max_iterations)) {
+             options_.max_iterations > 0) {
     report.stop_reason = StopReason::iteration_limit;
     report.explanation = formatted("%s took all of the %d steps allowed, mean distance %.4g %%", last->name.c_str(),
                                    options_.max_iterations, mean_percent);
