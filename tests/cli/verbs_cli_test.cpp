@@ -456,9 +456,25 @@ TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][
   CHECK(!place.has("x.mesh"));
 }
 
+TEST_CASE("A fit without a template fills the surface and says how good the cells are", "[cli][templates]") {
+  const Workplace place;
+  const Run run = place.run("fit target.off --cells 1500 -o out.mesh -o out.glb --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report.at("valid") == true);
+  CHECK(report.at("quality").at("min_scaled_jacobian") > 0.5);
+  const auto& trials = report.at("template").at("trials");
+  CHECK(trials.at(report.at("template").at("chosen").get<std::size_t>()).at("cells") <= 1500);
+  CHECK(place.run("fit target.off --cells 300 --quality-floor 0.99 -o x.mesh").status == 4);
+  CHECK(place.run("fit target.off --crease-angle sharp -o x.mesh").status == 2);
+  CHECK(place.run("fit target.off --levels 1 --max-tolerance 1 -o x.mesh").status == 2);
+  CHECK(place.run("fit target.off --quality 0.95 -o x.mesh").status == 2);
+}
+
 TEST_CASE("A surface alone is enough for a fit", "[cli][templates]") {
   const Workplace place;
-  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 27\nlevels = 1\n");
+  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 216\nlevels = 1\n");
   const Run run = place.run("fit target.off --config options.toml -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);

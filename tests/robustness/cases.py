@@ -29,7 +29,8 @@ CASES = [
     ("curve", "optimize {s}/bracket_template.mesh --order 2 --target {s}/bracket_target.off", ["out.vtu", "out.obj"]),
     ("curved-shell", "shell {s}/bowl.obj --thickness 2% --order 2", ["out.vtu"]),
     ("template", "template auto {s}/ball_target.off --cells 60", ["out.mesh", "out.usda"]),
-    ("automatic", "fit {s}/ball_target.off --cells 60 --levels 1", ["out.mesh"]),
+    ("template-made", "fit {s}/ball_target.off --cells 480 --levels 1", ["out.mesh"]),
+    ("automatic", "fit {s}/ball_target.off --cells 800", ["out.mesh"]),
 ]
 
 

@@ -212,7 +212,7 @@ def write_block(path, rng):
 
 def fit_words(rng, folder):
     write_off(folder / "target.off", surface_of(rng, SOLIDS + [soup]), rng)
-    words = f"fit target.off --cells {rng.choice([40, 80, 150])}"
+    words = f"fit target.off --cells {rng.choice([40, 300, 1200])}"
     if rng.random() < 0.35:
         return words + f" --order {rng.randint(1, 4)} --basis {rng.choice(['fourier', 'legendre'])}" + \
             rng.choice(["", " --adaptive"]) + rng.choice(["", " --tolerance 0.1"]), "out.vtu", "target.off"
