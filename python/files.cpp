@@ -140,6 +140,7 @@ void write(const py::object& path, const py::object& object, const py::kwargs& g
         cli::write_output(writing.output({}), surface.polygons, writing.options);
       }) ||
       written<Fitted>(object, [&](const Fitted& fit) { write_fit(writing, fit); }) ||
+      written<Filled>(object, [&](const Filled& result) { write_volume_mesh(writing, *result.mesh); }) ||
       written<Optimized>(object, [&](const Optimized& result) {
         result.curved ? write_curved(writing, *result.curved) : write_volume_mesh(writing, *result.mesh);
       }) ||
