@@ -120,7 +120,7 @@ class AutomaticFit {
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
   bool fit_level(int level, const QualitySchedule& schedule, const char* what);
-  void judge(AutomaticFitTrial trial);
+  bool judge(AutomaticFitTrial trial);
   void note_missed_edges();
   void conclude();
   bool is_worth_trying(const Attempt& attempt) const {
@@ -221,8 +221,8 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   return going;
 }
 
-/// Measures the present mesh and keeps it if it is the best.
-void AutomaticFit::judge(AutomaticFitTrial trial) {
+/// Measures the present mesh and keeps it if it is the best. Returns false if the fit must end.
+bool AutomaticFit::judge(AutomaticFitTrial trial) {
   constexpr double kQualityWeight = 5, kEdgeWeight = 3, kMeets = 1, kUncertified = 10;
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
@@ -234,7 +234,7 @@ void AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.mean_scaled_jacobian = quality.mean_scaled_jacobian;
   trial.least_share = least_share_;
   trial.uncertified = quality.certificate.not_certified.size();
-  trial.self_intersections = runner_.intersecting_pairs(surface, result_.report).value_or(0);
+  trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   std::optional<CreaseDistance> creases;
   if (!edges_.features.curves.empty()) {
     const std::vector<CreaseSegment> none;
@@ -247,13 +247,15 @@ void AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.merit = std::max(0.0, trial.max_percent / options_.max_tolerance_percent - 1) +
                 std::max(0.0, trial.mean_percent / options_.mean_tolerance_percent - 1) +
                 kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
-                (trial.self_intersections > 0 ? kMeets : 0) + (trial.uncertified > 0 ? kUncertified : 0);
+                (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
   result_.trials.push_back(trial);
-  if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return;
+  const bool going = trial.self_intersections.has_value();
+  if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return going;
   result_.chosen = result_.trials.size() - 1;
   result_.mesh = mesh_;
   result_.report.creases = creases;
   note_missed_edges();
+  return going;
 }
 
 void AutomaticFit::note_missed_edges() {
@@ -282,7 +284,7 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
     if (level == attempt.levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
     going = fit_level(level, schedule, "");
   }
-  if (going || result_.trials.empty()) judge(trial);
+  if (going || result_.trials.empty()) going = judge(trial) && going;
   return going;
 }
 
@@ -300,18 +302,18 @@ std::vector<double> AutomaticFit::faults_of_cells() const {
   return faults;
 }
 
-/// Routes, pads and fits, again and again while edges have to be given up. Returns false if the fit must end.
+/// Fits the present layout, then others while edges have to be given up. Returns false if the fit must end.
 bool AutomaticFit::route_and_fit(const VolumeMesh& grid, std::span<const Vec3> fitted, AutomaticFitTrial trial) {
   constexpr int kMostRoutings = 5;
   RoutingOptions routing;
   for (int round = 0; round < kMostRoutings; ++round) {
-    layout_ = edge_layout(grid, fitted, edges_.mesh, edges_.features, routing);
+    if (round > 0) layout_ = edge_layout(grid, fitted, edges_.mesh, edges_.features, routing);
     mesh_ = layout_->tagged_mesh;
     QualitySchedule schedule = single_quality_schedule(options_.quality);
     schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    const bool going = fit_level(0, schedule, ", edges");
+    bool going = fit_level(0, schedule, ", edges");
     trial.pads = layout_->pads.pads.size();
-    if (going || result_.trials.empty()) judge(trial);
+    if (going || result_.trials.empty()) going = judge(trial) && going;
     if (!going) return false;
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults_of_cells(), routing)) break;
   }
@@ -320,7 +322,7 @@ bool AutomaticFit::route_and_fit(const VolumeMesh& grid, std::span<const Vec3> f
 
 /// Fits a padded grid. Returns false if the fit must end.
 bool AutomaticFit::run_edges(const Attempt& attempt) {
-  constexpr double kRoomForPads = 0.5;
+  constexpr double kRoomForPads = 0.5, kLess = 0.95;
   constexpr int kTries = 3;
   double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
   for (int trial = 1;; ++trial) {
@@ -336,13 +338,13 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
       if (result_.trials.empty()) judge({.template_cells = grid.num_cells()});
       return false;
     }
-    const std::size_t padded =
-        edge_layout(grid, mesh_.positions, edges_.mesh, edges_.features, {}).patched.mesh.num_cells();
+    const std::vector<Vec3> fitted = mesh_.positions;
+    layout_ = edge_layout(grid, fitted, edges_.mesh, edges_.features, {});
+    const std::size_t padded = layout_->patched.mesh.num_cells();
     if (padded > attempt.template_cells && options_.cells && trial < kTries && count > kLeastTemplateCells) {
-      asked *= 0.95 * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
+      asked *= kLess * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
       continue;
     }
-    const std::vector<Vec3> fitted = mesh_.positions;
     return route_and_fit(grid, fitted,
                          {.template_cells = grid.num_cells(),
                           .through_planes = attempt.kind == Attempt::Kind::aligned});

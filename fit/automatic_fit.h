@@ -29,7 +29,7 @@ struct AutomaticFitOptions {
   /// Number of cells that the result may have, at least kLeastTemplateCells; more only if no smaller template has the
   /// solid's topology. Empty: as few as make the fit good, of the counts above.
   std::optional<std::size_t> cells;
-  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in [0, 0.8]
+  double quality = kUsualQuality;  ///< least scaled Jacobian to aim at, in [0, 0.8]; below 0.1: 0.1
   /// Edges of the target sharper than this angle stay sharp. In [0, 180]; empty: none.
   std::optional<double> crease_angle_degrees = kUsualCreaseAngle;
   /// False: edges are followed only on surfaces of designed parts (`EdgeCrispness::is_designed`), not on scans.
@@ -61,7 +61,8 @@ struct AutomaticFitTrial {
   double mean_percent = 0, max_percent = 0;  ///< distance, percent of the target's diagonal
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
   double least_share = 0;          ///< least share of the quality that a cell reaches, less being asked at sharp edges
-  std::size_t self_intersections = 0, uncertified = 0;
+  std::size_t uncertified = 0;
+  std::optional<std::size_t> self_intersections;  ///< pairs of triangles; empty: the search was interrupted
   double merit = 0;                ///< 0: all aims are reached; lower is better
 };
 
@@ -92,7 +93,7 @@ struct AutomaticFitResult {
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
-///         + 1 if the boundary meets itself + 10 if cells are uncertified
+///         + 1 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
 /// InputError: options out of range, a surface that `auto_templates` refuses or whose topology no grid reproduces.
 /// Same bits for any number of threads, except under a time limit.

@@ -23,7 +23,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"max_percent", trial.max_percent},
                       {"min_scaled_jacobian", trial.least_scaled_jacobian},
                       {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
-                      {"self_intersections", trial.self_intersections},
+                      {"self_intersections", trial.self_intersections ? Json(*trial.self_intersections) : Json()},
                       {"uncertified_cells", trial.uncertified},
                       {"merit", trial.merit}});
   return {{"components", result.topology.components},
