@@ -23,7 +23,8 @@ class StageLog;
 inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp edges,
 /// and of parts with them.
-inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000}, kAutomaticEdgeCells{3000, 10000, 30000};
+inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
+inline constexpr std::array<std::size_t, 3> kAutomaticEdgeCells{3000, 10000, 30000};
 
 struct AutomaticFitOptions {
   /// Number of cells that the result may have, at least kLeastTemplateCells; more only if no smaller template has the

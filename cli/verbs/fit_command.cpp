@@ -278,8 +278,8 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
   verb.add_option("--crease-angle", arguments.crease_angle,
                   "Keep edges of the target sharper than this sharp: edges of the mesh that follow them become creases\n"
-                  "and are drawn to them. auto: 40 without a template, if the target is a designed part and no scan; with one,\n"
-                  "only the creases that its file tags")
+                  "and are drawn to them. auto: without a template, 40 if the target is a designed part and no scan;\n"
+                  "with one, only the creases that its file tags")
       ->check(number_in(0.0, 180.0) | CLI::IsMember({kAutomaticAngle, kNoAngle}))
       ->type_name("DEGREES|auto|none")
       ->capture_default_str();
@@ -430,7 +430,8 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
 }  // namespace
 
 void add_fit_command(CLI::App& app, Action& action) {
-  CLI::App* verb = app.add_subcommand("fit", "Fill a surface with cells, or deform a template until its boundary reproduces it");
+  CLI::App* verb =
+      app.add_subcommand("fit", "Fill a surface with cells, or deform a template until its boundary reproduces it");
   const auto arguments = std::make_shared<FitArguments>();
   verb->add_option("TARGET", arguments->target,
                    "Surface to reproduce: " + surface_formats() + "; a volume mesh, for its boundary; or points: " +

@@ -21,8 +21,8 @@ struct VertexCap {
   double cap;  ///< in [0, 1)
 };
 
-/// What sharp edges and corners of the target allow: higher scaled Jacobians are not to be asked for there, since the
-/// surface would give way.
+/// The scaled Jacobians that sharp edges and corners of the target allow. Asking for more there would move the surface
+/// away from the target.
 struct QualityCaps {
   std::vector<EdgeCap> edges;       ///< of all edges of paths, ascending by their ends
   std::vector<VertexCap> vertices;  ///< of the corners of three paths or more, ascending

@@ -53,7 +53,7 @@ class RoutingGraph {
   SiteTree tree_;
 };
 
-/// What paths may not touch.
+/// The vertices and edges that paths may not touch.
 struct Occupied {
   std::vector<std::uint8_t> vertices, edges;
   void add(const RoutingGraph& graph, std::span<const Index> path);

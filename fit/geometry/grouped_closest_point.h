@@ -25,8 +25,8 @@ class GroupedClosestPoint {
   /// As `ClosestPoint::closest`, on the triangles of a group; on all of them if the group has none, or is kNoIndex.
   /// Triangles of hints and hits are numbered as in the mesh; a hint from another group is ignored.
   ClosestPoint::Hit closest(const Vec3& p, Index group, Index hint = kNoIndex) const;
-  /// The same for many points, in parallel. groups: of each point; empty: all in group 0. Hits as for
-  /// `ClosestPoint::closest`.
+  /// Does the same for many points, in parallel. `groups` holds the group of each point; if it is empty, all points are
+  /// in group 0. Hits are as for `ClosestPoint::closest`.
   void closest(std::span<const Vec3> points, std::span<const Index> groups, std::span<ClosestPoint::Hit> hits) const;
 
  private:

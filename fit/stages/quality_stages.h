@@ -108,7 +108,7 @@ class QualityStages {
   ClosestPointEnergy* surface_ = nullptr;
   std::vector<double> factors_, far_emphasis_;  ///< of each sample triangle
   State state_;
-  // Of the call of `run` in progress.
+  // These belong to the call of `run` that is in progress.
   const StageRunner* runner_ = nullptr;
   StageRecord record_;
   double fraction_ = 0;

@@ -23,7 +23,7 @@ struct AutoTemplateOptions {
 inline constexpr std::size_t kLeastTemplateCells = 8, kMostTemplateCells = 200'000;
 /// The number of cells of a template lies between these multiples of `AutoTemplate::cells_asked`.
 inline constexpr double kLeastCellShare = 0.8, kMostCellShare = 1.4;
-/// The same for a template whose grid passes through planes: these leave little choice of sizes.
+/// These multiples hold for a template whose grid passes through planes, which leave little choice of sizes.
 inline constexpr double kLeastShareThroughPlanes = 0.5, kMostShareThroughPlanes = 2;
 
 /// A template carved from a grid, and its properties.
