@@ -31,7 +31,6 @@ namespace {
 
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
-constexpr double kMostQuality = 0.8;
 constexpr double kGoodMerit = 0.1;           // no other template is tried below it
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
 constexpr double kMaxMargin = 0.8;
@@ -70,6 +69,7 @@ struct Attempt {
   Kind kind;
   std::size_t template_cells;
   int levels;
+  bool is_last_count = true;  ///< no attempt with more cells follows
 };
 
 std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
@@ -79,7 +79,7 @@ std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_ed
     std::vector<std::size_t> counts(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
     if (options.cells) counts = {*options.cells};
     for (const std::size_t cells : counts)
-      for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0});
+      for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0, cells == counts.back()});
   } else if (options.cells) {
     if (*options.cells >= kChildren * kLeastTemplateCells)
       attempts.push_back({Kind::smooth, *options.cells / kChildren, 1});
@@ -90,13 +90,19 @@ std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_ed
   return attempts;
 }
 
-/// Returns the surface to fit: where edges are to be followed, the solid's boundary, whose triangles agree about what is
-/// inside.
-TriangleMesh surface_to_fit(const TriangleMesh& target, const AutomaticFitOptions& options) {
-  if (!options.crease_angle_degrees) return target;
+/// Returns the share of the curves' length that paths follow.
+double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
+  double all = 0, routed = 0;
+  for (const FeatureCurve& curve : curves.curves) all += curve.length();
+  for (const CreasePath& path : routing.paths) routed += curves.curves[path.curve].length();
+  return all > 0 ? routed / all : 1;
+}
+
+/// Returns true if the target has sharp edges that the mesh is to follow.
+bool has_edges_to_follow(const TriangleMesh& target, const AutomaticFitOptions& options) {
+  if (!options.crease_angle_degrees) return false;
   const FeatureCurves curves = feature_curves(target, *options.crease_angle_degrees);
-  const bool follows = options.follows_all_edges ? !curves.empty() : edge_crispness(target, curves).is_designed();
-  return follows ? solid_boundary(target).surface : target;
+  return options.follows_all_edges ? !curves.empty() : edge_crispness(target, curves).is_designed();
 }
 
 /// An automatic fit, in normalized coordinates.
@@ -104,7 +110,8 @@ class AutomaticFit {
  public:
   AutomaticFit(const TriangleMesh& target, const AutomaticFitOptions& options)
       : options_(checked(options)),
-        original_(surface_to_fit(target, options)),
+        follows_edges_(has_edges_to_follow(target, options_)),
+        original_(follows_edges_ ? solid_boundary(target).surface : target),
         target_(original_),
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
                  options.cancelled, options.log}) {}
@@ -112,6 +119,7 @@ class AutomaticFit {
 
  private:
   void find_edges();
+  void find_features();
   bool run_attempt(const Attempt& attempt);
   bool run_smooth(const Attempt& attempt);
   bool run_edges(const Attempt& attempt);
@@ -131,28 +139,45 @@ class AutomaticFit {
   bool is_good() const { return !result_.trials.empty() && result_.trials[result_.chosen].merit < kGoodMerit; }
 
   AutomaticFitOptions options_;
-  TriangleMesh original_;
+  bool follows_edges_;
+  TriangleMesh original_;             ///< the target; if edges are followed, all its triangles agree about what is inside
   FitTarget target_;
   Edges edges_;
+  FeatureSizes features_;             ///< of the target, in normalized coordinates
+  std::vector<double> exaggeration_;  ///< of each triangle of the target (`QualityBoundary`); empty: no small features
   VolumeMesh mesh_;
   std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
+  std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
+  std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
   AutomaticFitResult result_;
   double fraction_ = 0;
-  double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes; 0: there is none
+  double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
   double least_share_ = 1;            ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
 
 void AutomaticFit::find_edges() {
+  if (!follows_edges_) return;
   edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
-  if (!options_.crease_angle_degrees) return;
-  FeatureCurves curves = feature_curves(edges_.mesh, *options_.crease_angle_degrees);
-  if (curves.empty()) return;
-  if (!options_.follows_all_edges && !edge_crispness(edges_.mesh, curves).is_designed()) return;
-  edges_.features = signed_features(edges_.mesh, std::move(curves));
+  edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, *options_.crease_angle_degrees));
 }
 
-/// Returns nothing if the fit must end.
+/// Finds the features that are so small that a distance within the tolerance may be too large there.
+void AutomaticFit::find_features() {
+  constexpr double kMostExaggeration = 5;  // the smallest features must not outweigh the quality of all cells
+  target_.sample(0);
+  features_ = feature_sizes(target_.surface, *target_.tree,
+                            options_.max_tolerance_percent / 100 / kAutomaticFeatureShare);
+  if (features_.points.empty()) return;
+  exaggeration_.assign(target_.surface.triangles().size(), 1);
+  for (std::size_t i = 0; i < features_.points.size(); ++i) {
+    const double aim = kAutomaticFeatureShare * features_.sizes[i];
+    double& factor = exaggeration_[features_.triangles[i]];
+    factor = std::max(factor, std::min(kMostExaggeration, options_.max_tolerance_percent / 100 / aim));
+  }
+}
+
+/// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
 std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions options) {
   options.progress = [this](double fraction) {
     return !runner_.is_to_end() && (!options_.progress || options_.progress({"template", 0, 0, fraction, fraction_}));
@@ -166,9 +191,11 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
     }
     return std::nullopt;
   }
-  if (made.templates.empty())
-    throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(options.cells) +
-                     " cells, has its " + to_string(made.wanted) + "; give a --template");
+  if (made.templates.empty()) {
+    no_template_ = "target: no grid that was tried, of up to 20 times " + std::to_string(options.cells) +
+                   " cells, has its " + to_string(made.wanted) + "; give a --template";
+    return std::nullopt;
+  }
   VolumeMesh& mesh = made.templates.front().mesh;
   target_.normalisation.take_in(mesh);
   if (result_.report.stages.empty())
@@ -176,7 +203,7 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
   return std::move(made.templates.front());
 }
 
-/// Makes a pillowed template of at most so many cells, if there is one. Returns nothing if the fit must end.
+/// Makes a pillowed template of at most so many cells, if there is one; else as `make_template`.
 std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cells) {
   constexpr int kTries = 3;
   constexpr double kLess = 0.97;
@@ -200,7 +227,8 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1);
-  QualityBoundary boundary{std::move(samples.positions), {}, samples.triangles, samples.triangle_faces};
+  QualityBoundary boundary{.samples = std::move(samples.positions), .triangles = samples.triangles,
+                           .triangle_faces = samples.triangle_faces, .exaggeration = exaggeration_};
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
     boundary.group_of_face = layout_->group_of_face;
@@ -223,10 +251,11 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
 
 /// Measures the present mesh and keeps it if it is the best. Returns false if the fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
-  constexpr double kQualityWeight = 5, kEdgeWeight = 3, kMeets = 1, kUncertified = 10;
+  constexpr double kQualityWeight = 5, kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
+  trial.feature_miss = largest_feature_miss(features_, ClosestPoint(surface));
   trial.cells = mesh_.num_cells();
   trial.mean_percent = 100 * distance.mean();
   trial.max_percent = 100 * distance.max();
@@ -244,7 +273,14 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
     trial.followed_curves = creases->num_followed;
     trial.within_share = creases->within_share();
   }
-  trial.merit = std::max(0.0, trial.max_percent / options_.max_tolerance_percent - 1) +
+  double missed = 0;
+  if (trial.feature_miss) {
+    missed = std::clamp(trial.feature_miss->share / kAutomaticFeatureShare - 1, 0.0, kMostMiss);
+    trial.feature_miss->place = target_.normalisation.from_unit({trial.feature_miss->place})[0];
+    trial.feature_miss->distance *= target_.normalisation.diagonal;
+    trial.feature_miss->size *= target_.normalisation.diagonal;
+  }
+  trial.merit = missed + std::max(0.0, trial.max_percent / options_.max_tolerance_percent - 1) +
                 std::max(0.0, trial.mean_percent / options_.mean_tolerance_percent - 1) +
                 kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
                 (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
@@ -271,7 +307,7 @@ void AutomaticFit::note_missed_edges() {
 /// Fits a pillowed template. Returns false if the fit must end.
 bool AutomaticFit::run_smooth(const Attempt& attempt) {
   std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
-  if (!made) return false;
+  if (!made) return !no_template_.empty();
   mesh_ = std::move(*made);
   AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
   bool going = true;
@@ -323,13 +359,14 @@ bool AutomaticFit::route_and_fit(const VolumeMesh& grid, std::span<const Vec3> f
 /// Fits a padded grid. Returns false if the fit must end.
 bool AutomaticFit::run_edges(const Attempt& attempt) {
   constexpr double kRoomForPads = 0.5, kLess = 0.95;
+  constexpr double kEnough = 0.8;  // share of the edges that must find a path, or a finer grid is worth more than a fit
   constexpr int kTries = 3;
   double asked = kRoomForPads * static_cast<double>(attempt.template_cells);
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
     std::optional<AutoTemplate> made =
         make_template({.cells = count, .through_planes = attempt.kind == Attempt::Kind::aligned});
-    if (!made) return false;
+    if (!made) return !no_template_.empty();
     if (attempt.kind == Attempt::Kind::aligned) aligned_share_ = made->aligned_share;
     const VolumeMesh grid = std::move(made->mesh);
     layout_.reset();
@@ -345,15 +382,23 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
       asked *= kLess * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
       continue;
     }
+    if (!attempt.is_last_count && routed_share(layout_->routing, edges_.features.curves) < kEnough) {
+      skipped_.push_back(attempt);
+      return true;
+    }
     return route_and_fit(grid, fitted,
                          {.template_cells = grid.num_cells(),
                           .through_planes = attempt.kind == Attempt::Kind::aligned});
   }
 }
 
+/// Returns false if the fit must end. InputError: there is no template, and there was none before.
 bool AutomaticFit::run_attempt(const Attempt& attempt) {
   layout_.reset();
-  return attempt.kind == Attempt::Kind::smooth ? run_smooth(attempt) : run_edges(attempt);
+  no_template_.clear();
+  const bool going = attempt.kind == Attempt::Kind::smooth ? run_smooth(attempt) : run_edges(attempt);
+  if (!no_template_.empty() && result_.trials.empty() && skipped_.empty()) throw InputError(no_template_);
+  return going;
 }
 
 void AutomaticFit::conclude() {
@@ -368,10 +413,17 @@ void AutomaticFit::conclude() {
     report.warnings.push_back(formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ",
                                         options_.quality, options_.mean_tolerance_percent,
                                         options_.max_tolerance_percent) + found);
+  if (best.feature_miss && best.feature_miss->share > kAutomaticFeatureShare) {
+    const FeatureMiss& miss = *best.feature_miss;
+    report.warnings.push_back(formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, %.0f %% "
+                                        "of its size, at (%.6g, %.6g, %.6g); more --cells may hold it",
+                                        miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(),
+                                        miss.place.z()));
+  }
   if (!result_.missed_edges.empty()) {
     const MissedEdge& longest = result_.missed_edges.front();
-    report.warnings.push_back(formatted("%zu of %zu sharp edges are not followed; the longest, %.3g %% of the diagonal, "
-                                        "at (%.6g, %.6g, %.6g): %s",
+    report.warnings.push_back(formatted("%zu of %zu sharp edges are not followed; the longest, %.3g %% of the "
+                                        "diagonal, at (%.6g, %.6g, %.6g): %s",
                                         result_.missed_edges.size(), best.curves, longest.length_percent,
                                         longest.place.x(), longest.place.y(), longest.place.z(),
                                         to_string(longest.reason).c_str()));
@@ -380,11 +432,17 @@ void AutomaticFit::conclude() {
 
 AutomaticFitResult AutomaticFit::run() {
   find_edges();
+  find_features();
   const std::vector<Attempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
     fraction_ = static_cast<double>(i) / static_cast<double>(attempts.size());
     if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
+  }
+  for (Attempt attempt : std::exchange(skipped_, {})) {
+    if (!going || !result_.trials.empty()) break;
+    attempt.is_last_count = true;
+    going = run_attempt(attempt);
   }
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));

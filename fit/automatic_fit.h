@@ -5,6 +5,7 @@
 #include "fit/features/followed_creases.h"
 #include "fit/stages/fit_report.h"
 #include "fit/stages/quality_stages.h"
+#include "fit/target/feature_size.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"
@@ -21,6 +22,8 @@ class StageLog;
 
 /// Distances that an automatic fit aims at, in percent of the diagonal.
 inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
+/// Largest distance from a small feature (`FeatureSizes`) that an automatic fit aims at, as a share of its radius.
+inline constexpr double kAutomaticFeatureShare = 0.1;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp edges,
 /// and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
@@ -60,6 +63,7 @@ struct AutomaticFitTrial {
   double within_share = 1;         ///< share of their length within `kSharpPercent` of edges of the mesh
   int level = 0;                   ///< times the template was subdivided
   double mean_percent = 0, max_percent = 0;  ///< distance, percent of the target's diagonal
+  std::optional<FeatureMiss> feature_miss;  ///< in the target's unit; empty: there are no small features
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
   double least_share = 0;          ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t uncertified = 0;
@@ -93,6 +97,7 @@ struct AutomaticFitResult {
 /// The best trial is kept:
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
+///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1))
 ///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
 ///         + 1 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///

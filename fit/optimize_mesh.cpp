@@ -67,7 +67,7 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("quality", options.quality, 0, 0.8);
+  in_range("quality", options.quality, 0, kMostQuality);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (has_target && options.fixed_boundary)
     throw InputError("OptimizeOptions: a boundary that is fixed cannot be drawn to a target");

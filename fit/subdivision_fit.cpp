@@ -45,7 +45,7 @@ void check_options(const FitOptions& options) {
   in_range("levels", options.levels, 1, 6);
   in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
   in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
-  in_range("quality", options.quality, 0, 0.8);
+  in_range("quality", options.quality, 0, kMostQuality);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);

@@ -3,10 +3,19 @@
 
 #include "cli/runs/check_report.h"
 
+#include <optional>
 #include <utility>
 
 namespace subvol::cli {
 namespace {
+
+Json feature_miss_json(const std::optional<FeatureMiss>& miss) {
+  if (!miss) return {};
+  return {{"share", miss->share},
+          {"distance", miss->distance},
+          {"radius", miss->size},
+          {"at", {miss->place.x(), miss->place.y(), miss->place.z()}}};
+}
 
 Json trials_json(const AutomaticFitResult& result) {
   Json trials = Json::array();
@@ -21,6 +30,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"edges_within_share", trial.within_share},
                       {"mean_percent", trial.mean_percent},
                       {"max_percent", trial.max_percent},
+                      {"feature_miss", feature_miss_json(trial.feature_miss)},
                       {"min_scaled_jacobian", trial.least_scaled_jacobian},
                       {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
                       {"self_intersections", trial.self_intersections ? Json(*trial.self_intersections) : Json()},

@@ -16,6 +16,8 @@ class StageLog;
 
 /// Least scaled Jacobian that fits aim at.
 inline constexpr double kUsualQuality = 0.65;
+/// Largest quality that may be asked for: hexes around an irregular edge cannot all be better.
+inline constexpr double kMostQuality = 0.8;
 
 /// The surface that is compared with the target.
 enum class FittedSurface {

@@ -20,6 +20,10 @@ constexpr double kMargin = 0.15;
 constexpr double kCoarseMargin = 0.05;
 constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;
 
+/// A distance that is too large by a tenth weighs as much as cells that miss the goal by a fifth: distances end at their
+/// bar, quality as high as possible.
+constexpr double kExcessWeight = 2;
+
 /// Width of the strip of surface that counts as much as a crease, in edges.
 constexpr double kCreaseEdges = 5;
 
@@ -84,6 +88,7 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
       for (const Index f : boundary.triangle_faces) groups.push_back(boundary.group_of_face[f]);
       surface->set_groups(std::move(groups), boundary.group_of_triangle);
     }
+    if (!boundary.exaggeration.empty()) surface->exaggerate(boundary.exaggeration);
     surface_ = surface.get();
     if (creases) {
       surface->discount_disagreeing();
@@ -140,7 +145,7 @@ QualityStages::State QualityStages::inspect(const QualitySchedule& schedule, std
   const bool minds_distance = surface_ && schedule.most_distance > 0;
   if (minds_distance) state.distance = emphasize_far(schedule.most_distance, x);
   const double excess = minds_distance ? std::max(0.0, state.distance / schedule.most_distance - 1) : 0;
-  state.merit = excess > 0 ? -excess : state.cells.least_share;
+  state.merit = state.cells.least_share - kExcessWeight * excess;
   return state;
 }
 

@@ -59,6 +59,9 @@ struct QualityBoundary {
   /// Groups of each face of the mesh and of each of the target's triangles (`ClosestPointEnergy::set_groups`); empty:
   /// none.
   std::vector<Index> group_of_face, group_of_triangle;
+  /// How many times distances from each of the target's triangles count in the lift (`ClosestPointEnergy::exaggerate`);
+  /// empty: once.
+  std::vector<double> exaggeration;
 };
 
 /// Runs the minimizations of one level on one problem.
@@ -78,7 +81,8 @@ class QualityStages {
   struct State {
     QualityEnergy::State cells;
     double distance = 0;   ///< largest distance at the samples, as a share of the diagonal; 0 if none is aimed at
-    /// Least share of the goal, at most 1; if the distance is too large, minus the share by which it is.
+    /// Least share of the goal that a cell reaches, at most 1, less a multiple of the share by which the distance is too
+    /// large. 1: all aims are reached.
     double merit = -1e300;
   };
 

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/target/feature_size.h"
+
+#include "subvol/base/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace subvol {
+
+namespace {
+
+/// Returns the radius of the ball at p on the side of n; `most` if it touches nothing that is about opposite to p.
+double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, double most) {
+  constexpr double kOpposite = -0.866;   // cosine of 150 degrees
+  constexpr double kTouching = 0.98;     // a ball is empty if the surface is farther than this share of its radius
+  constexpr int kMostRounds = 30;
+  double radius = most, cosine = 1;
+  for (int round = 0; round < kMostRounds; ++round) {
+    const Vec3 centre = p + radius * n;
+    const ClosestPoint::Hit hit = tree.closest(centre);
+    if (!(hit.distance < kTouching * radius)) break;
+    const Vec3 across = hit.point - p;
+    const double height = across.dot(n), squared = across.squaredNorm();
+    if (!(height > 0) || !(squared > 0)) break;  // only rounding puts a point of a smaller ball beside it
+    radius = squared / (2 * height);
+    cosine = -n.dot(hit.point - (p + radius * n)) / radius;
+  }
+  return cosine < kOpposite ? radius : most;
+}
+
+}  // namespace
+
+FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double most) {
+  if (!(most > 0) || !std::isfinite(most)) throw InputError("feature sizes: the largest radius must be > 0");
+  FeatureSizes features;
+  if (surface.is_cloud()) return features;
+  const std::vector<Vec3>&samples = surface.samples(), &normals = surface.sample_normals();
+  std::vector<double> sizes(samples.size());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    sizes[i] = std::min(ball_radius(samples[i], normals[i], tree, most),
+                        ball_radius(samples[i], -normals[i], tree, most));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (sizes[i] >= most) continue;
+    features.points.push_back(samples[i]);
+    features.sizes.push_back(sizes[i]);
+    features.triangles.push_back(surface.sample_triangles()[i]);
+  }
+  return features;
+}
+
+std::optional<FeatureMiss> largest_feature_miss(const FeatureSizes& features, const ClosestPoint& fitted) {
+  if (features.points.empty()) return std::nullopt;
+  std::vector<ClosestPoint::Hit> hits(features.points.size());
+  fitted.closest(features.points, hits);
+  FeatureMiss largest{-1};
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const double share = hits[i].distance / features.sizes[i];
+    if (share > largest.share) largest = {share, hits[i].distance, features.sizes[i], features.points[i]};
+  }
+  return largest;
+}
+
+}  // namespace subvol
