@@ -31,7 +31,11 @@ namespace {
 
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
-constexpr double kGoodMerit = 0.1;           // no other template is tried below it
+constexpr double kGoodMerit = 0.1;           // no other template is tried below it ...
+/// ... nor if the quality is what keeps the merit above it, and reaches this share of the goal: larger templates have the
+/// same angles at sharp edges and irregular vertices.
+constexpr double kEnoughQuality = 0.85;
+constexpr double kQualityWeight = 5;         // of the share of the quality in the merit
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
 constexpr double kMaxMargin = 0.8;
 
@@ -136,7 +140,7 @@ class AutomaticFit {
     constexpr double kMany = 0.4;
     return attempt.kind != Attempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
-  bool is_good() const { return !result_.trials.empty() && result_.trials[result_.chosen].merit < kGoodMerit; }
+  bool is_good() const;
 
   AutomaticFitOptions options_;
   bool follows_edges_;
@@ -155,6 +159,14 @@ class AutomaticFit {
   double least_share_ = 1;            ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
+
+/// Returns true if no other template needs to be tried.
+bool AutomaticFit::is_good() const {
+  if (result_.trials.empty()) return false;
+  const AutomaticFitTrial& best = result_.trials[result_.chosen];
+  const double excused = best.least_share >= kEnoughQuality ? kQualityWeight * (1 - best.least_share) : 0;
+  return best.merit - excused < kGoodMerit;
+}
 
 void AutomaticFit::find_edges() {
   if (!follows_edges_) return;
@@ -251,7 +263,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
 
 /// Measures the present mesh and keeps it if it is the best. Returns false if the fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
-  constexpr double kQualityWeight = 5, kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
+  constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
