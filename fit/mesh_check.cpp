@@ -100,6 +100,7 @@ Compare comparison(const TriangleMesh* target, const MeshCheckOptions& options) 
   return [target, tree, samples = options.distance_samples](const TriangleMesh& boundary, MeshCheck& check) {
     check.target_diagonal = bounding_box_diagonal(*target);
     check.distance = surface_distance(boundary, ClosestPoint(boundary), *target, *tree, {.num_samples = samples});
+    check.normals = normal_deviation(boundary, *target, *tree, samples);
   };
 }
 
@@ -244,6 +245,9 @@ void append_distance(std::string& text, const MeshCheck& check) {
          check.distance->one_sided ? " (of points)" : "           ", check.distance->mean(),
          check.mean_distance_percent(), check.distance->max(), check.max_distance_percent(), extreme.from[0],
          extreme.from[1], extreme.from[2]);
+  if (check.normals)
+    append(text, "normals             mean %.2f degrees, 95 %% of the area below %.1f\n", check.normals->mean_degrees,
+           check.normals->percentile_95_degrees);
 }
 
 void require_samples(int per_direction) {

@@ -3,6 +3,7 @@
 
 #include "fit/elements/high_order_mesh.h"
 #include "fit/geometry/curved_boundary.h"
+#include "fit/geometry/normal_deviation.h"
 #include "fit/geometry/surface_distance.h"
 #include "fit/quality/quality.h"
 #include "subvol/base/work_progress.h"
@@ -85,6 +86,7 @@ struct MeshCheck {
   std::size_t num_degenerate_boundary_triangles = 0;         ///< of zero area: not checked for intersections
 
   std::optional<SurfaceDistance> distance;  ///< a: boundary, b: target; empty without a target or a boundary
+  std::optional<NormalDeviation> normals;  ///< between the boundary and a target of triangles
   double target_diagonal = 0;                                ///< diagonal of the target's bounding box: 100 per cent
 
   /// Returns true if the mesh can be used as it is: it has no defects except unused vertices, every cell is certified,

@@ -124,6 +124,8 @@ class MeshOptimizer {
   struct Measured;
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
+  bool run_quality_stages(const QualitySchedule& schedule);
+  bool raise_quality(double goal);
   bool raise_quality();
   bool is_worth_keeping(const Measured& now, const Measured& start) const;
   void relieve_far_cells(std::span<const double> triangle_distances);
@@ -404,43 +406,64 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
   return gain > kLeastGain || (gain > -kLeastGain && now.mean_jacobian > start.mean_jacobian + kLeastGain);
 }
 
-/// Raises the lowest scaled Jacobians; if the surface suffers, it counts more in another attempt. Returns false if the
-/// work must end.
-bool MeshOptimizer::raise_quality() {
-  constexpr double kFraction = 0.9, kMoreSurface = 10;
+/// Runs quality stages on the present mesh. Returns false if the work must end.
+bool MeshOptimizer::run_quality_stages(const QualitySchedule& schedule) {
+  constexpr double kFraction = 0.9;
+  const bool slides = !options_.fixed_boundary;
+  FreeNodes free = free_nodes(fixed_vertices(slides ? Boundary::sliding : Boundary::fixed), mesh_.positions);
+  QualityBoundary boundary;
+  std::function<CreaseEnergy(double)> creases;
+  if (slides) {
+    boundary.samples = compose(samples_.positions, free.map);
+    boundary.fixed = samples_.positions.apply(free.fixed);
+    boundary.triangles = samples_.triangles;
+    boundary.triangle_faces = samples_.triangle_faces;
+    if (!creases_.curves().empty())
+      creases = [&](double width) {
+        return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
+      };
+  }
+  QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed, boundary, target_.surface, creases);
+  std::vector<Vec3> x = std::move(free.unknowns);
+  const bool going = stages.run(schedule, runner_, record("quality"), kFraction, x, report_);
+  mesh_.positions = std::move(free.fixed);
+  const std::vector<Vec3> moved = free.map.apply(x);
+  for (std::size_t v = 0; v < moved.size(); ++v) mesh_.positions[v] += moved[v];
+  return going;
+}
+
+/// Raises the least scaled Jacobian towards a goal; if the surface suffers, it counts more in another attempt. Returns
+/// false if the work must end.
+bool MeshOptimizer::raise_quality(double goal) {
+  constexpr double kMoreSurface = 10;
   constexpr int kAttempts = 2;
   const Measured before = measure();
-  if (before.least_jacobian >= options_.quality) return true;
+  if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
-  const bool slides = !options_.fixed_boundary;
-  QualitySchedule schedule = fine_quality_schedule(options_.quality);
+  QualitySchedule schedule = fine_quality_schedule(goal);
   schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    FreeNodes free = free_nodes(fixed_vertices(slides ? Boundary::sliding : Boundary::fixed), start);
-    std::vector<Vec3> x = std::move(free.unknowns);
-    const auto creases = [&](double width) {
-      return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
-    };
-    const bool has_creases = slides && !creases_.curves().empty();
-    QualityBoundary boundary;
-    if (slides)
-      boundary = {compose(samples_.positions, free.map), samples_.positions.apply(free.fixed), samples_.triangles,
-                  samples_.triangle_faces};
-    QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed, boundary, target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
     const std::size_t stages_before = report_.stages.size();
-    const bool going = stages.run(schedule, runner_, record("quality"), kFraction, x, report_);
-    mesh_.positions = std::move(free.fixed);
-    const std::vector<Vec3> moved = free.map.apply(x);
-    for (std::size_t v = 0; v < moved.size(); ++v) mesh_.positions[v] += moved[v];
+    const bool going = run_quality_stages(schedule);
     if (is_better(measure(), before)) return going;
     mesh_.positions = start;
     report_.undo_stages(stages_before, report_.stages.size());
     if (!going) return false;
+    if (options_.fixed_boundary) break;
     for (QualityStage& stage : schedule.stages) stage.surface *= kMoreSurface;
     schedule.lift.surface *= kMoreSurface;
-    if (!slides) break;
   }
   return true;
+}
+
+/// Raises the least scaled Jacobian to the quality that was asked for and then, from there, beyond it. Returns false if
+/// the work must end.
+bool MeshOptimizer::raise_quality() {
+  constexpr double kBeyond = 0.1;
+  if (options_.quality == 0) return true;
+  if (!raise_quality(options_.quality)) return false;
+  if (measure_quality(mesh_).min_scaled_jacobian < options_.quality) return true;
+  return raise_quality(std::min(kMostQuality, options_.quality + kBeyond));
 }
 
 /// There is nothing to measure if the target is the mesh's own boundary.

@@ -29,7 +29,7 @@ struct OptimizeOptions {
   /// Weight of the cells' shape, > 0. It is lowered while the mean distance between the boundary and its surface is too
   /// large. If the largest distance is too large, only the cells beside such places get less weight.
   double lambda = 0.1;
-  double quality = kUsualQuality;        ///< least scaled Jacobian to aim at, in [0, 0.8]; 0: none
+  double quality = kUsualQuality;        ///< least scaled Jacobian to aim at first, in [0, 0.8]; 0: none
   /// Largest acceptable distances, in per cent of the diagonal, > 0.
   double mean_tolerance_percent = 0.05, max_tolerance_percent = 0.5;
   int max_iterations = 0;                ///< per stage; 0: as the schedule says
@@ -53,16 +53,17 @@ struct OptimizeResult {
 /// question. Then E = E_S + lambda E_W is minimized with the Hencky barrier, as in the fits: no step makes a cell lose
 /// its certificate. Between rounds, each cell's ideal box takes the cell's present proportions (for
 /// `CellSizes::local`), and its weight becomes the reciprocal of its least scaled Jacobian, reduced beside places that
-/// are too far from the surface. At last, `QualityStages` raise the lowest scaled Jacobians; the state before is kept
-/// unless the least one is higher, no more cells are uncertified, no more faces meet, and the distances are within
-/// nine tenths of the mean tolerance and the largest, or no larger than before.
+/// are too far from the surface. At last, `QualityStages` raise the lowest scaled Jacobians, to the
+/// quality that is asked for and then, if it is reached, to 0.1 more; the state before is kept unless the least one is
+/// higher, no more cells are uncertified, no more faces meet, and the distances are within nine tenths of the mean
+/// tolerance and the largest, or no larger than before.
 ///
 /// mesh    must pass `validate` except for inverted cells and unused vertices, else InputError. Without a target, the
 ///         vertices where its sharp edges meet (`FollowedCreases`) stay fixed, except those of cells that are badly
 ///         shaped or cannot be untangled.
-/// With `CellSizes::local`, a mesh whose cells are all certified comes back as it is, bit for bit, unless the result is better: of a higher least
-/// scaled Jacobian, or of the same and a higher mean, with distances within the tolerances or no larger than before; or
-/// closer to a target that it was too far from.
+/// With `CellSizes::local`, a mesh whose cells are all certified comes back as it is, bit for bit, unless the result is
+/// better: of a higher least scaled Jacobian, or of the same and a higher mean, with distances within the tolerances or
+/// no larger than before; or closer to a target that it was too far from.
 ///
 /// target  the surface that the boundary must reproduce; null: the present boundary.
 /// returns the last state. Unless the work was ended early, report.stop_reason is `stalled` if cells are left that are

@@ -118,6 +118,9 @@ Json check_json(const MeshCheck& check) {
   Json json{{"valid", check.valid()}};
   if (check.ended_early) json["ended_early"] = true;
   if (check.distance) json["distance"] = distance_json(*check.distance, check.target_diagonal);
+  if (check.normals)
+    json["normal_deviation"] = {{"mean_degrees", check.normals->mean_degrees},
+                                {"percentile_95_degrees", check.normals->percentile_95_degrees}};
   if (check.orders) json["orders"] = orders_json(*check.orders);
   if (check.quality) json["quality"] = quality_json(*check.quality);
   if (!check.witnesses.empty()) json["inverted_at"] = witnesses_json(check.witnesses);

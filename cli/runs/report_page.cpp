@@ -6,6 +6,7 @@
 #include "export/vtu_arrays.h"
 #include "subvol/base/error.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -136,7 +137,50 @@ std::string distances(const Json& report) {
   add("at the start", "initial_distance");
   add("mesh", "distance");
   add("limit surface", "limit_surface_distance");
-  return rows.empty() ? "" : table({"distance to the surface", "mean, % of diagonal", "max, % of diagonal"}, rows);
+  if (rows.empty()) return "";
+  std::string text = table({"distance to the surface", "mean, % of diagonal", "max, % of diagonal"}, rows);
+  const Json& normals = part(report, "normal_deviation");
+  if (normals.contains("mean_degrees"))
+    text += "<p>The normals deviate by " + words(normals["mean_degrees"]) + " degrees on average, and by less than " +
+            words(normals.at("percentile_95_degrees")) + " degrees on 95 % of the area.</p>\n";
+  return text;
+}
+
+/// A point as text for people.
+std::string place(const Json& point) {
+  std::string text;
+  for (const Json& x : point) text += (text.empty() ? "" : ", ") + words(x);
+  return text;
+}
+
+std::string trials(const Json& report) {
+  const Json& made = part(report, "template");
+  std::string rows;
+  std::size_t count = 0;
+  for (const Json& trial : made.value("trials", Json::array())) {
+    const auto entry = [&](const char* name) { return trial.contains(name) ? words(trial[name]) : ""; };
+    const std::string edges =
+        trial.contains("sharp_edges") ? entry("followed_edges") + " of " + entry("sharp_edges") : "";
+    const bool chosen = made.value("chosen", Json()) == count;
+    rows += row({std::to_string(++count), entry("cells"), entry("min_scaled_jacobian"), entry("mean_percent"),
+                 entry("max_percent"), edges, entry("merit"), chosen ? "chosen" : ""});
+  }
+  if (rows.empty()) return "";
+  return table({"", "cells", "least scaled Jacobian", "mean distance, %", "max distance, %", "edges followed", "merit",
+                ""},
+               rows);
+}
+
+std::string missed_edges(const Json& report) {
+  constexpr std::size_t kMostRows = 30;
+  const Json edges = report.value("edges_not_followed", Json::array());
+  std::string rows;
+  for (std::size_t i = 0; i < std::min(edges.size(), kMostRows); ++i)
+    rows += row({words(edges[i].at("length_percent")), place(edges[i].at("at")), words(edges[i].at("why"))});
+  if (rows.empty()) return "";
+  std::string text = table({"length, % of diagonal", "place", "why"}, rows);
+  if (edges.size() > kMostRows) text += format("<p>... and %zu more</p>\n", edges.size() - kMostRows);
+  return text;
 }
 
 std::string quality(const Json& report) {
@@ -159,9 +203,7 @@ std::string quality(const Json& report) {
 std::string worst_cells(const Json& report) {
   std::string rows;
   for (const Json& cell : part(report, "quality").value("worst_cells", Json::array())) {
-    std::string centre;
-    for (const Json& x : cell.at("centre")) centre += (centre.empty() ? "" : ", ") + number(x.get<double>());
-    rows += row({words(cell.at("cell")), number(cell.at("scaled_jacobian").get<double>()), centre});
+    rows += row({words(cell.at("cell")), words(cell.at("scaled_jacobian")), place(cell.at("centre"))});
   }
   return rows.empty() ? "" : table({"cell", "scaled Jacobian", "centre"}, rows);
 }
@@ -269,6 +311,8 @@ std::string report_page(const Json& report, std::span<const ReportPicture> pictu
   page += section("Thickness", thicknesses(report));
   page += section("Quality", quality(report) + histogram(report));
   page += section("Worst cells", worst_cells(report));
+  page += section("Sharp edges that are not followed", missed_edges(report));
+  page += section("Templates that were tried", trials(report));
   page += section("Convergence", convergence(report) + stages(report));
   page += section("Time and memory", costs(report));
   page += section("Command", command(report));

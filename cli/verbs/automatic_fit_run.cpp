@@ -10,8 +10,12 @@
 #include "cli/runs/written_result.h"
 #include "cli/verbs/long_run.h"
 #include "cli/verbs/verb_options.h"
+#include "subvol/base/format.h"
 #include "subvol/base/version.h"
+#include "subvol/surface/solid_topology.h"
 
+#include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <optional>
 #include <utility>
@@ -51,8 +55,18 @@ void AutomaticFitRun::load() {
   tell_warnings();
 }
 
+/// Returns the number of cubes of an edge length that fill a solid. UsageError: there are too many.
+std::size_t cells_of_size(const TriangleMesh& target, double size) {
+  const double cells = solid_boundary(target).volume / std::pow(size, 3);
+  if (!(cells <= static_cast<double>(kMostCells)))
+    throw UsageError(formatted("--size %g: the target would need %.3g cells, expected at most %zu", size, cells,
+                               kMostCells));
+  return std::max(kLeastTemplateCells, static_cast<std::size_t>(std::lround(cells)));
+}
+
 void AutomaticFitRun::fit() {
   AutomaticFitOptions options = arguments_.fit;
+  if (arguments_.size) options.cells = cells_of_size(target_, *arguments_.size);
   checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
   options.log = checkpointing_->log();
   result_ = followed([&](auto progress) {

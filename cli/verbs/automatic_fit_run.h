@@ -4,13 +4,18 @@
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
 #include "fit/automatic_fit.h"
+#include "subvol/templates/auto_template.h"
 
 #include <CLI/CLI.hpp>
 
+#include <cstddef>
 #include <optional>
 #include <string>
 
 namespace subvol::cli {
+
+/// Largest number of cells that a fit may be asked for.
+inline constexpr std::size_t kMostCells = 8 * kMostTemplateCells;
 
 /// Arguments of `fit` without a template, for a mesh whose vertices are all free.
 struct AutomaticFitArguments {
@@ -21,6 +26,7 @@ struct AutomaticFitArguments {
   std::optional<double> mean_tolerance_percent, max_tolerance_percent;
   std::optional<double> least_quality;  ///< the same for the least scaled Jacobian
   std::string target;
+  std::optional<double> size;           ///< edge length of the cells, in the target's unit; takes the place of fit.cells
 };
 
 /// Fills a surface with hexes from files to files; returns an ExitStatus.

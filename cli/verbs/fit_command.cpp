@@ -31,8 +31,6 @@ namespace {
 
 constexpr const char *kAutomaticAngle = "auto", *kNoAngle = "none";
 
-constexpr std::size_t kMostCells = 8 * kMostTemplateCells;
-
 /// Options that ask for a subdivision volume.
 constexpr std::array kSubdivisionOptions{"--levels",     "--surface",      "--boundary", "--cage-only",
                                          "--lambda-far", "--lambda-close", "--solver",   "--correspondence",
@@ -48,7 +46,7 @@ struct FitArguments {
   std::string point_weights = "equal", energy = "hencky", crease_angle = kAutomaticAngle;
   std::optional<std::size_t> cells;              ///< of the result, if the template is made
   double quality = kUsualQuality;
-  std::optional<double> quality_floor, max_tolerance_percent;
+  std::optional<double> quality_floor, max_tolerance_percent, size;
   int order = 0;  ///< order of curved elements; 0: a subdivision volume is fitted
   std::string basis = to_string(HighOrderFitOptions{}.basis);
   bool adaptive = false;
@@ -259,7 +257,7 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("PERCENT");
   verb.add_option("--quality", arguments.quality,
                   "Least scaled Jacobian to aim at, as far as distances allow; 0: none; not with --order")
-      ->check(number_in(0.0, 0.8))
+      ->check(number_in(0.0, kMostQuality))
       ->type_name("Q")
       ->capture_default_str();
   verb.add_option("--quality-floor", arguments.quality_floor,
@@ -326,13 +324,14 @@ bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
 
 /// UsageError: an option was given that has a meaning only for automatic fits.
 void refuse_automatic_options(const CLI::App& verb) {
-  if (verb.count("--max-tolerance") > 0)
-    throw UsageError("--max-tolerance: only fits without a template, --order, a cage or --levels aim at it");
+  for (const std::string option : {"--max-tolerance", "--size"})
+    if (verb.count(option) > 0)
+      throw UsageError(option + ": only fits without a template, --order, a cage or --levels aim at it");
 }
 
 AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
   AutomaticFitArguments result{arguments.run, arguments.writing, {}, arguments.fit.tolerance_percent,
-                               arguments.max_tolerance_percent, arguments.quality_floor, arguments.target};
+                               arguments.max_tolerance_percent, arguments.quality_floor, arguments.target, arguments.size};
   AutomaticFitOptions& fit = result.fit;
   fit.cells = arguments.cells;
   fit.quality = arguments.quality;
@@ -448,6 +447,12 @@ void add_fit_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(kLeastTemplateCells, kMostCells))
       ->type_name("N")
       ->excludes(file);
+  verb->add_option("--size", arguments->size,
+                   "The same by the edge length of the cells, in the target's unit; only without a template")
+      ->check(number_in(1e-30, 1e30))
+      ->type_name("LENGTH")
+      ->excludes(file)
+      ->excludes(verb->get_option("--cells"));
   add_references_option(*verb, arguments->run)->needs(file);
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);

@@ -187,7 +187,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
           ->capture_default_str();
   CLI::Option* quality = verb.add_option("--quality", optimize.quality,
                                          "Least scaled Jacobian to aim at, as far as distances allow; 0: none")
-                             ->check(number_in(0.0, 0.8))
+                             ->check(number_in(0.0, kMostQuality))
                              ->type_name("Q")
                              ->capture_default_str();
   verb.add_option("--lambda", optimize.lambda,

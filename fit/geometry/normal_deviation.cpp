@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/geometry/normal_deviation.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kBinsPerDegree = 2;
+constexpr std::size_t kBins = 180;
+
+/// Areas by angle.
+struct Angles {
+  std::array<double, kBins> area{};
+  double total = 0, integral = 0;
+
+  void add(double degrees, double share) {
+    area[std::min(kBins - 1, static_cast<std::size_t>(kBinsPerDegree * degrees))] += share;
+    total += share;
+    integral += share * degrees;
+  }
+  void add(const Angles& other) {
+    for (std::size_t i = 0; i < kBins; ++i) area[i] += other.area[i];
+    total += other.total;
+    integral += other.integral;
+  }
+};
+
+/// Twice the area of a triangle times its normal.
+Vec3 area_vector(const TriangleMesh& mesh, std::size_t t) {
+  const auto& [a, b, c] = mesh.triangles[t];
+  return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
+}
+
+double degrees_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
+}
+
+}  // namespace
+
+NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh& target,
+                                 const ClosestPoint& target_tree, int num_samples) {
+  const ClosestPoint order(fitted);  // neighbors in its order are neighbors in space
+  double total = 0;
+  for (std::size_t t = 0; t < fitted.triangles.size(); ++t) total += area_vector(fitted, t).norm();
+  constexpr std::size_t kRun = 32;   // sums and hints stay within a run, whatever thread takes it
+  std::vector<Angles> runs((fitted.triangles.size() + kRun - 1) / kRun);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t run = 0; run < runs.size(); ++run) {
+    Index hint = kNoIndex;
+    for (std::size_t place = run * kRun; place < std::min((run + 1) * kRun, fitted.triangles.size()); ++place) {
+      const auto t = static_cast<std::size_t>(order.order()[place]);
+      const Vec3 vector = area_vector(fitted, t);
+      const double share = total > 0 ? vector.norm() / total : 0;
+      if (!(share > 0)) continue;
+      const auto& [ia, ib, ic] = fitted.triangles[t];
+      const Vec3 &a = fitted.positions[ia], &b = fitted.positions[ib], &c = fitted.positions[ic];
+      const int m = std::max(1, static_cast<int>(std::lround(std::sqrt(num_samples * share))));
+      const auto compare = [&](double u, double v) {
+        const ClosestPoint::Hit hit = target_tree.closest(a + u / m * (b - a) + v / m * (c - a), hint);
+        hint = hit.triangle;
+        const Vec3 other = area_vector(target, static_cast<std::size_t>(hit.triangle));
+        if (other.squaredNorm() > 0) runs[run].add(degrees_between(vector, other), share / (m * m));
+      };
+      for (int i = 0; i < m; ++i)
+        for (int j = 0; i + j < m; ++j) {
+          compare(i + 1 / 3.0, j + 1 / 3.0);
+          if (i + j + 1 < m) compare(i + 2 / 3.0, j + 2 / 3.0);
+        }
+    }
+  }
+  Angles all;
+  for (const Angles& run : runs) all.add(run);
+  if (!(all.total > 0)) return {};
+  double below = 0;
+  std::size_t bin = 0;
+  while (bin < kBins && (below += all.area[bin]) < 0.95 * all.total) ++bin;
+  return {all.integral / all.total, static_cast<double>(std::min(bin + 1, kBins)) / kBinsPerDegree};
+}
+
+}  // namespace subvol
