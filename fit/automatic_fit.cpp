@@ -5,6 +5,8 @@
 #include "fit/elements/boundary_samples.h"
 #include "fit/features/crisp_edges.h"
 #include "fit/features/edge_layout.h"
+#include "fit/features/flat_facets.h"
+#include "fit/fits/flat_faces.h"
 #include "fit/fits/smooth_refinement.h"
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/geometry/self_intersection.h"
@@ -147,6 +149,7 @@ class AutomaticFit {
   TriangleMesh original_;             ///< the target; if edges are followed, all its triangles agree about what is inside
   FitTarget target_;
   Edges edges_;
+  FlatFacets facets_;                 ///< of `target_.mesh`, if edges are followed
   FeatureSizes features_;             ///< of the target, in normalized coordinates
   std::vector<double> exaggeration_;  ///< of each triangle of the target (`QualityBoundary`); empty: no small features
   VolumeMesh mesh_;
@@ -172,6 +175,7 @@ void AutomaticFit::find_edges() {
   if (!follows_edges_) return;
   edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
   edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, *options_.crease_angle_degrees));
+  facets_ = flat_facets(target_.mesh);
 }
 
 /// Finds the features that are so small that a distance within the tolerance may be too large there.
@@ -261,9 +265,10 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   return going;
 }
 
-/// Measures the present mesh and keeps it if it is the best. Returns false if the fit must end.
+/// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
   constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
+  if (follows_edges_) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);

@@ -4,6 +4,8 @@
 #include "fit/elements/boundary_samples.h"
 #include "fit/elements/ideal_boxes.h"
 #include "fit/energies/closest_point_energy.h"
+#include "fit/features/flat_facets.h"
+#include "fit/fits/flat_faces.h"
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/geometry/self_intersection.h"
 #include "fit/geometry/surface_distance.h"
@@ -21,6 +23,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 namespace subvol {
@@ -124,6 +127,7 @@ class MeshOptimizer {
   struct Measured;
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
+  void flatten();
   bool run_quality_stages(const QualitySchedule& schedule);
   bool raise_quality(double goal);
   bool raise_quality();
@@ -466,6 +470,12 @@ bool MeshOptimizer::raise_quality() {
   return raise_quality(std::min(kMostQuality, options_.quality + kBeyond));
 }
 
+/// Makes flat faces exactly so, unless the boundary is fixed.
+void MeshOptimizer::flatten() {
+  if (options_.fixed_boundary) return;
+  flatten_faces(mesh_, target_.mesh, *target_.tree, flat_facets(target_.mesh));
+}
+
 /// There is nothing to measure if the target is the mesh's own boundary.
 void MeshOptimizer::measure_start() {
   if (own_boundary_) return;
@@ -521,6 +531,7 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
+  flatten();
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {

@@ -61,6 +61,8 @@ struct OptimizeResult {
 /// mesh    must pass `validate` except for inverted cells and unused vertices, else InputError. Without a target, the
 ///         vertices where its sharp edges meet (`FollowedCreases`) stay fixed, except those of cells that are badly
 ///         shaped or cannot be untangled.
+/// Faces on flat parts of the target are made exactly flat (`flatten_faces`) unless the boundary is fixed.
+///
 /// With `CellSizes::local`, a mesh whose cells are all certified comes back as it is, bit for bit, unless the result is
 /// better: of a higher least scaled Jacobian, or of the same and a higher mean, with distances within the tolerances or
 /// no larger than before; or closer to a target that it was too far from.

@@ -473,7 +473,7 @@ TEST_CASE("A fit without a template fills the surface and says how good the cell
   CHECK(place.run("fit target.off --levels 1 --size 1 -o x.mesh").status == 2);
   const Run too_small = place.run("fit target.off --size 1e-9 -o x.mesh");
   CHECK(too_small.status == 2);
-  CHECK_THAT(too_small.err, Contains("--size 1e-09: the target would need"));
+  CHECK(too_small.err.find("--size 1e-09: the target would need") != std::string::npos);
 }
 
 TEST_CASE("A surface alone is enough for a fit", "[cli][templates]") {

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "fit/features/flat_facets.h"
+#include "fit/geometry/closest_point.h"
+#include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
+
+#include <cstddef>
+
+namespace subvol {
+
+/// Moves the boundary vertices of a fitted mesh onto the planes of the target's flat facets, so that planar faces are
+/// planar and the edges between them straight, up to rounding.
+///
+/// A boundary face is flat if its center and the points halfway to its corners are all closest to the same facet, and
+/// its normal is within 25 degrees of the facet's. Each of its vertices must lie in the facet's plane; a vertex with
+/// several planes moves by the shortest vector that satisfies them all:
+///
+///   min |d|  subject to  n_i . (x + d) = c_i
+///
+/// Vertices stay where they are if no such vector exists, or if it is longer than a tenth of their shortest edge. Where a
+/// cell would lose its certificate, or become poorer than the poorest cell of the mesh was, the vertices of that cell
+/// stay, too.
+///
+/// mesh    passes `validate` except for unused vertices; its boundary lies close to the target.
+/// target  oriented outward or inward as a whole; tree and facets: its own.
+/// returns the number of vertices that lie on planes afterwards. Same bits for any number of threads.
+/// Cost: five closest points for each boundary face, and the quality of the mesh some times.
+std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
+                          const FlatFacets& facets);
+
+}  // namespace subvol
