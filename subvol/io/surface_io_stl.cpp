@@ -169,8 +169,8 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
     } else if (keyword == (in_solid ? "endsolid" : "solid")) {
       in_solid = !in_solid;
       num_solids += in_solid;
-      const std::string name = trimmed(scan.line().value_or(""));
-      if (in_solid) group = groups.by_name(name.empty() ? "solid " + std::to_string(num_solids) : name);
+      const std::string of_solid = trimmed(scan.line().value_or(""));
+      if (in_solid) group = groups.by_name(of_solid.empty() ? "solid " + std::to_string(num_solids) : of_solid);
     } else if (word->data() == bytes.data() && !in_solid) {
       scan.fail("expected solid, as STL in text begins, or the 84 bytes and the facets of a binary file, found " +
                 in_quotes(*word));

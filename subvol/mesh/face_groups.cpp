@@ -5,8 +5,27 @@
 
 #include <algorithm>
 #include <limits>
+#include <string_view>
 
 namespace subvol {
+
+namespace {
+
+/// Returns the number of bytes of the character that a text begins with, or 0 if it is not UTF-8.
+std::size_t utf8_size(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  const std::size_t size = first < 0x80 ? 1 : first >= 0xC2 && first < 0xE0 ? 2 : (first & 0xF0) == 0xE0 ? 3
+                           : first >= 0xF0 && first < 0xF5 ? 4 : 0;
+  if (size == 0 || size > text.size()) return 0;
+  for (std::size_t i = 1; i < size; ++i)
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  const bool is_overlong = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
+  const bool is_beyond = (first == 0xED && byte(1) > 0x9F) || (first == 0xF4 && byte(1) > 0x8F);
+  return is_overlong || is_beyond ? 0 : size;
+}
+
+}  // namespace
 
 FaceKey face_key(std::span<const Index> corners) {
   FaceKey key;
@@ -102,8 +121,16 @@ int free_number(std::span<const Group> groups) {
   return number;
 }
 
+// Names in files may be in any encoding; JSON, for one, must be UTF-8.
 std::string label_of(const Group& group) {
-  return group.name.empty() ? "group " + std::to_string(group.number) : group.name;
+  if (group.name.empty()) return "group " + std::to_string(group.number);
+  std::string label;
+  for (std::size_t i = 0; i < group.name.size();) {
+    const std::size_t size = utf8_size(std::string_view(group.name).substr(i));
+    label.append(size > 0 ? group.name.substr(i, size) : "?");
+    i += std::max(size, std::size_t{1});
+  }
+  return label;
 }
 
 Index GroupList::add(Group group) {
