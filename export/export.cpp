@@ -46,20 +46,6 @@ ScenePrimitive wire_primitive(const std::vector<Vec3>& positions, const Segments
   return wire;
 }
 
-/// Triangles over shaded vertices.
-ScenePrimitive shaded_primitive(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
-  // Triangulates the polygons with shaded vertices, so that the triangles refer to those.
-  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices, mesh.face_groups};
-  ScenePrimitive primitive;
-  primitive.positions = shaded.positions;
-  primitive.normals = shaded.normals;
-  const TriangleMesh triangles = triangulate(split);
-  for (const auto& triangle : triangles.triangles)
-    primitive.indices.insert(primitive.indices.end(), triangle.begin(), triangle.end());
-  part_by_group(primitive, triangles.face_groups.groups, triangles.face_groups.of_face);
-  return primitive;
-}
-
 /// Sorts the triangles by group, those without a group last, and makes each group a part. The two triangles of a quad
 /// must be consecutive and of one group.
 void part_by_group(ScenePrimitive& primitive, const std::vector<Group>& groups, const std::vector<Index>& of_triangle) {
@@ -79,6 +65,20 @@ void part_by_group(ScenePrimitive& primitive, const std::vector<Group>& groups, 
                                primitive.indices.size(), sorted[g].size()});
     primitive.indices.insert(primitive.indices.end(), sorted[g].begin(), sorted[g].end());
   }
+}
+
+/// Triangles over shaded vertices.
+ScenePrimitive shaded_primitive(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
+  // Triangulates the polygons with shaded vertices, so that the triangles refer to those.
+  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices, mesh.face_groups};
+  ScenePrimitive primitive;
+  primitive.positions = shaded.positions;
+  primitive.normals = shaded.normals;
+  const TriangleMesh triangles = triangulate(split);
+  for (const auto& triangle : triangles.triangles)
+    primitive.indices.insert(primitive.indices.end(), triangle.begin(), triangle.end());
+  part_by_group(primitive, triangles.face_groups.groups, triangles.face_groups.of_face);
+  return primitive;
 }
 
 /// The edges of polygons, once each, as pairs of shaded vertices.

@@ -3,7 +3,6 @@
 
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/geometry/closest_point.h"
-#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/surface/boundary.h"
 
