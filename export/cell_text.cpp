@@ -22,6 +22,9 @@ constexpr int kGmshTets[] = {4, 11, 29, 30, 31, 71, 72, 73, 74, 75};
 constexpr int kGmshPrisms[] = {6, 13};
 constexpr int kGmshHexes[] = {5, 12, 92, 93, 94, 95, 96, 97, 98};
 
+constexpr int kGmshTriangles[] = {2, 9, 21, 23, 25, 42, 43, 44, 45, 46};
+constexpr int kGmshQuads[] = {3, 10, 36, 37, 38, 47, 48, 49, 50, 51};
+
 std::span<const int> gmsh_types(CellKind kind) {
   if (kind == CellKind::tet) return kGmshTets;
   return kind == CellKind::prism ? std::span<const int>(kGmshPrisms) : std::span<const int>(kGmshHexes);
@@ -51,6 +54,49 @@ std::map<Volume, int> volume_numbers(const Blocks& blocks) {
   return numbers;
 }
 
+/// A surface of a .msh: the faces of the same groups and order.
+struct Surface {
+  std::vector<Index> groups;
+  int order;
+  auto operator<=>(const Surface&) const = default;
+};
+
+/// Faces in the order of a .msh: by surface, then number of corners, then number.
+using FaceBlocks = std::map<std::pair<Surface, std::uint8_t>, std::vector<std::size_t>>;
+
+FaceBlocks face_blocks_of(const CellView& mesh) {
+  FaceBlocks blocks;
+  if (!mesh.faces) return blocks;
+  for (std::size_t f = 0; f < mesh.faces->num_faces(); ++f)
+    blocks[{{mesh.faces->of_face[f], mesh.faces->orders[f]}, mesh.faces->sizes[f]}].push_back(f);
+  return blocks;
+}
+
+std::map<Surface, int> surface_numbers(const FaceBlocks& blocks) {
+  std::map<Surface, int> numbers;
+  for (const auto& [key, faces] : blocks) numbers.try_emplace(key.first, static_cast<int>(numbers.size()) + 1);
+  return numbers;
+}
+
+/// The numbers of the groups, all different and > 0: a number that is not is replaced by the first free one.
+std::vector<int> physical_surfaces(std::span<const Group> groups) {
+  std::vector<int> numbers;
+  std::set<int> taken;
+  for (const Group& group : groups) taken.insert(group.number);
+  int next = 1;
+  std::set<int> used;
+  for (const Group& group : groups) {
+    int number = group.number;
+    if (number <= 0 || used.contains(number)) {
+      while (taken.contains(next)) ++next;
+      number = next++;
+    }
+    used.insert(number);
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
 /// The physical group of each reference, > 0: if only some cells have a group, programs lose the others or refuse the
 /// file. A positive reference is its own group; any other gets the first free number.
 std::map<int, int> physical_groups(const Blocks& blocks) {
@@ -77,27 +123,60 @@ void append_line(std::string& text, std::initializer_list<std::size_t> numbers) 
   text += '\n';
 }
 
-void append_physical_names(std::string& text, const std::map<int, int>& groups) {
-  text += "$PhysicalNames\n" + std::to_string(groups.size()) + "\n";
+/// Returns a name for a .msh: on one line, without quotes, and no longer than Gmsh reads.
+std::string gmsh_name(std::string name) {
+  constexpr std::size_t kLongest = 126;
+  std::replace_if(name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  std::replace(name.begin(), name.end(), '"', '\'');
+  if (name.size() <= kLongest) return name;
+  std::size_t end = kLongest;
+  while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;  // not within a character
+  return name.substr(0, end);
+}
+
+std::string region_name(const CellView& mesh, int reference) {
+  for (const Group& region : mesh.regions)
+    if (region.number == reference && !region.name.empty()) return gmsh_name(region.name);
+  return "reference " + std::to_string(reference);
+}
+
+void append_physical_names(std::string& text, const CellView& mesh, const std::map<int, int>& groups) {
+  const std::size_t num_surfaces = mesh.faces ? mesh.faces->groups.size() : 0;
+  text += "$PhysicalNames\n" + std::to_string(num_surfaces + groups.size()) + "\n";
+  if (mesh.faces) {
+    const std::vector<int> numbers = physical_surfaces(mesh.faces->groups);
+    for (std::size_t g = 0; g < num_surfaces; ++g)
+      text += "2 " + std::to_string(numbers[g]) + " \"" + gmsh_name(label_of(mesh.faces->groups[g])) + "\"\n";
+  }
   for (const auto& [reference, group] : groups)
-    text += "3 " + std::to_string(group) + " \"reference " + std::to_string(reference) + "\"\n";
+    text += "3 " + std::to_string(group) + " \"" + region_name(mesh, reference) + "\"\n";
   text += "$EndPhysicalNames\n";
 }
 
-void append_entities(std::string& text, const CellView& mesh, const std::map<Volume, int>& volumes,
-                     const std::map<int, int>& groups) {
+void append_surface_entities(std::string& text, const CellView& mesh, const std::map<Surface, int>& surfaces,
+                             const std::string& box) {
+  if (!mesh.faces) return;
+  const std::vector<int> numbers = physical_surfaces(mesh.faces->groups);
+  for (const auto& [surface, number] : surfaces) {
+    text += std::to_string(number) + ' ' + box + ' ' + std::to_string(surface.groups.size());
+    for (const Index group : surface.groups) text += ' ' + std::to_string(numbers[group]);
+    text += " 0\n";
+  }
+}
+
+void append_entities(std::string& text, const CellView& mesh, const std::map<Surface, int>& surfaces,
+                     const std::map<Volume, int>& volumes, const std::map<int, int>& groups) {
   Vec3 low = mesh.positions[0], high = low;
   for (const Vec3& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  std::string box;
+  append_vector(box, low, " ");
+  box += ' ';
+  append_vector(box, high, " ");
   text += "$Entities\n";
-  append_line(text, {0, 0, 0, volumes.size()});
-  for (const auto& [volume, number] : volumes) {
-    append_number(text, number);
-    text += ' ';
-    append_vector(text, low, " ");
-    text += ' ';
-    append_vector(text, high, " ");
-    text += " 1 " + std::to_string(groups.at(volume.reference)) + " 0\n";
-  }
+  append_line(text, {0, 0, surfaces.size(), volumes.size()});
+  append_surface_entities(text, mesh, surfaces, box);
+  for (const auto& [volume, number] : volumes)
+    text += std::to_string(number) + ' ' + box + " 1 " + std::to_string(groups.at(volume.reference)) + " 0\n";
   text += "$EndEntities\n";
 }
 
@@ -114,23 +193,32 @@ void append_nodes(std::string& text, const CellView& mesh) {
   text += "$EndNodes\n";
 }
 
+void append_element(std::string& text, std::size_t number, std::span<const Index> nodes) {
+  append_number(text, number);
+  for (const Index v : nodes) {
+    text += ' ';
+    append_number(text, v + std::int64_t{1});
+  }
+  text += '\n';
+}
+
 void append_elements(std::string& text, const CellView& mesh, const Blocks& blocks,
-                     const std::map<Volume, int>& volumes) {
+                     const std::map<Volume, int>& volumes, const FaceBlocks& face_blocks,
+                     const std::map<Surface, int>& surfaces) {
+  const std::size_t total = mesh.num_cells() + (mesh.faces ? mesh.faces->num_faces() : 0);
   text += "$Elements\n";
-  append_line(text, {blocks.size(), mesh.num_cells(), 1, mesh.num_cells()});
+  append_line(text, {blocks.size() + face_blocks.size(), total, 1, total});
   std::size_t number = 0;
   for (const auto& [key, cells] : blocks) {
     const auto& [volume, kind] = key;
     append_line(text, {3, static_cast<std::size_t>(volumes.at(volume)),
                        static_cast<std::size_t>(gmsh_type(kind, volume.order)), cells.size()});
-    for (const std::size_t c : cells) {
-      append_number(text, ++number);
-      for (const Index v : mesh.cell(c)) {
-        text += ' ';
-        append_number(text, v + std::int64_t{1});
-      }
-      text += '\n';
-    }
+    for (const std::size_t c : cells) append_element(text, ++number, mesh.cell(c));
+  }
+  for (const auto& [key, faces] : face_blocks) {
+    append_line(text, {2, static_cast<std::size_t>(surfaces.at(key.first)),
+                       static_cast<std::size_t>(gmsh_face_type(key.second, key.first.order)), faces.size()});
+    for (const std::size_t f : faces) append_element(text, ++number, mesh.faces->face(f));
   }
   text += "$EndElements\n";
 }
@@ -172,6 +260,11 @@ int gmsh_type(CellKind kind, int order) {
   return gmsh_types(kind)[static_cast<std::size_t>(order) - 1];
 }
 
+int gmsh_face_type(std::size_t num_corners, int order) {
+  assert(order >= 1 && order <= static_cast<int>(std::size(kGmshTriangles)));
+  return num_corners == 3 ? kGmshTriangles[order - 1] : kGmshQuads[order - 1];
+}
+
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells) {
   if (!cell_minima.empty() && cell_minima.size() != num_cells)
     throw InputError("cell_minima: expected one value per cell");
@@ -180,7 +273,7 @@ void require_cell_minima(std::span<const double> cell_minima, std::size_t num_ce
 }
 
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
-                         const std::string& field_data) {
+                         const std::string& field_data, const std::string& group_data) {
   const std::span<const double> coordinates(mesh.positions.data()->data(), 3 * mesh.positions.size());
   const std::vector<std::int64_t> corners(mesh.nodes.begin(), mesh.nodes.end());
   const std::vector<std::int64_t> ends(mesh.offsets.begin() + 1, mesh.offsets.end());
@@ -191,7 +284,7 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"UnstructuredGrid\" version=\"2.2\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
       "  <UnstructuredGrid>\n";
-  if (!field_data.empty()) text += "    <FieldData>\n" + field_data + "    </FieldData>\n";
+  if (!field_data.empty()) text += "    <FieldData>\n" + field_data + group_data + "    </FieldData>\n";
   text += "    <Piece NumberOfPoints=\"" + std::to_string(mesh.positions.size()) +
           "\" NumberOfCells=\"" + std::to_string(mesh.num_cells()) +
           "\">\n      <Points>\n";
@@ -210,19 +303,23 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   if (!orders.empty()) append_data_array<std::int32_t>(text, "Name=\"order\"", orders);
   if (!references.empty()) append_data_array<std::int32_t>(text, "Name=\"reference\"", references);
   if (!cell_minima.empty()) append_data_array(text, "Name=\"scaled_jacobian\"", cell_minima);
-  return text + "      </CellData>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n";
+  text += "      </CellData>\n    </Piece>\n";
+  if (field_data.empty() && !group_data.empty()) text += "    <FieldData>\n" + group_data + "    </FieldData>\n";
+  return text + "  </UnstructuredGrid>\n</VTKFile>\n";
 }
 
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
                          std::span<const VertexField> fields) {
   const Blocks blocks = blocks_of(mesh);
   const std::map<Volume, int> volumes = volume_numbers(blocks);
+  const FaceBlocks face_blocks = face_blocks_of(mesh);
+  const std::map<Surface, int> surfaces = surface_numbers(face_blocks);
   std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
   const std::map<int, int> groups = physical_groups(blocks);
-  append_physical_names(text, groups);
-  append_entities(text, mesh, volumes, groups);
+  append_physical_names(text, mesh, groups);
+  append_entities(text, mesh, surfaces, volumes, groups);
   append_nodes(text, mesh);
-  append_elements(text, mesh, blocks, volumes);
+  append_elements(text, mesh, blocks, volumes, face_blocks, surfaces);
   if (!cell_minima.empty()) append_element_data(text, blocks, cell_minima);
   for (const VertexField& field : fields) append_node_data(text, field);
   return text;

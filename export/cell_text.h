@@ -3,6 +3,7 @@
 
 // Text of .vtu and .msh files, for linear and for Lagrange cells alike.
 
+#include "export/grouped_faces.h"
 #include "export/volume_writer.h"
 
 #include <cstdint>
@@ -20,6 +21,8 @@ struct CellView {
   std::span<const std::size_t> offsets;
   std::span<const Index> nodes;
   std::span<const int> references;  ///< one per cell, or empty: all 0
+  const GroupedFaces* faces = nullptr;  ///< for a .msh; may be null
+  std::span<const Group> regions{};     ///< names of references, for a .msh
 
   std::size_t num_cells() const { return kinds.size(); }
   int order(std::size_t c) const { return orders.empty() ? 1 : orders[c]; }
@@ -27,17 +30,20 @@ struct CellView {
 };
 
 /// Text of a .vtu. field_data: `<DataArray>` elements for the file's field data, or empty. `orders`, if there are any,
-/// become the cell data `order`.
+/// become the cell data `order`. group_data: more of these elements, for the groups; without `field_data`, they stand
+/// behind the mesh, because some readers stop at field data before it.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
-                         const std::string& field_data = {});
+                         const std::string& field_data = {}, const std::string& group_data = {});
 
 /// Largest order that Gmsh evaluates for a kind of cell: 10 for tets, 2 for prisms, 9 for hexes.
 int max_gmsh_order(CellKind kind);
 /// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted); VTK's for Lagrange cells of a
 /// kind.
 int gmsh_type(CellKind kind, int order);
+/// The same for a face of 3 or 4 corners, of an order from 1 to 10.
+int gmsh_face_type(std::size_t num_corners, int order);
 std::uint8_t vtk_type(CellKind kind);
-/// Text of a .msh. Orders: 1 .. max_gmsh_order (asserted).
+/// Text of a .msh. Orders: 1 .. max_gmsh_order (asserted). Grouped faces are elements of surfaces, behind the cells.
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
                          std::span<const VertexField> fields);
 

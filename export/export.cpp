@@ -46,15 +46,38 @@ ScenePrimitive wire_primitive(const std::vector<Vec3>& positions, const Segments
   return wire;
 }
 
+/// Sorts the triangles by group, those without a group last, and makes each group a part. The two triangles of a quad
+/// must be consecutive and of one group.
+void part_by_group(ScenePrimitive& primitive, const std::vector<Group>& groups, const std::vector<Index>& of_triangle) {
+  if (groups.empty()) return;
+  std::vector<std::vector<Index>> sorted(groups.size() + 1);
+  for (std::size_t t = 0; t < of_triangle.size(); ++t) {
+    const Index group = of_triangle[t];
+    std::vector<Index>& indices = sorted[group == kNoIndex ? groups.size() : static_cast<std::size_t>(group)];
+    indices.insert(indices.end(), primitive.indices.begin() + static_cast<std::ptrdiff_t>(3 * t),
+                   primitive.indices.begin() + static_cast<std::ptrdiff_t>(3 * t + 3));
+  }
+  primitive.indices.clear();
+  for (std::size_t g = 0; g < sorted.size(); ++g) {
+    if (sorted[g].empty()) continue;
+    const bool is_group = g < groups.size();
+    primitive.parts.push_back({is_group ? label_of(groups[g]) : "surface", is_group ? groups[g].number : 0,
+                               primitive.indices.size(), sorted[g].size()});
+    primitive.indices.insert(primitive.indices.end(), sorted[g].begin(), sorted[g].end());
+  }
+}
+
 /// Triangles over shaded vertices.
 ScenePrimitive shaded_primitive(const PolygonMesh& mesh, const ShadedPolygons& shaded) {
   // Triangulates the polygons with shaded vertices, so that the triangles refer to those.
-  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices};
+  const PolygonMesh split{shaded.positions, mesh.face_offsets, shaded.corner_vertices, mesh.face_groups};
   ScenePrimitive primitive;
   primitive.positions = shaded.positions;
   primitive.normals = shaded.normals;
-  for (const auto& triangle : triangulate(split).triangles)
+  const TriangleMesh triangles = triangulate(split);
+  for (const auto& triangle : triangles.triangles)
     primitive.indices.insert(primitive.indices.end(), triangle.begin(), triangle.end());
+  part_by_group(primitive, triangles.face_groups.groups, triangles.face_groups.of_face);
   return primitive;
 }
 
@@ -160,6 +183,12 @@ Scene surface_scene(const TessellatedSurface& surface, std::span<const double> p
   primitive.normals = surface.normals;
   for (const auto& [a, b, c, d] : surface.quads)
     primitive.indices.insert(primitive.indices.end(), {a, b, c, a, c, d});
+  if (!options.face_groups.empty()) {
+    std::vector<Index> of_triangle;
+    for (const Index patch : surface.quad_patches)
+      of_triangle.insert(of_triangle.end(), 2, options.face_groups.of_face.at(surface.patches[patch].face));
+    part_by_group(primitive, options.face_groups.groups, of_triangle);
+  }
   if (!patch_quality.empty()) {
     std::vector<double> quality(surface.positions.size(), 1);
     for (std::size_t q = 0; q < surface.quads.size(); ++q)

@@ -176,20 +176,20 @@ void check_sizes(const ScenePrimitive& primitive, const Complaint& refuse) {
       refuse("indices", "expected numbers from 0 to " + std::to_string(n - 1) + ", got " + std::to_string(i));
 }
 
-int add_indices(BufferWriter& buffer, const ScenePrimitive& primitive) {
+int add_indices(BufferWriter& buffer, const ScenePrimitive& primitive, std::span<const Index> indices) {
   // The index 65535 restarts a primitive in some graphics interfaces, so glTF forbids it.
   constexpr std::size_t kMaxShortVertices = 65535;
   constexpr int kTarget = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
   if (primitive.positions.size() <= kMaxShortVertices)
-    return buffer.add(std::vector<std::uint16_t>(primitive.indices.begin(), primitive.indices.end()), 1,
+    return buffer.add(std::vector<std::uint16_t>(indices.begin(), indices.end()), 1,
                       TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, kTarget, "indices");
-  return buffer.add(std::vector<std::uint32_t>(primitive.indices.begin(), primitive.indices.end()), 1,
+  return buffer.add(std::vector<std::uint32_t>(indices.begin(), indices.end()), 1,
                     TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, kTarget, "indices");
 }
 
-int add_material(gltf::Model& model, const SceneNode& node, const Complaint& refuse) {
+int add_material(gltf::Model& model, const SceneNode& node, const std::string& name, const Complaint& refuse) {
   gltf::Material material;
-  material.name = node.name;
+  material.name = name;
   material.doubleSided = true;
   material.pbrMetallicRoughness.metallicFactor = 0;
   material.pbrMetallicRoughness.roughnessFactor = 0.7;
@@ -233,6 +233,25 @@ void add_shapes(gltf::Mesh& mesh, BufferWriter& buffer, const SceneNode& node, c
   mesh.extras = gltf::Value(gltf::Value::Object{{"targetNames", gltf::Value(std::move(names))}});
 }
 
+/// Adds a copy of a primitive, without indices, for each part.
+void add_parts(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, const gltf::Primitive& primitive,
+               const Complaint& refuse, gltf::Mesh& mesh) {
+  const ScenePrimitive& source = node.primitive;
+  std::size_t next = 0;
+  for (const ScenePart& part : source.parts) {
+    if (part.first != next || part.size == 0 || part.size % 3 != 0 || part.size > source.indices.size() - next)
+      refuse("parts", "expected triangles, one part after another");
+    next += part.size;
+    gltf::Primitive one = primitive;
+    one.indices = add_indices(buffer, source, std::span(source.indices).subspan(part.first, part.size));
+    one.material = add_material(model, node, part.name, refuse);
+    if (part.number != 0)
+      model.materials.back().extras = gltf::Value(gltf::Value::Object{{"number", gltf::Value(part.number)}});
+    mesh.primitives.push_back(std::move(one));
+  }
+  if (next != source.indices.size()) refuse("parts", "expected all triangles to be in one");
+}
+
 /// Adds mesh, material and node; returns the node's number.
 int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, const Placement& place) {
   const Complaint refuse{node.name};
@@ -258,13 +277,17 @@ int add_node(gltf::Model& model, BufferWriter& buffer, const SceneNode& node, co
     for (const double x : attribute.values) values.push_back(to_float(x, attribute.name, refuse));
     primitive.attributes[attribute.name] = buffer.add(values, 1, kFloat, kTarget, attribute.name, true);
   }
-  primitive.indices = add_indices(buffer, source);
   primitive.mode =
       source.topology == ScenePrimitive::Topology::triangles ? TINYGLTF_MODE_TRIANGLES : TINYGLTF_MODE_LINE;
-  primitive.material = add_material(model, node, refuse);
   gltf::Mesh mesh;
   mesh.name = node.name;
-  mesh.primitives.push_back(std::move(primitive));
+  if (source.parts.empty() || !node.shapes.empty()) {
+    primitive.indices = add_indices(buffer, source, source.indices);
+    primitive.material = add_material(model, node, node.name, refuse);
+    mesh.primitives.push_back(std::move(primitive));
+  } else {
+    add_parts(model, buffer, node, primitive, refuse, mesh);
+  }
   if (!node.shapes.empty()) add_shapes(mesh, buffer, node, place, refuse);
   model.meshes.push_back(std::move(mesh));
   gltf::Node out;

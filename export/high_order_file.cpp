@@ -2,6 +2,8 @@
 #include "export/high_order_file.h"
 
 #include "export/cell_text.h"
+#include "export/group_data.h"
+#include "export/grouped_faces.h"
 #include "export/lagrange_cells.h"
 #include "export/lagrange_mesh.h"
 #include "export/text_format.h"
@@ -10,6 +12,7 @@
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>
@@ -28,6 +31,7 @@ void require_writable(const HighOrderMesh& mesh, const HighOrderFileOptions& opt
   for (std::size_t i = 0; i < mesh.coefficients.size(); ++i)
     if (!mesh.coefficients[i].allFinite())
       throw InputError("mesh: node " + std::to_string(i) + ": expected finite coefficients");
+  if (options.face_groups) require_groups(*options.face_groups, "mesh");
   require_cell_minima(options.cell_minima, num_cells);
   if (!options.references.empty() && options.references.size() != num_cells)
     throw InputError("references: expected one per cell");
@@ -195,14 +199,49 @@ Basis read_basis(const VtuArrays& file, const std::vector<std::int64_t>& format)
   return format[1] ? Basis::legendre : Basis::fourier;
 }
 
+/// Returns true if the linear shape function of a local vertex does not vanish at a point of the grid of a cell.
+bool touches(CellKind kind, int vertex, const LatticePoint& at, int order) {
+  const auto inner = [&](int coordinate, int end) { return end ? coordinate > 0 : coordinate < order; };
+  const auto in_triangle = [&](int corner) {
+    return corner == 0 ? at[0] + at[1] < order : at[corner - 1] > 0;
+  };
+  if (kind == CellKind::tet) return vertex == 0 ? at.sum() < order : at[vertex - 1] > 0;
+  if (kind == CellKind::prism) return in_triangle(vertex % 3) && inner(at[2], vertex / 3);
+  const int along = vertex % 4;
+  return inner(at[0], along == 1 || along == 2) && inner(at[1], along >= 2) && inner(at[2], vertex / 4);
+}
+
+/// Returns the groups of the small cells of `linear_cells`.
+VolumeFaceGroups small_groups(const HighOrderMesh& mesh, int intervals, const VolumeFaceGroups& groups,
+                              const VolumeMesh& cells) {
+  const VolumeMesh coarse = mesh.straight_sided();
+  const LagrangeMesh grid =
+      lagrange_mesh(mesh, std::vector<int>(coarse.num_cells(), intervals), NodeOrdering::rows);
+  std::vector<VertexSupport> support(grid.positions.size(), support_of({}));
+  std::vector<Index> corners;
+  for (std::size_t c = 0; c < coarse.num_cells(); ++c) {
+    const std::vector<LatticePoint> lattice = cell_lattice(coarse.kinds[c], intervals, NodeOrdering::rows);
+    for (std::size_t i = 0; i < lattice.size(); ++i) {
+      corners.clear();
+      for (int v = 0; v < cell_topology(coarse.kinds[c]).num_vertices; ++v)
+        if (touches(coarse.kinds[c], v, lattice[i], intervals)) corners.push_back(coarse.cell(c)[v]);
+      support[grid.cell(c)[i]] = support_of(corners);
+    }
+  }
+  return inherited_groups(groups, MeshTopology(cells), support);
+}
+
 }  // namespace
 
 VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
   std::vector<Index> parents;
-  VolumeMesh cells =
-      linear_cells(mesh, options.linear_intervals ? options.linear_intervals : mesh.space.max_order(), &parents);
+  const int intervals = options.linear_intervals ? options.linear_intervals : mesh.space.max_order();
+  VolumeMesh cells = linear_cells(mesh, intervals, &parents);
   if (!options.references.empty())
     for (const Index parent : parents) cells.references.push_back(options.references[parent]);
+  cells.regions.assign(options.regions.begin(), options.regions.end());
+  if (options.face_groups && !options.face_groups->empty())
+    cells.face_groups = small_groups(mesh, intervals, *options.face_groups, cells);
   return cells;
 }
 
@@ -222,7 +261,8 @@ std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
   const LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::vtk);
   return vtu_document(view_of(cells, options.references), minima_of(written, options),
                       fields_at_points(mesh, orders, NodeOrdering::vtk, options.fields),
-                      field_data(mesh, written.distance_bound));
+                      field_data(mesh, written.distance_bound),
+                      group_data(options.face_groups ? *options.face_groups : VolumeFaceGroups{}, options.regions));
 }
 
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
@@ -231,7 +271,13 @@ std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
   const PolynomialMap written = file_cells(mesh, ".msh", options.map_tolerance_percent);
   const std::vector<int> orders = lagrange_orders(written.mesh.space, kMaxOrder);
   const LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::gmsh);
-  return msh_document(view_of(cells, options.references), minima_of(written, options),
+  CellView view = view_of(cells, options.references);
+  const GroupedFaces faces = options.face_groups
+                                 ? grouped_faces(cells, mesh.space.topology(), *options.face_groups)
+                                 : GroupedFaces{};
+  view.faces = &faces;
+  view.regions = options.regions;
+  return msh_document(view, minima_of(written, options),
                       fields_at_points(mesh, orders, NodeOrdering::gmsh, options.fields));
 }
 
@@ -268,11 +314,15 @@ HighOrderFile read_high_order(const std::filesystem::path& path) {
     if (numbers.size() != mesh.num_cells()) file.fail("reference: expected one number for each cell");
     references.assign(numbers.begin(), numbers.end());
   }
+  FileGroups groups = read_groups(file, mesh.num_vertices());
   const EntityOrders orders{read_orders(file, "subvol_edge_orders"), read_orders(file, "subvol_face_orders"),
                             read_orders(file, "subvol_cell_orders")};
   require_nodes(file, mesh, orders, coefficients.size());
   try {
-    return {{ElementSpace(mesh, basis, orders), std::move(coefficients)}, std::move(references)};
+    return {{ElementSpace(mesh, basis, orders), std::move(coefficients)},
+            std::move(references),
+            std::move(groups.faces),
+            std::move(groups.regions)};
   } catch (const InputError& error) {
     file.fail(error.what());
   }

@@ -5,7 +5,20 @@
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/version.h"
 
+#include <algorithm>
+
 namespace subvol {
+
+namespace {
+
+/// Returns the name of a group as one word: blanks would separate the names of several groups.
+std::string group_name(const Group& group) {
+  std::string name = label_of(group);
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c <= ' ' || c == '#' || c == '\\'; }, '_');
+  return name;
+}
+
+}  // namespace
 
 std::string obj_text(const PolygonMesh& mesh, const std::string& name) {
   require_polygons(mesh, "obj");
@@ -15,7 +28,12 @@ std::string obj_text(const PolygonMesh& mesh, const std::string& name) {
     append_vector(text, position, " ");
     text += '\n';
   }
+  Index group = kNoIndex;
   for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
+    if (const Index next = mesh.face_groups.empty() ? kNoIndex : mesh.face_groups.of_face[f]; next != group) {
+      text += next == kNoIndex ? "g\n" : "g " + group_name(mesh.face_groups.groups[next]) + '\n';
+      group = next;
+    }
     text += 'f';
     for (std::size_t k = mesh.face_offsets[f]; k < mesh.face_offsets[f + 1]; ++k) {
       text += ' ';

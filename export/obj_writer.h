@@ -8,7 +8,8 @@
 
 namespace subvol {
 
-/// Returns a polygon mesh as Wavefront .obj text: `v` and `f` lines only, with the faces unchanged (quads stay quads).
+/// Returns a polygon mesh as Wavefront .obj text: `v` and `f` lines, with the faces unchanged (quads stay quads), and a
+/// line `g` wherever the group of the faces changes, if there are groups. Blanks in names become underscores.
 ///
 /// Coordinates have up to 17 significant digits, as many as are needed to read back the same doubles.
 /// InputError: no faces, a face of fewer than three corners, an index out of range, a coordinate that is not finite.

@@ -2,12 +2,14 @@
 #include "export/read_back.h"
 
 #include "export/cell_text.h"
+#include "export/grouped_faces.h"
 #include "export/lagrange_mesh.h"
 #include "export/text_format.h"
 #include "export/vtu_reader.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/mesh/mesh_topology.h"
 
 #include <tiny_gltf.h>
 
@@ -16,6 +18,7 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <tuple>
 
 namespace subvol {
@@ -82,6 +85,21 @@ FeatureTags normal_form(FeatureTags tags) {
   return tags;
 }
 
+/// Compares the group of each face by its number; 0 stands for another in a file.
+void compare_groups(const WrittenFile& file, const VolumeMesh& found, const VolumeMesh& wanted) {
+  if (wanted.face_groups.empty()) return;
+  const MeshTopology topology(wanted);
+  const auto number = [](const VolumeFaceGroups& groups, std::span<const Index> face) {
+    const Index group = group_of(groups, face);
+    return group == kNoIndex ? std::optional<int>() : groups.groups[group].number;
+  };
+  for (std::size_t f = 0; f < topology.num_faces(); ++f) {
+    const auto face = topology.face(static_cast<Index>(f));
+    const auto in_file = number(found.face_groups, face), expected = number(wanted.face_groups, face);
+    file.same(expected == 0 ? in_file.has_value() : in_file == expected, "the group of face", f);
+  }
+}
+
 void compare_linear(const WrittenFile& file, const VolumeMesh& wanted, bool is_medit) {
   const VolumeMesh found = read_volume_mesh(file.path(), {.check = false});
   file.same_count("vertices", found.num_vertices(), wanted.num_vertices());
@@ -100,6 +118,7 @@ void compare_linear(const WrittenFile& file, const VolumeMesh& wanted, bool is_m
     file.same(reference(found.references, i) == reference(wanted.references, c), "the reference of cell", c);
   }
   if (!is_medit) return;
+  compare_groups(file, found, wanted);
   const FeatureTags tags = normal_form(found.tags), tags_wanted = normal_form(wanted.tags);
   file.same_count("creases", tags.creases.size(), tags_wanted.creases.size());
   file.same_count("corners", tags.corners.size(), tags_wanted.corners.size());
@@ -157,15 +176,22 @@ void compare_msh(const WrittenFile& file, const CellView& wanted) {
     for (const double x : wanted.positions[v]) file.same(scan.number("a coordinate") == x, "node", v + 1);
   skip_to(scan, "$Elements");
   const std::size_t num_blocks = whole("the number of blocks");
-  file.same_count("elements", whole("the number of elements"), num_cells);
+  const std::size_t num_faces = wanted.faces ? wanted.faces->num_faces() : 0;
+  file.same_count("elements", whole("the number of elements"), num_cells + num_faces);
   skip(2);
   const std::vector<std::size_t> order = sorted_cells(num_cells, [&](std::size_t c) {
     return std::tuple(reference(wanted.references, c), wanted.order(c), wanted.kinds[c]);
   });
-  std::size_t element = 0;
+  std::size_t element = 0, num_grouped = 0;
   for (std::size_t block = 0; block < num_blocks; ++block) {
-    skip(2);
+    const std::size_t dimension = whole("a dimension");
+    skip(1);
     const std::size_t type = whole("a type"), size = whole("a number of elements");
+    if (dimension == 2) {
+      num_grouped += size;
+      for (std::size_t k = 0; k < size; ++k) scan.line();
+      continue;
+    }
     for (std::size_t k = 0; k < size; ++k, ++element) {
       file.same(element < num_cells && whole("an element's number") == element + 1, "the number of element",
                 element + 1);
@@ -177,14 +203,19 @@ void compare_msh(const WrittenFile& file, const CellView& wanted) {
     }
   }
   file.same_count("elements of all blocks", element, num_cells);
+  file.same_count("faces in groups", num_grouped, num_faces);
 }
 
 void compare_cells(const WrittenFile& file, const std::string& extension, const CellView& wanted) {
   extension == ".vtu" ? compare_vtu(file, wanted) : compare_msh(file, wanted);
 }
 
-void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, std::span<const int> references) {
+void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, const HighOrderFileOptions& options) {
   const HighOrderFile found = read_high_order(file.path());
+  const std::span<const int> references = options.references;
+  if (options.face_groups)
+    file.same(found.face_groups.faces == options.face_groups->faces, "the groups of faces, all",
+              options.face_groups->faces.size());
   file.same_count("nodes", found.mesh.space.num_nodes(), wanted.space.num_nodes());
   file.same(found.mesh.space.basis() == wanted.space.basis(), "the basis of all cells,", wanted.space.num_cells());
   const EntityOrders &orders = found.mesh.space.orders(), &orders_wanted = wanted.space.orders();
@@ -326,11 +357,11 @@ void compare_node(const WrittenFile& file, const gltf::Model& model, const gltf:
   const std::string where = "node \"" + wanted.name + "\": ";
   if (node.name != wanted.name || node.mesh < 0) file.differs("expected a " + where + "it is \"" + node.name + '"');
   const gltf::Mesh& mesh = model.meshes.at(static_cast<std::size_t>(node.mesh));
-  file.same_count(where + "primitives", mesh.primitives.size(), 1);
+  const std::size_t num_parts = wanted.shapes.empty() ? wanted.primitive.parts.size() : 0;
+  file.same_count(where + "primitives", mesh.primitives.size(), std::max(num_parts, std::size_t{1}));
   const gltf::Primitive& primitive = mesh.primitives[0];
-  const Numbers positions(file, model, primitive.attributes.at("POSITION")), indices(file, model, primitive.indices);
+  const Numbers positions(file, model, primitive.attributes.at("POSITION"));
   file.same_count(where + "positions", positions.count(), wanted.primitive.positions.size());
-  file.same_count(where + "indices", indices.count(), wanted.primitive.indices.size());
   file.same_count(where + "shapes", primitive.targets.size(), wanted.shapes.size());
   const bool quantized = positions.type() == TINYGLTF_COMPONENT_TYPE_SHORT;
   const double step = quantized && !node.scale.empty() ? node.scale[0] / 32767 : 1;
@@ -342,8 +373,14 @@ void compare_node(const WrittenFile& file, const gltf::Model& model, const gltf:
       const bool same = quantized ? std::abs(found * step - x) <= kHalfStep * step : found == static_cast<float>(x);
       if (!same) file.differs(where + "position " + std::to_string(v));
     }
-  for (std::size_t i = 0; i < indices.count(); ++i)
-    if (indices.at(i, 0) != wanted.primitive.indices[i]) file.differs(where + "index " + std::to_string(i));
+  std::size_t next = 0;
+  for (const gltf::Primitive& part : mesh.primitives) {
+    const Numbers indices(file, model, part.indices);
+    for (std::size_t i = 0; i < indices.count(); ++i, ++next)
+      if (next >= wanted.primitive.indices.size() || indices.at(i, 0) != wanted.primitive.indices[next])
+        file.differs(where + "index " + std::to_string(next));
+  }
+  file.same_count(where + "indices", next, wanted.primitive.indices.size());
 }
 
 void compare_scene(const WrittenFile& file, const Scene& wanted) {
@@ -362,8 +399,9 @@ void require_written(const fs::path& path, const VolumeMesh& mesh) {
   const std::string extension = lower_case_extension(path);
   read_back(path, [&](const WrittenFile& file) {
     if (extension == ".mesh" || extension == ".vtk") return compare_linear(file, mesh, extension == ".mesh");
+    const GroupedFaces faces = grouped_faces(mesh);
     compare_cells(file, extension,
-                  {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references});
+                  {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references, &faces});
   });
 }
 
@@ -375,10 +413,13 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
     const HighOrderMesh written = file_cells(mesh, extension, options.map_tolerance_percent).mesh;
     const LagrangeMesh cells = lagrange_mesh(written, lagrange_orders(written.space, kMaxOrder),
                                              is_vtu ? NodeOrdering::vtk : NodeOrdering::gmsh);
+    const GroupedFaces faces = options.face_groups && !is_vtu
+                                   ? grouped_faces(cells, mesh.space.topology(), *options.face_groups)
+                                   : GroupedFaces{};
     compare_cells(
         file, extension,
-        {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references});
-    if (is_vtu) compare_map(file, mesh, options.references);
+        {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references, &faces});
+    if (is_vtu) compare_map(file, mesh, options);
   });
 }
 

@@ -4,6 +4,7 @@
 #include "subvol/base/types.h"
 
 #include <array>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <variant>
@@ -20,6 +21,13 @@ struct SceneAttribute {
   std::vector<double> values;
 };
 
+/// A run of triangles with a name, which the writer gives a primitive and a material of its own.
+struct ScenePart {
+  std::string name;
+  int number = 0;                 ///< of the group that it shows; 0: of none
+  std::size_t first = 0, size = 0;///< places in the indices of the primitive
+};
+
 /// The drawing of a node: triangles or line segments over one array of vertices.
 struct ScenePrimitive {
   enum class Topology { triangles, lines };
@@ -30,6 +38,7 @@ struct ScenePrimitive {
   std::vector<SceneAttribute> attributes{};///< each with one value per position
   std::vector<Index> indices{};            ///< 3 per triangle (the two of a quad are consecutive), 2 per segment
   LinearColor material_color{1, 1, 1, 1};  ///< multiplies `colors`
+  std::vector<ScenePart> parts{};          ///< all indices, one part after another; or empty; not with shapes
 };
 
 /// Another shape of the same vertices that an animation passes through ("shape key", "morph target").

@@ -29,6 +29,12 @@ void require_polygons(const PolygonMesh& mesh, const std::string& what) {
   for (std::size_t v = 0; v < mesh.positions.size(); ++v)
     if (!mesh.positions[v].allFinite())
       throw InputError(what + ": vertex " + std::to_string(v) + ": expected finite coordinates");
+  const FaceGroups& groups = mesh.face_groups;
+  if (!groups.empty() && groups.of_face.size() != mesh.num_faces())
+    throw InputError(what + ": expected one group, or none, for each face");
+  for (const Index group : groups.of_face)
+    if (group < kNoIndex || group >= static_cast<Index>(groups.groups.size()))
+      throw InputError(what + ": group " + std::to_string(group) + " is out of range");
 }
 
 }  // namespace subvol

@@ -166,6 +166,49 @@ void append_tags(std::string& text, const FeatureTags& tags) {
   append_array(text, "float[] cornerSharpnesses", corner_sharpnesses, number);
 }
 
+/// Returns a name as USD allows it for a prim: letters, digits and underscores, no digit first, none twice.
+std::string prim_name(const std::string& name, std::set<std::string>& taken) {
+  std::string plain;
+  for (const char c : name) {
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    plain += is_letter || (c >= '0' && c <= '9') ? c : '_';
+  }
+  if (plain.empty() || (plain[0] >= '0' && plain[0] <= '9')) plain = '_' + plain;
+  std::string unique = plain;
+  for (int n = 2; !taken.insert(unique).second; ++n) unique = plain + '_' + std::to_string(n);
+  return unique;
+}
+
+/// Returns a text in quotes.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+  }
+  return result + '"';
+}
+
+/// Appends a GeomSubset for each group that has faces.
+void append_groups(std::string& text, const FaceGroups& groups) {
+  if (groups.empty()) return;
+  text += "    uniform token subsetFamily:group:familyType = \"nonOverlapping\"\n";
+  std::vector<std::vector<std::size_t>> faces(groups.groups.size());
+  for (std::size_t f = 0; f < groups.of_face.size(); ++f)
+    if (groups.of_face[f] != kNoIndex) faces[groups.of_face[f]].push_back(f);
+  std::set<std::string> taken;
+  for (std::size_t g = 0; g < faces.size(); ++g) {
+    if (faces[g].empty()) continue;
+    const Group& group = groups.groups[g];
+    text += "\n    def GeomSubset \"" + prim_name(label_of(group), taken) +
+            "\" (\n        customData = {\n            string name = " + quoted(group.name) +
+            "\n            int number = " + std::to_string(group.number) + "\n        }\n    )\n    {\n" +
+            "        uniform token elementType = \"face\"\n        uniform token familyName = \"group\"\n    ";
+    append_array(text, "int[] indices", faces[g], [&](std::size_t f) { append_number(text, f); });
+    text += "    }\n";
+  }
+}
+
 }  // namespace
 
 std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const UsdOptions& options) {
@@ -183,6 +226,7 @@ std::string usd_text(const PolygonMesh& cage, const FeatureTags& tags, const Usd
           "    token triangleSubdivisionRule = \"catmullClark\"\n"
           "    uniform token orientation = \"rightHanded\"\n";
   append_tags(text, tags);
+  append_groups(text, cage.face_groups);
   return text + "}\n";
 }
 

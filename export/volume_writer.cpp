@@ -2,9 +2,12 @@
 #include "export/volume_writer.h"
 
 #include "export/cell_text.h"
+#include "export/group_data.h"
+#include "export/grouped_faces.h"
 #include "export/text_format.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/mesh/validate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,6 +30,7 @@ void require_cells(const VolumeMesh& mesh, std::span<const double> cell_minima, 
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
     if (!mesh.positions[v].allFinite())
       throw InputError("mesh: vertex " + std::to_string(v) + ": expected finite coordinates");
+  require_groups(mesh.face_groups, "mesh");
   require_cell_minima(cell_minima, mesh.num_cells());
   for (const VertexField& field : fields) {
     if (field.values.size() != mesh.num_vertices()) throw InputError(field.name + ": expected one value per vertex");
@@ -35,20 +39,21 @@ void require_cells(const VolumeMesh& mesh, std::span<const double> cell_minima, 
   }
 }
 
-CellView view_of(const VolumeMesh& mesh) {
-  return {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references};
+CellView view_of(const VolumeMesh& mesh, const GroupedFaces* faces = nullptr) {
+  return {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references, faces, mesh.regions};
 }
 
 }  // namespace
 
 std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {
   require_cells(mesh, cell_minima, fields);
-  return vtu_document(view_of(mesh), cell_minima, fields);
+  return vtu_document(view_of(mesh), cell_minima, fields, {}, group_data(mesh.face_groups, mesh.regions));
 }
 
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {
   require_cells(mesh, cell_minima, fields);
-  return msh_document(view_of(mesh), cell_minima, fields);
+  const GroupedFaces faces = grouped_faces(mesh);
+  return msh_document(view_of(mesh, &faces), cell_minima, fields);
 }
 
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima,

@@ -81,20 +81,20 @@ struct Writing {
 };
 
 void write_volume_mesh(const Writing& writing, const VolumeMesh& mesh) {
-  const cli::Output output = writing.output({cli::Part::cutaway});
+  const cli::Output output = writing.output({cli::Part::cutaway, cli::Part::boundary});
   if (!writing.limit || !cli::shows_surface(output)) return cli::write_output(output, mesh, writing.options);
   const TessellatedSurface limit = cli::tessellated_limit(mesh, writing.options);
   cli::write_output(output, mesh, mesh, &limit, writing.options);
 }
 
 void write_curved(Writing& writing, const CurvedMesh& curved) {
-  const cli::Output output = writing.output({cli::Part::cutaway});
+  const cli::Output output = writing.output({cli::Part::cutaway, cli::Part::boundary});
   cli::write_output(output, curved, writing.options);
   writing.judge(output, curved.mesh);
 }
 
 void write_fit(Writing& writing, const Fitted& fit) {
-  std::vector<cli::Part> parts{cli::Part::cutaway};
+  std::vector<cli::Part> parts{cli::Part::cutaway, cli::Part::boundary};
   if (!fit.curved) parts.push_back(cli::Part::cage);
   if (!fit.states.empty()) parts.push_back(cli::Part::animation);
   const cli::Output output = writing.output(parts);
@@ -137,7 +137,7 @@ void write(const py::object& path, const py::object& object, const py::kwargs& g
       written<VolumeMesh>(object, [&](const VolumeMesh& mesh) { write_volume_mesh(writing, mesh); }) ||
       written<CurvedMesh>(object, [&](const CurvedMesh& curved) { write_curved(writing, curved); }) ||
       written<SurfaceMesh>(object, [&](const SurfaceMesh& surface) {
-        cli::write_output(writing.output({}), surface.polygons, writing.options);
+        cli::write_output(writing.output({cli::Part::boundary}), surface.polygons, writing.options);
       }) ||
       written<Fitted>(object, [&](const Fitted& fit) { write_fit(writing, fit); }) ||
       written<Filled>(object, [&](const Filled& result) { write_volume_mesh(writing, *result.mesh); }) ||
@@ -172,7 +172,8 @@ name is replaced, once the new one is whole.
 
 what       VolumeMesh, HighOrderMesh, SurfaceMesh, FitResult (its finest mesh; in a scene the limit surface, coloured by
            the quality of the cells; 'cage:FILE' is the cage, 'animation:FILE.glb' the fit as it went where its states
-           were kept), OptimizeResult, ShellResult (in a scene its sheets); 'cutaway:FILE.glb' shows the cells inside
+           were kept), OptimizeResult, ShellResult (in a scene its sheets); 'cutaway:FILE.glb' shows the cells inside,
+           'boundary:FILE.vtu' or .vtk holds the faces of the boundary with their groups
 chord      how close triangles are to a curved surface, per cent of its bounding box's diagonal
 unit, up   metres a unit has, and the mesh's upward axis, 'y' or 'z': for .glb, .gltf and .usda
 cut        where a cutaway is cut: the axis 'x', 'y' or 'z' that the plane stands across, also with a place between 0

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
 #include "fit/automatic_fit.h"
 #include "fit/mesh_check.h"
@@ -39,13 +40,16 @@ class Filling {
       return fit_automatically(target_, options_);
     });
     if (found.mesh.num_cells() == 0) throw InputError("fill: ended before there was a mesh");
+    const cli::GroupsFound groups = work_.run("groups", [&] { return cli::carry_groups(target_, found.mesh); });
     const MeshCheck checked = work_.run("check", [&] { return check_mesh(found.mesh, &target_); });
     Json json{{"input", {{"target", cli::describe("", target_)}}}};
     json.update(cli::automatic_fit_json(found));
     json.update(cli::fit_json(found.report));
     json.update(cli::check_json(checked));
+    if (!groups.groups.empty()) json["groups"] = cli::groups_json(groups.groups);
     checkpoints_.describe(json);
     warnings.insert(warnings.end(), found.report.warnings.begin(), found.report.warnings.end());
+    warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
     const auto result = std::make_shared<Filled>();
     result->report = make_report("fill", json, keywords_, work_, warnings);
     result->mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/automatic_template.h"
 #include "cli/runs/check_report.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
 #include "cli/runs/untangling.h"
 #include "cli/runs/writing.h"
@@ -145,7 +146,11 @@ class Fit {
           return std::visit([&](const auto& target) { return surface_distance(triangles_of(limit), target); }, target_);
         });
     const double diagonal = found.target_diagonal;
-    Json json = report_of(fit.report, found);
+    const cli::GroupsFound groups = work_.run("groups", [&] {
+      cli::carry_groups(target_, fit.cage);
+      return cli::carry_groups(target_, fit.mesh);
+    });
+    Json json = report_of(fit.report, found, groups);
     json["limit_surface_distance"] = cli::distance_json(distance, diagonal);
     json["limit_surface_distance"]["chord_error_percent"] = 100 * limit.chord_error / diagonal;
     if (fit.report.creases) json["creases"] = cli::creases_json(*fit.report.creases);
@@ -168,18 +173,23 @@ class Fit {
       const CurvedBoundary boundary = curved_boundary(fit.mesh, writing_.chord_percent);
       return std::visit([&](const auto& target) { return check_mesh(fit.mesh, boundary, &target); }, target_);
     });
-    Json json = report_of(fit.report, found);
-    json["mesh"] = cli::describe("", fit.mesh);
+    auto curved = std::make_shared<CurvedMesh>(
+        CurvedMesh{std::move(fit.mesh), template_->references, template_->face_groups, template_->regions});
+    const cli::GroupsFound groups = work_.run("groups", [&] { return cli::carry_groups(target_, *curved); });
+    Json json = report_of(fit.report, found, groups);
+    json["mesh"] = cli::describe("", curved->mesh);
     finish(result, json, fit.report);
     result.states = std::move(fit.states);
-    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{std::move(fit.mesh), template_->references});
+    result.curved = std::move(curved);
   }
 
-  Json report_of(const FitReport& report, const MeshCheck& found) const {
+  Json report_of(const FitReport& report, const MeshCheck& found, const cli::GroupsFound& groups) {
     Json json{{"input", {{"target", cli::describe("", target_)}, {"template", cli::describe("", *template_)}}}};
     if (choice_) json["template"] = cli::choice_json(*choice_);
     json.update(cli::fit_json(report));
     json.update(cli::check_json(found));
+    if (!groups.groups.empty()) json["groups"] = cli::groups_json(groups.groups);
+    warnings_.insert(warnings_.end(), groups.warnings.begin(), groups.warnings.end());
     checkpoints_.describe(json);
     return json;
   }

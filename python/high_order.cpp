@@ -3,6 +3,7 @@
 #include "export/lagrange_mesh.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
+#include "python/groups.h"
 #include "python/meshes.h"
 #include "python/module.h"
 #include "subvol/base/error.h"
@@ -18,7 +19,7 @@ std::shared_ptr<CurvedMesh> make_curved(const py::object& object, int order, con
   keywords.finish();
   const auto mesh = sound_volume_from(object, "mesh");
   return std::make_shared<CurvedMesh>(
-      CurvedMesh{HighOrderMesh(ElementSpace(*mesh, basis, order), *mesh), mesh->references});
+      CurvedMesh{HighOrderMesh(ElementSpace(*mesh, basis, order), *mesh), mesh->references, mesh->face_groups, mesh->regions});
 }
 
 std::vector<CellPoint> cell_points(const py::object& cells, const py::object& points, const CurvedMesh& curved) {
@@ -67,6 +68,20 @@ Straight cells to begin with.)");
     const auto& references = self.cast<const CurvedMesh&>().references;
     return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
   }, "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
+  type.def_property_readonly("group_names", [](const CurvedMesh& curved) {
+    return names_of(curved.face_groups.groups);
+  }, kNamesHelp);
+  type.def_property_readonly("group_numbers", [](const py::object& self) {
+    return numbers_of(self.cast<const CurvedMesh&>().face_groups.groups, self);
+  }, kNumbersHelp);
+  type.def_property_readonly("grouped_faces", [](const py::object& self) {
+    return faces_shown(self.cast<const CurvedMesh&>().face_groups, self);
+  }, kFacesHelp);
+  type.def_property_readonly("face_groups", [](const py::object& self) {
+    return places_shown(self.cast<const CurvedMesh&>().face_groups, self);
+  }, kPlacesHelp);
+  type.def_property_readonly("region_names", [](const CurvedMesh& curved) { return region_names(curved.regions); },
+                             "Names of references: dict of number and name.");
   type.def("point_map", [](const CurvedMesh& curved, const py::object& cells, const py::object& points) {
     return std::make_shared<SparseMap>(point_map(curved.mesh.space, cell_points(cells, points, curved)));
   }, py::arg("cells"), py::arg("points"),
@@ -80,6 +95,8 @@ Straight cells to begin with.)");
   type.def("straight_sided", [](const CurvedMesh& curved) {
     VolumeMesh mesh = curved.mesh.straight_sided();
     mesh.references = curved.references;
+    mesh.face_groups = curved.face_groups;
+    mesh.regions = curved.regions;
     return std::make_shared<VolumeMesh>(std::move(mesh));
   }, "straight_sided($self)\n--\n\nThe points with linear cells between them: VolumeMesh.");
   type.def("linear_cells", [](const CurvedMesh& curved, int intervals) {
@@ -89,7 +106,12 @@ Straight cells to begin with.)");
      "linear_cells($self, intervals)\n--\n\nThe curved cells as intervals**3 linear ones each: VolumeMesh.");
   type.def("boundary", [](const CurvedMesh& curved, double chord) {
     const py::gil_scoped_release unlocked;
-    return SurfaceMesh{as_polygons(curved_boundary(curved.mesh, chord).triangles), {}};
+    CurvedBoundary boundary = curved_boundary(curved.mesh, chord);
+    const std::vector<Index> groups = groups_of_boundary(curved.face_groups, curved.mesh.space.topology());
+    boundary.triangles.face_groups.groups = curved.face_groups.groups;
+    if (!groups.empty())
+      for (const Index face : boundary.faces) boundary.triangles.face_groups.of_face.push_back(groups[face]);
+    return SurfaceMesh{as_polygons(boundary.triangles), {}};
   }, py::arg("chord") = cli::WritingOptions{}.chord_percent,
      "boundary($self, chord=0.005)\n--\n\n"
      "The curved boundary as triangles within chord per cent of its diagonal: SurfaceMesh.");

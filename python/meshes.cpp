@@ -2,6 +2,7 @@
 #include "python/meshes.h"
 
 #include "python/arrays.h"
+#include "python/groups.h"
 #include "python/module.h"
 #include "python/work.h"
 #include "subvol/base/error.h"
@@ -100,6 +101,22 @@ void add_tags(py::class_<Mesh, Extra...>& type) {
   }, "As crease_sharpness, of the corners: (n,) float64. A view.");
 }
 
+/// Adds the groups of the faces of a VolumeMesh.
+template <class Mesh, class... Extra>
+void add_groups(py::class_<Mesh, Extra...>& type) {
+  type.def_property_readonly("group_names", [](const Mesh& mesh) { return names_of(mesh.face_groups.groups); },
+                             kNamesHelp);
+  type.def_property_readonly("group_numbers", [](const py::object& self) {
+    return numbers_of(self.cast<const Mesh&>().face_groups.groups, self);
+  }, kNumbersHelp);
+  type.def_property_readonly("grouped_faces", [](const py::object& self) {
+    return faces_shown(self.cast<const Mesh&>().face_groups, self);
+  }, kFacesHelp);
+  type.def_property_readonly("face_groups", [](const py::object& self) {
+    return places_shown(self.cast<const Mesh&>().face_groups, self);
+  }, kPlacesHelp);
+}
+
 // --- Volume meshes --------------------------------------------------------------------------------------------------
 
 struct KindName {
@@ -120,6 +137,7 @@ std::shared_ptr<VolumeMesh> make_volume(const py::object& points, const py::kwar
   }
   mesh->references = integers_from(keywords.object("references"), "references", mesh->num_cells());
   mesh->tags = take_tags(keywords, mesh->num_vertices());
+  mesh->face_groups = take_volume_groups(keywords, mesh->num_vertices());
   keywords.finish();
   return mesh;
 }
@@ -162,11 +180,17 @@ references  a group number for each cell: of the hexes, then the prisms, then th
 creases     (n, 2) boundary edges kept sharp, for ever or through so many refinements
 corners     (n,) boundary points kept in their place
 
+Groups of faces, as of physical groups, side sets or materials:
+group_names    list of str, and group_numbers (n,): one for each group; numbers are 1, 2, .. unless given
+grouped_faces  (n, 4) point numbers of faces in any order; -1 in place of the fourth of a triangle
+face_groups    (n,) the place of each face's group in group_names
+
 The arrays given are copied. Those of a mesh are views of its memory, which they keep alive; only points can be written.
 What is wrong with a mesh is told by `check`; InputError here only for arrays that do not fit together.)");
   type.def(py::init(&make_volume), py::arg("points"),
            R"(__init__(self, points, *, hexes=None, prisms=None, tets=None, references=None, creases=None,
-    crease_sharpness=None, corners=None, corner_sharpness=None)
+    crease_sharpness=None, corners=None, corner_sharpness=None, grouped_faces=None, face_groups=None, group_names=None,
+    group_numbers=None)
 --
 
 Takes the arrays named above.)");
@@ -193,6 +217,9 @@ Takes the arrays named above.)");
     return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
   }, "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
   add_tags(type);
+  add_groups(type);
+  type.def_property_readonly("region_names", [](const VolumeMesh& mesh) { return region_names(mesh.regions); },
+                             "Names of references: dict of number and name.");
   type.def("boundary", &cli::tagged_polygons,
            "boundary($self)\n--\n\nThe boundary as it stands: a SurfaceMesh with the mesh's tags.");
   type.def("copy", [](const VolumeMesh& mesh) { return std::make_shared<VolumeMesh>(mesh); },
@@ -237,6 +264,7 @@ SurfaceMesh make_surface(const py::object& points, const py::object& triangles, 
   const py::object face_points = keywords.object("face_points");
   add_polygons(mesh.polygons, face_points, keywords.object("face_offsets"));
   mesh.tags = take_tags(keywords, num_points);
+  mesh.polygons.face_groups = take_face_groups(keywords, mesh.polygons.num_faces());
   keywords.finish();
   return mesh;
 }
@@ -271,11 +299,13 @@ points        (n, 3) numbers
 triangles     (n, 3) point numbers, quads (n, 4); or any polygons:
 face_points   point numbers of all faces, one after another, and
 face_offsets  (n + 1,) where each face begins in face_points, and the end
+group_names   list of str, and group_numbers (n,): groups of faces; numbers are 1, 2, .. unless given
+face_groups   (n,) the place of each face's group in group_names, -1 for none; triangles before quads
 
 Tags and arrays as of VolumeMesh.)");
   type.def(py::init(&make_surface), py::arg("points"), py::arg("triangles") = py::none(), py::arg("quads") = py::none(),
            R"(__init__(self, points, triangles=None, quads=None, *, face_points=None, face_offsets=None, creases=None,
-    crease_sharpness=None, corners=None, corner_sharpness=None)
+    crease_sharpness=None, corners=None, corner_sharpness=None, face_groups=None, group_names=None, group_numbers=None)
 --
 
 Takes the arrays named above.)");
@@ -296,6 +326,17 @@ Takes the arrays named above.)");
     return shown_offsets(self.cast<const SurfaceMesh&>().polygons.face_offsets, self);
   }, "Where each face begins in face_points, and the end: (n + 1,) int64. A view.");
   add_tags(type);
+  type.def_property_readonly("group_names", [](const SurfaceMesh& mesh) {
+    return names_of(mesh.polygons.face_groups.groups);
+  }, kNamesHelp);
+  type.def_property_readonly("group_numbers", [](const py::object& self) {
+    return numbers_of(self.cast<const SurfaceMesh&>().polygons.face_groups.groups, self);
+  }, kNumbersHelp);
+  type.def_property_readonly("face_groups", [](const py::object& self) {
+    const auto& places = self.cast<const SurfaceMesh&>().polygons.face_groups.of_face;
+    return shown(places.data(), {static_cast<py::ssize_t>(places.size())}, self);
+  }, "Place of each face's group in group_names, -1 for none: (n,) int32; without entries where there are no groups. A "
+     "view.");
   type.def("triangulated", [](const SurfaceMesh& mesh) {
     return SurfaceMesh{as_polygons(triangulate(mesh.polygons)), mesh.tags};
   }, "triangulated($self)\n--\n\nThe same with larger faces cut into triangles.");

@@ -2,6 +2,7 @@
 #include "fit/optimize_mesh.h"
 
 #include "cli/runs/check_report.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/mesh_check.h"
@@ -92,6 +93,7 @@ class Optimization {
       return check_mesh(found.mesh, &surface);
     });
     add(found.report, checked);
+    if (target_) add(work_.run("groups", [&] { return cli::carry_groups(*target_, found.mesh); }));
     result.mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));
   }
 
@@ -120,7 +122,14 @@ class Optimization {
       return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent), &*target_);
     });
     add(found.report, checked);
-    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{std::move(found.mesh), mesh_->references});
+    result.curved = std::make_shared<CurvedMesh>(
+        CurvedMesh{std::move(found.mesh), mesh_->references, mesh_->face_groups, mesh_->regions});
+    add(work_.run("groups", [&] { return cli::carry_groups(*target_, *result.curved); }));
+  }
+
+  void add(const cli::GroupsFound& groups) {
+    if (!groups.groups.empty()) json_["groups"] = cli::groups_json(groups.groups);
+    warnings_.insert(warnings_.end(), groups.warnings.begin(), groups.warnings.end());
   }
 
   void add(const FitReport& report, const MeshCheck& checked) {

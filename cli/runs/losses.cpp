@@ -10,6 +10,9 @@ namespace subvol::cli {
 namespace {
 
 bool holds_references(const Output& output) { return output.is_volume(); }
+bool holds_groups(const Output& output) {
+  return output.part == Part::boundary || (output.extension != ".vtk" && output.part != Part::cutaway);
+}
 bool holds_tags(const Output& output) { return output.extension == ".mesh" || output.extension == ".usda"; }
 
 }  // namespace
@@ -17,7 +20,7 @@ bool holds_tags(const Output& output) { return output.extension == ".mesh" || ou
 Marks marks_of(const VolumeMesh& mesh) {
   const auto is_set = [](int reference) { return reference != 0; };
   return {static_cast<std::size_t>(std::count_if(mesh.references.begin(), mesh.references.end(), is_set)),
-          mesh.tags.creases.size(), mesh.tags.corners.size()};
+          mesh.tags.creases.size(), mesh.tags.corners.size(), mesh.face_groups.groups.size()};
 }
 
 void warn_of_losses(const Marks& read, const Marks& result, std::span<const Output> outputs,
@@ -25,10 +28,12 @@ void warn_of_losses(const Marks& read, const Marks& result, std::span<const Outp
   if (outputs.empty()) return;
   const bool keeps_references = std::any_of(outputs.begin(), outputs.end(), holds_references);
   const bool keeps_tags = !curved && std::any_of(outputs.begin(), outputs.end(), holds_tags);
+  const bool keeps_groups = std::any_of(outputs.begin(), outputs.end(), holds_groups);
   LeftOut lost;
   if (!keeps_references || result.references == 0) lost.add("references of cells", read.references);
   if (!keeps_tags || result.creases == 0) lost.add("creases", read.creases);
   if (!keeps_tags || result.corners == 0) lost.add("corners", read.corners);
+  if (!keeps_groups || result.groups == 0) lost.add("groups of faces", read.groups);
   if (!lost.empty()) warnings.push_back("read, but in none of the outputs: " + lost.text());
 }
 

@@ -11,9 +11,9 @@
 
 namespace subvol::cli {
 
-/// Data of a mesh besides its cells: numbers of cells with a reference, of creases and of corners.
+/// Data of a mesh besides its cells: numbers of cells with a reference, of creases, of corners and of groups of faces.
 struct Marks {
-  std::size_t references = 0, creases = 0, corners = 0;
+  std::size_t references = 0, creases = 0, corners = 0, groups = 0;
 };
 Marks marks_of(const VolumeMesh& mesh);
 

@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Prefix of each Part; in -o it stands before the file, separated by a colon.
-constexpr std::array<std::string_view, 4> kPartNames{"", "cage", "cutaway", "animation"};
+constexpr std::array<std::string_view, 5> kPartNames{"", "cage", "cutaway", "animation", "boundary"};
 constexpr std::array<std::string_view, 4> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh"};
 constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
 constexpr std::array<std::string_view, 2> kSceneExtensions{".glb", ".gltf"};
@@ -44,7 +44,7 @@ std::pair<Part, std::string> part_and_file(const std::string& text) {
   if (colon == std::string::npos || !std::all_of(name.begin(), name.end(), is_letter)) return {Part::result, text};
   for (std::size_t part = 1; part < kPartNames.size(); ++part)
     if (name == kPartNames[part]) return {static_cast<Part>(part), text.substr(colon + 1)};
-  throw UsageError("-o " + text + ": expected cage:, cutaway: or animation: before a file, not '" + name +
+  throw UsageError("-o " + text + ": expected cage:, cutaway:, animation: or boundary: before a file, not '" + name +
                    ":'; the file of that name is ./" + text);
 }
 
@@ -59,6 +59,8 @@ Output parse_output(const std::string& text) {
   }
   if ((output.part == Part::cutaway || output.part == Part::animation) && !output.is_scene())
     throw UsageError("-o " + text + ": this part is a scene; the extension must be .glb or .gltf");
+  if (output.part == Part::boundary && output.extension != ".vtu" && output.extension != ".vtk")
+    throw UsageError("-o " + text + ": faces as cells; the extension must be .vtu or .vtk");
   return output;
 }
 

@@ -15,7 +15,8 @@ enum class Part {
   result,    ///< the finest mesh, or its surface
   cage,      ///< the control mesh
   cutaway,   ///< a scene that shows the cells inside
-  animation  ///< a scene of the surface in the course of the fit
+  animation, ///< a scene of the surface in the course of the fit
+  boundary   ///< the faces of the boundary as cells, with their groups
 };
 
 /// One -o: the part to write, and the file.

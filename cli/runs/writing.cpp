@@ -4,6 +4,7 @@
 #include "cli/runs/exit_status.h"
 #include "cli/runs/loading.h"
 #include "export/animation.h"
+#include "export/boundary_file.h"
 #include "export/export.h"
 #include "export/gltf_writer.h"
 #include "export/obj_writer.h"
@@ -12,8 +13,11 @@
 #include "export/volume_writer.h"
 #include "fit/quality/high_order_quality.h"
 #include "fit/quality/quality.h"
+#include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
 
 #include <algorithm>
 #include <array>
@@ -48,14 +52,16 @@ void write_polygons(const Output& output, const PolygonMesh& surface, const Feat
   require_written(output.path, surface);
 }
 
-/// Joins every two consecutive triangles to a quad.
-PolygonMesh polygons_of(const CurvedBoundary& boundary) {
+/// Joins every two consecutive triangles to a quad. groups: of the boundary faces.
+PolygonMesh polygons_of(const CurvedBoundary& boundary, const FaceGroups& groups) {
   PolygonMesh mesh{boundary.triangles.positions, {0}, {}};
+  mesh.face_groups.groups = groups.groups;
   const auto& triangles = boundary.triangles.triangles;
   for (std::size_t t = 0; t < triangles.size(); t += 2) {
     mesh.face_vertices.insert(mesh.face_vertices.end(), triangles[t].begin(), triangles[t].end());
     mesh.face_vertices.push_back(triangles[t + 1][2]);
     mesh.face_offsets.push_back(mesh.face_vertices.size());
+    if (!groups.empty()) mesh.face_groups.of_face.push_back(groups.of_face[boundary.faces[t]]);
   }
   return mesh;
 }
@@ -74,6 +80,38 @@ PolygonMesh polygons_of(const TessellatedSurface& surface) {
     mesh.face_offsets.push_back(mesh.face_vertices.size());
   }
   return mesh;
+}
+
+/// Writes a boundary and compares the bytes of the file with what they should be: IoError.
+void write_boundary_file(const Output& output, const PolygonMesh& boundary, const BoundaryOrigin& origin = {}) {
+  write_boundary(output.path, boundary, origin);
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(output.path, ignored)) return;
+  if (read_file(output.path.string()) !=
+      (output.extension == ".vtu" ? boundary_vtu_text(boundary, origin) : boundary_vtk_text(boundary, origin)))
+    throw IoError(output.path.string() + ": was written, but does not hold what it should");
+}
+
+/// Writes the faces of the boundary with the numbers of their vertices and cells in the mesh.
+void write_boundary_faces(const Output& output, const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  std::vector<Index> vertices, cells;
+  const PolygonMesh boundary = boundary_surface(mesh, topology, &vertices);
+  for (const Index f : topology.boundary_faces()) cells.push_back(topology.face_cells(f)[0]);
+  write_boundary_file(output, boundary, {vertices, cells});
+}
+
+/// The groups of the boundary faces of a mesh.
+FaceGroups boundary_groups(const VolumeFaceGroups& groups, const MeshTopology& topology) {
+  return {groups.groups, groups_of_boundary(groups, topology)};
+}
+
+/// Options of the scene of a surface that shows the groups of a mesh's faces.
+SurfaceSceneOptions grouped_scene_options(const Output& output, const WritingOptions& options,
+                                          const VolumeFaceGroups& groups, const MeshTopology& topology) {
+  SurfaceSceneOptions scene = scene_options(output, options);
+  scene.face_groups = boundary_groups(groups, topology);
+  return scene;
 }
 
 }  // namespace
@@ -122,10 +160,13 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
   if (output.part == Part::cage) return write_output(output, cage, options);
   if (!shows_surface(output)) return write_output(output, mesh, options);
   const std::vector<double> quality = patch_quality(cage, *limit, measure_quality(mesh).cell_minima);
-  write_scene(output.path, surface_scene(*limit, quality, scene_options(output, options)));
+  // The faces of the cage are those of the limit surface.
+  write_scene(output.path, surface_scene(*limit, quality, grouped_scene_options(output, options, cage.face_groups,
+                                                                                MeshTopology(cage))));
 }
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
+  if (output.part == Part::boundary) return write_boundary_faces(output, mesh);
   if (output.is_volume()) return write_cells(output, mesh);
   if (output.part == Part::cutaway)
     return write_scene(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
@@ -138,21 +179,30 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
   const HighOrderMesh& mesh = file.mesh;
   require_for_curved_cells(output);
-  if (output.extension == ".obj")
-    return write_polygons(output, polygons_of(curved_boundary(mesh, options.chord_percent)), {}, options);
+  if (output.extension == ".obj" || output.part == Part::boundary) {
+    const FaceGroups groups = boundary_groups(file.face_groups, mesh.space.topology());
+    const PolygonMesh polygons = polygons_of(curved_boundary(mesh, options.chord_percent), groups);
+    return output.part == Part::boundary ? write_boundary_file(output, polygons)
+                                         : write_polygons(output, polygons, {}, options);
+  }
   const bool is_linear = output.extension == ".mesh" || output.extension == ".vtk";
   const std::vector<double> minima = is_linear ? std::vector<double>{} : measure_quality(mesh).cell_minima;
   if (output.part == Part::cutaway)
     return write_scene(output.path, cutaway_scene(mesh, minima, options.cut, scene_options(output, options)));
-  if (output.is_scene()) return write_scene(output.path, surface_scene(mesh, minima, scene_options(output, options)));
+  if (output.is_scene())
+    return write_scene(output.path, surface_scene(mesh, minima, grouped_scene_options(output, options, file.face_groups,
+                                                                                      mesh.space.topology())));
   write_curved_cells(output, mesh,
                      {.cell_minima = minima,
                       .references = file.references,
+                      .face_groups = &file.face_groups,
+                      .regions = file.regions,
                       .linear_intervals = options.linear_intervals,
                       .map_tolerance_percent = options.map_tolerance_percent});
 }
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
+  if (output.part == Part::boundary) return write_boundary_file(output, surface);
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
   if (output.is_scene()) return write_scene(output.path, polygon_scene(surface, {}, scene_options(output, options)));
   write_polygons(output, surface, {}, options);

@@ -5,6 +5,7 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/report.h"
 #include "cli/runs/written_result.h"
@@ -43,6 +44,7 @@ class AutomaticFitRun : public LongRun {
   TriangleMesh target_;
   std::optional<Checkpointing> checkpointing_;
   AutomaticFitResult result_;
+  GroupsFound groups_;
   MeshCheck mesh_check_;
 };
 
@@ -76,6 +78,8 @@ void AutomaticFitRun::fit() {
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
+  groups_ = carry_groups(target_, result_.mesh);
+  add_warnings(groups_.warnings);
 }
 
 void AutomaticFitRun::write() {
@@ -101,6 +105,7 @@ Json AutomaticFitRun::report() const {
   json.update(automatic_fit_json(result_));
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
+  if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   checkpointing_->describe(json);
   return json;
 }
@@ -113,7 +118,7 @@ void AutomaticFitRun::summarise() const {
 }
 
 int AutomaticFitRun::run() {
-  prepare({Part::cutaway});
+  prepare({Part::cutaway, Part::boundary});
   timed("read", &AutomaticFitRun::load);
   timed("fit", &AutomaticFitRun::fit);
   if (result_.mesh.num_cells() == 0)  // nothing has been fitted yet

@@ -48,7 +48,7 @@ int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& o
   const HighOrderFile file = load_high_order(arguments.input);
   const auto is_set = [](int reference) { return reference != 0; };
   const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
-  const Marks marks{.references = static_cast<std::size_t>(num_set)};
+  const Marks marks{.references = static_cast<std::size_t>(num_set), .groups = file.face_groups.groups.size()};
   warn_of_losses(marks, marks, outputs, warnings, true);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, file, writing); }));
   const std::vector<PolynomialCells> polynomials =
@@ -67,7 +67,7 @@ void convert_surface(const ConvertArguments& arguments, std::vector<Output>& out
   for (const Output& output : outputs) {
     if (output.part == Part::cutaway)
       throw UsageError(output.path.string() + ": " + arguments.input + " has no inside");
-    if (output.is_volume()) {
+    if (output.is_volume() && output.part != Part::boundary) {
       throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
     }
   }
@@ -76,7 +76,7 @@ void convert_surface(const ConvertArguments& arguments, std::vector<Output>& out
 }
 
 int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
-  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway});
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::boundary});
   apply_resources(arguments.run);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.input;
@@ -117,7 +117,8 @@ void add_convert_command(CLI::App& app, Action& action) {
   add_references_option(*verb, arguments->run);
   add_output_options(*verb, arguments->run,
                      "Where to, the extension choosing the format: " + output_formats() +
-                         "; cutaway:FILE.glb for the cells inside; may be given several times");
+                         "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
+                         "their groups; may be given several times");
   verb->get_option("--output")->required();
   add_writing_options(*verb, arguments->writing);
   verb->footer(

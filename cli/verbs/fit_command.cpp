@@ -3,6 +3,7 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/losses.h"
 #include "cli/runs/report.h"
@@ -99,6 +100,7 @@ class FitRun : public LongRun {
   std::optional<TemplateChoice> choice_;  ///< if the template was made
   std::optional<Checkpointing> checkpointing_;
   FitResult result_;
+  GroupsFound groups_;
   MeshCheck mesh_check_;
   TessellatedSurface limit_;
   SurfaceDistance limit_distance_;
@@ -152,6 +154,9 @@ void FitRun::fit() {
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
+  groups_ = carry_groups(target_, result_.mesh);
+  carry_groups(target_, result_.cage);
+  add_warnings(groups_.warnings);
 }
 
 void FitRun::write() {
@@ -205,6 +210,7 @@ Json FitRun::report() const {
   if (choice_) json["template"] = choice_json(*choice_);
   json.update(fit_json(report));
   json.update(check_json(mesh_check_));
+  if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
   json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
   if (report.creases) json["creases"] = creases_json(*report.creases);
@@ -227,7 +233,7 @@ void FitRun::summarise() const {
 }
 
 int FitRun::run() {
-  prepare({Part::cage, Part::cutaway, Part::animation});
+  prepare({Part::cage, Part::cutaway, Part::animation, Part::boundary});
   timed("read", &FitRun::load);
   timed("template", &FitRun::load_template);
   if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet

@@ -4,6 +4,7 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/losses.h"
@@ -107,7 +108,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (arguments.run.outputs.empty() && arguments.run.report.empty())
     throw UsageError(std::string(arguments.command) + ": nothing to write; give -o FILE or --report FILE");
   const Clock::time_point start = Clock::now();
-  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::animation});
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cutaway, Part::animation, Part::boundary});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   std::size_t told = 0;
@@ -170,7 +171,11 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   WritingOptions writing = arguments.writing;
   writing.source = arguments.target;
   writing.options = options_used(arguments, options_of_result(verb));
-  const HighOrderFile file{std::move(result.mesh), template_mesh.references};
+  HighOrderFile file{std::move(result.mesh), template_mesh.references, template_mesh.face_groups,
+                     template_mesh.regions};
+  const GroupsFound groups = carry_groups(target, file);
+  warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
+  tell_warnings();
   const std::vector<std::string> failures = write_each(outputs, [&](const Output& output) {
     if (output.part == Part::animation)
       write_animation(output, file.mesh, result.states, writing);
@@ -203,6 +208,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   if (!arguments.run.report.empty()) {
     Json json = report_json(arguments.command, options_used(arguments, options_in_force(verb)), std::move(input),
                             report, file.mesh, mesh_check);
+    if (!groups.groups.empty()) json["groups"] = groups_json(groups.groups);
     if (linear) json["linear_cells"] = check_json(*linear);
     if (!polynomials.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials);
     if (arguments.untangles) json["not_certified_cells"] = not_certified_cells(mesh_check);

@@ -2,6 +2,7 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
+#include "cli/runs/face_groups.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/losses.h"
 #include "cli/runs/report.h"
@@ -57,6 +58,7 @@ class OptimizeRun : public LongRun {
   QualityReport before_;
   std::optional<Checkpointing> checkpointing_;
   OptimizeResult result_;
+  GroupsFound groups_;
   MeshCheck mesh_check_;
 };
 
@@ -83,6 +85,8 @@ void OptimizeRun::optimize() {
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
+  if (target_) groups_ = carry_groups(*target_, result_.mesh);
+  add_warnings(groups_.warnings);
 }
 
 void OptimizeRun::write() {
@@ -109,6 +113,7 @@ Json OptimizeRun::report() const {
   if (target_) json["input"]["target"] = describe(arguments_.target, *target_);
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
+  if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   checkpointing_->describe(json);
   json["not_certified_cells"] = not_certified_cells(mesh_check_);
   return json;
@@ -127,7 +132,7 @@ void OptimizeRun::summarise() const {
 }
 
 int OptimizeRun::run() {
-  prepare({Part::cutaway});
+  prepare({Part::cutaway, Part::boundary});
   timed("read", &OptimizeRun::load);
   timed("optimize", &OptimizeRun::optimize);
   timed("write", &OptimizeRun::write);
@@ -232,7 +237,8 @@ void add_optimize_command(CLI::App& app, Action& action) {
   add_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "The mesh, or its surface, by extension: " + output_formats() +
-                         "; cutaway:FILE.glb for the cells inside; may be given several times");
+                         "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
+                         "their groups; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   add_checkpoint_options(*verb, arguments->run);

@@ -29,7 +29,7 @@ struct SubdivideArguments {
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
-  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway});
+  std::vector<Output> outputs = checked_outputs(arguments.run, {Part::cage, Part::cutaway, Part::boundary});
   apply_resources(arguments.run);
   std::vector<std::string> warnings;
   VolumeMesh cage = load_volume(arguments.mesh, warnings, true, arguments.run.references);
@@ -85,7 +85,8 @@ void add_subdivide_command(CLI::App& app, Action& action) {
   add_references_option(*verb, arguments->run);
   add_output_options(*verb, arguments->run,
                      "Refined mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside; may be given\n"
+                         "; cage:FILE for the control mesh, cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for\n"
+                         "the faces of the boundary with their groups; may be given\n"
                          "several times");
   add_writing_options(*verb, arguments->writing);
   verb->add_option("--report", arguments->run.report, "Write what was done and what is true of the result")

@@ -21,7 +21,7 @@ void add_template_options(CLI::App& verb, TemplateRun& run) {
 std::vector<Output> template_outputs(const TemplateRun& run, const CLI::App& verb) {
   if (run.run.outputs.empty() && run.run.report.empty())
     throw UsageError("template " + verb.get_name() + ": nothing to write; give -o FILE or --report FILE");
-  std::vector<Output> outputs = checked_outputs(run.run, {Part::cutaway});
+  std::vector<Output> outputs = checked_outputs(run.run, {Part::cutaway, Part::boundary});
   apply_resources(run.run);
   return outputs;
 }

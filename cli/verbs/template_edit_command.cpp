@@ -52,6 +52,7 @@ VolumeMesh load_edited(EditArguments& arguments, const std::string& path) {
   arguments.read.references += marks.references;
   arguments.read.creases += marks.creases;
   arguments.read.corners += marks.corners;
+  arguments.read.groups += marks.groups;
   return mesh;
 }
 

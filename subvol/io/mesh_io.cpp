@@ -54,6 +54,17 @@ std::size_t drop_inner_tags(VolumeMesh& mesh) {
          });
 }
 
+/// Drops grouped faces that are faces of no cell, with a warning, and groups that no face is left of.
+void drop_lone_faces(ParsedMesh& parsed) {
+  VolumeFaceGroups& groups = parsed.mesh.face_groups;
+  if (groups.empty()) return;
+  const std::size_t before = groups.faces.size();
+  groups = groups_of_faces(groups, MeshTopology(parsed.mesh));
+  if (const std::size_t n = before - groups.faces.size())
+    parsed.warnings.push_back(std::to_string(n) + " faces with a group are faces of no cell: dropped");
+  if (groups.faces.empty()) groups = {};
+}
+
 void warn_of(const std::vector<MeshDefect>& defects, MeshDefect::Kind kind, const std::string& what,
              std::vector<std::string>& warnings) {
   const auto is_kind = [&](const MeshDefect& defect) { return defect.kind == kind; };
@@ -82,6 +93,7 @@ void check_mesh(const std::string& name, ParsedMesh& parsed) {
   }
   if (const std::size_t n = drop_inner_tags(parsed.mesh))
     parsed.warnings.push_back(std::to_string(n) + " tagged edges or corners are not on the boundary: dropped");
+  drop_lone_faces(parsed);
   warn_of(defects, MeshDefect::Kind::inverted_cell,
           " of " + std::to_string(parsed.mesh.num_cells()) + " cells are flat or left-handed somewhere",
           parsed.warnings);
@@ -170,6 +182,7 @@ void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind <= MeshDefect::Kind::not_finite || defect.kind == MeshDefect::Kind::bad_tag)
       throw InputError("write_volume_mesh: " + defect.message);
+  require_groups(mesh.face_groups, "write_volume_mesh");
   write_file_atomically(path, format.format(mesh));
 }
 

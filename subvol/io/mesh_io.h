@@ -24,7 +24,8 @@ struct ReadOptions {
 
 /// Reads a volume mesh of hexes, prisms and tets; the extension chooses the format (docs/file-formats.md).
 ///
-///   .mesh  Medit ASCII, versions 1 to 4, dimension 3; tags from Edges + Ridges and Corners
+///   .mesh  Medit ASCII, versions 1 to 4, dimension 3; tags from Edges + Ridges and Corners; groups of faces from the
+///          references of Triangles and Quadrilaterals
 ///   .vtk   legacy VTK 2.0 to 5.1, ASCII or binary, UNSTRUCTURED_GRID; a VTK wedge is renumbered to our prism
 ///
 /// Vertices and cells keep the file's order (Medit: section by section). Cells of lower dimension are skipped. Only
@@ -41,7 +42,8 @@ VolumeMesh read_volume_mesh(const std::filesystem::path& path, const ReadOptions
 /// Writes a volume mesh atomically; the extension chooses the format. Reading it back gives the same bits of positions.
 ///
 ///   .mesh  Medit ASCII version 2: hexes, then prisms, then tets; tags as Edges + Ridges + Corners,
-///          finite sharpness in comments of our own (values of 10 and above are written as infinite)
+///          finite sharpness in comments of our own (values of 10 and above are written as infinite); groups of faces
+///          as references of Triangles and Quadrilaterals, names in comments
 ///   .vtk   legacy VTK 3.0 ASCII; references as cell data; carries no tags
 ///
 /// InputError: an unknown extension, inconsistent arrays, no cells, a position that is not finite, or a bad tag.

@@ -4,6 +4,7 @@
 #include "subvol/io/left_out.h"
 #include "subvol/io/mesh_formats.h"
 #include "subvol/mesh/features.h"
+#include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
 #include <array>
@@ -21,16 +22,20 @@ constexpr CellSection kCellSections[] = {
     {"Hexahedra", CellKind::hex}, {"Prisms", CellKind::prism}, {"Tetrahedra", CellKind::tet},
     {"Pentahedra", CellKind::prism}};  // an old name of Prisms, never written
 
+/// Sections of faces, whose references are groups.
+struct FaceSection {
+  const char* keyword;
+  std::size_t corners;
+};
+constexpr FaceSection kFaceSections[] = {{"Triangles", 3}, {"Quadrilaterals", 4}};
+
 /// A section that says nothing about cells or features, and how many numbers each of its entries has.
 struct SkippedSection {
   const char* keyword;
   std::size_t numbers_per_entry;
-  bool has_reference = false;  ///< true if the last number is a reference; a nonzero one counts as left out
 };
 constexpr std::size_t kUntilKeyword = 0;  // files disagree on the length of an entry
-constexpr SkippedSection kSkippedSections[] = {{"Triangles", 4, true},
-                                               {"Quadrilaterals", 5, true},
-                                               {"RequiredVertices", 1},
+constexpr SkippedSection kSkippedSections[] = {{"RequiredVertices", 1},
                                                {"RequiredEdges", 1},
                                                {"RequiredTriangles", 1},
                                                {"RequiredQuadrilaterals", 1},
@@ -49,6 +54,9 @@ constexpr SkippedSection kSkippedValues[] = {{"AngleOfCornerBound", 1}, {"Boundi
 /// Prefixes of the comments that store finite sharpness; other readers skip them.
 constexpr std::string_view kRidgeSharpness = "subvol:RidgeSharpness";
 constexpr std::string_view kCornerSharpness = "subvol:CornerSharpness";
+/// Prefixes of the comments that name references of faces and of cells.
+constexpr std::string_view kFaceName = "subvol:FaceName";
+constexpr std::string_view kCellName = "subvol:CellName";
 
 /// A number in the file (from 1) that can only be checked once everything has been read.
 struct Numbered {
@@ -79,6 +87,7 @@ class MeditParser {
     if (!has_vertices_) scan_.fail("the file has no Vertices");
     check_cells();
     resolve_tags();
+    resolve_groups();
     left_out_.tell(parsed_.warnings);
     return std::move(parsed_);
   }
@@ -104,6 +113,9 @@ class MeditParser {
     if (const auto* s = std::find_if(std::begin(kCellSections), std::end(kCellSections), named);
         s != std::end(kCellSections))
       return read_cells(*s);
+    if (const auto* s = std::find_if(std::begin(kFaceSections), std::end(kFaceSections), named);
+        s != std::end(kFaceSections))
+      return read_faces(*s);
     if (const auto* s = std::find_if(std::begin(kSkippedSections), std::end(kSkippedSections), named);
         s != std::end(kSkippedSections))
       return skip_section(*s);
@@ -127,15 +139,6 @@ class MeditParser {
   void skip_section(const SkippedSection& section) {
     const std::string keyword = section.keyword;
     const std::size_t n = scan_.count("the number of entries", section.numbers_per_entry);
-    if (section.has_reference) {
-      std::size_t num_marked = 0;
-      for (std::size_t i = 0; i < n; ++i) {
-        skip_numbers(section.numbers_per_entry - 1);
-        num_marked += scan_.number("a number") != 0;
-      }
-      left_out_.add("references of " + keyword, num_marked);
-      return;
-    }
     if (keyword.starts_with("Required")) left_out_.add(keyword, n);
     if (section.numbers_per_entry != kUntilKeyword) return skip_numbers(n * section.numbers_per_entry);
     for (auto word = scan_.peek(); word && parse_number(*word); word = scan_.peek()) scan_.next();
@@ -170,6 +173,21 @@ class MeditParser {
     }
   }
 
+  /// Faces with a reference are in its group; the reference 0 means that a face is in none.
+  void read_faces(const FaceSection& section) {
+    const std::size_t n = scan_.count((std::string("the number of ") + section.keyword).c_str(), section.corners + 1);
+    std::array<Index, 4> face;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < section.corners; ++k) face[k] = read_vertex_number();
+      const std::size_t line = scan_.word_line();
+      const int reference = read_reference("a face reference");
+      if (reference == 0) continue;
+      parsed_.mesh.face_groups.faces.push_back({face_key({face.data(), section.corners}),
+                                                face_groups_.by_number(reference)});
+      last_face_line_ = line;
+    }
+  }
+
   /// Reads a vertex number and returns it counted from 0. Before the section Vertices, the only check is that it fits.
   Index read_vertex_number() {
     const std::int64_t number = scan_.integer("a vertex number");
@@ -184,10 +202,10 @@ class MeditParser {
                  line);
   }
 
-  int read_reference() {
-    const std::int64_t reference = scan_.integer("a cell reference");
+  int read_reference(const char* what = "a cell reference") {
+    const std::int64_t reference = scan_.integer(what);
     if (reference < std::numeric_limits<int>::min() || reference > std::numeric_limits<int>::max())
-      scan_.fail("a cell reference beyond 32 bits: " + std::to_string(reference));
+      scan_.fail(std::string(what) + " beyond 32 bits: " + std::to_string(reference));
     return static_cast<int>(reference);
   }
 
@@ -209,6 +227,8 @@ class MeditParser {
   }
 
   void read_comment(std::string_view text) {
+    for (const auto& [opening, names] : {std::pair(kFaceName, &face_names_), std::pair(kCellName, &cell_names_)})
+      if (text.starts_with(opening)) names->push_back(read_name(opening, text.substr(opening.size())));
     for (const auto& [opening, list] :
          {std::pair(kRidgeSharpness, &ridge_sharpness_), std::pair(kCornerSharpness, &corner_sharpness_)}) {
       if (!text.starts_with(opening)) continue;
@@ -220,6 +240,32 @@ class MeditParser {
         scan_.fail("expected '#" + std::string(opening) + " NUMBER SHARPNESS' with a sharpness > 0");
       list->push_back({{*n, scan_.word_line()}, *sharpness});
     }
+  }
+
+  /// Reads "NUMBER NAME"; the name is the rest of the line.
+  Group read_name(std::string_view opening, std::string_view text) const {
+    constexpr std::string_view kBlanks = " \t";
+    const std::size_t begin = std::min(text.find_first_not_of(kBlanks), text.size());
+    const std::size_t end = std::min(text.find_first_of(kBlanks, begin), text.size());
+    const auto number = parse_integer(text.substr(begin, end - begin));
+    const std::size_t name = text.find_first_not_of(kBlanks, end);
+    const bool fits = number && *number >= std::numeric_limits<int>::min() && *number <= std::numeric_limits<int>::max();
+    if (!fits || name == text.npos) scan_.fail("expected '#" + std::string(opening) + " NUMBER NAME'");
+    const std::size_t last = text.find_last_not_of(kBlanks);
+    return {std::string(text.substr(name, last + 1 - name)), static_cast<int>(*number), opening == kCellName ? 3 : 2};
+  }
+
+  void resolve_groups() {
+    VolumeFaceGroups& groups = parsed_.mesh.face_groups;
+    for (const GroupedFace& entry : groups.faces)
+      for (const Index v : entry.face)
+        if (v != kNoIndex) check_number(std::int64_t{v} + 1, parsed_.mesh.num_vertices(), "vertex", last_face_line_);
+    std::vector<Index> places;
+    for (const Group& named : face_names_) places.push_back(face_groups_.by_number(named.number));
+    groups.groups = face_groups_.take();
+    for (std::size_t i = 0; i < places.size(); ++i) groups.groups[places[i]].name = face_names_[i].name;
+    normalise(groups);
+    parsed_.mesh.regions = std::move(cell_names_);
   }
 
   void check_cells() const {
@@ -267,7 +313,18 @@ class MeditParser {
   std::vector<std::array<Index, 2>> edges_;
   std::vector<Numbered> ridges_, corners_;
   std::vector<Sharpness> ridge_sharpness_, corner_sharpness_;
+  GroupList face_groups_;
+  std::vector<Group> face_names_, cell_names_;
+  std::size_t last_face_line_ = 0;
 };
+
+/// Appends a comment that names a group. Line ends in the name become blanks.
+void append_name(std::string& text, std::string_view opening, const Group& group) {
+  if (group.name.find_first_not_of(" \t\r\n") == group.name.npos) return;
+  std::string name = group.name;
+  std::replace_if(name.begin(), name.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  text.append("#").append(opening).append(" ").append(std::to_string(group.number)).append(" ").append(name) += '\n';
+}
 
 void append_cells(std::string& text, const VolumeMesh& mesh, const CellSection& section) {
   const auto n = std::count(mesh.kinds.begin(), mesh.kinds.end(), section.kind);
@@ -278,6 +335,31 @@ void append_cells(std::string& text, const VolumeMesh& mesh, const CellSection& 
     for (const Index v : mesh.cell(c)) text += std::to_string(v + 1) + " ";
     text += std::to_string(mesh.references.empty() ? 0 : mesh.references[c]) + "\n";
   }
+}
+
+/// Appends faces of the mesh with the number of their group as reference, and the names of groups as comments.
+///
+/// A group whose number is 0 would be read as none: it gets the lowest free number.
+void append_face_groups(std::string& text, const VolumeMesh& mesh) {
+  if (mesh.face_groups.empty()) return;
+  const MeshTopology topology(mesh);
+  std::vector<Group> groups = mesh.face_groups.groups;
+  for (Group& group : groups)
+    if (group.number == 0) group.number = free_number(groups);
+  for (const FaceSection& section : kFaceSections) {
+    std::string lines;
+    std::size_t n = 0;
+    for (std::size_t f = 0; f < topology.num_faces(); ++f) {
+      const auto face = topology.face(static_cast<Index>(f));
+      const Index group = face.size() == section.corners ? group_of(mesh.face_groups, face) : kNoIndex;
+      if (group == kNoIndex) continue;
+      for (const Index v : face) lines += std::to_string(v + 1) + " ";
+      lines += std::to_string(groups[group].number) + "\n";
+      ++n;
+    }
+    if (n > 0) text += std::string(section.keyword) + "\n" + std::to_string(n) + "\n" + lines;
+  }
+  for (const Group& group : groups) append_name(text, kFaceName, group);
 }
 
 void append_sharpness(std::string& text, std::string_view opening, std::size_t number, double sharpness) {
@@ -324,6 +406,8 @@ std::string format_medit(const VolumeMesh& mesh) {
     text += "0\n";
   }
   for (const CellSection& section : std::span(kCellSections).first(kNumCellKinds)) append_cells(text, mesh, section);
+  append_face_groups(text, mesh);
+  for (const Group& region : mesh.regions) append_name(text, kCellName, region);
   append_tags(text, mesh.tags);
   return text + "End\n";
 }

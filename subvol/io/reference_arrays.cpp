@@ -41,8 +41,7 @@ bool is_id_or_ghost(std::string_view name) {
 }
 
 std::size_t rank(const CellNumbers& array) {
-  return static_cast<std::size_t>(std::find(std::begin(kReferenceNames), std::end(kReferenceNames), plain(array.name)) -
-                                  std::begin(kReferenceNames));
+  return reference_name_rank(array.name).value_or(std::size(kReferenceNames));
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -52,6 +51,12 @@ std::string listed(const std::vector<std::string>& names) {
 }
 
 }  // namespace
+
+std::optional<std::size_t> reference_name_rank(std::string_view name) {
+  const auto* found = std::find(std::begin(kReferenceNames), std::end(kReferenceNames), plain(name));
+  if (found == std::end(kReferenceNames)) return std::nullopt;
+  return static_cast<std::size_t>(found - std::begin(kReferenceNames));
+}
 
 bool may_be_references(const CellNumbers& array) {
   return !is_id_or_ghost(array.name) && (!array.is_real || rank(array) < std::size(kReferenceNames));

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <string_view>
 #include <vector>
 
 namespace subvol {
@@ -26,6 +27,10 @@ struct CellNumbers {
 /// InputError (without the file's name): there is no array of that name; the message lists `arrays` and `others`.
 std::optional<std::size_t> choose_references(const std::vector<CellNumbers>& arrays, const std::string& name,
                                              const std::vector<std::string>& others = {});
+
+/// Returns the place of a name in the list of names that programs give to materials and regions, the most telling name
+/// first; nothing if it is not in the list. Case, separators and a plural's s do not count.
+std::optional<std::size_t> reference_name_rank(std::string_view name);
 
 /// Returns true if the array may be chosen as references without being asked for.
 bool may_be_references(const CellNumbers& array);

@@ -2,16 +2,26 @@
 #include "subvol/base/binary_value.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/color_groups.h"
 #include "subvol/io/left_out.h"
+#include "subvol/io/reference_arrays.h"
 #include "subvol/io/surface_formats.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <optional>
+#include <utility>
 
 namespace subvol {
 
 namespace {
+
+constexpr double kLevels = 255;  // of a color in 8 bits
+/// Largest number of labels that become groups: the references of most formats have at least 16 bits.
+constexpr std::size_t kMostLabels = 65535;
 
 struct NamedType {
   const char* name;
@@ -24,8 +34,9 @@ constexpr NamedType kPlyTypes[] = {
     {"float64", kFloat64}};
 
 struct Property {
-  enum class Use { none, x, y, z, corners, attribute };
+  enum class Use { none, x, y, z, corners, attribute, label, red, green, blue };
   Use use = Use::none;
+  std::string name;
   bool is_list = false;
   ValueType count_type = kUInt8, type = kFloat32;
 };
@@ -61,6 +72,7 @@ class PlyParser {
       if (static_cast<std::size_t>(v) >= mesh_.positions.size())
         throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
                          std::to_string(mesh_.positions.size()));
+    add_groups();
     ParsedSurface parsed{std::move(mesh_), {}};
     left_out_.tell(parsed.warnings);
     return parsed;
@@ -92,6 +104,7 @@ class PlyParser {
       const std::string_view keyword = words.next().value_or("comment");
       if (keyword == "end_header") {
         if (!has_format) scan_.fail("the header has no format");
+        choose_face_properties();
         return;
       }
       if (keyword == "format") has_format = true, read_format(words);
@@ -135,16 +148,68 @@ class PlyParser {
     property.type = type_of(word);
     const std::string_view name = words.next().value_or("");
     property.use = use_of(elements_.back().name, name, property.is_list);
+    property.name = name;
     elements_.back().properties.push_back(property);
-    note(elements_.back(), property, name);
+  }
+
+  /// Chooses the properties of faces that become groups: the one whose name tells most of a material or a region, else
+  /// a color. Counts all properties that are not used.
+  void choose_face_properties() {
+    for (Element& element : elements_) {
+      if (element.name == "face") choose_groups(element);
+      for (const Property& property : element.properties) note(element, property);
+    }
+  }
+
+  static void choose_groups(Element& face) {
+    Property* label = nullptr;
+    for (Property& p : face.properties) {
+      const auto rank = reference_name_rank(p.name);
+      if (p.is_list || p.type.is_real() || !rank) continue;
+      if (!label || *rank < *reference_name_rank(label->name)) label = &p;
+    }
+    if (label) {
+      label->use = Property::Use::label;
+      return;
+    }
+    constexpr std::array kColors{std::pair("red", Property::Use::red), std::pair("green", Property::Use::green),
+                                 std::pair("blue", Property::Use::blue)};
+    const auto find = [&](std::string_view name) {
+      return std::find_if(face.properties.begin(), face.properties.end(),
+                          [&](const Property& p) { return p.name == name && !p.is_list; });
+    };
+    for (const auto& [name, use] : kColors)
+      if (find(name) == face.properties.end()) return;
+    for (const auto& [name, use] : kColors) find(name)->use = use;
   }
 
   /// Counts a property that is not used. Normals do not count: faces define them.
-  void note(const Element& element, const Property& property, std::string_view name) {
+  void note(const Element& element, const Property& property) {
+    const std::string& name = property.name;
     const bool is_normal = name == "nx" || name == "ny" || name == "nz";
     if (element.count == 0 || property.use != Property::Use::none || is_normal) return;
     const bool is_known = element.name == "vertex" || element.name == "face";
     left_out_.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
+  }
+
+  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label.
+  void add_groups() {
+    if (colors_) mesh_.face_groups = colors_->take(left_out_, "colours of faces");
+    if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;
+    std::vector<std::int64_t> found = labels_;
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    if (found.size() > kMostLabels) return left_out_.add("properties of face");
+    const bool are_numbers = found.front() > 0 && found.back() <= std::numeric_limits<int>::max();
+    FaceGroups& groups = mesh_.face_groups;
+    for (const std::int64_t label : found) {
+      const auto next = static_cast<int>(groups.groups.size()) + 1;
+      groups.groups.push_back({are_numbers ? "" : label_name_ + " " + std::to_string(label),
+                               are_numbers ? static_cast<int>(label) : next, 2});
+    }
+    for (const std::int64_t label : labels_)
+      groups.of_face.push_back(
+          static_cast<Index>(std::lower_bound(found.begin(), found.end(), label) - found.begin()));
   }
 
   ValueType type_of(std::string_view word) const {
@@ -177,7 +242,12 @@ class PlyParser {
     for (std::size_t i = 0; i < element.count; ++i) {
       if (vertices) mesh_.positions.emplace_back();
       for (const Property& property : element.properties) read_property(property);
-      if (faces) mesh_.face_offsets.push_back(mesh_.face_vertices.size());
+      if (!faces) continue;
+      mesh_.face_offsets.push_back(mesh_.face_vertices.size());
+      if (element.has(Property::Use::red)) {
+        if (!colors_) colors_.emplace();
+        colors_->add_face(color_name(color_));
+      }
     }
   }
 
@@ -194,6 +264,13 @@ class PlyParser {
       }
     } else if (property.use == Use::none) {
       skip_value(property.type);
+    } else if (property.use == Use::label) {
+      label_name_ = property.name;
+      labels_.push_back(static_cast<std::int64_t>(read_whole(property.type, "a label of a face")));
+    } else if (property.use >= Use::red) {
+      const double level = read_number(property.type, "a color of a face");
+      color_[static_cast<std::size_t>(property.use) - static_cast<std::size_t>(Use::red)] =
+          property.type.is_real() ? kLevels * level : level;
     } else if (property.use == Use::attribute) {
       values_.push_back(read_number(property.type, "a value of " + attribute_));
     } else {
@@ -241,6 +318,10 @@ class PlyParser {
   PolygonMesh mesh_;
   std::string attribute_;
   std::vector<double> values_;
+  std::string label_name_;
+  std::vector<std::int64_t> labels_;  // of the faces
+  std::array<double, 3> color_{};     // of the present face
+  std::optional<ColorGroups> colors_;
 };
 
 }  // namespace

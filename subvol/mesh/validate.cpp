@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/validate.h"
 
+#include "subvol/base/error.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <Eigen/Geometry>
@@ -387,6 +388,13 @@ class Validator {
 }  // namespace
 
 std::vector<MeshDefect> validate(const VolumeMesh& mesh) { return Validator(mesh).run(); }
+
+void require_groups(const VolumeFaceGroups& groups, const std::string& what) {
+  for (const GroupedFace& entry : groups.faces)
+    if (entry.group < 0 || static_cast<std::size_t>(entry.group) >= groups.groups.size())
+      throw InputError(what + ": a face is in group " + std::to_string(entry.group) + " of " +
+                       std::to_string(groups.groups.size()));
+}
 
 const char* to_string(MeshDefect::Kind kind) {
   switch (kind) {

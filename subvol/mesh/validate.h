@@ -39,6 +39,9 @@ struct MeshDefect {
 /// Cost: linear in the mesh, apart from sorts of its cells and faces.
 std::vector<MeshDefect> validate(const VolumeMesh& mesh);
 
+/// Throws InputError, naming `what`, if a grouped face names a group that is not there.
+void require_groups(const VolumeFaceGroups& groups, const std::string& what);
+
 /// Returns the name of a defect kind in snake_case, as it stands in reports.
 const char* to_string(MeshDefect::Kind kind);
 

@@ -2,6 +2,7 @@
 #include "subvol/subdivision/subdivision.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/crease_sheets.h"
 #include "subvol/subdivision/surface_refinement.h"
@@ -160,6 +161,8 @@ class Refiner {
   }
 
   VolumeMesh fine_cells() const;
+  /// Expects the positions of the fine mesh to be there.
+  VolumeFaceGroups fine_groups(const VolumeMesh& fine) const;
   FeatureTags fine_tags() const;
 
  private:
@@ -252,6 +255,19 @@ VolumeMesh Refiner::fine_cells() const {
   return fine;
 }
 
+VolumeFaceGroups Refiner::fine_groups(const VolumeMesh& fine) const {
+  if (mesh_.face_groups.empty()) return {};
+  std::vector<VertexSupport> support;
+  support.reserve(fine.num_vertices());
+  for (std::size_t v = 0; v < mesh_.num_vertices(); ++v) support.push_back(kept_vertex(static_cast<Index>(v)));
+  for (std::size_t e = 0; e < topology_.num_edges(); ++e)
+    support.push_back(support_of(topology_.edge(static_cast<Index>(e))));
+  for (std::size_t f = 0; f < topology_.num_faces(); ++f)
+    support.push_back(support_of(topology_.face(static_cast<Index>(f))));
+  support.resize(fine.num_vertices(), support_of({}));
+  return inherited_groups(mesh_.face_groups, MeshTopology(fine), support);
+}
+
 FeatureTags Refiner::fine_tags() const {
   FeatureTags tags;
   const Index nv = static_cast<Index>(mesh_.num_vertices());
@@ -295,6 +311,8 @@ SubdivisionLevel subdivide(const VolumeMesh& control, BoundaryRule rule) {
   level.fine = refiner.fine_cells();
   level.fine.positions = level.matrix.apply(control.positions);
   level.fine.tags = refiner.fine_tags();
+  level.fine.face_groups = refiner.fine_groups(level.fine);
+  level.fine.regions = control.regions;
   return level;
 }
 

@@ -2,6 +2,7 @@
 #include "subvol/templates/cell_split.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/templates/template_edit.h"
 
@@ -95,6 +96,12 @@ std::vector<int> carried_axes(const VolumeMesh& mesh, const MeshTopology& topolo
   return axes;
 }
 
+/// Gives the parts of faces the groups of the faces.
+void inherit_groups(const VolumeMesh& mesh, VolumeMesh& result) {
+  result.regions = mesh.regions;
+  if (!mesh.face_groups.empty()) result.face_groups = inherited_groups(mesh.face_groups, MeshTopology(result));
+}
+
 }  // namespace
 
 VolumeMesh split_into_tets(const VolumeMesh& mesh) {
@@ -104,6 +111,7 @@ VolumeMesh split_into_tets(const VolumeMesh& mesh) {
   result.tags = mesh.tags;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) fan_tets(mesh, c, result);
   require_sound(result, "split");
+  inherit_groups(mesh, result);
   return result;
 }
 
@@ -181,6 +189,7 @@ VolumeMesh split_into_prisms(const VolumeMesh& mesh, Index v0, Index v1) {
     }
   }
   require_sound(result, "split");
+  inherit_groups(mesh, result);
   return result;
 }
 

@@ -2,6 +2,7 @@
 #include "subvol/templates/refine.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/templates/template_edit.h"
 
@@ -267,6 +268,19 @@ class PlaceNumbers {
     return number;
   }
 
+  /// Where each vertex of the result lies in the mesh.
+  std::vector<VertexSupport> supports() const {
+    std::vector<VertexSupport> support(result_.num_vertices(), support_of({}));
+    for (std::size_t v = 0; v < mesh_.num_vertices(); ++v) support[v] = kept_vertex(static_cast<Index>(v));
+    for (std::size_t e = 0; e < on_edges_.size(); ++e)
+      for (const Index v : on_edges_[e])
+        if (v != kNoIndex) support[v] = support_of(topology_.edge(static_cast<Index>(e)));
+    for (std::size_t f = 0; f < on_faces_.size(); ++f)
+      for (const Index v : on_faces_[f])
+        if (v != kNoIndex) support[v] = support_of(topology_.face(static_cast<Index>(f)));
+    return support;
+  }
+
   const MeshTopology& topology() const { return topology_; }
   /// The vertex on edge e next to one of its ends, or kNoIndex if the edge has none there.
   Index near_end(Index e, Index end) const { return on_edges_[e][topology_.edge(e)[0] == end ? 0 : 1]; }
@@ -374,6 +388,9 @@ VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
     }
   }
   cut_creases(mesh.tags, number, result.tags);
+  result.regions = mesh.regions;
+  if (!mesh.face_groups.empty())
+    result.face_groups = inherited_groups(mesh.face_groups, MeshTopology(result), number.supports());
   return result;
 }
 

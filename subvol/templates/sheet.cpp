@@ -2,6 +2,7 @@
 #include "subvol/templates/sheet.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/inherited_groups.h"
 #include "subvol/templates/template_edit.h"
 #include "subvol/templates/vertex_merge.h"
 
@@ -173,6 +174,13 @@ VolumeMesh split_sheet(const VolumeMesh& mesh, Index v0, Index v1, int parts) {
   }
   normalise_tags(result.tags);
   require_sound(result, "split");
+  result.regions = mesh.regions;
+  if (!mesh.face_groups.empty()) {
+    std::vector<VertexSupport> support;
+    for (std::size_t v = 0; v < mesh.num_vertices(); ++v) support.push_back(kept_vertex(static_cast<Index>(v)));
+    for (const Edge& edge : sheet) support.insert(support.end(), static_cast<std::size_t>(parts - 1), support_of(edge));
+    result.face_groups = inherited_groups(mesh.face_groups, MeshTopology(result), support);
+  }
   return result;
 }
 

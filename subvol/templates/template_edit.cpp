@@ -71,6 +71,9 @@ VolumeMesh kept_cells(const VolumeMesh& mesh, std::span<const char> kept) {
   for (const CornerVertex& c : mesh.tags.corners)
     if (number[c.vertex] != kNoIndex) result.tags.corners.push_back({number[c.vertex], c.sharpness});
   drop_lost_tags(result);
+  result.regions = mesh.regions;
+  if (!mesh.face_groups.empty())
+    result.face_groups = groups_of_faces(renumbered(mesh.face_groups, number), MeshTopology(result));
   return result;
 }
 

@@ -88,6 +88,21 @@ std::optional<std::array<Index, 6>> prism_of(const CellTopology& hex, std::span<
   return prism;
 }
 
+/// A quad two of whose corners become one keeps its group as a triangle.
+VolumeFaceGroups merged_groups(const VolumeFaceGroups& groups, std::span<const Index> target) {
+  VolumeFaceGroups merged{groups.groups, {}};
+  for (const GroupedFace& entry : groups.faces) {
+    Corners corners;
+    for (const Index v : entry.face)
+      if (v != kNoIndex) corners.push_back(target[v]);
+    std::sort(corners.begin(), corners.end());
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    if (corners.size() >= 3) merged.faces.push_back({face_key(corners), entry.group});
+  }
+  normalise(merged);
+  return merged;
+}
+
 }  // namespace
 
 VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target, const std::string& name) {
@@ -117,6 +132,8 @@ VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target,
   merged.tags = {};
   require_sound(merged, name);
   merged.tags = std::move(tags);
+  merged.regions = mesh.regions;
+  merged.face_groups = merged_groups(mesh.face_groups, target);
   return kept_cells(merged, all);
 }
 
@@ -137,6 +154,10 @@ VolumeMesh joined(const VolumeMesh& a, const VolumeMesh& b) {
   }
   for (const CreaseEdge& c : b.tags.creases) result.tags.creases.push_back({first + c.v0, first + c.v1, c.sharpness});
   for (const CornerVertex& c : b.tags.corners) result.tags.corners.push_back({first + c.vertex, c.sharpness});
+  append_groups(result.face_groups, b.face_groups, first);
+  for (const Group& region : b.regions)
+    if (std::find(result.regions.begin(), result.regions.end(), region) == result.regions.end())
+      result.regions.push_back(region);
   return result;
 }
 

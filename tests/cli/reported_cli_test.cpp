@@ -84,9 +84,14 @@ TEST_CASE("What reported files hold beside the mesh is counted", "[cli]") {
   const auto inputs = reported_inputs();
   if (!inputs) return;
   const Workplace place;
-  CHECK(has(place.run("convert " + *inputs + "03-three.stl -o a.obj").err, "3 solids"));
+  CHECK(place.run("convert " + *inputs + "03-three.stl -o a.obj").err.empty());
+  for (const char* solid : {"g red\n", "g gray\n", "g blue\n"}) CHECK(has(content_of(place / "a.obj"), solid));
   CHECK(has(place.run("convert " + *inputs + "03-groups.obj -o b.obj").err, "uses of materials"));
-  CHECK(has(place.run("convert " + *inputs + "03-labels.mesh -o a.mesh").err, "references of Quadrilaterals"));
+  CHECK(has(content_of(place / "b.obj"), "g face5\n"));
+  CHECK(place.run("convert " + *inputs + "03-labels.mesh -o a.mesh").err.empty());
+  const subvol::VolumeFaceGroups groups = subvol::read_volume_mesh(place / "a.mesh").face_groups;
+  CHECK(groups.faces.size() == 6);
+  CHECK(groups == subvol::read_volume_mesh(*inputs + "03-labels.mesh").face_groups);
 }
 
 TEST_CASE("Reported surfaces are told with their own numbers, and which way they face", "[cli]") {

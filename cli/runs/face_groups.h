@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/runs/loading.h"
+#include "cli/runs/run_options.h"
+#include "export/high_order_file.h"
+#include "fit/target/carried_groups.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <string>
+#include <vector>
+
+namespace subvol::cli {
+
+/// What has become of the groups of a target, and warnings about it. Both are empty if the target has no groups.
+struct GroupsFound {
+  std::vector<CarriedGroup> groups;
+  std::vector<std::string> warnings;
+};
+
+/// Give each boundary face of a result the group of the target that it lies on (`carried_groups`). Groups that the mesh
+/// has already stay where the target gives none. Points have no groups.
+GroupsFound carry_groups(const Target& target, VolumeMesh& mesh);
+GroupsFound carry_groups(const Target& target, HighOrderFile& file);
+
+/// Entry "groups" of a report.
+Json groups_json(const std::vector<CarriedGroup>& groups);
+
+}  // namespace subvol::cli

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "export/boundary_file.h"
+
+#include "export/text_format.h"
+#include "export/vtu_arrays.h"
+#include "subvol/base/atomic_file.h"
+#include "subvol/base/error.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+namespace subvol {
+namespace {
+
+void require_boundary(const PolygonMesh& boundary, const BoundaryOrigin& origin) {
+  require_polygons(boundary, "boundary");
+  if ((!origin.vertices.empty() && origin.vertices.size() != boundary.positions.size()) ||
+      (!origin.cells.empty() && origin.cells.size() != boundary.num_faces()))
+    throw InputError("boundary: expected one vertex of the volume for each vertex, and one cell for each face");
+}
+
+std::uint8_t type_of(std::size_t corners) { return corners == 3 ? 5 : corners == 4 ? 9 : 7; }
+
+std::size_t corners_of(const PolygonMesh& mesh, std::size_t f) { return mesh.face_offsets[f + 1] - mesh.face_offsets[f]; }
+
+/// Returns the groups with positive numbers.
+std::vector<Group> positive_groups(std::vector<Group> groups) {
+  for (Group& group : groups)
+    if (group.number <= 0) group.number = free_number(groups);
+  return groups;
+}
+
+std::vector<std::int32_t> numbers_of_faces(const PolygonMesh& mesh, const std::vector<Group>& groups) {
+  std::vector<std::int32_t> numbers(mesh.num_faces(), 0);
+  if (groups.empty()) return numbers;
+  for (std::size_t f = 0; f < numbers.size(); ++f)
+    if (const Index group = mesh.face_groups.of_face[f]; group != kNoIndex) numbers[f] = groups[group].number;
+  return numbers;
+}
+
+/// Appends the codes of the characters of the names, each ended by 0, as VTK writes texts.
+void append_names(std::string& text, const std::vector<Group>& groups) {
+  text += "        <DataArray type=\"String\" Name=\"group_names\" NumberOfTuples=\"" + std::to_string(groups.size()) +
+          "\" format=\"ascii\">";
+  for (const Group& group : groups) {
+    for (const char c : label_of(group)) text += std::to_string(static_cast<unsigned char>(c)) + ' ';
+    text += "0 ";
+  }
+  text += "</DataArray>\n";
+}
+
+void append_groups(std::string& text, const std::vector<Group>& groups) {
+  if (groups.empty()) return;
+  std::vector<std::int32_t> numbers;
+  for (const Group& group : groups) numbers.push_back(group.number);
+  text += "    <FieldData>\n";
+  append_data_array<std::int32_t>(text, "Name=\"group_numbers\" NumberOfTuples=\"" + std::to_string(groups.size()) + '"',
+                                  numbers);
+  append_names(text, groups);
+  text += "    </FieldData>\n";
+}
+
+/// Appends numbers, one a line.
+template <class Numbers>
+void append_lines(std::string& text, const Numbers& numbers) {
+  for (const auto number : numbers) {
+    append_number(text, number);
+    text += '\n';
+  }
+}
+
+void append_vtk_groups(std::string& text, const std::vector<Group>& groups) {
+  if (groups.empty()) return;
+  text += "FIELD FieldData 2\ngroup_numbers 1 " + std::to_string(groups.size()) + " int\n";
+  for (const Group& group : groups) text += std::to_string(group.number) + "\n";
+  text += "group_names 1 " + std::to_string(groups.size()) + " string\n";
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  for (const Group& group : groups) {  // VTK writes blanks and the like as %20
+    for (const char c : label_of(group)) {
+      const auto code = static_cast<unsigned char>(c);
+      if (code > ' ' && code < 127 && c != '%' && c != '"')
+        text += c;
+      else
+        (text += '%') += {kDigits[code / 16], kDigits[code % 16]};
+    }
+    text += '\n';
+  }
+}
+
+}  // namespace
+
+std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin& origin) {
+  require_boundary(boundary, origin);
+  const std::vector<Group> groups = positive_groups(boundary.face_groups.groups);
+  std::vector<std::uint8_t> types;
+  for (std::size_t f = 0; f < boundary.num_faces(); ++f) types.push_back(type_of(corners_of(boundary, f)));
+  const std::vector<std::int64_t> corners(boundary.face_vertices.begin(), boundary.face_vertices.end());
+  const std::vector<std::int64_t> ends(boundary.face_offsets.begin() + 1, boundary.face_offsets.end());
+  std::string text =
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+      "  <UnstructuredGrid>\n    <Piece NumberOfPoints=\"" +
+      std::to_string(boundary.positions.size()) + "\" NumberOfCells=\"" + std::to_string(types.size()) +
+      "\">\n      <Points>\n";
+  append_data_array<double>(text, "Name=\"Points\" NumberOfComponents=\"3\"",
+                            {boundary.positions.data()->data(), 3 * boundary.positions.size()});
+  text += "      </Points>\n      <Cells>\n";
+  append_data_array<std::int64_t>(text, "Name=\"connectivity\"", corners);
+  append_data_array<std::int64_t>(text, "Name=\"offsets\"", ends);
+  append_data_array<std::uint8_t>(text, "Name=\"types\"", types);
+  text += "      </Cells>\n";
+  if (!origin.vertices.empty()) {
+    text += "      <PointData>\n";
+    append_data_array<std::int32_t>(text, "Name=\"vertex\"", origin.vertices);
+    text += "      </PointData>\n";
+  }
+  text += "      <CellData>\n";
+  append_data_array<std::int32_t>(text, "Name=\"group\"", numbers_of_faces(boundary, groups));
+  if (!origin.cells.empty()) append_data_array<std::int32_t>(text, "Name=\"cell\"", origin.cells);
+  text += "      </CellData>\n    </Piece>\n";
+  append_groups(text, groups);
+  return text + "  </UnstructuredGrid>\n</VTKFile>\n";
+}
+
+std::string boundary_vtk_text(const PolygonMesh& boundary, const BoundaryOrigin& origin) {
+  require_boundary(boundary, origin);
+  const std::vector<Group> groups = positive_groups(boundary.face_groups.groups);
+  const std::string n = std::to_string(boundary.num_faces());
+  std::string text = "# vtk DataFile Version 3.0\nsubvol boundary\nASCII\nDATASET UNSTRUCTURED_GRID\n";
+  append_vtk_groups(text, groups);
+  text += "POINTS " + std::to_string(boundary.positions.size()) + " double\n";
+  for (const Vec3& position : boundary.positions) {
+    append_vector(text, position, " ");
+    text += '\n';
+  }
+  text += "CELLS " + n + " " + std::to_string(boundary.num_faces() + boundary.face_vertices.size()) + "\n";
+  for (std::size_t f = 0; f < boundary.num_faces(); ++f) {
+    append_number(text, corners_of(boundary, f));
+    for (std::size_t k = boundary.face_offsets[f]; k < boundary.face_offsets[f + 1]; ++k) {
+      text += ' ';
+      append_number(text, boundary.face_vertices[k]);
+    }
+    text += '\n';
+  }
+  text += "CELL_TYPES " + n + "\n";
+  for (std::size_t f = 0; f < boundary.num_faces(); ++f)
+    text += std::to_string(type_of(corners_of(boundary, f))) + "\n";
+  text += "CELL_DATA " + n + "\nSCALARS group int 1\nLOOKUP_TABLE default\n";
+  append_lines(text, numbers_of_faces(boundary, groups));
+  if (!origin.cells.empty()) {
+    text += "SCALARS cell int 1\nLOOKUP_TABLE default\n";
+    append_lines(text, origin.cells);
+  }
+  if (origin.vertices.empty()) return text;
+  text += "POINT_DATA " + std::to_string(boundary.positions.size()) +
+          "\nSCALARS vertex int 1\nLOOKUP_TABLE default\n";
+  append_lines(text, origin.vertices);
+  return text;
+}
+
+void write_boundary(const std::filesystem::path& path, const PolygonMesh& boundary, const BoundaryOrigin& origin) {
+  const std::string extension = lower_case_extension(path);
+  if (extension != ".vtu" && extension != ".vtk")
+    throw InputError(path.string() + ": expected the extension .vtu or .vtk");
+  write_file_atomically(
+      path, extension == ".vtu" ? boundary_vtu_text(boundary, origin) : boundary_vtk_text(boundary, origin));
+}
+
+}  // namespace subvol

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/target/carried_groups.h"
+
+#include "fit/geometry/boundary_triangles.h"
+#include "fit/geometry/closest_point.h"
+#include "subvol/base/format.h"
+#include "subvol/surface/boundary.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <string>
+
+namespace subvol {
+
+namespace {
+
+/// Cosine of the largest angle between normals that agree: 60 degrees. Faces of a coarse mesh deviate from the surface by
+/// some 30; sides of a sharp edge that matter here are further apart.
+constexpr double kAgrees = 0.5;
+
+/// Twice the area of a triangle times its normal.
+Vec3 area_vector(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
+  const Vec3& a = mesh.positions[t[0]];
+  return (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a);
+}
+
+std::vector<Vec3> normals_of(const TriangleMesh& mesh) {
+  std::vector<Vec3> normals;
+  normals.reserve(mesh.triangles.size());
+  for (const auto& t : mesh.triangles) normals.push_back(area_vector(mesh, t).stableNormalized());
+  return normals;
+}
+
+/// Points on the faces: the centers of the four equal parts of each triangle.
+struct Samples {
+  std::vector<Vec3> points, normals;
+  std::vector<double> areas;
+  std::vector<Index> faces;
+};
+
+Samples samples_of(const CurvedBoundary& boundary) {
+  constexpr double kNear = 2.0 / 3, kFar = 1.0 / 6;  // weights of the corners at the centers of the three outer parts
+  Samples samples;
+  const TriangleMesh& mesh = boundary.triangles;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 vector = area_vector(mesh, mesh.triangles[t]);
+    const Vec3 sum = mesh.positions[a] + mesh.positions[b] + mesh.positions[c];
+    samples.points.push_back(sum / 3);
+    for (const Index v : mesh.triangles[t])
+      samples.points.push_back(kFar * sum + (kNear - kFar) * mesh.positions[v]);
+    samples.normals.insert(samples.normals.end(), 4, vector.stableNormalized());
+    samples.areas.insert(samples.areas.end(), 4, vector.norm() / 8);
+    samples.faces.insert(samples.faces.end(), 4, boundary.faces[t]);
+  }
+  return samples;
+}
+
+/// Returns the 26 directions to the faces, edges and corners of a cube. Every direction is within 28 degrees of one.
+std::vector<Vec3> directions() {
+  std::vector<Vec3> found;
+  for (int x = -1; x <= 1; ++x)
+    for (int y = -1; y <= 1; ++y)
+      for (int z = -1; z <= 1; ++z)
+        if (x || y || z) found.push_back(Vec3(x, y, z).normalized());
+  return found;
+}
+
+/// Finds the triangle of the target that each sample lies on.
+class TriangleFinder {
+ public:
+  explicit TriangleFinder(const TriangleMesh& target) : target_(target), normals_(normals_of(target)) {}
+
+  std::vector<Index> find(const Samples& samples, const std::vector<double>& reach) {
+    std::vector<ClosestPoint::Hit> hits(samples.points.size());
+    ClosestPoint(target_).closest(samples.points, hits);
+    orient(samples, hits);
+    std::map<std::size_t, std::vector<std::size_t>> doubtful;  // samples by direction
+    const std::vector<Vec3> all = directions();
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      if (hits[i].triangle == kNoIndex || agrees(hits[i].triangle, samples.normals[i])) continue;
+      std::size_t best = 0;
+      for (std::size_t d = 1; d < all.size(); ++d)
+        if (all[d].dot(samples.normals[i]) > all[best].dot(samples.normals[i])) best = d;
+      doubtful[best].push_back(i);
+    }
+    for (const auto& [direction, group] : doubtful) find_again(all[direction], group, samples, reach, hits);
+    std::vector<Index> triangles;
+    for (const ClosestPoint::Hit& hit : hits) triangles.push_back(hit.triangle);
+    return triangles;
+  }
+
+ private:
+  bool agrees(Index triangle, const Vec3& normal) const { return normals_[triangle].dot(normal) >= kAgrees; }
+
+  /// Turns the normals of a target that is oriented inward.
+  void orient(const Samples& samples, const std::vector<ClosestPoint::Hit>& hits) {
+    double sum = 0;
+    for (std::size_t i = 0; i < hits.size(); ++i)
+      if (hits[i].triangle != kNoIndex)
+        sum += samples.areas[i] * normals_[hits[i].triangle].dot(samples.normals[i]);
+    if (sum < 0)
+      for (Vec3& normal : normals_) normal = -normal;
+  }
+
+  /// Looks for closest points of some samples among the triangles that face a direction.
+  void find_again(const Vec3& direction, const std::vector<std::size_t>& group, const Samples& samples,
+                  const std::vector<double>& reach, std::vector<ClosestPoint::Hit>& hits) const {
+    TriangleMesh part{target_.positions, {}};
+    std::vector<Index> number;
+    for (std::size_t t = 0; t < normals_.size(); ++t) {
+      if (!agrees(static_cast<Index>(t), direction)) continue;
+      part.triangles.push_back(target_.triangles[t]);
+      number.push_back(static_cast<Index>(t));
+    }
+    if (number.empty()) return;
+    std::vector<Vec3> points;
+    for (const std::size_t i : group) points.push_back(samples.points[i]);
+    std::vector<ClosestPoint::Hit> found(points.size());
+    ClosestPoint(part).closest(points, found);
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      const std::size_t i = group[k];
+      if (found[k].triangle == kNoIndex || !(found[k].distance <= hits[i].distance + reach[samples.faces[i]])) continue;
+      hits[i] = found[k];
+      hits[i].triangle = number[found[k].triangle];
+    }
+  }
+
+  const TriangleMesh& target_;
+  std::vector<Vec3> normals_;
+};
+
+/// Area of a face that lies on one group.
+struct Share {
+  Index face, group;
+  double area;
+};
+
+std::vector<Index> largest_shares(std::vector<Share> shares, const std::vector<Group>& groups, std::size_t num_faces) {
+  std::stable_sort(shares.begin(), shares.end(), [](const Share& a, const Share& b) {
+    return a.face != b.face ? a.face < b.face : a.group < b.group;
+  });
+  std::vector<Index> best(num_faces, kNoIndex);
+  std::vector<double> most(num_faces, 0);
+  for (std::size_t i = 0, end = 0; i < shares.size(); i = end) {
+    double area = 0;
+    for (; end < shares.size() && shares[end].face == shares[i].face && shares[end].group == shares[i].group; ++end)
+      area += shares[end].area;
+    const Index face = shares[i].face, group = shares[i].group;
+    const bool is_lower = group != kNoIndex &&
+                          (best[face] == kNoIndex || groups[group].number < groups[best[face]].number);
+    if (area > most[face] || (area == most[face] && is_lower)) most[face] = area, best[face] = group;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<Index> carried_groups(const TriangleMesh& target, const CurvedBoundary& boundary, std::size_t num_faces) {
+  if (target.face_groups.empty()) return {};
+  const Samples samples = samples_of(boundary);
+  std::vector<double> reach(num_faces, 0);
+  for (std::size_t i = 0; i < samples.faces.size(); ++i) reach[samples.faces[i]] += samples.areas[i];
+  for (double& area : reach) area = std::sqrt(area);
+  const std::vector<Index> triangles = TriangleFinder(target).find(samples, reach);
+  std::vector<Share> shares;
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    if (triangles[i] != kNoIndex)
+      shares.push_back({samples.faces[i], target.face_groups.of_face[triangles[i]], samples.areas[i]});
+  return largest_shares(std::move(shares), target.face_groups.groups, num_faces);
+}
+
+CurvedBoundary linear_boundary(const VolumeMesh& mesh, const MeshTopology& topology) {
+  CurvedBoundary boundary;
+  boundary.triangles = refined_triangles(boundary_surface(mesh, topology), &boundary.faces);
+  return boundary;
+}
+
+VolumeFaceGroups with_carried_groups(const TriangleMesh& target, std::vector<Index> carried,
+                                     const VolumeFaceGroups& own, const MeshTopology& topology) {
+  if (target.face_groups.empty()) return own;
+  VolumeFaceGroups groups = groups_from_boundary(target.face_groups.groups, topology, carried);
+  if (own.empty()) return groups;
+  VolumeFaceGroups rest;
+  std::vector<Index> place(own.groups.size(), kNoIndex);  // of each own group that is left
+  for (const GroupedFace& entry : own.faces) {
+    const std::span<const Index> corners(entry.face.data(), entry.face.back() == kNoIndex ? 3 : 4);
+    if (group_of(groups, corners) != kNoIndex) continue;
+    if (place[entry.group] == kNoIndex) {
+      place[entry.group] = static_cast<Index>(rest.groups.size());
+      rest.groups.push_back(own.groups[entry.group]);
+    }
+    rest.faces.push_back({entry.face, place[entry.group]});
+  }
+  append_groups(groups, rest, 0);
+  return groups;
+}
+
+std::vector<CarriedGroup> areas_of_groups(const TriangleMesh& target, const CurvedBoundary& boundary,
+                                          const std::vector<Index>& carried) {
+  std::vector<CarriedGroup> all;
+  for (const Group& group : target.face_groups.groups) all.push_back({.group = group});
+  if (all.empty()) return all;
+  std::vector<char> has_triangles(all.size(), 0);
+  for (std::size_t t = 0; t < target.triangles.size(); ++t) {
+    const Index group = target.face_groups.of_face[t];
+    if (group == kNoIndex) continue;
+    all[group].target_area += area_vector(target, target.triangles[t]).norm() / 2;
+    has_triangles[group] = 1;
+  }
+  for (const Index group : carried)
+    if (group != kNoIndex) ++all[group].faces;
+  const TriangleMesh& mesh = boundary.triangles;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (const Index group = carried[boundary.faces[t]]; group != kNoIndex)
+      all[group].area += area_vector(mesh, mesh.triangles[t]).norm() / 2;
+  std::vector<CarriedGroup> found;
+  for (std::size_t g = 0; g < all.size(); ++g)
+    if (has_triangles[g]) found.push_back(std::move(all[g]));
+  return found;
+}
+
+std::vector<std::string> warnings_of_groups(const std::vector<CarriedGroup>& groups) {
+  double whole = 0;
+  for (const CarriedGroup& group : groups) whole += group.target_area;
+  std::vector<std::string> warnings;
+  for (const CarriedGroup& group : groups) {
+    const double difference = std::abs(group.area - group.target_area);
+    if (group.is_lost()) {
+      warnings.push_back("the group " + label_of(group.group) + " is lost: no boundary face lies mostly on it" +
+                         formatted(" (its area on the target is %.6g)", group.target_area));
+    } else if (difference > std::max(kMostAreaDifference * group.target_area, kMostShareOfWhole * whole)) {
+      warnings.push_back("the area of the group " + label_of(group.group) +
+                         formatted(" is %.6g, on the target it is %.6g (%+.1f %%)", group.area, group.target_area,
+                                   100 * (group.area / group.target_area - 1)));
+    }
+  }
+  return warnings;
+}
+
+}  // namespace subvol
