@@ -2,7 +2,7 @@
 #pragma once
 
 #include "export/cell_text.h"
-#include "export/lagrange_lattice.h"
+#include "subvol/io/cell_lattice.h"
 #include "fit/elements/high_order_mesh.h"
 
 namespace subvol {
