@@ -21,6 +21,8 @@ struct HighOrderFileOptions {
   std::span<const double> cell_minima{};  ///< one scaled Jacobian per cell, or empty: cell data `scaled_jacobian`
   CellReference reference{};              ///< the cells that these are measured against; empty: the ideal cells
   std::span<const int> references{};      ///< one per cell, or empty: all 0
+  const VolumeFaceGroups* face_groups = nullptr;  ///< named faces of the cells; may be null
+  std::span<const Group> regions{};       ///< names of references
   /// Fields with one number per vertex of the mesh: point data of .vtu and .msh, interpolated linearly (order 1 of the
   /// cell's kind).
   std::span<const VertexField> fields{};
@@ -75,10 +77,12 @@ void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh,
 /// Returns the cells of a .mesh or .vtk: `linear_cells`, with the references of the curved cells.
 VolumeMesh small_cells(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// A mesh from a file, with the references of its cells, if any.
+/// A mesh from a file, with the references of its cells and its groups, if any.
 struct HighOrderFile {
   HighOrderMesh mesh;
   std::vector<int> references;
+  VolumeFaceGroups face_groups{};
+  std::vector<Group> regions{};
 };
 
 /// Reads a file that `vtu_text` has written: orders, coefficients and references are the same to the bit.

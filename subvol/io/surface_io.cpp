@@ -55,6 +55,7 @@ class Remarks {
 /// Drops corners that repeat the one before, and then faces that are not polygons.
 void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
   PolygonMesh kept;
+  std::vector<Index>& of_face = mesh.face_groups.of_face;
   std::size_t num_shortened = 0, num_dropped = 0;
   std::vector<Index> corners, sorted;
   for (std::size_t f = 0; f < mesh.num_faces(); ++f) {
@@ -73,11 +74,13 @@ void drop_bad_faces(PolygonMesh& mesh, Remarks& remarks) {
       remarks.fail("face " + std::to_string(f) + " has " + std::to_string(corners.size()) +
                    " corners, expected at most " + std::to_string(kMaxPolygonCorners));
     num_shortened += corners.size() < size;
+    if (!of_face.empty()) of_face[kept.num_faces()] = of_face[f];
     kept.face_vertices.insert(kept.face_vertices.end(), corners.begin(), corners.end());
     kept.face_offsets.push_back(kept.face_vertices.size());
   }
   mesh.face_vertices = std::move(kept.face_vertices);
   mesh.face_offsets = std::move(kept.face_offsets);
+  if (!of_face.empty()) of_face.resize(mesh.num_faces());
   remarks.count(num_shortened, "faces repeat a corner: the repetition is dropped");
   remarks.count(num_dropped, "faces have fewer than three different corners or name one twice: dropped");
   if (mesh.num_faces() == 0) remarks.fail(num_dropped ? "no usable faces" : "no faces");
@@ -136,6 +139,23 @@ std::vector<Index> places(const std::vector<Vec3>& x) {
   return place;
 }
 
+/// Drops the triangles for which is_bad(i) is true, and their groups. Returns the number of dropped triangles.
+template <class IsBad>
+std::size_t drop_triangles(TriangleMesh& mesh, const IsBad& is_bad) {
+  std::vector<Index>& groups = mesh.face_groups.of_face;
+  const std::size_t before = mesh.triangles.size();
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < before; ++i) {
+    if (is_bad(i)) continue;
+    mesh.triangles[kept] = mesh.triangles[i];
+    if (!groups.empty()) groups[kept] = groups[i];
+    ++kept;
+  }
+  mesh.triangles.resize(kept);
+  if (!groups.empty()) groups.resize(kept);
+  return before - kept;
+}
+
 /// Drops all but the first of triangles with the same three places. Returns the number of dropped triangles.
 std::size_t drop_duplicates(TriangleMesh& mesh) {
   const std::vector<Index> place = places(mesh.positions);
@@ -149,11 +169,7 @@ std::size_t drop_duplicates(TriangleMesh& mesh) {
   std::vector<char> duplicate(keys.size(), 0);
   for (std::size_t i = 1; i < keys.size(); ++i)
     if (keys[i].first == keys[i - 1].first) duplicate[keys[i].second] = 1;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < keys.size(); ++i)
-    if (!duplicate[i]) mesh.triangles[kept++] = mesh.triangles[i];
-  mesh.triangles.resize(kept);
-  return keys.size() - kept;
+  return drop_triangles(mesh, [&](std::size_t i) { return duplicate[i] != 0; });
 }
 
 /// Drops all but the first of points in one place. Returns the number of dropped points.
@@ -195,7 +211,7 @@ TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* 
   Remarks remarks(path.string(), warnings);
   TriangleMesh mesh = triangulate(read_polygon_mesh(path, warnings));
   const std::size_t num_flat =
-      std::erase_if(mesh.triangles, [&](const Triangle& t) { return !has_area(mesh.positions, t); });
+      drop_triangles(mesh, [&](std::size_t i) { return !has_area(mesh.positions, mesh.triangles[i]); });
   remarks.count(num_flat, "triangles have no area: dropped");
   remarks.count(drop_duplicates(mesh), "triangles are there more than once: the first is kept");
   if (mesh.triangles.empty()) remarks.fail("no triangle has any area");

@@ -30,6 +30,11 @@ class Welder {
     mesh_.face_vertices.push_back(it->second);
     if (mesh_.face_vertices.size() % 3 == 0) mesh_.face_offsets.push_back(mesh_.face_vertices.size());
   }
+  /// Puts the facet that was added last into a group.
+  void set_group(Index group) { mesh_.face_groups.of_face.push_back(group); }
+  /// Names the groups of the facets.
+  void name_groups(std::vector<Group> groups) { mesh_.face_groups.groups = std::move(groups); }
+  void drop_groups() { mesh_.face_groups = {}; }
   bool is_empty() const { return mesh_.face_vertices.empty(); }
   PolygonMesh take() { return std::move(mesh_); }
 
@@ -140,20 +145,32 @@ void parse_facet(TextScanner& scan, Welder& welder) {
   expect(scan, "endfacet");
 }
 
-PolygonMesh parse_text(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
+/// Returns the text without blanks at its ends.
+std::string trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t";
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == text.npos) return {};
+  return std::string(text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin));
+}
+
+/// Each solid is a group; a single solid, whose name often only names the program that wrote it, is none.
+PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
   TextScanner scan(name, bytes, TextScanner::Comments::none);
   Welder welder;
-  LeftOut left_out;
-  std::size_t num_solids = 0;
+  GroupList groups;
+  int num_solids = 0;
+  Index group = kNoIndex;
   bool in_solid = false;
   while (const auto word = scan.next()) {
     const std::string keyword = lower_case(*word);
     if (keyword == "facet" && in_solid) {
       parse_facet(scan, welder);
+      welder.set_group(group);
     } else if (keyword == (in_solid ? "endsolid" : "solid")) {
       in_solid = !in_solid;
       num_solids += in_solid;
-      scan.line();  // the solid's name
+      const std::string name = trimmed(scan.line().value_or(""));
+      if (in_solid) group = groups.by_name(name.empty() ? "solid " + std::to_string(num_solids) : name);
     } else if (word->data() == bytes.data() && !in_solid) {
       scan.fail("expected solid, as STL in text begins, or the 84 bytes and the facets of a binary file, found " +
                 in_quotes(*word));
@@ -164,8 +181,7 @@ PolygonMesh parse_text(const std::string& name, std::string_view bytes, std::vec
   if (in_solid && welder.is_empty())
     scan.fail("the file ends after " + std::to_string(bytes.size()) + " bytes without a facet, in text or in binary");
   if (in_solid) scan.fail("the file ends where facet or endsolid is expected");
-  if (num_solids > 1) left_out.add("solids, which become one", num_solids);
-  left_out.tell(warnings);
+  groups.groups().size() > 1 ? welder.name_groups(groups.take()) : welder.drop_groups();
   return welder.take();
 }
 
@@ -175,7 +191,7 @@ ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
   ParsedSurface parsed;
   if (is_binary(bytes) && !has_room_for_facets(bytes)) require_no_utf16(name, bytes);
   parsed.mesh =
-      is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes, parsed.warnings);
+      is_binary(bytes) ? parse_binary(name, bytes, parsed.warnings) : parse_text(name, bytes);
   return parsed;
 }
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // OFF, OBJ and XYZ.
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/color_groups.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/surface_formats.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 
 namespace subvol {
@@ -29,10 +32,46 @@ OffCounts read_off_counts(TextScanner& scan) {
   return {vertices, faces};
 }
 
+/// Returns the name of the color in the rest of a line of OFF: "#ff0000" for three or four numbers, whole ones up to 255
+/// or real ones up to 1, and "color 7" for a place in a color map. Returns an empty text if there is no color.
+std::string color_in_rest_of_line(TextScanner& scan) {
+  const auto rest = scan.line();
+  if (!rest) return {};
+  TextScanner words("", *rest);
+  std::vector<double> numbers;
+  bool is_real = false;
+  while (const auto word = words.next()) {
+    const auto number = parse_number(*word);
+    if (!number) break;
+    is_real = is_real || word->find('.') != word->npos;
+    numbers.push_back(*number);
+  }
+  if (numbers.size() == 1) return "color " + std::to_string(static_cast<int>(std::clamp(numbers[0], 0.0, 1e9)));
+  if (numbers.size() < 3) return {};
+  std::array<double, 3> color;
+  for (std::size_t i = 0; i < 3; ++i) color[i] = is_real ? 255 * numbers[i] : numbers[i];
+  return color_name(color);
+}
+
 /// Skips the rest of the line; returns true if it held a word.
 bool skip_rest_of_line(TextScanner& scan) {
   const auto rest = scan.line();
   return rest && TextScanner("", *rest).next().has_value();
+}
+
+/// Returns the groups that have faces, numbered anew from 1 in their order.
+FaceGroups used_groups(const FaceGroups& all) {
+  std::vector<Index> place(all.groups.size(), kNoIndex);
+  for (const Index group : all.of_face)
+    if (group != kNoIndex) place[group] = 0;
+  FaceGroups used;
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if (place[i] == kNoIndex) continue;
+    place[i] = static_cast<Index>(used.groups.size());
+    used.groups.push_back({all.groups[i].name, place[i] + 1, 2});
+  }
+  for (const Index group : all.of_face) used.of_face.push_back(group == kNoIndex ? kNoIndex : place[group]);
+  return used;
 }
 
 /// A keyword of OBJ that says nothing about polygons, and the name under which it counts as left out, if it does.
@@ -43,11 +82,8 @@ struct SkippedObj {
 constexpr SkippedObj kSkippedObj[] = {{"vt", "texture coordinates"},
                                       {"vn"},
                                       {"vp"},
-                                      {"g", "names of groups"},
-                                      {"o", "names of objects"},
                                       {"s"},
                                       {"mg"},
-                                      {"usemtl", "uses of materials"},
                                       {"mtllib"},
                                       {"usemap", "uses of maps"},
                                       {"maplib"},
@@ -59,6 +95,43 @@ constexpr SkippedObj kSkippedObj[] = {{"vt", "texture coordinates"},
                                       {"lod"},
                                       {"shadow_obj"},
                                       {"trace_obj"}};
+
+/// The keywords of OBJ that name what the faces after them belong to, in order of preference.
+struct ObjNaming {
+  std::string_view keyword;
+  const char* missed;          ///< what they are, for warnings
+  std::size_t least_names;     ///< fewest names on faces for which they become groups
+};
+/// A lone object is the whole file; its name tells nothing apart.
+constexpr std::array<ObjNaming, 3> kObjNamings{
+    {{"g", "names of groups", 1}, {"usemtl", "uses of materials", 1}, {"o", "names of objects", 2}}};
+
+/// Collects the names that one of these keywords gives to the faces of a file.
+class FaceNames {
+ public:
+  /// name  of the faces that follow; empty: none.
+  void begin(const std::string& name) {
+    ++uses_;
+    current_ = name.empty() ? kNoIndex : groups_.by_name(name);
+  }
+  void add_face() {
+    of_face_.push_back(current_);
+    if (current_ == kNoIndex) return;
+    if (static_cast<std::size_t>(current_) >= is_used_.size()) is_used_.resize(groups_.groups().size(), 0);
+    num_used_ += !is_used_[current_];
+    is_used_[current_] = 1;
+  }
+  std::size_t uses() const { return uses_; }
+  std::size_t num_used() const { return num_used_; }
+  FaceGroups take() { return {groups_.take(), std::move(of_face_)}; }
+
+ private:
+  GroupList groups_;
+  std::vector<Index> of_face_;
+  std::vector<char> is_used_;
+  Index current_ = kNoIndex;
+  std::size_t uses_ = 0, num_used_ = 0;
+};
 
 class ObjParser {
  public:
@@ -78,22 +151,43 @@ class ObjParser {
       if (!line) break;
     }
     check_indices();
+    choose_groups();
     ParsedSurface parsed{std::move(mesh_), {}};
     left_out_.tell(parsed.warnings);
     return parsed;
   }
 
  private:
+  /// Groups are named by the first keyword that names at least two on faces; if none does, by the first that names one.
+  void choose_groups() {
+    std::size_t chosen = kObjNamings.size();
+    for (const std::size_t least : {std::size_t{2}, std::size_t{1}})
+      for (std::size_t i = 0; i < names_.size() && chosen == kObjNamings.size(); ++i)
+        if (names_[i].num_used() >= std::max(least, kObjNamings[i].least_names)) chosen = i;
+    for (std::size_t i = 0; i < names_.size(); ++i)
+      if (i != chosen) left_out_.add(kObjNamings[i].missed, names_[i].uses());
+    if (chosen != kObjNamings.size()) mesh_.face_groups = used_groups(names_[chosen].take());
+  }
+
   void parse_line(std::string_view line) {
     TextScanner words(name_, line);
     const auto keyword = words.next();
     if (!keyword) return;
     if (*keyword == "v") return parse_vertex(words);
     if (*keyword == "f" || *keyword == "fo") return parse_face(words);
+    for (std::size_t i = 0; i < names_.size(); ++i)
+      if (*keyword == kObjNamings[i].keyword) return names_[i].begin(rest_of(words));
     const auto* skipped = std::find_if(std::begin(kSkippedObj), std::end(kSkippedObj),
                                        [&](const SkippedObj& s) { return s.keyword == *keyword; });
     if (skipped == std::end(kSkippedObj)) scan_.fail("unknown OBJ keyword " + in_quotes(*keyword), line_);
     if (skipped->missed) left_out_.add(skipped->missed);
+  }
+
+  /// Returns the words that are left, with one blank between them.
+  static std::string rest_of(TextScanner& words) {
+    std::string text;
+    while (const auto word = words.next()) text.append(text.empty() ? "" : " ").append(*word);
+    return text;
   }
 
   void parse_vertex(TextScanner& words) {
@@ -123,6 +217,7 @@ class ObjParser {
     }
     mesh_.face_offsets.push_back(mesh_.face_vertices.size());
     face_lines_.push_back(line_);
+    for (FaceNames& names : names_) names.add_face();
   }
 
   // Vertices may come after the faces that name them.
@@ -138,6 +233,7 @@ class ObjParser {
   TextScanner scan_;
   PolygonMesh mesh_;
   LeftOut left_out_;
+  std::array<FaceNames, kObjNamings.size()> names_;  // of each of kObjNamings
   std::size_t line_ = 1;
   std::vector<std::size_t> face_lines_;
 };
@@ -156,6 +252,7 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
 
   PolygonMesh mesh;
   LeftOut left_out;
+  ColorGroups colors;
   if (keyword->find('C') != std::string_view::npos) left_out.add("colours of vertices", num_vertices);
   if (keyword->find("ST") != std::string_view::npos) left_out.add("texture coordinates", num_vertices);
   mesh.positions.resize(num_vertices);
@@ -173,8 +270,9 @@ ParsedSurface parse_off(const std::string& name, std::string_view bytes) {
       mesh.face_vertices.push_back(static_cast<Index>(v));
     }
     mesh.face_offsets.push_back(mesh.face_vertices.size());
-    if (skip_rest_of_line(scan)) left_out.add("colours of faces");
+    colors.add_face(color_in_rest_of_line(scan));
   }
+  mesh.face_groups = colors.take(left_out, "colours of faces");
   if (const auto more = scan.next()) scan.fail("more than the counts say: " + in_quotes(*more));
   ParsedSurface parsed{std::move(mesh), {}};
   left_out.tell(parsed.warnings);

@@ -3,6 +3,7 @@
 
 #include "subvol/base/types.h"
 #include "subvol/mesh/cell_topology.h"
+#include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/feature_tags.h"
 
 #include <cstddef>
@@ -22,6 +23,8 @@ struct VolumeMesh {
   std::vector<Index> cell_vertices;
   std::vector<int> references;             ///< one group number per cell, or empty (all 0)
   FeatureTags tags;
+  VolumeFaceGroups face_groups;            ///< named faces; empty: none
+  std::vector<Group> regions;              ///< names of references, where there are any; dimension 3
 
   std::size_t num_vertices() const { return positions.size(); }
   std::size_t num_cells() const { return kinds.size(); }

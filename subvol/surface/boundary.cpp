@@ -99,6 +99,7 @@ PolygonMesh boundary_surface(const VolumeMesh& mesh, const MeshTopology& topolog
     for (const Index v : topology.face(f)) surface.face_vertices.push_back(surface_vertex[v]);
     surface.face_offsets.push_back(surface.face_vertices.size());
   }
+  surface.face_groups = {mesh.face_groups.groups, groups_of_boundary(mesh.face_groups, topology)};
   if (volume_vertex) *volume_vertex = std::move(kept);
   return surface;
 }
@@ -106,12 +107,15 @@ PolygonMesh boundary_surface(const VolumeMesh& mesh, const MeshTopology& topolog
 TriangleMesh triangulate(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle) {
   TriangleMesh result;
   result.positions = polygons.positions;
+  result.face_groups.groups = polygons.face_groups.groups;
   if (polygon_of_triangle) polygon_of_triangle->clear();
   PolygonCutter cutter(result.positions, result.triangles);
   for (std::size_t f = 0; f < polygons.num_faces(); ++f) {
     cutter.cut({polygons.face_vertices.data() + polygons.face_offsets[f],
                 polygons.face_offsets[f + 1] - polygons.face_offsets[f]});
     if (polygon_of_triangle) polygon_of_triangle->resize(result.triangles.size(), static_cast<Index>(f));
+    if (!polygons.face_groups.empty())
+      result.face_groups.of_face.resize(result.triangles.size(), polygons.face_groups.of_face[f]);
   }
   return result;
 }
@@ -122,6 +126,7 @@ PolygonMesh as_polygons(const TriangleMesh& mesh) {
     polygons.face_vertices.insert(polygons.face_vertices.end(), triangle.begin(), triangle.end());
     polygons.face_offsets.push_back(polygons.face_vertices.size());
   }
+  polygons.face_groups = mesh.face_groups;
   return polygons;
 }
 

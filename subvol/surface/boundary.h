@@ -14,7 +14,7 @@ namespace subvol {
 /// topology       of this mesh.
 /// volume_vertex  if not null, receives the volume mesh's number of every vertex of the result, ascending.
 /// returns        one polygon per entry of `topology.boundary_faces()`, in that order and with that first corner, and
-///                only the vertices of the boundary.
+///                only the vertices of the boundary. A face in several groups gets the first of them.
 PolygonMesh boundary_surface(const VolumeMesh& mesh, const MeshTopology& topology,
                              std::vector<Index>* volume_vertex = nullptr);
 
@@ -22,7 +22,7 @@ PolygonMesh boundary_surface(const VolumeMesh& mesh, const MeshTopology& topolog
 ///
 /// A quad is cut along its shorter diagonal (the one from its first corner if both are equally long), unless only the
 /// other one gives two triangles that face the same side. Larger polygons are cut by ear clipping, the shortest cut
-/// first, even if they are far from planar. Positions are copied as they are.
+/// first, even if they are far from planar. Positions are copied as they are; a triangle is in its polygon's group.
 ///
 /// polygon_of_triangle  if not null, receives the polygon that each triangle comes from. The triangles of one polygon
 ///                      are consecutive.

@@ -41,6 +41,8 @@ TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped, std::vector<
     first[order[i]] = same ? first[order[i - 1]] : order[i];
   }
   TriangleMesh result;
+  const std::vector<Index>& groups = mesh.face_groups.of_face;
+  result.face_groups.groups = mesh.face_groups.groups;
   std::vector<Index> number(mesh.positions.size(), kNoIndex);
   const auto vertex = [&](Index v) {
     Index& n = number[first[v]];
@@ -51,10 +53,15 @@ TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped, std::vector<
     }
     return n;
   };
-  for (const auto& t : mesh.triangles) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& t = mesh.triangles[i];
     const std::array<Index, 3> corners{vertex(t[0]), vertex(t[1]), vertex(t[2])};
-    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) ++dropped;
-    else result.triangles.push_back(corners);
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
+      ++dropped;
+      continue;
+    }
+    result.triangles.push_back(corners);
+    if (!groups.empty()) result.face_groups.of_face.push_back(groups[i]);
   }
   return result;
 }
@@ -162,10 +169,12 @@ void drop_loners(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
   for (std::size_t t = 0; t < component.size(); ++t) {
     if (component[t] < 0) continue;
     mesh.triangles[kept] = mesh.triangles[t];
+    if (!mesh.face_groups.empty()) mesh.face_groups.of_face[kept] = mesh.face_groups.of_face[t];
     component[kept++] = component[t];
   }
   result.dropped_triangles += component.size() - kept;
   mesh.triangles.resize(kept);
+  if (!mesh.face_groups.empty()) mesh.face_groups.of_face.resize(kept);
   component.resize(kept);
 }
 
@@ -200,6 +209,7 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
     for (std::size_t at : loop) {
       mesh.triangles.push_back({rims[at][1], rims[at][0], centre});
       component.push_back(component[rims[at][2]]);
+      if (!mesh.face_groups.empty()) mesh.face_groups.of_face.push_back(kNoIndex);
     }
     ++result.closed_holes;
   }

@@ -33,7 +33,7 @@ struct SolidBoundary {
 /// Triangles that share an edge are flipped to agree. A component bounds a solid; it is the wall of a void if its
 /// signed volume is opposite to the total and its box lies inside the box of a component of the total's sign. Holes are
 /// closed by a fan around the mean of their boundary vertices, as if they were disks. Triangles with two equal corners,
-/// and those without a neighbor, are dropped.
+/// and those without a neighbor, are dropped. Triangles keep their groups; those that close holes are in none.
 ///
 /// InputError: a vertex number out of range, a position that is not finite, no triangles that share an edge; more than
 /// two triangles at an edge, with the number of such edges and the vertices and coordinates of the first ten; a surface

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/base/types.h"
+#include "subvol/mesh/face_groups.h"
 
 #include <array>
 #include <string>
@@ -13,6 +14,7 @@ namespace subvol {
 struct TriangleMesh {
   std::vector<Vec3> positions;
   std::vector<std::array<Index, 3>> triangles;
+  FaceGroups face_groups{};
 };
 
 /// Polygons in space (triangles, quads and more), for surfaces whose faces matter: boundaries, shells, exports.
@@ -20,6 +22,7 @@ struct PolygonMesh {
   std::vector<Vec3> positions;
   std::vector<std::size_t> face_offsets{0};
   std::vector<Index> face_vertices;
+  FaceGroups face_groups{};
   std::size_t num_faces() const { return face_offsets.size() - 1; }
 };
 
