@@ -24,12 +24,14 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
   // Everything that subvol does not write is reported in the same way: nobody should edit headers one by one until the
   // file is accepted.
   const auto refuse_foreign = [&](const std::string& found) {
-    fail("another program has written this .vtu (" + found +
-         "), and of those subvol reads none, only its own; save it as legacy .vtk");
+    fail("another program has written this .vtu (" + found + "), and it holds no exact map of curved cells");
   };
   const std::string_view header = tag(bytes, begin);
-  for (const auto& [key, expected] : {std::pair{"type", "UnstructuredGrid"}, {"version", "2.2"},
-                                      {"byte_order", "LittleEndian"}, {"header_type", "UInt64"}})
+  const std::string version = attribute(header, "version") == "1.0" ? "1.0" : "2.2";  // of linear cells, or of others
+  for (const auto& [key, expected] : {std::pair<const char*, std::string>{"type", "UnstructuredGrid"},
+                                      {"version", version},
+                                      {"byte_order", "LittleEndian"},
+                                      {"header_type", "UInt64"}})
     if (attribute(header, key) != expected)
       refuse_foreign("its " + std::string(key) + " is " + in_quotes(attribute(header, key)) + ", not '" + expected +
                      "'");

@@ -25,7 +25,7 @@ py::object read(const py::object& path, const py::kwargs& given) {
     std::shared_ptr<CurvedMesh> curved;
     {
       const py::gil_scoped_release unlocked;
-      curved = std::make_shared<CurvedMesh>(read_high_order(file));
+      curved = std::make_shared<CurvedMesh>(read_curved(file));
     }
     return py::cast(curved);
   }

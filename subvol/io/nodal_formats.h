@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace subvol {
 
@@ -35,6 +36,9 @@ enum class VtkCellUse { added, lower_dimension };
 ///              a point that does not exist.
 VtkCellUse add_vtk_cell(NodalMesh& mesh, NodalCells& cells, int type, std::span<const std::int64_t> nodes,
                         bool old_numbers, const std::function<void(const std::string&)>& fail);
+
+/// Returns the corners of the faces S1, S2, .. of an element of Abaqus.
+std::vector<std::vector<int>> inp_faces(CellKind kind);
 
 /// Adds a face, given by its corners in any order, to a group of the mesh.
 void add_face(NodalMesh& mesh, std::span<const Index> corners, Index group);

@@ -29,13 +29,6 @@ constexpr InpType kInpTypes[] = {
 };
 constexpr const char* kSolidFamilies[] = {"C3D", "DC3D", "AC3D", "DCC3D", "F3D"};
 
-/// Corners of the faces S1, S2, .. of a kind.
-std::vector<std::vector<int>> inp_faces(CellKind kind) {
-  if (kind == CellKind::tet) return {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
-  if (kind == CellKind::prism) return {{0, 1, 2}, {3, 5, 4}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}};
-  return {{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
-}
-
 std::string upper_case(std::string_view text) {
   std::string upper(text);
   for (char& c : upper)
@@ -61,6 +54,17 @@ std::vector<std::string> fields_of(std::string_view line) {
   }
   if (fields.size() > 1 && fields.back().empty()) fields.pop_back();
   return fields;
+}
+
+/// The number of a name such as REFERENCE_7, or REFERENCE_M7 for -7.
+std::optional<int> numbered(const std::string& name, std::string_view prefix) {
+  std::string number = upper_case(name);
+  if (!number.starts_with(prefix)) return std::nullopt;
+  number.erase(0, prefix.size());
+  if (number.starts_with("M")) number[0] = '-';
+  const auto value = parse_integer(number);
+  if (!value || std::abs(*value) > std::numeric_limits<int>::max()) return std::nullopt;
+  return static_cast<int>(*value);
 }
 
 /// Part of a set: every step-th number of a range, or another set.
@@ -276,6 +280,7 @@ class InpParser {
   }
   std::size_t element_set(const std::string& name) {
     const std::size_t set = named_set(name);
+    if (!element_sets_[set].is_defined) element_sets_[set].name = name;
     element_sets_[set].is_defined = true;
     return set;
   }
@@ -362,7 +367,9 @@ class InpParser {
       left_out_.add("surfaces of nodes");
       return;
     }
-    surface_ = faces_.by_name(parameter("NAME"));
+    const std::string name = parameter("NAME");
+    const std::optional<int> number = numbered(name, "GROUP_");
+    surface_ = number ? faces_.by_number(*number) : faces_.by_name(name);
   }
 
   void read_surface(const std::vector<std::string>& fields) {
@@ -459,36 +466,35 @@ class InpParser {
   }
 
   /// The reference that a set of subvol stands for: REFERENCE_7, or REFERENCE_M7 for -7.
-  std::optional<int> own_reference(std::size_t set) const {
-    constexpr std::string_view kOwn = "REFERENCE_";
-    const std::string name = upper_case(element_sets_[set].name);
-    if (!name.starts_with(kOwn)) return std::nullopt;
-    std::string number = name.substr(kOwn.size());
-    if (number.starts_with("M")) number[0] = '-';
-    const auto value = parse_integer(number);
-    if (!value || std::abs(*value) > std::numeric_limits<int>::max()) return std::nullopt;
-    return static_cast<int>(*value);
-  }
+  std::optional<int> own_reference(std::size_t set) const { return numbered(element_sets_[set].name, "REFERENCE_"); }
 
   void choose_references() {
     const std::vector<std::size_t> sets = material_sets();
+    std::set<std::size_t> used(sets.begin(), sets.end());
     mesh_.references.assign(elements_.size(), 0);
-    std::set<std::size_t> used;
     int next = 1;
-    for (const std::size_t s : sets) {
-      if (!used.insert(s).second) continue;
+    for (const std::size_t s : used) {
       const std::optional<int> own = own_reference(s);
+      const std::vector<std::size_t>& members = members_of(s);
+      if (members.empty() || (!own && used.size() == 1 && members.size() == elements_.size())) continue;
       const int reference = own ? *own : next++;
-      bool any = false;
-      for (const std::size_t element : members_of(s)) {
-        mesh_.references[element] = reference;
-        any = true;
-      }
-      if (!own && any) mesh_.regions.push_back({element_sets_[s].name, reference, 3});
+      for (const std::size_t element : members) mesh_.references[element] = reference;
+      if (!own) mesh_.regions.push_back({element_sets_[s].name, reference, 3});
+      else name_region(reference, s, used);
     }
     left_out_.add("element sets", element_sets_.size() - used.size());
   }
 
+  /// A set that holds nothing but the set of one of our references has its name.
+  void name_region(int reference, std::size_t own, std::set<std::size_t>& used) {
+    for (std::size_t s = 0; s < element_sets_.size(); ++s) {
+      const InpSet& set = element_sets_[s];
+      if (used.contains(s) || set.items.size() != 1 || set.items[0].other != own) continue;
+      mesh_.regions.push_back({set.name, reference, 3});
+      used.insert(s);
+      return;
+    }
+  }
 
   std::string name_, file_, keyword_, skipped_type_;
   std::size_t line_ = 0;
@@ -515,6 +521,12 @@ class InpParser {
 };
 
 }  // namespace
+
+std::vector<std::vector<int>> inp_faces(CellKind kind) {
+  if (kind == CellKind::tet) return {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  if (kind == CellKind::prism) return {{0, 1, 2}, {3, 5, 4}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}};
+  return {{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
+}
 
 NodalMesh parse_inp(const std::string& name, std::string_view bytes, const std::string&) {
   return InpParser(name).parse(bytes);

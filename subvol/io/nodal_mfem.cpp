@@ -41,6 +41,8 @@ class MfemParser {
     if (const auto word = scan_.peek(); word && *word == "bdr_attribute_sets") skip_to("vertices");
     expect("vertices");
     read_vertices();
+    const auto is_one = [](int reference) { return reference == 1; };  // which all have that have none
+    if (std::all_of(mesh_.references.begin(), mesh_.references.end(), is_one)) mesh_.references.clear();
     return std::move(mesh_);
   }
 

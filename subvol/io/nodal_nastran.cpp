@@ -228,6 +228,8 @@ class NastranParser {
       for (std::size_t i = 0; i < element.nodes.size(); ++i) corners.push_back(point(element, i));
       add_face(mesh_, corners, faces.by_number(number_of(element.property)));
     }
+    const auto is_one = [](int reference) { return reference == 1; };  // which all have that have none
+    if (std::all_of(mesh_.references.begin(), mesh_.references.end(), is_one)) mesh_.references.clear();
     mesh_.face_groups.groups = faces.take();
     LeftOut left_out;
     left_out.add("other elements", num_others_);
