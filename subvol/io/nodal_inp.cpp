@@ -470,13 +470,14 @@ class InpParser {
 
   void choose_references() {
     const std::vector<std::size_t> sets = material_sets();
-    std::set<std::size_t> used(sets.begin(), sets.end());
+    const std::set<std::size_t> materials(sets.begin(), sets.end());
+    std::set<std::size_t> used = materials;
     mesh_.references.assign(elements_.size(), 0);
     int next = 1;
-    for (const std::size_t s : used) {
+    for (const std::size_t s : materials) {
       const std::optional<int> own = own_reference(s);
       const std::vector<std::size_t>& members = members_of(s);
-      if (members.empty() || (!own && used.size() == 1 && members.size() == elements_.size())) continue;
+      if (members.empty() || (!own && materials.size() == 1 && members.size() == elements_.size())) continue;
       const int reference = own ? *own : next++;
       for (const std::size_t element : members) mesh_.references[element] = reference;
       if (!own) mesh_.regions.push_back({element_sets_[s].name, reference, 3});

@@ -236,7 +236,7 @@ TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files o
   CHECK(mesh.references[0] != mesh.references[1]);
   std::set<std::string> names;
   for (const Group& region : mesh.regions) names.insert(region.name);
-  CHECK(names == std::set<std::string>{"lower", "upper"});
+  CHECK(names == std::set<std::string>{"Upper", "lower"});
   REQUIRE(mesh.face_groups.groups.size() == 2);
   CHECK(mesh.face_groups.groups[1].name == "side wall");
   CHECK(mesh.face_groups.faces.size() == 3);
