@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
+#include "export/curved_file.h"
 #include "fit/geometry/self_intersection.h"
 #include "fit/mesh_check.h"
 #include "python/arrays.h"

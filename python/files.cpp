@@ -3,6 +3,7 @@
 #include "cli/runs/shell_output.h"
 #include "cli/runs/writing.h"
 #include "cli/runs/written_result.h"
+#include "export/curved_file.h"
 #include "fit/mesh_check.h"
 #include "fit/quality/quality.h"
 #include "python/fit_options.h"
