@@ -16,7 +16,7 @@ std::string_view attribute(std::string_view tag, const std::string& key) {
 
 }  // namespace
 
-VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move(name)) {
+VtuArrays::VtuArrays(std::string name, std::string_view bytes, const std::string& version) : name_(std::move(name)) {
   require_no_utf16(name_, bytes);
   const std::size_t begin = bytes.find("<VTKFile");
   if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
@@ -27,7 +27,6 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
     fail("another program has written this .vtu (" + found + "), and it holds no exact map of curved cells");
   };
   const std::string_view header = tag(bytes, begin);
-  const std::string version = attribute(header, "version") == "1.0" ? "1.0" : "2.2";  // of linear cells, or of others
   for (const auto& [key, expected] : {std::pair<const char*, std::string>{"type", "UnstructuredGrid"},
                                       {"version", version},
                                       {"byte_order", "LittleEndian"},
