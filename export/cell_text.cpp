@@ -253,6 +253,13 @@ void append_node_data(std::string& text, const VertexField& field) {
 
 std::uint8_t vtk_type(CellKind kind) { return kind == CellKind::tet ? 71 : kind == CellKind::hex ? 72 : 73; }
 
+std::uint8_t vtk_linear_type(CellKind kind) { return kind == CellKind::tet ? 10 : kind == CellKind::hex ? 12 : 13; }
+
+void turn_wedge(std::int64_t* corners) {
+  std::swap(corners[1], corners[2]);
+  std::swap(corners[4], corners[5]);
+}
+
 int max_gmsh_order(CellKind kind) { return static_cast<int>(gmsh_types(kind).size()); }
 
 int gmsh_type(CellKind kind, int order) {
@@ -275,16 +282,17 @@ void require_cell_minima(std::span<const double> cell_minima, std::size_t num_ce
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data, const std::string& group_data) {
   const std::span<const double> coordinates(mesh.positions.data()->data(), 3 * mesh.positions.size());
-  const std::vector<std::int64_t> corners(mesh.nodes.begin(), mesh.nodes.end());
+  const bool is_linear = mesh.orders.empty();
+  std::vector<std::int64_t> corners(mesh.nodes.begin(), mesh.nodes.end());
+  for (std::size_t c = 0; is_linear && c < mesh.num_cells(); ++c)
+    if (mesh.kinds[c] == CellKind::prism) turn_wedge(corners.data() + mesh.offsets[c]);
   const std::vector<std::int64_t> ends(mesh.offsets.begin() + 1, mesh.offsets.end());
   const std::vector<std::int32_t> references(mesh.references.begin(), mesh.references.end());
   std::vector<std::uint8_t> types;
-  for (const CellKind kind : mesh.kinds) types.push_back(vtk_type(kind));
-  std::string text =
-      "<?xml version=\"1.0\"?>\n"
-      "<VTKFile type=\"UnstructuredGrid\" version=\"2.2\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-      "  <UnstructuredGrid>\n";
-  if (!field_data.empty()) text += "    <FieldData>\n" + field_data + group_data + "    </FieldData>\n";
+  for (const CellKind kind : mesh.kinds) types.push_back(is_linear ? vtk_linear_type(kind) : vtk_type(kind));
+  std::string text = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"") +
+                     (is_linear ? "1.0" : "2.2") +
+                     "\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  <UnstructuredGrid>\n";
   text += "    <Piece NumberOfPoints=\"" + std::to_string(mesh.positions.size()) +
           "\" NumberOfCells=\"" + std::to_string(mesh.num_cells()) +
           "\">\n      <Points>\n";
@@ -298,14 +306,18 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   for (const VertexField& field : fields)
     append_data_array<double>(text, "Name=\"" + field.name + "\"", field.values);
   if (!fields.empty()) text += "      </PointData>\n";
-  text += "      <CellData>\n";
+  // MFEM takes the attributes of cells from the first array, if it is called material.
+  text += references.empty() ? "      <CellData>\n" : "      <CellData Scalars=\"material\">\n";
+  if (!references.empty()) append_data_array<std::int32_t>(text, "Name=\"material\"", references);
   const std::vector<std::int32_t> orders(mesh.orders.begin(), mesh.orders.end());
   if (!orders.empty()) append_data_array<std::int32_t>(text, "Name=\"order\"", orders);
   if (!references.empty()) append_data_array<std::int32_t>(text, "Name=\"reference\"", references);
   if (!cell_minima.empty()) append_data_array(text, "Name=\"scaled_jacobian\"", cell_minima);
-  text += "      </CellData>\n    </Piece>\n";
-  if (field_data.empty() && !group_data.empty()) text += "    <FieldData>\n" + group_data + "    </FieldData>\n";
-  return text + "  </UnstructuredGrid>\n</VTKFile>\n";
+  text += "      </CellData>\n    </Piece>\n  </UnstructuredGrid>\n";
+  // Behind the grid, where VTK and MFEM pass over it: MFEM reads a grid only if it has nothing but its piece.
+  if (!field_data.empty() || !group_data.empty())
+    text += "  <FieldData>\n" + field_data + group_data + "  </FieldData>\n";
+  return text + "</VTKFile>\n";
 }
 
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,

@@ -29,9 +29,9 @@ struct CellView {
   std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
 };
 
-/// Text of a .vtu. field_data: `<DataArray>` elements for the file's field data, or empty. `orders`, if there are any,
-/// become the cell data `order`. group_data: more of these elements, for the groups; without `field_data`, they stand
-/// behind the mesh, because some readers stop at field data before it.
+/// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13) without `orders`, else of version 2.2 with Lagrange cells
+/// and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty; they stand behind the
+/// grid, because some readers stop at field data before it.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {}, const std::string& group_data = {});
 
@@ -43,6 +43,10 @@ int gmsh_type(CellKind kind, int order);
 /// The same for a face of 3 or 4 corners, of an order from 1 to 10.
 int gmsh_face_type(std::size_t num_corners, int order);
 std::uint8_t vtk_type(CellKind kind);
+/// VTK's type number of a linear cell.
+std::uint8_t vtk_linear_type(CellKind kind);
+/// Renumbers the six corners of a prism to VTK's plain wedge, or back: the normal of its first triangle points outward.
+void turn_wedge(std::int64_t* corners);
 /// Text of a .msh. Orders: 1 .. max_gmsh_order (asserted). Grouped faces are elements of surfaces, behind the cells.
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
                          std::span<const VertexField> fields);

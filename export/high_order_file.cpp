@@ -6,6 +6,7 @@
 #include "export/grouped_faces.h"
 #include "export/lagrange_cells.h"
 #include "export/lagrange_mesh.h"
+#include "export/nodal_export.h"
 #include "export/text_format.h"
 #include "export/vtu_reader.h"
 #include "fit/quality/high_order_quality.h"
@@ -89,6 +90,17 @@ std::string field_data(const HighOrderMesh& mesh, double cells_distance) {
                                 std::to_string(mesh.coefficients.size()) + '"',
                             {mesh.coefficients.data()->data(), 3 * mesh.coefficients.size()});
   return text;
+}
+
+/// Text of a .inp, .bdf or .mfem.
+std::string nodal_text_of(const HighOrderMesh& mesh, const std::string& extension,
+                          const HighOrderFileOptions& options) {
+  require_writable(mesh, options);
+  if (extension != ".mfem" && mesh.space.max_order() > 2)
+    throw InputError("cells of order " + std::to_string(mesh.space.max_order()) +
+                     ", but elements of these formats have order 2 at most (C3D20); fit with --order 2, or write a .msh, "
+                     ".mfem or .vtu");
+  return nodal_text(extension, written_nodes(mesh, extension, options));
 }
 
 /// Refuses orders that Gmsh does not evaluate: a mesh lowered to these would lose much of its shape.
@@ -251,7 +263,17 @@ PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension
   if (extension == ".msh")
     return polynomial_map(
         mesh, {max_gmsh_order(CellKind::tet), max_gmsh_order(CellKind::prism), max_gmsh_order(CellKind::hex)}, wanted);
-  throw InputError("file_cells: expected the extension .vtu or .msh, found " + extension);
+  if (extension == ".mfem") return polynomial_map(mesh, {}, wanted);
+  if (is_nodal_output(extension)) return edge_cells(polynomial_map(mesh, {2, 2, 2}, wanted));
+  throw InputError("file_cells: expected the extension .vtu, .msh, .inp, .bdf or .mfem, found " + extension);
+}
+
+NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension, const HighOrderFileOptions& options) {
+  NodalMesh cells = nodal_cells(file_cells(mesh, extension, options.map_tolerance_percent).mesh, extension);
+  cells.references.assign(options.references.begin(), options.references.end());
+  if (options.face_groups) cells.face_groups = *options.face_groups;
+  cells.regions.assign(options.regions.begin(), options.regions.end());
+  return cells;
 }
 
 std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
@@ -287,9 +309,10 @@ void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh, 
     require_writable(mesh, options);
     return write_volume_mesh(path, small_cells(mesh, options));
   }
-  if (extension != ".vtu" && extension != ".msh")
-    throw InputError(path.string() + ": expected the extension .vtu, .msh, .mesh or .vtk");
+  if (extension != ".vtu" && extension != ".msh" && !is_nodal_output(extension))
+    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .mesh or .vtk");
   try {
+    if (is_nodal_output(extension)) return write_file_atomically(path, nodal_text_of(mesh, extension, options));
     write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, options) : msh_text(mesh, options));
   } catch (const InputError& error) {
     throw InputError(path.string() + ": " + error.what());

@@ -5,6 +5,7 @@
 #include "fit/elements/cell_reference.h"
 #include "fit/elements/high_order_mesh.h"
 #include "fit/elements/polynomial_map.h"
+#include "subvol/io/nodal_mesh.h"
 
 #include <filesystem>
 #include <span>
@@ -42,9 +43,15 @@ inline constexpr int kMaxVtkOrder = 12;
 /// A Legendre mesh within the format's orders is returned unchanged, at distance 0; for any other mesh the cells are
 /// those of `polynomial_map` with the lowest orders that keep to the tolerance, or the format's largest orders if none
 /// do.
-/// extension  ".vtu" (orders up to 12) or ".msh" (up to 10 for tets, 2 for prisms, 9 for hexes); else InputError.
+/// extension  ".vtu" (orders up to 12), ".msh" (up to 10 for tets, 2 for prisms, 9 for hexes), ".mfem" (up to 16), or
+///            ".inp" and ".bdf" (up to 2, without the modes of faces and hexes: `edge_cells`); else InputError.
 PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension,
                          double map_tolerance_percent = kMapTolerancePercent);
+
+/// Returns what a .inp, .bdf or .mfem holds of a mesh: the cells of `file_cells` at the nodes of the format, with
+/// references and groups.
+NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension,
+                        const HighOrderFileOptions& options = {});
 
 /// Returns the mesh as a VTK XML unstructured grid, version 2.2, with arrays in base64.
 ///
@@ -69,8 +76,9 @@ std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
 /// InputError: as above, and for meshes of orders beyond what Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// Writes .vtu or .msh as above, or .mesh or .vtk as `linear_cells` (whose references are those of the curved cells);
-/// the whole file or nothing. InputError: another extension, and as above. IoError: the file cannot be written.
+/// Writes .vtu or .msh as above, .inp, .bdf or .mfem as the cells of `file_cells` (subvol/io/nodal_writers.h), or .mesh
+/// or .vtk as `linear_cells` (whose references are those of the curved cells); the whole file or nothing.
+/// InputError: another extension, orders above 2 in .inp and .bdf, and as above. IoError: the file cannot be written.
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh,
                   const HighOrderFileOptions& options = {});
 

@@ -3,6 +3,7 @@
 
 #include "fit/elements/pattern_table.h"
 #include "subvol/base/error.h"
+#include "subvol/io/node_points.h"
 
 #include <Eigen/LU>
 
@@ -14,21 +15,26 @@
 namespace subvol {
 namespace {
 
+/// Largest difference between the curves that two cells give a common edge or face, as a share of a cell's extent: far
+/// above the rounding of files of single precision (6e-8), far below what a curve is made for.
+constexpr double kMostGap = 1e-6;
+
 /// Maps values at the nodes of one kind and order to coefficients of the modes of a cell.
 class Interpolation {
  public:
-  Interpolation(const ElementSpace& space, std::size_t pattern, NodeOrdering ordering)
+  Interpolation(const ElementSpace& space, std::size_t pattern, NodeOrdering ordering, NodeSpacing spacing)
       : order_(space.pattern_order(pattern)), is_hex_(space.pattern_kind(pattern) == CellKind::hex) {
     const CellKind kind = space.pattern_kind(pattern);
     for (const LatticePoint& at : cell_lattice(kind, order_, ordering)) lattice_.push_back(at);
     if (is_hex_) {
-      factor(line_values(space.basis()));
+      factor(line_values(space.basis(), spacing));
     } else {
       ShapeFunctions shapes(kind, space.basis(), order_);
       const auto modes = space.pattern_modes(pattern);
+      const std::vector<Vec3> points = node_points(kind, order_, ordering, spacing);
       Eigen::MatrixXd values(lattice_.size(), modes.size());
       for (std::size_t q = 0; q < lattice_.size(); ++q) {
-        shapes.set_point(lattice_[q].cast<double>() / order_);
+        shapes.set_point(points[q]);
         for (std::size_t a = 0; a < modes.size(); ++a) values(q, a) = shapes.value(modes[a]);
       }
       factor(values);
@@ -45,13 +51,16 @@ class Interpolation {
  private:
   void factor(const Eigen::MatrixXd& values) { factors_.compute(values); }
 
-  /// N_a at the points q / p.
-  Eigen::MatrixXd line_values(Basis basis) const {
+  /// N_a at the nodes of a line.
+  Eigen::MatrixXd line_values(Basis basis, NodeSpacing spacing) const {
     const int n = order_ + 1;
     Eigen::MatrixXd result(n, n);
     std::array<double, kMaxOrder + 1> values, derivatives;
+    const bool is_equal = spacing == NodeSpacing::equal;
+    const std::vector<double> lobatto = is_equal ? std::vector<double>{} : lobatto_points(order_);
     for (int q = 0; q < n; ++q) {
-      line_functions(basis, order_, static_cast<double>(q) / order_, values.data(), derivatives.data());
+      const double at = is_equal ? static_cast<double>(q) / order_ : lobatto[static_cast<std::size_t>(q)];
+      line_functions(basis, order_, at, values.data(), derivatives.data());
       for (int a = 0; a < n; ++a) result(q, a) = values[static_cast<std::size_t>(a)];
     }
     return result;
@@ -117,18 +126,14 @@ EntityOrders orders_of_cells(const MeshTopology& topology, const CellView& cells
   return result;
 }
 
-}  // namespace
-
-HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering) {
-  if (ordering == NodeOrdering::rows) throw InputError("polynomials_of: expected cells whose corners come first");
-  const VolumeMesh corners = separate_cells(cells);
-  HighOrderMesh mesh(ElementSpace(corners, Basis::legendre, orders_of_cells(MeshTopology(corners), cells)),
-                     corners);
-  const ElementSpace& space = mesh.space;
+/// Calls visit(cell, its nodes' coefficients: one row per mode, without signs) for every cell.
+template <class Visit>
+void interpolate(const CellView& cells, NodeOrdering ordering, NodeSpacing spacing, const ElementSpace& space,
+                 const Visit& visit) {
   const auto by_pattern = cells_by_pattern(space);
   for (std::size_t pattern = 0; pattern < by_pattern.size(); ++pattern) {
     if (by_pattern[pattern].empty()) continue;
-    const Interpolation interpolation(space, pattern, ordering);
+    const Interpolation interpolation(space, pattern, ordering, spacing);
     const auto num_nodes = interpolation.num_nodes();
     Eigen::MatrixX3d values(num_nodes, 3);
     for (const Index c : by_pattern[pattern]) {
@@ -141,14 +146,62 @@ HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering) {
           throw InputError("cell " + std::to_string(c) + ": node " + std::to_string(nodes[q]) + " has no point");
         values.row(static_cast<Eigen::Index>(q)) = cells.positions[static_cast<std::size_t>(nodes[q])];
       }
-      const Eigen::MatrixX3d found = interpolation.coefficients(values);
-      const auto into = space.nodes(static_cast<std::size_t>(c));
-      const auto signs = space.signs(static_cast<std::size_t>(c));
-      for (std::size_t a = 0; a < into.size(); ++a)
-        if (static_cast<std::size_t>(into[a]) >= space.num_vertices())
-          mesh.coefficients[into[a]] = signs[a] * found.row(static_cast<Eigen::Index>(a)).transpose();
+      visit(static_cast<std::size_t>(c), interpolation.coefficients(values));
     }
   }
+}
+
+/// Largest extent of a cell's nodes.
+double extent(const CellView& cells, std::size_t c) {
+  Vec3 low = cells.positions[cells.cell(c).front()], high = low;
+  for (const Index node : cells.cell(c)) {
+    low = low.cwiseMin(cells.positions[node]);
+    high = high.cwiseMax(cells.positions[node]);
+  }
+  return (high - low).maxCoeff();
+}
+
+}  // namespace
+
+HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering, NodeSpacing spacing) {
+  if (ordering == NodeOrdering::rows) throw InputError("polynomials_of: expected cells whose corners come first");
+  const VolumeMesh corners = separate_cells(cells);
+  HighOrderMesh mesh(ElementSpace(corners, Basis::legendre, orders_of_cells(MeshTopology(corners), cells)),
+                     corners);
+  const ElementSpace& space = mesh.space;
+  interpolate(cells, ordering, spacing, space, [&](std::size_t c, const Eigen::MatrixX3d& found) {
+    const auto into = space.nodes(c);
+    const auto signs = space.signs(c);
+    for (std::size_t a = 0; a < into.size(); ++a)
+      if (static_cast<std::size_t>(into[a]) >= space.num_vertices())
+        mesh.coefficients[into[a]] = signs[a] * found.row(static_cast<Eigen::Index>(a)).transpose();
+  });
+  return mesh;
+}
+
+HighOrderMesh joined_polynomials(const CellView& cells, const VolumeMesh& corners, int order, NodeOrdering ordering,
+                                 NodeSpacing spacing) {
+  HighOrderMesh mesh(ElementSpace(corners, Basis::legendre, order), corners);
+  const ElementSpace& space = mesh.space;
+  std::vector<Index> cell_of(space.num_nodes(), kNoIndex);  // the first cell that has told a coefficient
+  interpolate(cells, ordering, spacing, space, [&](std::size_t c, const Eigen::MatrixX3d& found) {
+    const auto into = space.nodes(c);
+    const auto signs = space.signs(c);
+    const double most = kMostGap * extent(cells, c);
+    for (std::size_t a = 0; a < into.size(); ++a) {
+      const Index node = into[a];
+      if (static_cast<std::size_t>(node) < space.num_vertices()) continue;
+      const Vec3 value = signs[a] * found.row(static_cast<Eigen::Index>(a)).transpose();
+      if (cell_of[node] == kNoIndex) {
+        mesh.coefficients[node] = value;
+        cell_of[node] = static_cast<Index>(c);
+      } else if (!((value - mesh.coefficients[node]).norm() <= most)) {
+        throw InputError("cells " + std::to_string(cell_of[node]) + " and " + std::to_string(c) +
+                         " have the same corners on an edge or face, but curve it differently: expected cells without "
+                         "gaps between them");
+      }
+    }
+  });
   return mesh;
 }
 

@@ -2,7 +2,8 @@
 #pragma once
 
 #include "export/cell_text.h"
-#include "export/lagrange_lattice.h"
+#include "subvol/io/cell_lattice.h"
+#include "subvol/io/nodal_mesh.h"
 #include "fit/elements/high_order_mesh.h"
 
 namespace subvol {
@@ -17,6 +18,14 @@ namespace subvol {
 /// InputError: an order out of range, a number of nodes other than that of the cell's kind and order, a node without a
 /// point. The points are matched to rounding times the condition of the interpolation, about 1e-11 of the cell's size
 /// at order 12. Cost: one factorization for each kind and order (prism of order 12: 1 s), then a product per cell.
-HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering);
+HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering, NodeSpacing spacing = NodeSpacing::equal);
+
+/// Returns the same polynomials as one mesh, in which cells with common corners share the modes of their edges and
+/// faces: exact up to rounding if they agree there.
+///
+/// cells    all of one order; corners: the same cells in the same order, by their corners (as `ElementSpace` takes it).
+/// InputError: as above, and if two cells differ on an edge or face by more than 1e-6 of a cell's extent.
+HighOrderMesh joined_polynomials(const CellView& cells, const VolumeMesh& corners, int order, NodeOrdering ordering,
+                                 NodeSpacing spacing);
 
 }  // namespace subvol

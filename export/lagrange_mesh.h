@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/lagrange_lattice.h"
+#include "subvol/io/cell_lattice.h"
 #include "fit/elements/high_order_mesh.h"
 
 #include <span>

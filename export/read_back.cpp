@@ -4,11 +4,13 @@
 #include "export/cell_text.h"
 #include "export/grouped_faces.h"
 #include "export/lagrange_mesh.h"
+#include "export/nodal_export.h"
 #include "export/text_format.h"
 #include "export/vtu_reader.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <tiny_gltf.h>
@@ -132,7 +134,7 @@ void compare_linear(const WrittenFile& file, const VolumeMesh& wanted, bool is_m
 
 void compare_vtu(const WrittenFile& file, const CellView& wanted) {
   const std::string bytes = read_file(file.path());
-  const VtuArrays arrays(file.path().string(), bytes);
+  const VtuArrays arrays(file.path().string(), bytes, wanted.orders.empty() ? "1.0" : "2.2");
   const auto points = arrays.get<double>("Points");
   const auto nodes = arrays.get<std::int64_t>("connectivity"), ends = arrays.get<std::int64_t>("offsets");
   const auto types = arrays.get<std::uint8_t>("types");
@@ -143,9 +145,12 @@ void compare_vtu(const WrittenFile& file, const CellView& wanted) {
   for (std::size_t v = 0; v < wanted.positions.size(); ++v)
     file.same(std::equal(wanted.positions[v].begin(), wanted.positions[v].end(), &points[3 * v]), "point", v);
   for (std::size_t c = 0; c < wanted.num_cells(); ++c) {
-    file.same(types[c] == vtk_type(wanted.kinds[c]), "the kind of cell", c);
+    const bool is_linear = wanted.orders.empty();
+    file.same(types[c] == (is_linear ? vtk_linear_type(wanted.kinds[c]) : vtk_type(wanted.kinds[c])), "the kind of cell",
+              c);
     file.same(ends[c] == static_cast<std::int64_t>(wanted.offsets[c + 1]), "the end of cell", c);
-    const auto cell = wanted.cell(c);
+    std::vector<std::int64_t> cell(wanted.cell(c).begin(), wanted.cell(c).end());
+    if (is_linear && wanted.kinds[c] == CellKind::prism) turn_wedge(cell.data());
     file.same(std::equal(cell.begin(), cell.end(), nodes.begin() + static_cast<std::ptrdiff_t>(wanted.offsets[c])),
               "the nodes of cell", c);
   }
@@ -226,6 +231,27 @@ void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, const Hig
     file.same(found.mesh.coefficients[i] == wanted.coefficients[i], "the coefficient of node", i);
   for (std::size_t c = 0; c < wanted.space.num_cells(); ++c)
     file.same(reference(found.references, c) == reference(references, c), "the reference of cell", c);
+}
+
+// --- .inp, .bdf, .mfem ----------------------------------------------------------------------------------------------
+
+/// The whole text is made again: these writers are a function of the cells alone. The reader then sees its cells.
+void compare_nodal(const WrittenFile& file, const std::string& extension, const NodalMesh& wanted) {
+  const std::string text = read_file(file.path());
+  if (text != nodal_text(extension, wanted)) file.differs("its text is not what was written");
+  const NodalMesh found = read_nodal_mesh(file.path());
+  file.same_count("cells", found.num_cells(), wanted.num_cells());
+  for (std::size_t c = 0; c < wanted.num_cells(); ++c) {
+    file.same(found.kinds[c] == wanted.kinds[c] && found.orders[c] == wanted.orders[c], "the kind of cell", c);
+    for (int i = 0; i < cell_topology(wanted.kinds[c]).num_vertices; ++i) {
+      const auto corner = [&](const NodalMesh& mesh) -> const Vec3& {
+        return mesh.positions[static_cast<std::size_t>(mesh.cell(c)[static_cast<std::size_t>(i)])];
+      };
+      const double size = corner(wanted).cwiseAbs().maxCoeff();
+      const double rounding = extension == ".bdf" ? 1e-7 : 0;  // sixteen characters hold eight digits at least
+      file.same((corner(found) - corner(wanted)).cwiseAbs().maxCoeff() <= rounding * size, "the corners of cell", c);
+    }
+  }
 }
 
 // --- .obj, .usda ----------------------------------------------------------------------------------------------------
@@ -399,6 +425,7 @@ void require_written(const fs::path& path, const VolumeMesh& mesh) {
   const std::string extension = lower_case_extension(path);
   read_back(path, [&](const WrittenFile& file) {
     if (extension == ".mesh" || extension == ".vtk") return compare_linear(file, mesh, extension == ".mesh");
+    if (is_nodal_output(extension)) return compare_nodal(file, extension, nodal_mesh(mesh));
     const GroupedFaces faces = grouped_faces(mesh);
     compare_cells(file, extension,
                   {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references, &faces});
@@ -408,6 +435,10 @@ void require_written(const fs::path& path, const VolumeMesh& mesh) {
 void require_written(const fs::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
   const std::string extension = lower_case_extension(path);
   if (extension == ".mesh" || extension == ".vtk") return require_written(path, small_cells(mesh, options));
+  if (is_nodal_output(extension)) {
+    const NodalMesh wanted = written_nodes(mesh, extension, options);
+    return read_back(path, [&](const WrittenFile& file) { compare_nodal(file, extension, wanted); });
+  }
   read_back(path, [&](const WrittenFile& file) {
     const bool is_vtu = extension == ".vtu";
     const HighOrderMesh written = file_cells(mesh, extension, options.map_tolerance_percent).mesh;

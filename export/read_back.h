@@ -16,9 +16,9 @@
 
 namespace subvol {
 
-/// Checks a .mesh (with tags), .vtk, .vtu or .msh.
+/// Checks a .mesh (with tags), .vtk, .vtu, .msh, .inp, .bdf or .mfem.
 void require_written(const std::filesystem::path& path, const VolumeMesh& mesh);
-/// Checks a .vtu (with the map), a .msh, or a .mesh or .vtk of linear cells.
+/// Checks a .vtu (with the map), a .msh, .inp, .bdf or .mfem, or a .mesh or .vtk of linear cells.
 void require_written(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
 /// Checks an .obj or .usda.
 void require_written(const std::filesystem::path& path, const PolygonMesh& surface);

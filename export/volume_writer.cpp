@@ -4,9 +4,11 @@
 #include "export/cell_text.h"
 #include "export/group_data.h"
 #include "export/grouped_faces.h"
+#include "export/nodal_export.h"
 #include "export/text_format.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>
@@ -59,8 +61,12 @@ std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima,
                   std::span<const VertexField> fields) {
   const std::string extension = lower_case_extension(path);
+  if (is_nodal_output(extension)) {
+    require_cells(mesh, cell_minima, fields);
+    return write_file_atomically(path, nodal_text(extension, nodal_mesh(mesh)));
+  }
   if (extension != ".vtu" && extension != ".msh")
-    throw InputError(path.string() + ": expected the extension .vtu or .msh");
+    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf or .mfem");
   write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields)
                                                   : msh_text(mesh, cell_minima, fields));
 }

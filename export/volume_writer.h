@@ -16,12 +16,12 @@ struct VertexField {
   std::vector<double> values;
 };
 
-/// Returns linear cells as a VTK XML unstructured grid: one piece, file version 2.2, arrays in base64 of little-endian
+/// Returns linear cells as a VTK XML unstructured grid: one piece, file version 1.0, arrays in base64 of little-endian
 /// numbers.
 ///
-/// Cells are written as Lagrange tets, hexes and wedges (71, 72, 73) of order 1, whose corners are numbered as in
-/// VolumeMesh; VTK's plain wedge would have the opposite orientation. Cell data: `reference` if the mesh has
-/// references, and `scaled_jacobian` if values are given. Point data: the fields. Tags are not written.
+/// Cells are plain tets, hexes and wedges (10, 12, 13); VTK's wedge has the opposite orientation of a prism here. Cell
+/// data: `material` and `reference`, the same numbers, if the mesh has references, and `scaled_jacobian` if values are
+/// given. Point data: the fields. Tags are not written.
 ///
 /// cell_minima  one scaled Jacobian per cell, or empty. fields: one number per vertex each.
 /// InputError: no cells, arrays of inconsistent length, a vertex number out of range, a number that is not finite.
@@ -35,8 +35,9 @@ std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                      std::span<const VertexField> fields = {});
 
-/// Writes `vtu_text` or `msh_text`, depending on the extension; the whole text or nothing. InputError: another
-/// extension. IoError: the file cannot be written.
+/// Writes `vtu_text`, `msh_text`, or the cells as .inp, .bdf or .mfem (subvol/io/nodal_writers.h), which hold neither
+/// minima nor fields, depending on the extension; the whole text or nothing. InputError: another extension. IoError:
+/// the file cannot be written.
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                   std::span<const VertexField> fields = {});
 

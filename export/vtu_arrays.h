@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/base/base64.h"
+
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 
 namespace subvol {
 
@@ -25,11 +25,6 @@ template <>
 constexpr const char* vtu_type<std::int64_t>() { return "Int64"; }
 template <>
 constexpr const char* vtu_type<std::uint8_t>() { return "UInt8"; }
-
-/// Appends bytes as base64, four digits for three bytes.
-void append_base64(std::string& text, std::string_view bytes);
-/// Returns the bytes, or nothing if a character or the length is invalid in base64.
-std::optional<std::string> decode_base64(std::string_view digits);
 
 /// Appends a `<DataArray>` with its length in bytes and its numbers in base64. attributes: the name and any others.
 template <class T>

@@ -16,7 +16,7 @@ std::string_view attribute(std::string_view tag, const std::string& key) {
 
 }  // namespace
 
-VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move(name)) {
+VtuArrays::VtuArrays(std::string name, std::string_view bytes, const std::string& version) : name_(std::move(name)) {
   require_no_utf16(name_, bytes);
   const std::size_t begin = bytes.find("<VTKFile");
   if (begin == std::string_view::npos || bytes.find("</VTKFile>") == std::string_view::npos)
@@ -24,12 +24,13 @@ VtuArrays::VtuArrays(std::string name, std::string_view bytes) : name_(std::move
   // Everything that subvol does not write is reported in the same way: nobody should edit headers one by one until the
   // file is accepted.
   const auto refuse_foreign = [&](const std::string& found) {
-    fail("another program has written this .vtu (" + found +
-         "), and of those subvol reads none, only its own; save it as legacy .vtk");
+    fail("another program has written this .vtu (" + found + "), and it holds no exact map of curved cells");
   };
   const std::string_view header = tag(bytes, begin);
-  for (const auto& [key, expected] : {std::pair{"type", "UnstructuredGrid"}, {"version", "2.2"},
-                                      {"byte_order", "LittleEndian"}, {"header_type", "UInt64"}})
+  for (const auto& [key, expected] : {std::pair<const char*, std::string>{"type", "UnstructuredGrid"},
+                                      {"version", version},
+                                      {"byte_order", "LittleEndian"},
+                                      {"header_type", "UInt64"}})
     if (attribute(header, key) != expected)
       refuse_foreign("its " + std::string(key) + " is " + in_quotes(attribute(header, key)) + ", not '" + expected +
                      "'");

@@ -19,8 +19,9 @@ namespace subvol {
 /// the file.
 class VtuArrays {
  public:
-  /// name: of the file, for messages; `bytes` must outlive this object.
-  VtuArrays(std::string name, std::string_view bytes);
+  /// name: of the file, for messages; `bytes` must outlive this object. version: of the file, "2.2" or, for linear
+  /// cells, "1.0".
+  VtuArrays(std::string name, std::string_view bytes, const std::string& version = "2.2");
 
   bool has(const std::string& array) const { return arrays_.contains(array); }
 

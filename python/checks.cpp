@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
+#include "export/curved_file.h"
 #include "fit/geometry/self_intersection.h"
 #include "fit/mesh_check.h"
 #include "python/arrays.h"
@@ -22,8 +23,8 @@ struct CheckedMesh {
     } else if (is_path(object) && cli::is_high_order_file(path_from(object))) {
       const std::string path = path_from(object);
       const py::gil_scoped_release unlocked;
-      curved = std::make_shared<const CurvedMesh>(read_high_order(path));
-      lagrange = cli::check_lagrange_cells(path, curved->mesh);
+      curved = std::make_shared<const CurvedMesh>(read_curved(path));
+      if (holds_exact_map(path)) lagrange = cli::check_lagrange_cells(path, curved->mesh);
     } else {
       linear = volume_from(object, "mesh", false);
     }

@@ -3,6 +3,7 @@
 #include "cli/runs/shell_output.h"
 #include "cli/runs/writing.h"
 #include "cli/runs/written_result.h"
+#include "export/curved_file.h"
 #include "fit/mesh_check.h"
 #include "fit/quality/quality.h"
 #include "python/fit_options.h"
@@ -25,7 +26,7 @@ py::object read(const py::object& path, const py::kwargs& given) {
     std::shared_ptr<CurvedMesh> curved;
     {
       const py::gil_scoped_release unlocked;
-      curved = std::make_shared<CurvedMesh>(read_high_order(file));
+      curved = std::make_shared<CurvedMesh>(read_curved(file));
     }
     return py::cast(curved);
   }

@@ -71,6 +71,9 @@ const std::vector<Library> kLibraries{
     {"CGAL/", {"fit/geometry", "shell"}, "_cgal.cpp"},
     {"opensubdiv/", {"subvol/subdivision", "bench", "tests"}, ".cpp"},
     {"tiny_gltf", {"export"}, ".cpp"},
+    {"pugixml", {"subvol/io"}, "_pugixml.cpp"},
+    {"zlib", {"subvol/io", "tests"}, ".cpp"},
+    {"lz4", {"subvol/io"}, ".cpp"},
     {"CLI/", {"cli/verbs"}, ""},
     {"pybind11/", {"python"}, ""},
 };

@@ -2,11 +2,13 @@
 #include "cli/runs/loading.h"
 
 #include "cli/runs/exit_status.h"
+#include "export/curved_file.h"
 #include "fit/geometry/surface_distance.h"
 #include "fit/mesh_check.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
@@ -16,14 +18,9 @@
 
 namespace subvol::cli {
 
-bool is_volume_file(const std::filesystem::path& path) {
-  const std::string extension = lower_case(path.extension().string());
-  return extension == ".mesh" || extension == ".vtk";
-}
-
-bool is_high_order_file(const std::filesystem::path& path) { return lower_case(path.extension().string()) == ".vtu"; }
-
 namespace {
+
+bool has_cells(const std::filesystem::path& path) { return is_nodal_extension(path); }
 
 bool is_surface_or_points(const std::filesystem::path& path) {
   const std::string extension = lower_case(path.extension().string());
@@ -32,8 +29,16 @@ bool is_surface_or_points(const std::filesystem::path& path) {
 
 }  // namespace
 
+bool is_volume_file(const std::filesystem::path& path) { return has_cells(path) && !is_high_order_file(path); }
+
+bool is_high_order_file(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!has_cells(path) || !std::filesystem::is_regular_file(path, ignored)) return false;
+  return holds_exact_map(path) || holds_curved_cells(path);
+}
+
 void require_known_file(const std::filesystem::path& path) {
-  if (is_volume_file(path) || is_high_order_file(path) || is_surface_or_points(path)) return;
+  if (has_cells(path) || is_surface_or_points(path)) return;
   throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +
                    "; of cells there are " + cell_formats() + "; of surfaces " + surface_formats() + "; of points " +
                    point_cloud_formats());
@@ -47,7 +52,7 @@ void require_surface_file(const std::filesystem::path& path) {
 
 void require_cell_file(const std::filesystem::path& path) {
   require_known_file(path);
-  if (is_surface_or_points(path))
+  if (!has_cells(path))
     throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
   if (is_high_order_file(path))
     throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but linear cells are wanted: " +
@@ -101,8 +106,9 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
   return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
 }
 
-HighOrderFile load_high_order(const std::filesystem::path& path) {
-  HighOrderFile file = read_high_order(path);
+HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings,
+                              const std::string& references) {
+  HighOrderFile file = read_curved(path, warnings, references);
   const auto& x = file.mesh.coefficients;  // positions of vertices, then displacements
   const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
   if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
@@ -112,7 +118,7 @@ HighOrderFile load_high_order(const std::filesystem::path& path) {
 }
 
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references) {
-  if (references.empty() || is_volume_file(path)) return;
+  if (references.empty() || (has_cells(path) && !(is_high_order_file(path) && holds_exact_map(path)))) return;
   throw UsageError("--references: " + path.string() + " has no cell data to choose from");
 }
 
@@ -180,6 +186,6 @@ Json describe(const std::string& path, const HighOrderMesh& mesh) {
 
 std::string target_formats() { return surface_formats() + "; points: " + point_cloud_formats(); }
 
-std::string cell_formats() { return volume_mesh_formats() + ", .vtu (high-order, as subvol writes it)"; }
+std::string cell_formats() { return volume_mesh_formats() + "; with linear or, but for Medit, curved cells"; }
 
 }  // namespace subvol::cli

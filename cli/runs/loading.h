@@ -22,10 +22,10 @@ void require_known_file(const std::filesystem::path& path);
 void require_surface_file(const std::filesystem::path& path);
 void require_cell_file(const std::filesystem::path& path);
 
-/// True if a path has the extension of a volume mesh.
+/// True if a path has the extension of a file of cells, and does not hold curved ones; whether it exists does not matter.
 bool is_volume_file(const std::filesystem::path& path);
 
-/// True if a path has the extension of a high-order mesh, for `read_high_order`.
+/// True if a file holds curved cells, for `load_high_order`; false also if it cannot be read. Cost: that of reading it.
 bool is_high_order_file(const std::filesystem::path& path);
 
 /// A target to fit or to compare with: a surface, or points on one.
@@ -53,8 +53,9 @@ TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vect
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
 
-/// `read_high_order`; InputError also if the whole mesh is at one point.
-HighOrderFile load_high_order(const std::filesystem::path& path);
+/// `read_curved`; InputError also if the whole mesh is at one point. warnings: may be null.
+HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr,
+                              const std::string& references = {});
 
 /// UsageError: --references was given for a file in which cell data cannot be chosen.
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references);

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 /// Prefix of each Part; in -o it stands before the file, separated by a colon.
 constexpr std::array<std::string_view, 5> kPartNames{"", "cage", "cutaway", "animation", "boundary"};
-constexpr std::array<std::string_view, 4> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh"};
+constexpr std::array<std::string_view, 7> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh", ".inp", ".bdf", ".mfem"};
 constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
 constexpr std::array<std::string_view, 2> kSceneExtensions{".glb", ".gltf"};
 
@@ -97,7 +97,7 @@ bool Output::is_volume() const { return contains(kVolumeExtensions, extension); 
 bool Output::is_scene() const { return contains(kSceneExtensions, extension); }
 
 bool holds_polynomial_cells(const Output& output) {
-  return output.extension == ".vtu" || output.extension == ".msh";
+  return output.is_volume() && output.extension != ".mesh" && output.extension != ".vtk";
 }
 
 std::string output_formats() {

@@ -2,6 +2,7 @@
 #include "cli/runs/report_pictures.h"
 
 #include "cli/runs/loading.h"
+#include "export/curved_file.h"
 #include "export/export.h"
 #include "export/high_order_file.h"
 #include "export/raster.h"
@@ -101,7 +102,7 @@ fs::path find_file(const std::string& name, const fs::path& folder) {
 
 Shown load_shown(const fs::path& path) {
   std::vector<std::string> warnings;
-  if (is_high_order_file(path)) return shown(read_high_order(path).mesh);
+  if (is_high_order_file(path)) return shown(read_curved(path).mesh);
   if (is_volume_file(path)) return shown(load_volume(path, warnings));
   Shown result;
   result.triangles = load_surface(path, warnings);

@@ -149,7 +149,7 @@ std::optional<std::string> inward_warning(const TriangleMesh& surface) {
 void write_shell(const Output& output, const ShellResult& shell, const WritingOptions& options) {
   if (shows_surface(output)) {
     write_scene(output.path, scene_of(shell, scene_options(output, options)));
-  } else if (output.extension == ".vtu" || output.extension == ".msh") {
+  } else if (holds_polynomial_cells(output)) {
     write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell));
     require_written(output.path, shell.mesh);
   } else {
@@ -161,7 +161,7 @@ void write_shell(const Output& output, const ShellResult& shell, const CurvedShe
                  const WritingOptions& options) {
   if (output.part == Part::cage) return write_output(output, shell.mesh, options);
   if (shows_surface(output)) return write_scene(output.path, scene_of(shell, curved, scene_options(output, options)));
-  if (output.extension == ".vtu" || output.extension == ".msh") {
+  if (holds_polynomial_cells(output)) {
     const std::vector<VertexField> fields = thickness_fields(shell);
     return write_curved_cells(output, curved.mesh,
                               {.cell_minima = curved.quality.cell_minima,

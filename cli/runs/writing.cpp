@@ -33,7 +33,7 @@ SceneValue scene_value(const Json& value) {
 }
 
 void write_cells(const Output& output, const VolumeMesh& mesh) {
-  if (output.extension == ".vtu" || output.extension == ".msh") {
+  if (holds_polynomial_cells(output)) {
     write_volume(output.path, mesh, measure_quality(mesh).cell_minima);
   } else {
     write_volume_mesh(output.path, mesh);

@@ -65,11 +65,15 @@ std::vector<PolynomialCells> check_polynomial_cells(std::span<const Output> outp
 
 std::vector<std::string> polynomial_cells_warnings(const PolynomialCells& cells) {
   std::vector<std::string> warnings;
+  const bool is_serendipity = cells.file.ends_with(".inp") || cells.file.ends_with(".bdf");
   if (!cells.is_close)
     warnings.push_back(cells.file + formatted(": its polynomial cells are up to %.3g %% of the diagonal away from the "
-                                              "curved cells, which is more than --map-tolerance; the basis legendre "
-                                              "needs no such approximation up to order %d",
-                                              cells.distance_percent, kMaxVtkOrder));
+                                              "curved cells, which is more than --map-tolerance; %s",
+                                              cells.distance_percent,
+                                              is_serendipity ? "its elements have nodes on edges only, and lack those "
+                                                               "inside faces"
+                                                             : "the basis legendre needs no such approximation up to "
+                                                               "the largest order of the format"));
   if (!cells.check.valid())
     warnings.push_back(cells.file + ": its polynomial cells, which other programs compute with, are not valid" +
                        (cells.check.quality ? formatted(": %zu of %zu are not certified",

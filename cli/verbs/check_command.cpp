@@ -9,6 +9,7 @@
 #include "cli/runs/writing.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/verb_options.h"
+#include "export/curved_file.h"
 #include "subvol/base/version.h"
 #include "subvol/io/surface_io.h"
 
@@ -31,7 +32,7 @@ struct Checked {
   MeshCheck check;
   Json input;                             ///< description of the mesh
   std::optional<SubdivisionAudit> audit;  ///< for a mesh that may be subdivided
-  std::optional<LagrangeCheck> lagrange;  ///< for curved cells
+  std::optional<LagrangeCheck> lagrange;  ///< for the cells beside an exact map
 
   bool valid() const { return check.valid() && (!lagrange || lagrange->valid()); }
 };
@@ -53,11 +54,14 @@ Checked check_linear(const CheckArguments& arguments, const std::optional<Target
 }
 
 Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target,
-                         const WorkProgress& progress) {
-  const HighOrderMesh mesh = load_high_order(arguments.mesh).mesh;
+                         const WorkProgress& progress, std::vector<std::string>& warnings) {
+  const HighOrderMesh mesh = load_high_order(arguments.mesh, &warnings, arguments.run.references).mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
-  return {against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
-          describe(arguments.mesh, mesh), std::nullopt, check_lagrange_cells(arguments.mesh, mesh)};
+  Checked checked{
+      against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
+      describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
+  if (holds_exact_map(arguments.mesh)) checked.lagrange = check_lagrange_cells(arguments.mesh, mesh);
+  return checked;
 }
 
 Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Checked& checked,
@@ -94,7 +98,7 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet || arguments.json);
-  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target, teller.work())
+  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target, teller.work(), warnings)
                                                              : check_linear(arguments, target, teller.work(), warnings);
   teller.finish();
   if (!arguments.run.quiet) {

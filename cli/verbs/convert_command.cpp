@@ -45,7 +45,7 @@ int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& o
                        std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   for (const Output& output : outputs) require_for_curved_cells(output);
-  const HighOrderFile file = load_high_order(arguments.input);
+  const HighOrderFile file = load_high_order(arguments.input, &warnings, arguments.run.references);
   const auto is_set = [](int reference) { return reference != 0; };
   const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
   const Marks marks{.references = static_cast<std::size_t>(num_set), .groups = file.face_groups.groups.size()};

@@ -23,7 +23,6 @@ struct ParsedMesh {
 /// references  `ReadOptions::references`.
 /// Errors: as `read_volume_mesh`.
 ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const std::string& references);
-ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes, const std::string& references);
 
 /// Return the bytes of the file. The mesh must be consistent, which `write_volume_mesh` checks.
 std::string format_medit(const VolumeMesh& mesh);

@@ -5,6 +5,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/mesh_formats.h"
+#include "subvol/io/nodal_formats.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 
@@ -22,12 +23,36 @@ struct Format {
   const char* extension;
   const char* description;
   ParsedMesh (*parse)(const std::string& name, std::string_view bytes, const std::string& references);
-  std::string (*format)(const VolumeMesh& mesh);
+  std::string (*format)(const VolumeMesh& mesh);  ///< null: written elsewhere (export/volume_writer.h)
 };
 
+/// Parses a file of cells of any order, which must be linear.
+template <NodalMesh (*parse)(const std::string&, std::string_view, const std::string&)>
+ParsedMesh parse_linear(const std::string& name, std::string_view bytes, const std::string& references) {
+  NodalMesh mesh = parse(name, bytes, references);
+  if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
+    mesh.references.clear();
+  normalise(mesh.face_groups);
+  std::vector<std::string> warnings = std::move(mesh.warnings);
+  return {linear_mesh(name, std::move(mesh)), std::move(warnings)};
+}
+
+ParsedMesh parse_mesh_file(const std::string& name, std::string_view bytes, const std::string& references) {
+  return is_mfem(bytes) ? parse_linear<parse_mfem>(name, bytes, references) : parse_medit(name, bytes, references);
+}
+
+constexpr const char* kNastran = "Nastran bulk data";
 constexpr Format kFormats[] = {
-    {".mesh", "Medit ASCII, versions 1 to 4", parse_medit, format_medit},
-    {".vtk", "legacy VTK 2.0 to 5.1, ASCII or binary, unstructured grid", parse_legacy_vtk, format_legacy_vtk},
+    {".mesh", "Medit ASCII, versions 1 to 4, or MFEM 1.0", parse_mesh_file, format_medit},
+    {".vtk", "legacy VTK 2.0 to 5.1, ASCII or binary, unstructured grid", parse_linear<parse_nodal_vtk>,
+     format_legacy_vtk},
+    {".vtu", "VTK XML 0.1 to 2.2", parse_linear<parse_vtu>, nullptr},
+    {".msh", "Gmsh 2.2 to 4.1, ASCII or binary", parse_linear<parse_msh>, nullptr},
+    {".inp", "Abaqus and CalculiX", parse_linear<parse_inp>, nullptr},
+    {".bdf", kNastran, parse_linear<parse_nastran>, nullptr},
+    {".nas", kNastran, parse_linear<parse_nastran>, nullptr},
+    {".fem", kNastran, parse_linear<parse_nastran>, nullptr},
+    {".mfem", "MFEM 1.0", parse_linear<parse_mfem>, nullptr},
 };
 
 const Format& format_of(const fs::path& path) {
@@ -179,6 +204,7 @@ VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
 
 void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {
   const Format& format = format_of(path);
+  if (!format.format) throw InputError(path.string() + ": expected the extension .mesh or .vtk");
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind <= MeshDefect::Kind::not_finite || defect.kind == MeshDefect::Kind::bad_tag)
       throw InputError("write_volume_mesh: " + defect.message);

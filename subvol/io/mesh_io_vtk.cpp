@@ -4,6 +4,7 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/mesh_formats.h"
+#include "subvol/io/nodal_formats.h"
 #include "subvol/io/reference_arrays.h"
 
 #include <algorithm>
@@ -17,23 +18,6 @@
 namespace subvol {
 
 namespace {
-
-/// A VTK cell type that can be read. corner[i]: the VTK cell's number of our corner i.
-struct VtkCell {
-  int type;
-  CellKind kind;
-  std::array<std::int8_t, kMaxCellVertices> corner;
-};
-constexpr VtkCell kVtkCells[] = {
-    {12, CellKind::hex, {0, 1, 2, 3, 4, 5, 6, 7}},
-    {11, CellKind::hex, {0, 1, 3, 2, 4, 5, 7, 6}},  // voxel: x runs fastest
-    {13, CellKind::prism, {0, 2, 1, 3, 5, 4}},      // wedge: the normal of 0 1 2 points away from 3 4 5
-    {10, CellKind::tet, {0, 1, 2, 3}},
-};
-
-constexpr int kPyramid = 14;
-/// Types of vertices, lines and polygons, linear and of higher order.
-constexpr int kLowerDimensions[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75, 76, 77};
 
 struct VtkType {
   const char* name;
@@ -62,12 +46,14 @@ constexpr VtkAttribute kSkippedAttributes[] = {
     {"color_scalars", 0, true}, {"lookup_table", 4, true},
 };
 
+constexpr int kPyramid = 14;
+
 class VtkParser {
  public:
   VtkParser(const std::string& name, std::string_view bytes, const std::string& references)
       : scan_(name, bytes, TextScanner::Comments::none), name_(name), asked_(references) {}
 
-  ParsedMesh parse() {
+  NodalMesh parse() {
     read_header();
     while (const auto word = scan_.next()) {
       const std::string keyword = lower_case(*word);
@@ -75,7 +61,7 @@ class VtkParser {
       else if (keyword == "cells") read_cells();
       else if (keyword == "cell_types") read_cell_types();
       else if (keyword == "cell_data") read_attributes(num_cells_, true);
-      else if (keyword == "point_data") read_attributes(parsed_.mesh.num_vertices(), false);
+      else if (keyword == "point_data") read_attributes(mesh_.positions.size(), false);
       else if (keyword == "field") read_field(false);
       else if (keyword == "metadata") skip_metadata();
       else scan_.fail("expected a section of an unstructured grid, found " + in_quotes(*word));
@@ -85,7 +71,7 @@ class VtkParser {
     if (!has_cells_) scan_.fail("the file ends without CELLS");
     if (!has_types_) scan_.fail("the file ends without CELL_TYPES");
     build_cells();
-    return std::move(parsed_);
+    return std::move(mesh_);
   }
 
  private:
@@ -98,6 +84,7 @@ class VtkParser {
     const auto number = parse_number(version.next().value_or(""));
     if (!number || *number < 2.0 || *number > 5.1) scan_.fail("expected version 2.0 to 5.1 of legacy VTK");
     major_ = static_cast<int>(*number);
+    old_numbers_ = *number < 5.1;
     if (!scan_.line()) scan_.fail("the file ends where the title is expected");
 
     const std::string format = lower_case(scan_.word("ASCII or BINARY"));
@@ -165,10 +152,10 @@ class VtkParser {
     const std::size_t n = read_count("the number of points");
     const ValueType type = read_type();
     if (n > scan_.bytes_left() / 3) scan_.fail("the file ends within the coordinates");
-    parsed_.mesh.positions.resize(n);
+    mesh_.positions.resize(n);
     read_values(3 * n, type, "a coordinate", [&](std::size_t i, double value) {
       if (!std::isfinite(value)) scan_.fail("point " + std::to_string(i / 3) + " has a coordinate that is not finite");
-      parsed_.mesh.positions[i / 3][static_cast<Eigen::Index>(i % 3)] = value;
+      mesh_.positions[i / 3][static_cast<Eigen::Index>(i % 3)] = value;
     });
   }
 
@@ -270,7 +257,7 @@ class VtkParser {
   void end_attributes(std::string_view word) {
     stray_attribute_ = true;
     if (std::none_of(arrays_.begin(), arrays_.end(), may_be_references) || !asked_.empty())
-      parsed_.warnings.push_back("attributes from " + in_quotes(word) + " on are not read");
+      mesh_.warnings.push_back("attributes from " + in_quotes(word) + " on are not read");
   }
 
   void read_scalars(std::size_t n, bool of_cells) {
@@ -374,14 +361,17 @@ class VtkParser {
     } catch (const InputError& error) {
       throw InputError(name_ + ": " + error.what());
     }
+    if (chosen) references_ = arrays_[*chosen].values;
+    const auto is_chosen = [&](const CellNumbers& array) { return chosen && array.values == references_; };
     LeftOut left_out;
-    left_out.add("data arrays", num_arrays_ - (chosen ? 1 : 0));
-    left_out.tell(parsed_.warnings);
+    left_out.add("data arrays", num_arrays_ - std::count_if(arrays_.begin(), arrays_.end(), is_chosen));
+    left_out.tell(mesh_.warnings);
     if (!chosen) return;
-    references_ = arrays_[*chosen].values;
-    const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), may_be_references) - 1;
+    const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), [&](const CellNumbers& array) {
+      return may_be_references(array) && !is_chosen(array);
+    });
     if (rivals > 0 && asked_.empty())
-      parsed_.warnings.push_back("references are taken from the cell data " + in_quotes(arrays_[*chosen].name) +
+      mesh_.warnings.push_back("references are taken from the cell data " + in_quotes(arrays_[*chosen].name) +
                                  "; there are " + std::to_string(rivals) +
                                  " more of whole numbers, of which --references NAME chooses another");
   }
@@ -398,72 +388,65 @@ class VtkParser {
     if (types_.size() != num_cells_)
       scan_.fail(std::to_string(types_.size()) + " cell types for " + std::to_string(num_cells_) + " cells",
                  types_line_);
+    NodalCells cells(mesh_);
+    const std::size_t num_points = mesh_.positions.size();
     for (std::size_t c = 0; c < num_cells_; ++c) {
-      const auto known = std::find_if(std::begin(kVtkCells), std::end(kVtkCells),
-                                      [&](const VtkCell& cell) { return cell.type == types_[c]; });
-      if (known != std::end(kVtkCells)) {
-        add_cell(c, *known);
-        continue;
-      }
-      const std::string name = "cell " + std::to_string(c);
-      if (types_[c] == kPyramid)
-        scan_.fail(name + " is a pyramid, of " + std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) +
-                       ": " + kNoPyramids,
-                   types_line_);
-      if (std::find(std::begin(kLowerDimensions), std::end(kLowerDimensions), types_[c]) == std::end(kLowerDimensions))
-        scan_.fail(name + " has VTK type " + std::to_string(types_[c]) +
-                       ", expected 10 (tet), 11 (voxel), 12 (hex) or 13 (wedge)", types_line_);
-      ++num_skipped_;
+      const auto fail = [&](const std::string& what) {
+        const bool is_pyramid = types_[c] == kPyramid;
+        scan_.fail("cell " + std::to_string(c) +
+                       (is_pyramid ? " is a pyramid, of " +
+                                         std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) + ": " +
+                                         kNoPyramids
+                                   : ' ' + what),
+                   what.starts_with("has VTK") || is_pyramid ? types_line_ : cells_line_);
+      };
+      const std::span<const std::int64_t> nodes(corners_.data() + offsets_[c], offsets_[c + 1] - offsets_[c]);
+      const int type = static_cast<int>(std::clamp<std::int64_t>(types_[c], -1, 1000000));
+      for (const std::int64_t node : nodes)  // nodes that complete cells come after those of the file
+        if (node < 0 || static_cast<std::uint64_t>(node) >= num_points)
+          fail("names point " + std::to_string(node) + " of " + std::to_string(num_points));
+      if (add_vtk_cell(mesh_, cells, type, nodes, old_numbers_, fail) == VtkCellUse::lower_dimension)
+        ++num_skipped_;
+      else
+        add_reference(c);
     }
     if (num_skipped_ > 0)
-      parsed_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
+      mesh_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
     if (num_beyond_ > 0)
-      parsed_.warnings.push_back("the references of " + std::to_string(num_beyond_) +
-                                 " cells are beyond 32 bits, and become 0");
-    auto& references = parsed_.mesh.references;
-    if (std::all_of(references.begin(), references.end(), [](int r) { return r == 0; })) references.clear();
+      mesh_.warnings.push_back("the references of " + std::to_string(num_beyond_) +
+                               " cells are beyond 32 bits, and become 0");
   }
 
-  void add_cell(std::size_t c, const VtkCell& vtk_cell) {
-    const auto size = static_cast<std::size_t>(cell_topology(vtk_cell.kind).num_vertices);
-    const std::span<const std::int64_t> corners(corners_.data() + offsets_[c], offsets_[c + 1] - offsets_[c]);
-    if (corners.size() != size)
-      scan_.fail("cell " + std::to_string(c) + " of VTK type " + std::to_string(vtk_cell.type) + " has " +
-                     std::to_string(corners.size()) + " corners, expected " + std::to_string(size), cells_line_);
-    std::array<Index, kMaxCellVertices> cell;
-    for (std::size_t i = 0; i < size; ++i) {
-      const std::int64_t v = corners[static_cast<std::size_t>(vtk_cell.corner[i])];
-      if (v < 0 || static_cast<std::uint64_t>(v) >= parsed_.mesh.num_vertices())
-        scan_.fail("cell " + std::to_string(c) + " names point " + std::to_string(v) + " of " +
-                       std::to_string(parsed_.mesh.num_vertices()), cells_line_);
-      cell[i] = static_cast<Index>(v);
-    }
-    parsed_.mesh.add_cell(vtk_cell.kind, {cell.data(), size});
+  void add_reference(std::size_t c) {
     const std::int64_t reference = references_.empty() ? 0 : references_[c];
     const bool fits = reference >= std::numeric_limits<int>::min() && reference <= std::numeric_limits<int>::max();
-    parsed_.mesh.references.push_back(fits ? static_cast<int>(reference) : 0);
+    mesh_.references.push_back(fits ? static_cast<int>(reference) : 0);
     num_beyond_ += !fits;
   }
 
   TextScanner scan_;
   std::string name_, asked_;
-  ParsedMesh parsed_;
+  NodalMesh mesh_;
   std::vector<CellNumbers> arrays_;   ///< arrays from which the references may be chosen
   std::vector<std::string> others_;   ///< names of the other cell data
   int major_ = 0;
-  bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false;
+  bool binary_ = false, has_points_ = false, has_cells_ = false, has_types_ = false, stray_attribute_ = false,
+       old_numbers_ = false;
   std::size_t num_arrays_ = 0, num_cells_ = 0, num_skipped_ = 0, num_beyond_ = 0, cells_line_ = 0, types_line_ = 0;
   std::vector<std::size_t> offsets_{0};
   std::vector<std::int64_t> corners_, types_, references_;
 };
 
-const VtkCell& vtk_cell_of(CellKind kind) {
-  return *std::find_if(std::begin(kVtkCells), std::end(kVtkCells), [&](const VtkCell& c) { return c.kind == kind; });
+/// The VTK type of a linear cell, and the place in it of each of our corners; each of these orders is its own inverse.
+int vtk_linear_type(CellKind kind) { return kind == CellKind::tet ? 10 : kind == CellKind::hex ? 12 : 13; }
+std::size_t vtk_corner(CellKind kind, std::size_t i) {
+  constexpr std::array<std::size_t, 6> kWedge{0, 2, 1, 3, 5, 4};  // the normal of 0 1 2 points away from 3 4 5
+  return kind == CellKind::prism ? kWedge[i] : i;
 }
 
 }  // namespace
 
-ParsedMesh parse_legacy_vtk(const std::string& name, std::string_view bytes, const std::string& references) {
+NodalMesh parse_nodal_vtk(const std::string& name, std::string_view bytes, const std::string& references) {
   return VtkParser(name, bytes, references).parse();
 }
 
@@ -479,17 +462,19 @@ std::string format_legacy_vtk(const VolumeMesh& mesh) {
           std::to_string(mesh.num_cells() + mesh.cell_vertices.size()) + "\n";
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const auto cell = mesh.cell(c);
-    const auto& corner = vtk_cell_of(mesh.kinds[c]).corner;  // each of these orders is its own inverse
     text += std::to_string(cell.size());
     for (std::size_t i = 0; i < cell.size(); ++i)
-      text.append(" ").append(std::to_string(cell[static_cast<std::size_t>(corner[i])]));
+      text.append(" ").append(std::to_string(cell[vtk_corner(mesh.kinds[c], i)]));
     text += '\n';
   }
   text += "CELL_TYPES " + std::to_string(mesh.num_cells()) + "\n";
-  for (const CellKind kind : mesh.kinds) text += std::to_string(vtk_cell_of(kind).type) + "\n";
+  for (const CellKind kind : mesh.kinds) text += std::to_string(vtk_linear_type(kind)) + "\n";
   if (!mesh.references.empty()) {
-    text += "CELL_DATA " + std::to_string(mesh.num_cells()) + "\nSCALARS reference int 1\nLOOKUP_TABLE default\n";
-    for (const int reference : mesh.references) text += std::to_string(reference) + "\n";
+    text += "CELL_DATA " + std::to_string(mesh.num_cells()) + "\n";
+    for (const char* array : {"material", "reference"}) {  // MFEM looks for the first name, subvol for the second
+      text += std::string("SCALARS ") + array + " int 1\nLOOKUP_TABLE default\n";
+      for (const int reference : mesh.references) text += std::to_string(reference) + "\n";
+    }
   }
   return text;
 }

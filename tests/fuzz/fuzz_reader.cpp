@@ -2,7 +2,7 @@
 // libFuzzer target of one of the library's readers: kExtension says of which files. Whatever the bytes, the reader
 // returns something sound or throws InputError.
 
-#include "export/high_order_file.h"
+#include "export/curved_file.h"
 #include "fit/stages/checkpoint.h"
 #include "subvol/base/error.h"
 #include "subvol/base/fingerprint.h"
@@ -43,6 +43,18 @@ void read_points(const std::filesystem::path& file) {
   require_finite(cloud.points);
 }
 
+/// Linear cells as such, and all cells as polynomials, also those of a .vtu with an exact map.
+void read_cells(const std::filesystem::path& file) {
+  std::vector<std::string> warnings;
+  if (!subvol::holds_exact_map(file) && !subvol::holds_curved_cells(file)) {
+    const subvol::VolumeMesh mesh = subvol::read_volume_mesh(file, {.check = false, .warnings = &warnings});
+    require_finite(mesh.positions);
+    require_indices(mesh.cell_vertices, mesh.positions.size());
+  }
+  const subvol::HighOrderMesh mesh = subvol::read_curved(file, &warnings).mesh;
+  require(mesh.coefficients.size() == mesh.space.num_nodes());
+}
+
 void read(const std::filesystem::path& file) {
   if (kExtension == ".mesh" || kExtension == ".vtk") {
     std::vector<std::string> warnings;
@@ -50,9 +62,8 @@ void read(const std::filesystem::path& file) {
     for (const subvol::MeshDefect& defect : validate(mesh))
       require(defect.kind == subvol::MeshDefect::Kind::inverted_cell ||
               defect.kind == subvol::MeshDefect::Kind::unused_vertex);
-  } else if (kExtension == ".vtu") {
-    const subvol::HighOrderMesh mesh = subvol::read_high_order(file).mesh;
-    require(mesh.coefficients.size() == mesh.space.num_nodes());
+  } else if (subvol::is_nodal_extension(file)) {
+    read_cells(file);
   } else if (subvol::is_point_cloud_file(file)) {
     read_points(file);
   } else {

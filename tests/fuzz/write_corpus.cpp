@@ -3,6 +3,7 @@
 
 #include "export/high_order_file.h"
 #include "export/obj_writer.h"
+#include "export/volume_writer.h"
 #include "fit/stages/checkpoint.h"
 #include "samples/shapes.h"
 #include "subvol/base/atomic_file.h"
@@ -47,6 +48,13 @@ void write_volumes(const fs::path& folder) {
       fs::create_directories(folder / extension);
       write_volume_mesh(folder / extension / (name + '.' + extension), mesh);
     }
+    for (const char* extension : {"vtu", "msh", "inp", "bdf", "mfem"}) {
+      fs::create_directories(folder / extension);
+      write_volume(folder / extension / (name + '.' + extension), mesh);
+    }
+    const HighOrderMesh quadratic(ElementSpace(mesh, Basis::legendre, 2), mesh);
+    for (const char* extension : {"msh", "inp", "bdf", "mfem"})
+      write_volume(folder / extension / (name + "2." + extension), quadratic);
     for (const int order : {1, 3})
       write(folder / "vtu", (name + std::to_string(order)).c_str(),
             vtu_text({ElementSpace(mesh, order == 1 ? Basis::fourier : Basis::legendre, order), mesh}));
@@ -58,6 +66,25 @@ void write_volumes(const fs::path& folder) {
   write(folder / "vtk", "offsets", "# vtk DataFile Version 5.1\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
                                    "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY "
                                    "vtktypeint64\n0 1 2 3\nCELL_TYPES 1\n10\n");
+}
+
+void write_variants(const fs::path& folder) {
+  write(folder / "msh", "old", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n"
+                               "4 0 0 1\n$EndNodes\n$Elements\n2\n2 2 2 8 1 9 5 3\n3 4 2 6 1 9 3 5 4\n$EndElements\n");
+  write(folder / "msh", "four", "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n"
+                                "$EndEntities\n$Nodes\n1 4\n1 3 0 4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n4 0 0 1\n$EndNodes\n"
+                                "$Elements\n1 1\n1 3 4 1\n2 9 3 5 4\n$EndElements\n");
+  write(folder / "inp", "sets", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=e\n1,1,2,3,4\n"
+                                "*ELSET,ELSET=g,GENERATE\n1,9,2\n*ELSET,ELSET=s\ng,e\n*SURFACE,NAME=f\ns,S2\n");
+  write(folder / "bdf", "fields", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID           3              0.    1.+0\n"
+                                  "GRID*                  4\n*                      1.\nCTETRA,1,1,1,2,3,4\n"
+                                  "CTRIA3,2,5,1,2,3\n");
+  write(folder / "vtu", "ascii", "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid><Piece "
+                                 "NumberOfPoints=\"4\" NumberOfCells=\"1\"><Points><DataArray type=\"Float32\" "
+                                 "format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points><Cells><DataArray "
+                                 "type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" "
+                                 "Name=\"offsets\">4</DataArray><DataArray type=\"UInt8\" Name=\"types\">10</DataArray>"
+                                 "</Cells></Piece></UnstructuredGrid></VTKFile>");
 }
 
 void write_surfaces(const fs::path& folder) {
@@ -159,6 +186,7 @@ int main(int argc, char** argv) try {
   }
   const fs::path folder = argv[1];
   write_volumes(folder);
+  write_variants(folder);
   write_surfaces(folder);
   write_points(folder);
   write_checkpoints(folder);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/vtu_arrays.h"
+#include "subvol/base/base64.h"
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 
 namespace subvol {
 namespace {

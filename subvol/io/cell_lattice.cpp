@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/lagrange_lattice.h"
+#include "subvol/io/cell_lattice.h"
 
 #include "subvol/base/error.h"
 

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/io/nodal_mesh.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/nodal_formats.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace subvol {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct NodalFormat {
+  const char* extension;
+  NodalMesh (*parse)(const std::string& name, std::string_view bytes, const std::string& references);
+};
+
+constexpr NodalFormat kNodalFormats[] = {
+    {".msh", parse_msh}, {".vtu", parse_vtu}, {".vtk", parse_nodal_vtk}, {".inp", parse_inp},   {".bdf", parse_nastran},
+    {".nas", parse_nastran}, {".fem", parse_nastran}, {".mfem", parse_mfem}, {".mesh", parse_mfem},
+};
+
+const NodalFormat* nodal_format(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  const auto found = std::find_if(std::begin(kNodalFormats), std::end(kNodalFormats),
+                                  [&](const NodalFormat& format) { return extension == format.extension; });
+  return found == std::end(kNodalFormats) ? nullptr : found;
+}
+
+std::array<int, 3> key_of(const LatticePoint& at) { return {at[0], at[1], at[2]}; }
+
+/// The cell seen in a mirror: node i of the turned cell is node turned[i] of the cell.
+std::vector<int> turned_places(CellKind kind, int order) {
+  const auto mirrored = [&](const LatticePoint& at) {
+    return LatticePoint(at[1], at[0], at[2]);
+  };
+  const auto lattice = cell_lattice(kind, order, NodeOrdering::vtk);
+  std::map<std::array<int, 3>, int> place;
+  for (std::size_t i = 0; i < lattice.size(); ++i) place[key_of(lattice[i])] = static_cast<int>(i);
+  std::vector<int> turned;
+  for (const LatticePoint& at : lattice) turned.push_back(place.at(key_of(mirrored(at))));
+  return turned;
+}
+
+/// True if the straight-sided cell is left-handed at every corner.
+bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
+  const CellTopology& topology = cell_topology(mesh.kinds[c]);
+  const auto cell = mesh.cell(c);
+  for (int i = 0; i < topology.num_vertices; ++i) {
+    const auto& n = topology.corner_neighbors[i];
+    const auto edge = [&](int k) -> Vec3 { return mesh.positions[cell[n[k]]] - mesh.positions[cell[i]]; };
+    if (!(edge(0).cross(edge(1)).dot(edge(2)) < 0)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+int NodalMesh::max_order() const { return orders.empty() ? 1 : *std::max_element(orders.begin(), orders.end()); }
+
+bool NodalCells::is_size(CellKind kind, int order, std::size_t num_nodes) {
+  if (num_nodes == num_lattice_points(kind, order)) return true;
+  return order == 2 && ((kind == CellKind::hex && num_nodes == 20) || (kind == CellKind::prism && num_nodes == 15));
+}
+
+const std::vector<int>& NodalCells::places(CellKind kind, int order, NodeOrdering ordering) {
+  std::vector<int>& result = places_[{kind, order, ordering}];
+  if (!result.empty()) return result;
+  std::map<std::array<int, 3>, int> place;
+  int n = 0;
+  for (const LatticePoint& at : cell_lattice(kind, order, ordering)) place[key_of(at)] = n++;
+  for (const LatticePoint& at : cell_lattice(kind, order, NodeOrdering::vtk)) result.push_back(place.at(key_of(at)));
+  return result;
+}
+
+void NodalCells::add(CellKind kind, int order, NodeOrdering ordering, std::span<const Index> nodes) {
+  assert(is_size(kind, order, nodes.size()));
+  std::vector<Index> cell;
+  for (const int place : places(kind, order, ordering))
+    if (static_cast<std::size_t>(place) < nodes.size()) cell.push_back(nodes[static_cast<std::size_t>(place)]);
+  if (cell.size() < num_lattice_points(kind, order)) complete(kind, cell);
+  mesh_.kinds.push_back(kind);
+  mesh_.orders.push_back(order);
+  mesh_.nodes.insert(mesh_.nodes.end(), cell.begin(), cell.end());
+  mesh_.offsets.push_back(mesh_.nodes.size());
+}
+
+/// Adds a node at a sum of others, taken in ascending order so that all cells around it would get the same bits.
+Index NodalCells::center(std::span<const Index> corners, std::span<const Index> middles, double corner_weight,
+                         double middle_weight) {
+  const auto sum = [&](std::span<const Index> nodes) {
+    std::vector<Index> sorted(nodes.begin(), nodes.end());
+    std::sort(sorted.begin(), sorted.end());
+    Vec3 total = Vec3::Zero();
+    for (const Index node : sorted) total += mesh_.positions[node];
+    return total;
+  };
+  mesh_.positions.push_back(corner_weight * sum(corners) + middle_weight * sum(middles));
+  return static_cast<Index>(mesh_.positions.size() - 1);
+}
+
+// VTK lists the nodes of a cell of order 2 by corners, edges, faces with an inside, and the inside of a hex.
+void NodalCells::complete(CellKind kind, std::vector<Index>& nodes) {
+  const std::vector<LatticePoint> lattice = cell_lattice(kind, 2, NodeOrdering::vtk);
+  const auto corners = static_cast<std::size_t>(cell_topology(kind).num_vertices), given = nodes.size();
+  for (std::size_t q = given; q < lattice.size(); ++q) {
+    const LatticePoint& at = lattice[q];
+    std::vector<Index> face_corners, middles;
+    const auto same_face = [&](const LatticePoint& other) {  // around the middle of a quad, or of a hex
+      if (kind == CellKind::hex)
+        return (at[0] == 1 || other[0] == at[0]) && (at[1] == 1 || other[1] == at[1]) &&
+               (at[2] == 1 || other[2] == at[2]);
+      return at[0] == 0 ? other[0] == 0 : at[1] == 0 ? other[1] == 0 : other[0] + other[1] == 2;
+    };
+    for (std::size_t i = 0; i < given; ++i)
+      if (same_face(lattice[i])) (i < corners ? face_corners : middles).push_back(nodes[i]);
+    if (face_corners.size() != 4) {
+      nodes.push_back(center(face_corners, middles, -0.25, 0.25));  // 8 corners and 12 edges of a hex
+      continue;
+    }
+    const auto [known, is_new] = face_centers_.try_emplace(face_key(face_corners), kNoIndex);
+    if (is_new) known->second = center(face_corners, middles, -0.25, 0.5);
+    nodes.push_back(known->second);
+  }
+}
+
+bool is_nodal_extension(const fs::path& path) { return nodal_format(path) != nullptr; }
+
+NodalMesh read_nodal_mesh(const fs::path& path, const std::string& references) {
+  const NodalFormat* format = nodal_format(path);
+  if (!format) throw InputError(path.string() + ": expected .msh, .vtu, .vtk, .inp, .bdf or an MFEM .mesh");
+  NodalMesh mesh = format->parse(path.string(), read_file(path), references);
+  if (mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
+    mesh.references.clear();
+  normalise(mesh.face_groups);
+  return mesh;
+}
+
+bool holds_curved_cells(const fs::path& path) {
+  if (!is_nodal_extension(path)) return false;
+  try {
+    const std::string bytes = read_file(path);
+    if (lower_case(path.extension().string()) == ".mesh" && !is_mfem(bytes)) return false;
+    return nodal_format(path)->parse(path.string(), bytes, {}).max_order() > 1;
+  } catch (const InputError&) {
+    return false;  // whoever reads it next says why
+  }
+}
+
+VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh) {
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    if (mesh.orders[c] > 1)
+      throw InputError(name + ": cell " + std::to_string(c) + " has order " + std::to_string(mesh.orders[c]) +
+                       ": curved cells, which `check` and `convert` read, but linear cells are wanted");
+  VolumeMesh linear;
+  linear.positions = std::move(mesh.positions);
+  linear.kinds = std::move(mesh.kinds);
+  linear.cell_offsets = std::move(mesh.offsets);
+  linear.cell_vertices = std::move(mesh.nodes);
+  linear.references = std::move(mesh.references);
+  linear.face_groups = std::move(mesh.face_groups);
+  linear.regions = std::move(mesh.regions);
+  return linear;
+}
+
+void turn_over_mirrored(NodalMesh& mesh) {
+  std::size_t num_mirrored = 0, num_prisms = 0, num_mirrored_prisms = 0;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    const bool is_prism = mesh.kinds[c] == CellKind::prism, is_mirrored = is_left_handed(mesh, c);
+    num_mirrored += is_mirrored;
+    num_prisms += is_prism;
+    num_mirrored_prisms += is_prism && is_mirrored;
+  }
+  const bool all = num_mirrored == mesh.num_cells();
+  if (!all && (num_prisms == 0 || num_mirrored_prisms < num_prisms)) return;
+  std::map<std::pair<CellKind, int>, std::vector<int>> places;
+  std::vector<Index> old;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    if (!all && mesh.kinds[c] != CellKind::prism) continue;
+    std::vector<int>& turned = places[{mesh.kinds[c], mesh.orders[c]}];
+    if (turned.empty()) turned = turned_places(mesh.kinds[c], mesh.orders[c]);
+    old.assign(mesh.cell(c).begin(), mesh.cell(c).end());
+    for (std::size_t i = 0; i < old.size(); ++i)
+      mesh.nodes[mesh.offsets[c] + i] = old[static_cast<std::size_t>(turned[i])];
+  }
+  mesh.warnings.push_back((all ? "all " : "all prisms, ") + std::to_string(all ? num_mirrored : num_prisms) +
+                          " cells are left-handed at every corner, as of a mirrored mesh or of other numbering: their "
+                          "nodes are numbered anew");
+}
+
+}  // namespace subvol

@@ -1,0 +1,409 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/binary_value.h"
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/mesh_formats.h"
+#include "subvol/io/nodal_formats.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+
+namespace subvol {
+
+namespace {
+
+enum class Shape { point, line, triangle, quad, tet, hex, prism, pyramid };
+
+/// An element type of Gmsh.
+struct MshType {
+  int type;
+  Shape shape;
+  int order;
+  int size;  ///< number of nodes
+};
+
+constexpr MshType kMshTypes[] = {
+    {1, Shape::line, 1, 2},      {2, Shape::triangle, 1, 3},   {3, Shape::quad, 1, 4},       {4, Shape::tet, 1, 4},
+    {5, Shape::hex, 1, 8},       {6, Shape::prism, 1, 6},      {7, Shape::pyramid, 1, 5},    {8, Shape::line, 2, 3},
+    {9, Shape::triangle, 2, 6},  {10, Shape::quad, 2, 9},      {11, Shape::tet, 2, 10},      {12, Shape::hex, 2, 27},
+    {13, Shape::prism, 2, 18},   {14, Shape::pyramid, 2, 14},  {15, Shape::point, 1, 1},     {16, Shape::quad, 2, 8},
+    {17, Shape::hex, 2, 20},     {18, Shape::prism, 2, 15},    {19, Shape::pyramid, 2, 13},  {20, Shape::triangle, 3, 9},
+    {21, Shape::triangle, 3, 10}, {22, Shape::triangle, 4, 12}, {23, Shape::triangle, 4, 15},
+    {24, Shape::triangle, 5, 15}, {25, Shape::triangle, 5, 21}, {26, Shape::line, 3, 4},     {27, Shape::line, 4, 5},
+    {28, Shape::line, 5, 6},     {29, Shape::tet, 3, 20},      {30, Shape::tet, 4, 35},      {31, Shape::tet, 5, 56},
+    {36, Shape::quad, 3, 16},    {37, Shape::quad, 4, 25},     {38, Shape::quad, 5, 36},     {39, Shape::quad, 3, 12},
+    {40, Shape::quad, 4, 16},    {41, Shape::quad, 5, 20},     {42, Shape::triangle, 6, 28},
+    {43, Shape::triangle, 7, 36}, {44, Shape::triangle, 8, 45}, {45, Shape::triangle, 9, 55},
+    {46, Shape::triangle, 10, 66}, {47, Shape::quad, 6, 49},   {48, Shape::quad, 7, 64},     {49, Shape::quad, 8, 81},
+    {50, Shape::quad, 9, 100},   {51, Shape::quad, 10, 121},   {62, Shape::line, 6, 7},      {63, Shape::line, 7, 8},
+    {64, Shape::line, 8, 9},     {65, Shape::line, 9, 10},     {66, Shape::line, 10, 11},    {71, Shape::tet, 6, 84},
+    {72, Shape::tet, 7, 120},    {73, Shape::tet, 8, 165},     {74, Shape::tet, 9, 220},     {75, Shape::tet, 10, 286},
+    {84, Shape::line, 1, 1},     {90, Shape::prism, 3, 40},    {91, Shape::prism, 4, 75},    {92, Shape::hex, 3, 64},
+    {93, Shape::hex, 4, 125},    {94, Shape::hex, 5, 216},     {95, Shape::hex, 6, 343},     {96, Shape::hex, 7, 512},
+    {97, Shape::hex, 8, 729},    {98, Shape::hex, 9, 1000},    {118, Shape::pyramid, 3, 30},
+    {119, Shape::pyramid, 4, 55},
+};
+
+int dimension(Shape shape) {
+  if (shape == Shape::point) return 0;
+  if (shape == Shape::line) return 1;
+  return shape == Shape::triangle || shape == Shape::quad ? 2 : 3;
+}
+
+CellKind kind_of(Shape shape) {
+  return shape == Shape::tet ? CellKind::tet : shape == Shape::hex ? CellKind::hex : CellKind::prism;
+}
+
+/// An element with the tags of its nodes still unresolved: nodes may come after elements.
+struct Element {
+  const MshType* type;
+  int physical;           ///< number of its first physical group, 0: none
+  std::int64_t entity;    ///< the part of the geometry that it is on
+  std::size_t line;
+  std::size_t first_node; ///< in the list of all elements' nodes
+};
+
+class MshParser {
+ public:
+  MshParser(const std::string& name, std::string_view bytes) : scan_(name, bytes, TextScanner::Comments::none) {}
+
+  NodalMesh parse() {
+    read_format();
+    while (const auto word = scan_.next()) {
+      const std::string section(*word);
+      if (section == "$Nodes") read_nodes();
+      else if (section == "$Elements") read_elements();
+      else if (section == "$PhysicalNames") read_physical_names();
+      else if (section == "$Entities") read_entities();
+      else if (section == "$PartitionedEntities") skip_partitions();
+      else if (section.starts_with("$")) skip_section(section);
+      else scan_.fail("expected a section such as $Nodes, found " + in_quotes(*word));
+    }
+    if (!has_nodes_) scan_.fail("the file ends without $Nodes");
+    if (!has_elements_) scan_.fail("the file ends without $Elements");
+    build();
+    return std::move(mesh_);
+  }
+
+ private:
+  void read_format() {
+    const std::string_view first = scan_.word("$MeshFormat");
+    if (first == "$NOD") scan_.fail("version 1 of Gmsh's format, expected 2.2, 4.0 or 4.1");
+    if (first != "$MeshFormat") scan_.fail("expected $MeshFormat, found " + in_quotes(first));
+    const double version = scan_.number("the version");
+    if (version != 2 && version != 2.1 && version != 2.2 && version != 4 && version != 4.1)
+      scan_.fail("expected version 2.2, 4.0 or 4.1 of Gmsh's format");
+    is_old_ = version < 3;
+    is_4_1_ = version == 4.1;
+    const std::int64_t type = scan_.integer("0 (ASCII) or 1 (binary)");
+    if (type != 0 && type != 1) scan_.fail("expected 0 (ASCII) or 1 (binary)");
+    binary_ = type == 1;
+    const std::int64_t size = scan_.integer("the size of a number, 4 or 8");
+    if (size != 4 && size != 8) scan_.fail("expected 4 or 8 bytes for a size");
+    size_type_ = size == 4 ? kUInt32 : kUInt64;
+    if (!is_4_1_) size_type_ = kUInt64;
+    if (binary_) {
+      scan_.line();
+      const std::string_view one = scan_.bytes(4, "the number 1");
+      if (decode(one.data(), kInt32, std::endian::little) == 1) endian_ = std::endian::little;
+      else if (decode(one.data(), kInt32, std::endian::big) == 1) endian_ = std::endian::big;
+      else scan_.fail("expected the number 1 in four bytes after the format");
+    }
+    end_section("$MeshFormat");
+  }
+
+  void end_section(const std::string& section) {
+    const std::string end = "$End" + section.substr(1);
+    const std::string_view word = scan_.word(end.c_str());
+    if (word != end) scan_.fail("expected " + end + ", found " + in_quotes(word));
+  }
+
+  void skip_section(const std::string& section) {
+    const std::string end = "$End" + section.substr(1);
+    while (const auto line = scan_.line())
+      if (line->substr(0, line->find_last_not_of(" \t") + 1).ends_with(end)) return;
+    scan_.fail("the file ends within " + section);
+  }
+
+  void skip_partitions() {
+    skip_section("$PartitionedEntities");
+    mesh_.warnings.push_back("the file is partitioned: physical groups of partitions are not read");
+  }
+
+  /// Goes to where the binary part of a section begins.
+  void begin_section() {
+    if (binary_) scan_.line();
+  }
+
+  double read(ValueType type, const char* what) {
+    if (!binary_) return type.is_real() ? scan_.number(what) : static_cast<double>(scan_.integer(what));
+    const double value = decode(scan_.bytes(type.size, what).data(), type, endian_);
+    if (!std::isfinite(value)) scan_.fail(std::string(what) + " is not a finite number");
+    return value;
+  }
+  std::int64_t read_int(const char* what) { return static_cast<std::int64_t>(read(kInt32, what)); }
+  std::int64_t read_tag(const char* what) {  // a tag of a node or element
+    if (is_4_1_) return static_cast<std::int64_t>(std::min(read(size_type_, what), 9e15));
+    return read_int(what);
+  }
+
+  /// Reads a number of things that each take so many words in ASCII, at least a byte each in binary.
+  std::size_t read_size(const char* what, std::size_t words, bool as_int = false) {
+    if (!binary_) return scan_.count(what, words);
+    const double n = read(as_int ? kInt32 : size_type_, what);
+    if (n < 0 || n > static_cast<double>(scan_.bytes_left()) || n > std::numeric_limits<Index>::max())
+      scan_.fail(std::string(what) + " is more than the rest of the file can hold");
+    return static_cast<std::size_t>(n);
+  }
+
+  void read_physical_names() {
+    const std::size_t n = scan_.count("the number of names", 3);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::int64_t dim = scan_.integer("a dimension"), number = scan_.integer("the number of a group");
+      const auto rest = scan_.line();
+      const std::size_t begin = rest ? rest->find('"') : std::string_view::npos,
+                        end = rest ? rest->rfind('"') : std::string_view::npos;
+      if (begin == std::string_view::npos || end <= begin) scan_.fail("expected a name in double quotes");
+      if (dim < 0 || dim > 3 || std::abs(number) > std::numeric_limits<int>::max())
+        scan_.fail("expected a dimension from 0 to 3 and a number of 32 bits");
+      names_[static_cast<std::size_t>(dim)][static_cast<int>(number)] =
+          std::string(rest->substr(begin + 1, end - begin - 1));
+    }
+    end_section("$PhysicalNames");
+  }
+
+  /// Reads the physical groups of the parts of the geometry.
+  void read_entities() {
+    begin_section();
+    std::array<std::size_t, 4> counts{};
+    for (std::size_t& n : counts) n = read_size("a number of entities", 1);
+    for (std::size_t dim = 0; dim < 4; ++dim)
+      for (std::size_t i = 0; i < counts[dim]; ++i) {
+        const std::int64_t tag = read_int("the tag of an entity");
+        const int num_coordinates = dim == 0 && is_4_1_ ? 3 : 6;
+        for (int k = 0; k < num_coordinates; ++k) read_box_coordinate();
+        const std::size_t groups = read_size("the number of physical groups", 1);
+        for (std::size_t k = 0; k < groups; ++k) {
+          const std::int64_t group = std::abs(read_int("a physical group"));
+          if (k == 0) physical_[dim][tag] = static_cast<int>(std::min<std::int64_t>(group, kMostNumber));
+          else ++num_more_groups_;
+        }
+        if (dim == 0) continue;
+        const std::size_t borders = read_size("the number of bounding entities", 1);
+        for (std::size_t k = 0; k < borders; ++k) read_int("a bounding entity");
+      }
+    end_section("$Entities");
+  }
+
+  /// Boxes of entities do not matter, and may be infinite.
+  void read_box_coordinate() {
+    if (binary_) scan_.bytes(8, "a coordinate");
+    else scan_.word("a coordinate");
+  }
+
+  void add_node(std::int64_t tag, const Vec3& position) {
+    if (!numbers_.try_emplace(tag, static_cast<Index>(mesh_.positions.size())).second)
+      scan_.fail("a second node " + std::to_string(tag));
+    mesh_.positions.push_back(position);
+  }
+
+  Vec3 read_position() {
+    Vec3 p;
+    for (int k = 0; k < 3; ++k) p[k] = read(kFloat64, "a coordinate");
+    return p;
+  }
+
+  void read_nodes() {
+    if (has_nodes_) scan_.fail("a second section $Nodes");
+    has_nodes_ = true;
+    if (is_old_) {
+      const std::size_t n = scan_.count("the number of nodes", binary_ ? 1 : 4);
+      begin_section();
+      for (std::size_t i = 0; i < n; ++i) {
+        const std::int64_t tag = read_int("the number of a node");
+        add_node(tag, read_position());
+      }
+      return end_section("$Nodes");
+    }
+    begin_section();
+    const std::size_t num_blocks = read_size("the number of blocks", 4);
+    read_size("the number of nodes", 3);
+    if (is_4_1_) read(size_type_, "the smallest tag"), read(size_type_, "the largest tag");
+    std::vector<std::int64_t> tags;
+    for (std::size_t block = 0; block < num_blocks; ++block) {
+      const std::int64_t first = read_int("a dimension or tag"), second = read_int("a dimension or tag");
+      const std::int64_t dim = is_4_1_ ? first : second;
+      const std::int64_t parametric = read_int("0 or 1");
+      if (dim < 0 || dim > 3 || parametric < 0 || parametric > 1)
+        scan_.fail("expected a dimension from 0 to 3, and 0 or 1 for parametric coordinates");
+      const std::size_t n = read_size("the number of nodes of a block", is_4_1_ ? 1 : 4);
+      tags.clear();
+      if (is_4_1_)
+        for (std::size_t i = 0; i < n; ++i) tags.push_back(read_tag("the tag of a node"));
+      for (std::size_t i = 0; i < n; ++i) {
+        const std::int64_t tag = is_4_1_ ? tags[i] : read_tag("the tag of a node");
+        const Vec3 position = read_position();
+        for (int k = 0; k < parametric * dim; ++k) read_box_coordinate();
+        add_node(tag, position);
+      }
+    }
+    end_section("$Nodes");
+  }
+
+  const MshType& type_of(std::int64_t type) {
+    const auto found = std::find_if(std::begin(kMshTypes), std::end(kMshTypes),
+                                    [&](const MshType& t) { return t.type == type; });
+    if (found == std::end(kMshTypes)) scan_.fail("elements of Gmsh's type " + std::to_string(type) + " are not read");
+    if (found->shape == Shape::pyramid) scan_.fail(std::string("a pyramid: ") + kNoPyramids);
+    if (found->shape == Shape::prism && found->order > 2)
+      scan_.fail("a prism of order " + std::to_string(found->order) + ", which Gmsh does not evaluate; expected order 1 "
+                 "or 2");
+    return *found;
+  }
+
+  void add_element(const MshType& type, int physical, std::int64_t entity) {
+    const bool wanted = dimension(type.shape) == 3 || (dimension(type.shape) == 2 && physical != 0);
+    if (wanted)
+      elements_.push_back({&type, physical, entity, scan_.word_line(), element_nodes_.size()});
+    else
+      ++num_skipped_;
+    for (int i = 0; i < type.size; ++i) {
+      const std::int64_t node = read_tag("a node of an element");
+      if (wanted) element_nodes_.push_back(node);
+    }
+  }
+
+  void read_elements() {
+    if (has_elements_) scan_.fail("a second section $Elements");
+    has_elements_ = true;
+    if (is_old_) return read_old_elements();
+    begin_section();
+    const std::size_t num_blocks = read_size("the number of blocks", 4);
+    read_size("the number of elements", 2);
+    if (is_4_1_) read(size_type_, "the smallest tag"), read(size_type_, "the largest tag");
+    for (std::size_t block = 0; block < num_blocks; ++block) {
+      const std::int64_t first = read_int("a dimension or tag"), second = read_int("a dimension or tag");
+      const std::int64_t entity = is_4_1_ ? second : first;
+      const MshType& type = type_of(read_int("a type of elements"));
+      const std::size_t n = read_size("the number of elements of a block", static_cast<std::size_t>(type.size) + 1);
+      const auto& groups = physical_[static_cast<std::size_t>(dimension(type.shape))];
+      const auto group = groups.find(entity);
+      for (std::size_t i = 0; i < n; ++i) {
+        read_tag("the tag of an element");
+        add_element(type, group == groups.end() ? 0 : group->second, entity);
+      }
+    }
+    end_section("$Elements");
+  }
+
+  void read_old_elements() {
+    const std::size_t n = scan_.count("the number of elements", binary_ ? 1 : 4);
+    begin_section();
+    for (std::size_t i = 0; i < n;) {
+      if (!binary_) read_int("the number of an element");
+      const MshType& type = type_of(read_int("the type of an element"));
+      const std::size_t group = binary_ ? read_size("a number of elements", 1, true) : 1;
+      if (group == 0 || group > n - i) scan_.fail("expected a number of elements up to that of the section");
+      const std::size_t num_tags = read_size("the number of tags", 1, true);
+      for (std::size_t k = 0; k < group; ++k, ++i) {
+        if (binary_) read_int("the number of an element");
+        std::int64_t physical = 0, entity = 0;
+        for (std::size_t t = 0; t < num_tags; ++t) {
+          const std::int64_t tag = read_int("a tag");
+          if (t == 0) physical = std::min<std::int64_t>(std::abs(tag), kMostNumber);
+          if (t == 1) entity = tag;
+        }
+        add_element(type, static_cast<int>(physical), entity);
+      }
+    }
+    end_section("$Elements");
+  }
+
+  // --- Building the mesh ----------------------------------------------------------------------------------------------
+
+  void build() {
+    const auto is_cell = [](const Element& element) { return dimension(element.type->shape) == 3; };
+    const bool has_groups = std::any_of(elements_.begin(), elements_.end(), [&](const Element& element) {
+      return is_cell(element) && element.physical != 0;
+    });
+    NodalCells cells(mesh_);
+    GroupList faces;
+    std::vector<Index> nodes;
+    for (const Element& element : elements_) {
+      nodes.clear();
+      for (int i = 0; i < element.type->size; ++i) {
+        const std::int64_t tag = element_nodes_[element.first_node + static_cast<std::size_t>(i)];
+        const auto found = numbers_.find(tag);
+        if (found == numbers_.end())
+          scan_.fail("an element names node " + std::to_string(tag) + ", which the file does not have", element.line);
+        nodes.push_back(found->second);
+      }
+      if (!is_cell(element)) {
+        const std::size_t corners = element.type->shape == Shape::quad ? 4 : 3;
+        add_face(mesh_, std::span(nodes).first(corners), faces.by_number(element.physical));
+        continue;
+      }
+      cells.add(kind_of(element.type->shape), element.type->order, NodeOrdering::gmsh, nodes);
+      const std::int64_t entity = std::clamp<std::int64_t>(element.entity, -kMostNumber, kMostNumber);
+      mesh_.references.push_back(has_groups ? reference_of(element.physical) : static_cast<int>(entity));
+    }
+    mesh_.face_groups.groups = faces.take();
+    for (Group& group : mesh_.face_groups.groups)
+      if (const auto name = names_[2].find(group.number); name != names_[2].end()) group.name = name->second;
+    if (!has_groups && std::all_of(mesh_.references.begin(), mesh_.references.end(),
+                                   [&](int reference) { return reference == mesh_.references.front(); }))
+      mesh_.references.clear();
+    name_regions();
+    if (num_more_groups_ > 0)
+      mesh_.warnings.push_back(std::to_string(num_more_groups_) +
+                               " parts of the geometry are in more than one physical group: only the first is used");
+    if (num_skipped_ > 0)
+      mesh_.warnings.push_back(std::to_string(num_skipped_) +
+                               " elements of lower dimension that are no face of a physical group are skipped");
+  }
+
+  /// A group that `write_volume` has named after a reference stands for that reference.
+  std::optional<int> own_reference(int group) const {
+    constexpr std::string_view kOwn = "reference ";
+    const auto name = names_[3].find(group);
+    if (name == names_[3].end() || !name->second.starts_with(kOwn)) return std::nullopt;
+    const auto reference = parse_integer(std::string_view(name->second).substr(kOwn.size()));
+    if (!reference || std::abs(*reference) > kMostNumber) return std::nullopt;
+    return static_cast<int>(*reference);
+  }
+  int reference_of(int group) const { return own_reference(group).value_or(group); }
+
+  void name_regions() {
+    for (const auto& [number, name] : names_[3])
+      if (!own_reference(number) &&
+          std::find(mesh_.references.begin(), mesh_.references.end(), number) != mesh_.references.end())
+        mesh_.regions.push_back({name, number, 3});
+  }
+
+  static constexpr std::int64_t kMostNumber = std::numeric_limits<int>::max();
+
+  TextScanner scan_;
+  NodalMesh mesh_;
+  bool is_old_ = false, is_4_1_ = false, binary_ = false, has_nodes_ = false, has_elements_ = false;
+  std::endian endian_ = std::endian::little;
+  ValueType size_type_ = kUInt64;
+  std::unordered_map<std::int64_t, Index> numbers_;             ///< of nodes by their tags
+  std::array<std::map<int, std::string>, 4> names_;             ///< of physical groups, by dimension
+  std::array<std::map<std::int64_t, int>, 4> physical_;         ///< of entities
+  std::vector<Element> elements_;
+  std::vector<std::int64_t> element_nodes_;
+  std::size_t num_skipped_ = 0, num_more_groups_ = 0;
+};
+
+}  // namespace
+
+NodalMesh parse_msh(const std::string& name, std::string_view bytes, const std::string&) {
+  return MshParser(name, bytes).parse();
+}
+
+}  // namespace subvol

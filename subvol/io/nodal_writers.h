@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/io/nodal_mesh.h"
+
+#include <string>
+
+namespace subvol {
+
+/// Returns the cells as an input file of Abaqus and CalculiX.
+///
+/// Elements are C3D4, C3D6 and C3D8, or C3D10, C3D15 and C3D20 of cells of order 2, whose nodes inside faces and hexes
+/// are left out. Numbers of nodes and elements are ours and 1; the set EALL holds all elements. Each reference has the
+/// element set REFERENCE_7 (REFERENCE_M7 for -7) and, if it has a name, another one of that name. Each group of faces
+/// becomes a surface of elements and a set of its nodes. Names keep their letters, digits, _ and -; other characters
+/// become _, and a name without any becomes GROUP_7.
+///
+/// InputError: orders other than 1 and 2, or both of them; nodes that are not equally spaced.
+std::string inp_text(const NodalMesh& mesh);
+
+/// Returns the cells as bulk data of Nastran, with large fields: GRID, CTETRA, CPENTA and CHEXA, of order 2 with the
+/// middles of edges as above. The number of a property is the reference, or, for those below 1, the first free number.
+/// There are no groups of faces: they would be shells. InputError: as above.
+std::string nastran_text(const NodalMesh& mesh);
+
+/// Returns the cells as an MFEM mesh v1.0, curved ones with nodes in the space H1 of their order.
+///
+/// Attributes are as the properties above. If there are groups of faces, the boundary and the faces of groups are
+/// listed with the group's number (below 1, or none: the first free number). Names are not written.
+/// InputError: cells of several orders; cells of order 3 or more without Gauss-Lobatto nodes.
+std::string mfem_text(const NodalMesh& mesh);
+
+/// Returns linear cells as a NodalMesh.
+NodalMesh nodal_mesh(const VolumeMesh& mesh);
+
+}  // namespace subvol
