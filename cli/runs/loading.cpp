@@ -32,6 +32,10 @@ bool is_surface_or_points(const std::filesystem::path& path) {
 
 }  // namespace
 
+bool is_surface_file(const std::filesystem::path& path) {
+  return is_surface_extension(lower_case(path.extension().string())) && !is_point_cloud_file(path);
+}
+
 void require_known_file(const std::filesystem::path& path) {
   if (is_volume_file(path) || is_high_order_file(path) || is_surface_or_points(path)) return;
   throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +

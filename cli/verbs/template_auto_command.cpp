@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
@@ -26,7 +27,6 @@ AutoTemplateResult make(const AutoArguments& arguments, const TriangleMesh& targ
     teller.tell({.stage = "template", .level = 0, .iteration = 0, .energy = 0, .fraction = fraction});
     return !interrupted();
   };
-  catch_interrupt();
   AutoTemplateResult result = auto_templates(target, options);
   teller.finish();
   return result;
@@ -41,13 +41,15 @@ Json topology_json(const BettiNumbers& topology) {
 
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
-  const TriangleMesh target = load_surface(arguments.target, arguments.warnings);
+  catch_interrupt();
+  const SurfaceRepair repair = repair_surface(load_surface(arguments.target, arguments.warnings), interrupted);
+  const TriangleMesh& target = repair.surface;
+  add_remarks(repair, arguments.warnings);
   arguments.writing.source = arguments.target;
   const AutoTemplateResult result = make(arguments, target);
   if (result.cancelled) return kInterrupted;
   if (result.templates.empty()) {
-    std::cerr << "subvol: no grid that was tried, of up to 20 times " << arguments.options.cells
-              << " cells has the target's " << to_string(result.wanted) << "\n";
+    std::cerr << "subvol: " << why_no_grid(target, arguments.options.cells, result.wanted) << '\n';
     return kFailed;
   }
   const AutoTemplate& made = result.templates.front();
@@ -59,6 +61,7 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
   for (int a = 0; a < 3; ++a) axes.push_back({made.axes(0, a), made.axes(1, a), made.axes(2, a)});
   const int status = write_template(arguments, verb, outputs, made.mesh,
                                     {{"input", {{"target", describe(arguments.target, target)}}},
+                                     {"repairs", repair.done},
                                      {"template",
                                       {{"cells", made.mesh.num_cells()},
                                        {"cells_that_work", made.cells_asked},
