@@ -9,6 +9,7 @@
 #include "subvol/io/surface_io.h"
 #include "subvol/templates/auto_template.h"
 
+#include <chrono>
 #include <iostream>
 #include <memory>
 
@@ -18,14 +19,20 @@ namespace {
 struct AutoArguments : TemplateRun {
   std::string target;
   AutoTemplateOptions options;
+  double time_limit_seconds = 0;  ///< 0: none
 };
 
 AutoTemplateResult make(const AutoArguments& arguments, const TriangleMesh& target) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   AutoTemplateOptions options = arguments.options;
+  const auto start = std::chrono::steady_clock::now();
+  const auto in_time = [&] {
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
+    return arguments.time_limit_seconds == 0 || passed.count() < arguments.time_limit_seconds;
+  };
   options.progress = [&](double fraction) {
     teller.tell({.stage = "template", .level = 0, .iteration = 0, .energy = 0, .fraction = fraction});
-    return !interrupted();
+    return !interrupted() && in_time();
   };
   AutoTemplateResult result = auto_templates(target, options);
   teller.finish();
@@ -47,7 +54,11 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
   add_remarks(repair, arguments.warnings);
   arguments.writing.source = arguments.target;
   const AutoTemplateResult result = make(arguments, target);
-  if (result.cancelled) return kInterrupted;
+  if (result.cancelled && interrupted()) return kInterrupted;
+  if (result.cancelled) {
+    std::cerr << "subvol: the time limit was reached before a template was made\n";
+    return kNotConverged;
+  }
   if (result.templates.empty()) {
     std::cerr << "subvol: " << why_no_grid(target, arguments.options.cells, result.wanted) << '\n';
     return kFailed;
@@ -89,6 +100,9 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->type_name("N")
       ->capture_default_str();
   verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");
+  verb->add_option("--time-limit", arguments->time_limit_seconds, "End after this time, without a template")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("SECONDS");
   add_template_options(*verb, *arguments);
   verb->add_option("--progress", arguments->run.progress,
                    "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")

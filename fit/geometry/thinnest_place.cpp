@@ -52,8 +52,10 @@ class Balls {
     diagonal_ = box.diagonal().norm();
   }
 
-  /// Returns the place where the ball at a sample touches the surface again; width 0: it is none that counts.
-  ThinPlace place(const Sample& sample) const {
+  double diagonal() const { return diagonal_; }
+  /// Returns the place where the ball at a sample, at most of a radius, touches the surface again; width 0: there is
+  /// none that counts.
+  ThinPlace place(const Sample& sample, double radius) const {
     constexpr int kSteps = 40;
     constexpr double kTouches = 1e-7;  // share of the radius
     const auto& t = mesh_.triangles[sample.triangle];
@@ -61,11 +63,12 @@ class Balls {
                             .cross(mesh_.positions[t[2]] - mesh_.positions[t[0]]).normalized();
     if (!normal.allFinite() || normal.isZero()) return {};
     const Vec3 inward = side_ == ThinSide::wall ? Vec3(-normal) : normal;
-    double radius = diagonal_;
     ThinPlace found;
+    Index hint = sample.triangle;
     for (int step = 0; step < kSteps; ++step) {
       const Vec3 center = sample.point + radius * inward;
-      const ClosestPoint::Hit hit = tree_.closest(center);
+      const ClosestPoint::Hit hit = tree_.closest(center, hint);
+      hint = hit.triangle;
       if (hit.triangle == kNoIndex || hit.distance >= (1 - kTouches) * radius) break;
       const Vec3 to = hit.point - sample.point;
       const double depth = inward.dot(to);
@@ -96,19 +99,21 @@ class Balls {
 
 std::optional<ThinPlace> thinnest_place(const TriangleMesh& mesh, const ClosestPoint& tree, ThinSide side,
                                         const std::function<bool()>& cancelled) {
-  constexpr std::size_t kAtATime = 2048;  // samples between two questions whether to go on
+  constexpr std::size_t kAtATime = 512;  // samples between two questions whether to go on
   const std::vector<Sample> samples = samples_of(mesh);
   const Balls balls(mesh, tree, side);
   std::vector<ThinPlace> places(samples.size());
+  const ThinPlace* best = nullptr;
   for (std::size_t first = 0; first < samples.size(); first += kAtATime) {
     if (cancelled && cancelled()) return std::nullopt;
     const std::size_t end = std::min(first + kAtATime, samples.size());
+    // A ball that touches two points 120 degrees apart is no larger than their distance over the root of 3.
+    const double radius = best ? best->width / std::sqrt(3.0) : balls.diagonal();
 #pragma omp parallel for schedule(dynamic, 64)
-    for (std::size_t i = first; i < end; ++i) places[i] = balls.place(samples[i]);
+    for (std::size_t i = first; i < end; ++i) places[i] = balls.place(samples[i], radius);
+    for (std::size_t i = first; i < end; ++i)
+      if (places[i].width > 0 && (!best || places[i].width < best->width)) best = &places[i];
   }
-  const ThinPlace* best = nullptr;
-  for (const ThinPlace& place : places)
-    if (place.width > 0 && (!best || place.width < best->width)) best = &place;
   if (!best) return std::nullopt;
   return *best;
 }
