@@ -6,6 +6,7 @@
 #include "cli/runs/outputs.h"
 #include "cli/runs/progress.h"
 #include "cli/verbs/template_command.h"
+#include "cli/verbs/verb_options.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/templates/auto_template.h"
 
@@ -101,7 +102,7 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->capture_default_str();
   verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");
   verb->add_option("--time-limit", arguments->time_limit_seconds, "End after this time, without a template")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");
   add_template_options(*verb, *arguments);
   verb->add_option("--progress", arguments->run.progress,

@@ -69,7 +69,7 @@ struct Parts {
     }
   }
   double volume(std::size_t p) const {
-    const Vec3 origin = boxes[p].center();
+    const Vec3 origin = mesh.positions[mesh.triangles[triangles[p].front()][0]];
     double sum = 0;
     for (Index t : triangles[p]) {
       const auto& [a, b, c] = mesh.triangles[t];
