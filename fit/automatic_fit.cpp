@@ -12,6 +12,7 @@
 #include "fit/geometry/self_intersection.h"
 #include "fit/quality/quality.h"
 #include "fit/target/fit_target.h"
+#include "fit/target/surface_repair.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
@@ -208,8 +209,7 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
     return std::nullopt;
   }
   if (made.templates.empty()) {
-    no_template_ = "target: no grid that was tried, of up to 20 times " + std::to_string(options.cells) +
-                   " cells, has its " + to_string(made.wanted) + "; give a --template";
+    no_template_ = "target: " + why_no_grid(original_, options.cells, made.wanted) + "; give a --template";
     return std::nullopt;
   }
   VolumeMesh& mesh = made.templates.front().mesh;

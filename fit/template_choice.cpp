@@ -9,6 +9,7 @@
 #include "fit/quality/high_order_quality.h"
 #include "fit/quality/quality.h"
 #include "fit/subdivision_fit.h"
+#include "fit/target/surface_repair.h"
 #include "subvol/base/error.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -145,8 +146,7 @@ bool Chooser::try_count(std::size_t cells) {
   std::vector<AutoTemplate> plain = candidates(cells, false, kPlain);
   if (choice_.cancelled) return false;
   if (plain.empty())
-    throw InputError("target: no grid that was tried, of up to 20 times " + std::to_string(cells) + " cells has its " +
-                     to_string(choice_.topology) + "; give a --template");
+    throw InputError("target: " + why_no_grid(target_, cells, choice_.topology) + "; give a --template");
   if (plain.front().cells_asked != cells)
     choice_.warnings.push_back(std::to_string(cells) + " cells cannot carry the target's " +
                                to_string(choice_.topology) + "; the template is made for " +

@@ -37,6 +37,10 @@ bool is_high_order_file(const std::filesystem::path& path) {
   return holds_exact_map(path) || holds_curved_cells(path);
 }
 
+bool is_surface_file(const std::filesystem::path& path) {
+  return is_surface_extension(lower_case(path.extension().string())) && !is_point_cloud_file(path);
+}
+
 void require_known_file(const std::filesystem::path& path) {
   if (has_cells(path) || is_surface_or_points(path)) return;
   throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +

@@ -28,6 +28,9 @@ bool is_volume_file(const std::filesystem::path& path);
 /// True if a file holds curved cells, for `load_high_order`; false also if it cannot be read. Cost: that of reading it.
 bool is_high_order_file(const std::filesystem::path& path);
 
+/// True if a path has the extension of a surface and the file has faces. InputError: as `is_point_cloud_file`.
+bool is_surface_file(const std::filesystem::path& path);
+
 /// A target to fit or to compare with: a surface, or points on one.
 using Target = std::variant<TriangleMesh, PointCloud>;
 inline bool is_cloud(const Target& target) { return std::holds_alternative<PointCloud>(target); }

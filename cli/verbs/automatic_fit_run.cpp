@@ -4,8 +4,10 @@
 #include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/face_groups.h"
+#include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/report.h"
 #include "cli/runs/written_result.h"
@@ -41,7 +43,8 @@ class AutomaticFitRun : public LongRun {
   void summarise() const;
 
   const AutomaticFitArguments& arguments_;
-  TriangleMesh target_;
+  TriangleMesh target_;                ///< repaired
+  std::vector<std::string> repairs_;   ///< made to the target
   std::optional<Checkpointing> checkpointing_;
   AutomaticFitResult result_;
   GroupsFound groups_;
@@ -53,7 +56,10 @@ void AutomaticFitRun::load() {
   require_fitting_options(verb_, is_cloud(target));
   if (is_cloud(target))
     throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
-  target_ = std::get<TriangleMesh>(std::move(target));
+  SurfaceRepair repair = repair_surface(std::get<TriangleMesh>(target), interrupted);
+  target_ = std::move(repair.surface);
+  add_remarks(repair, warnings_);
+  repairs_ = std::move(repair.done);
   tell_warnings();
 }
 
@@ -101,7 +107,8 @@ Json AutomaticFitRun::report() const {
   Json json{{"subvol", version()},
             {"command", "fit"},
             {"options", options_in_force(verb_)},
-            {"input", {{"target", describe(arguments_.target, target_)}}}};
+            {"input", {{"target", describe(arguments_.target, target_)}}},
+            {"repairs", repairs_}};
   json.update(automatic_fit_json(result_));
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
+#include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/outputs.h"
 #include "cli/runs/progress.h"
@@ -89,11 +91,42 @@ std::string text_of(const Checked& checked) {
   return text.substr(0, verdict) + to_text(*checked.lagrange) + (checked.valid() ? "valid\n" : "NOT VALID\n");
 }
 
+void tell_check(const CheckArguments& arguments, const std::vector<std::string>& warnings, const Json& json,
+                const std::string& text) {
+  if (!arguments.run.quiet)
+    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
+  if (!arguments.run.report.empty()) write_report(arguments.run.report, json);
+  if (arguments.json) print(json_text(json));
+  else if (!arguments.run.quiet) print(text);
+}
+
+/// Says what is in the way of filling a surface.
+int check_surface(const CheckArguments& arguments, const CLI::App& verb) {
+  if (!arguments.target.empty())
+    throw UsageError("--target: " + arguments.mesh + " is a surface; only a volume mesh is compared with a target");
+  std::vector<std::string> warnings;
+  const FileSurface surface = load_file_surface(arguments.mesh, warnings);
+  catch_interrupt();
+  SurfaceDiagnosis diagnosis = diagnose(surface.mesh, interrupted);
+  number_by_faces(diagnosis, surface);
+  Json json{{"subvol", version()},
+            {"command", "check"},
+            {"options", options_in_force(verb)},
+            {"input", {{"surface", describe(arguments.mesh, surface.mesh)}}}};
+  json.update(diagnosis_json(diagnosis));
+  json["warnings"] = warnings;
+  json["peak_memory_bytes"] = peak_memory_bytes();
+  tell_check(arguments, warnings, json, to_text(diagnosis));
+  if (diagnosis.is_cancelled) return kInterrupted;
+  return diagnosis.is_fillable() ? kDone : kFailed;
+}
+
 int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   checked_outputs(arguments.run, {});
   apply_resources(arguments.run);
   require_known_file(arguments.mesh);
   require_choice_of_references(arguments.mesh, arguments.run.references);
+  if (is_surface_file(arguments.mesh)) return check_surface(arguments, verb);
   std::vector<std::string> warnings;
   std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
@@ -101,16 +134,7 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target, teller.work(), warnings)
                                                              : check_linear(arguments, target, teller.work(), warnings);
   teller.finish();
-  if (!arguments.run.quiet) {
-    for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';
-  }
-  const Json json = report_json(arguments, verb, checked, warnings);
-  if (!arguments.run.report.empty()) write_report(arguments.run.report, json);
-  if (arguments.json) {
-    print(json_text(json));
-  } else if (!arguments.run.quiet) {
-    print(text_of(checked));
-  }
+  tell_check(arguments, warnings, report_json(arguments, verb, checked, warnings), text_of(checked));
   return checked.valid() ? kDone : kFailed;
 }
 
@@ -118,9 +142,10 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
 
 void add_check_command(CLI::App& app, Action& action) {
   CLI::App* verb =
-      app.add_subcommand("check", "Say what is true of a volume mesh: defects, quality, certificate, distance");
+      app.add_subcommand("check", "Say what is true of a volume mesh (defects, quality, certificate, distance), or "
+                                  "what is in the way of filling a surface");
   const auto arguments = std::make_shared<CheckArguments>();
-  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats())->required()->type_name("FILE");
+  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats() + "; or surface: " + surface_formats())->required()->type_name("FILE");
   verb->add_option("--target", arguments->target,
                    "Measure the distance to this surface, or of these points: " + target_formats())
       ->type_name("SURFACE");
@@ -136,9 +161,11 @@ void add_check_command(CLI::App& app, Action& action) {
   verb->add_flag("--quiet", arguments->run.quiet, "Say nothing but errors; the exit status tells");
   add_resource_options(*verb, arguments->run);
   verb->footer(R"(Exit status 0 if the mesh is valid (every cell proved positive, no defects), 1 if it is not.
+For a surface: 0 if it bounds a solid as it stands, 1 if it does not.
 
-Example:
-  subvol check bone_fine.mesh --target bone.off --json)");
+Examples:
+  subvol check bone_fine.mesh --target bone.off --json
+  subvol check bone.off)");
   verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_check(*arguments, *verb); }; });
 }
 

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/outputs.h"
 #include "cli/runs/progress.h"
 #include "cli/verbs/template_command.h"
+#include "cli/verbs/verb_options.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/templates/auto_template.h"
 
+#include <chrono>
 #include <iostream>
 #include <memory>
 
@@ -17,16 +20,21 @@ namespace {
 struct AutoArguments : TemplateRun {
   std::string target;
   AutoTemplateOptions options;
+  double time_limit_seconds = 0;  ///< 0: none
 };
 
 AutoTemplateResult make(const AutoArguments& arguments, const TriangleMesh& target) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
   AutoTemplateOptions options = arguments.options;
+  const auto start = std::chrono::steady_clock::now();
+  const auto in_time = [&] {
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
+    return arguments.time_limit_seconds == 0 || passed.count() < arguments.time_limit_seconds;
+  };
   options.progress = [&](double fraction) {
     teller.tell({.stage = "template", .level = 0, .iteration = 0, .energy = 0, .fraction = fraction});
-    return !interrupted();
+    return !interrupted() && in_time();
   };
-  catch_interrupt();
   AutoTemplateResult result = auto_templates(target, options);
   teller.finish();
   return result;
@@ -41,13 +49,19 @@ Json topology_json(const BettiNumbers& topology) {
 
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
-  const TriangleMesh target = load_surface(arguments.target, arguments.warnings);
+  catch_interrupt();
+  const SurfaceRepair repair = repair_surface(load_surface(arguments.target, arguments.warnings), interrupted);
+  const TriangleMesh& target = repair.surface;
+  add_remarks(repair, arguments.warnings);
   arguments.writing.source = arguments.target;
   const AutoTemplateResult result = make(arguments, target);
-  if (result.cancelled) return kInterrupted;
+  if (result.cancelled && interrupted()) return kInterrupted;
+  if (result.cancelled) {
+    std::cerr << "subvol: the time limit was reached before a template was made\n";
+    return kNotConverged;
+  }
   if (result.templates.empty()) {
-    std::cerr << "subvol: no grid that was tried, of up to 20 times " << arguments.options.cells
-              << " cells has the target's " << to_string(result.wanted) << "\n";
+    std::cerr << "subvol: " << why_no_grid(target, arguments.options.cells, result.wanted) << '\n';
     return kFailed;
   }
   const AutoTemplate& made = result.templates.front();
@@ -59,6 +73,7 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
   for (int a = 0; a < 3; ++a) axes.push_back({made.axes(0, a), made.axes(1, a), made.axes(2, a)});
   const int status = write_template(arguments, verb, outputs, made.mesh,
                                     {{"input", {{"target", describe(arguments.target, target)}}},
+                                     {"repairs", repair.done},
                                      {"template",
                                       {{"cells", made.mesh.num_cells()},
                                        {"cells_that_work", made.cells_asked},
@@ -86,6 +101,9 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->type_name("N")
       ->capture_default_str();
   verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");
+  verb->add_option("--time-limit", arguments->time_limit_seconds, "End after this time, without a template")
+      ->check(number_in(1e-3, 1e9))
+      ->type_name("SECONDS");
   add_template_options(*verb, *arguments);
   verb->add_option("--progress", arguments->run.progress,
                    "How to tell it: bar (default on a terminal) or plain on stderr, json on stdout, none")

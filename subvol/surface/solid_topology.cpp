@@ -3,12 +3,16 @@
 
 #include "subvol/base/error.h"
 #include "subvol/surface/crowded_edges.h"
+#include "subvol/surface/part_nesting.h"
+#include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -17,116 +21,53 @@ namespace subvol {
 
 namespace {
 
-/// Merges vertices of equal position and removes vertices of no triangle. The remaining vertices are numbered in the
-/// order in which the triangles name them; `names` receives the smallest input number of each.
-TriangleMesh welded(const TriangleMesh& mesh, std::size_t& dropped, std::vector<Index>& names) {
-  std::vector<char> used(mesh.positions.size(), 0);
-  for (const auto& t : mesh.triangles)
-    for (Index v : t) {
-      if (v < 0 || static_cast<std::size_t>(v) >= mesh.positions.size() || !mesh.positions[v].allFinite())
-        throw InputError("surface: a triangle names a vertex that is not there, or whose position is not finite");
-      used[v] = 1;
-    }
-  std::vector<Index> order;
-  for (std::size_t v = 0; v < used.size(); ++v)
-    if (used[v]) order.push_back(static_cast<Index>(v));
-  const auto less = [&](Index a, Index b) {
-    const Vec3 &p = mesh.positions[a], &q = mesh.positions[b];
-    return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
-  };
-  std::stable_sort(order.begin(), order.end(), less);
-  std::vector<Index> first(mesh.positions.size(), kNoIndex);
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool same = i > 0 && !less(order[i - 1], order[i]);
-    first[order[i]] = same ? first[order[i - 1]] : order[i];
-  }
-  TriangleMesh result;
-  const std::vector<Index>& groups = mesh.face_groups.of_face;
-  result.face_groups.groups = mesh.face_groups.groups;
-  std::vector<Index> number(mesh.positions.size(), kNoIndex);
-  const auto vertex = [&](Index v) {
-    Index& n = number[first[v]];
-    if (n == kNoIndex) {
-      n = static_cast<Index>(result.positions.size());
-      result.positions.push_back(mesh.positions[v]);
-      names.push_back(first[v]);
-    }
-    return n;
-  };
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    const auto& t = mesh.triangles[i];
-    const std::array<Index, 3> corners{vertex(t[0]), vertex(t[1]), vertex(t[2])};
-    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
-      ++dropped;
-      continue;
-    }
-    result.triangles.push_back(corners);
-    if (!groups.empty()) result.face_groups.of_face.push_back(groups[i]);
-  }
-  return result;
-}
-
-struct HalfEdge {
-  Index low, high, triangle;
-  bool forward;
-};
-
-std::vector<HalfEdge> sorted_half_edges(const TriangleMesh& mesh) {
-  std::vector<HalfEdge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (std::size_t e = 0; e < 3; ++e) {
-      const Index v = mesh.triangles[t][e], w = mesh.triangles[t][(e + 1) % 3];
-      edges.push_back({std::min(v, w), std::max(v, w), static_cast<Index>(t), v < w});
-    }
-  std::sort(edges.begin(), edges.end(), [](const HalfEdge& a, const HalfEdge& b) {
-    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-  });
-  return edges;
-}
-
-/// Calls visit(run) with the half-edges of each edge.
-template <class Visit>
-void for_each_edge(std::span<const HalfEdge> edges, Visit&& visit) {
-  for (std::size_t first = 0, last; first < edges.size(); first = last) {
-    last = first + 1;
-    while (last < edges.size() && edges[last].low == edges[first].low && edges[last].high == edges[first].high) ++last;
-    visit(edges.subspan(first, last - first));
-  }
-}
-
 struct Neighbor {
   Index triangle = kNoIndex;
   bool flipped = false;  ///< true if both triangles run the same way along their common edge
 };
 
-void require_two_triangles(const TriangleMesh& mesh, std::span<const HalfEdge> edges, std::span<const Index> names) {
+/// The sides of one or two triangles at an edge of the surface. Where solids touch along an edge, each has its own.
+struct SurfaceEdge {
+  SurfaceHalfEdge first;
+  std::optional<SurfaceHalfEdge> second;
+};
+
+/// Returns the edges of a surface. names: vertex numbers for messages. InputError: an edge of more than two triangles
+/// that are not those of solids that touch there.
+std::vector<SurfaceEdge> edges_of(const TriangleMesh& mesh, std::span<const Index> names) {
+  const bool outward = signed_volume_of(mesh) >= 0;
+  std::vector<SurfaceEdge> edges;
+  std::vector<std::array<std::size_t, 2>> pairs;
   CrowdedEdges crowded;
   const auto name = [&](Index v) { return vertex_text(names[v], &mesh.positions[v]); };
-  for_each_edge(edges, [&](std::span<const HalfEdge> run) {
-    if (run.size() > 2) crowded.add(name(run[0].low), name(run[0].high), run.size());
+  const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh.triangles, mesh.positions.size());
+  for_each_edge(std::span(sides), [&](std::span<const SurfaceHalfEdge> run) {
+    if (run.size() == 1) edges.push_back({run[0], std::nullopt});
+    else if (run.size() == 2) edges.push_back({run[0], run[1]});
+    else if (pair_around_edge(mesh, run, outward, pairs))
+      for (const auto& [i, j] : pairs) edges.push_back({run[i], run[j]});
+    else crowded.add(name(run[0].low), name(run[0].high), run.size());
   });
   if (!crowded.empty()) throw InputError("surface: it bounds no solid: " + crowded.text());
+  return edges;
 }
 
 /// Returns the neighbors across the edges of each triangle, in no particular order. names: vertex numbers for messages.
-std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const HalfEdge> edges,
-                                                std::span<const Index> names) {
-  require_two_triangles(mesh, edges, names);
+std::vector<std::vector<Neighbor>> neighbors_of(const TriangleMesh& mesh, std::span<const Index> names) {
   std::vector<std::vector<Neighbor>> neighbors(mesh.triangles.size());
-  for_each_edge(edges, [&](std::span<const HalfEdge> run) {
-    if (run.size() < 2) return;
-    const bool flipped = run[0].forward == run[1].forward;
-    neighbors[run[0].triangle].push_back({run[1].triangle, flipped});
-    neighbors[run[1].triangle].push_back({run[0].triangle, flipped});
-  });
+  for (const auto& [first, second] : edges_of(mesh, names)) {
+    if (!second) continue;
+    const bool flipped = first.forward == second->forward;
+    neighbors[first.triangle].push_back({second->triangle, flipped});
+    neighbors[second->triangle].push_back({first.triangle, flipped});
+  }
   return neighbors;
 }
 
 /// Flips triangles to agree with their neighbors; the majority of a component stays as it is. Returns the component of
 /// each triangle, or -1 for a triangle without neighbors.
 std::vector<int> orient(TriangleMesh& mesh, std::span<const Index> names, SolidBoundary& result) {
-  const auto neighbors = neighbors_of(mesh, sorted_half_edges(mesh), names);
+  const auto neighbors = neighbors_of(mesh, names);
   std::vector<int> component(mesh.triangles.size(), -1);
   std::vector<char> turned(mesh.triangles.size(), 0);
   std::vector<Index> queue;
@@ -181,7 +122,8 @@ void drop_loners(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
 /// Closes every loop of boundary edges, those with one triangle, by a fan.
 void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary& result) {
   std::vector<std::array<Index, 3>> rims;  // from, to, triangle
-  for_each_edge(sorted_half_edges(mesh), [&](std::span<const HalfEdge> run) {
+  const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh.triangles, mesh.positions.size());
+  for_each_edge(std::span(sides), [&](std::span<const SurfaceHalfEdge> run) {
     if (run.size() == 1)
       rims.push_back(
           {run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
@@ -216,7 +158,8 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
 }
 
 /// Returns vertices - edges + triangles of each component; each fan at a vertex counts as a vertex of its own.
-std::vector<int> euler_numbers(const TriangleMesh& mesh, std::span<const int> component, int count) {
+std::vector<int> euler_numbers(const TriangleMesh& mesh, std::span<const int> component, int count,
+                               std::span<const Index> names) {
   std::vector<int> euler(static_cast<std::size_t>(count), 0);
   // Corners at one vertex that share an edge belong to one fan.
   std::vector<Index> group(3 * mesh.triangles.size());
@@ -229,92 +172,18 @@ std::vector<int> euler_numbers(const TriangleMesh& mesh, std::span<const int> co
     const auto& corners = mesh.triangles[t];
     return static_cast<Index>(3 * t + (corners[0] == v ? 0 : corners[1] == v ? 1 : 2));
   };
-  const std::vector<HalfEdge> edges = sorted_half_edges(mesh);
-  for_each_edge(edges, [&](std::span<const HalfEdge> run) {
-    --euler[component[run[0].triangle]];
-    for (const HalfEdge& edge : run.subspan(1))
-      for (Index v : {edge.low, edge.high}) {
-        const Index a = root(corner(run[0].triangle, v)), b = root(corner(edge.triangle, v));
-        group[std::max(a, b)] = std::min(a, b);
-      }
-  });
+  for (const auto& [first, second] : edges_of(mesh, names)) {
+    --euler[component[first.triangle]];
+    if (!second) continue;
+    for (Index v : {first.low, first.high}) {
+      const Index a = root(corner(first.triangle, v)), b = root(corner(second->triangle, v));
+      group[std::max(a, b)] = std::min(a, b);
+    }
+  }
   for (std::size_t c = 0; c < group.size(); ++c)
     if (group[c] == static_cast<Index>(c)) ++euler[component[c / 3]];
   for (int c : component) ++euler[c];
   return euler;
-}
-
-struct Component {
-  double volume = 0;  ///< signed
-  Eigen::AlignedBox3d box;
-};
-
-std::vector<Component> measured(const TriangleMesh& mesh, std::span<const int> component, int count) {
-  std::vector<Component> result(static_cast<std::size_t>(count));
-  const Vec3 origin = mesh.positions[mesh.triangles.front()[0]];
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    Component& c = result[component[t]];
-    std::array<Vec3, 3> p;
-    for (std::size_t i = 0; i < 3; ++i) {
-      p[i] = mesh.positions[mesh.triangles[t][i]] - origin;
-      c.box.extend(p[i]);
-    }
-    c.volume += p[0].dot(p[1].cross(p[2])) / 6;
-  }
-  return result;
-}
-
-/// Finds out if one of many boxes contains a given box: a tree with the largest box of each branch at its root.
-class BoxTree {
- public:
-  explicit BoxTree(std::vector<Eigen::AlignedBox3d> boxes) : boxes_(std::move(boxes)), hulls_(boxes_.size()) {
-    arrange(0, boxes_.size());
-  }
-  bool holds(const Eigen::AlignedBox3d& box) const { return holds(0, boxes_.size(), box); }
-
- private:
-  /// A branch holds the boxes first .. last - 1: its root at `first`, and two branches of half of the others each.
-  /// Returns the place where the second one begins.
-  static std::size_t middle(std::size_t first, std::size_t last) { return first + 1 + (last - first - 1) / 2; }
-
-  void arrange(std::size_t first, std::size_t last) {
-    if (first == last) return;
-    const auto at = [&](std::size_t i) { return boxes_.begin() + static_cast<std::ptrdiff_t>(i); };
-    for (std::size_t i = first; i < last; ++i) hulls_[first].extend(boxes_[i]);
-    std::iter_swap(at(first), std::max_element(at(first), at(last), [](const auto& a, const auto& b) {
-      return a.diagonal().maxCoeff() < b.diagonal().maxCoeff();
-    }));
-    int axis = 0;
-    hulls_[first].diagonal().maxCoeff(&axis);
-    const std::size_t half = middle(first, last);
-    std::nth_element(at(first + 1), at(half), at(last),
-                     [&](const auto& a, const auto& b) { return a.min()[axis] < b.min()[axis]; });
-    arrange(first + 1, half);
-    arrange(half, last);
-  }
-  bool holds(std::size_t first, std::size_t last, const Eigen::AlignedBox3d& box) const {
-    if (first == last || !hulls_[first].contains(box)) return false;
-    const std::size_t half = middle(first, last);
-    return boxes_[first].contains(box) || holds(first + 1, half, box) || holds(half, last, box);
-  }
-
-  std::vector<Eigen::AlignedBox3d> boxes_;
-  std::vector<Eigen::AlignedBox3d> hulls_;  ///< bounding box of the branch that begins at each place
-};
-
-/// Marks the walls of voids: components whose signed volume is opposite to the total and that lie inside the box of a
-/// component of the total's sign.
-std::vector<char> find_cavities(std::span<const Component> parts) {
-  const double total =
-      std::accumulate(parts.begin(), parts.end(), 0.0, [](double s, const Component& c) { return s + c.volume; });
-  const auto with_whole = [&](const Component& part) { return part.volume * total > 0; };
-  std::vector<Eigen::AlignedBox3d> outer;
-  for (const Component& part : parts)
-    if (with_whole(part)) outer.push_back(part.box);
-  const BoxTree tree(std::move(outer));
-  std::vector<char> cavity(parts.size(), 0);
-  for (std::size_t c = 0; c < parts.size(); ++c) cavity[c] = !with_whole(parts[c]) && tree.holds(parts[c].box);
-  return cavity;
 }
 
 }  // namespace
@@ -329,25 +198,26 @@ std::string to_string(const BettiNumbers& numbers) {
 
 SolidBoundary solid_boundary(const TriangleMesh& surface) {
   SolidBoundary result;
-  std::vector<Index> names;
-  TriangleMesh mesh = welded(surface, result.dropped_triangles, names);
+  WeldedSurface input = welded(surface);
+  result.dropped_triangles = input.dropped;
+  TriangleMesh& mesh = input.mesh;
+  std::vector<Index>& names = input.vertex_numbers;
   std::vector<int> component = orient(mesh, names, result);
   drop_loners(mesh, component, result);
   if (mesh.triangles.empty()) throw InputError("surface: it has no triangles that share an edge");
   close_holes(mesh, component, result);
+  names.resize(mesh.positions.size(), kNoIndex);  // centers of holes have no number
   const int count = *std::max_element(component.begin(), component.end()) + 1;
-  const std::vector<Component> parts = measured(mesh, component, count);
-  const std::vector<char> cavity = find_cavities(parts);
-  const std::vector<int> euler = euler_numbers(mesh, component, count);
-  for (std::size_t c = 0; c < parts.size(); ++c) {
-    ++(cavity[c] ? result.topology.cavities : result.topology.components);
+  const PartNesting parts = part_nesting(mesh, component, count);
+  const std::vector<int> euler = euler_numbers(mesh, component, count, names);
+  for (std::size_t c = 0; c < euler.size(); ++c) {
+    ++(parts.is_void(c) ? result.topology.cavities : result.topology.components);
     result.topology.handles += (2 - euler[c]) / 2;
-    result.volume += cavity[c] ? -std::abs(parts[c].volume) : std::abs(parts[c].volume);
+    result.volume += parts.is_void(c) ? -std::abs(parts.volumes[c]) : std::abs(parts.volumes[c]);
   }
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto c = static_cast<std::size_t>(component[t]);
-    if ((parts[c].volume > 0) == (cavity[c] != 0)) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
-  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    if (!parts.faces_out(static_cast<std::size_t>(component[t])))
+      std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
   // A surface with a volume below kFlat area^(3/2) is flat up to rounding.
   double area = 0;
   for (const auto& t : mesh.triangles) {

@@ -5,6 +5,7 @@
 #include "subvol/base/parallel_errors.h"
 #include "subvol/templates/pillow.h"
 #include "subvol/templates/plane_grid.h"
+#include "subvol/templates/search_stop.h"
 #include "subvol/templates/solid_fraction.h"
 #include "subvol/templates/template_frames.h"
 #include "subvol/templates/voxel_evolution.h"
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -119,7 +121,11 @@ std::size_t num_boundary_faces(const VoxelSolid& solid) {
 class Search {
  public:
   Search(const SolidBoundary& solid, const AutoTemplateOptions& options, std::size_t cells, std::vector<Mat3> frames)
-      : solid_(solid), options_(options), cells_(static_cast<double>(cells)), frames_(std::move(frames)) {}
+      : solid_(solid),
+        options_(options),
+        cells_(static_cast<double>(cells)),
+        frames_(std::move(frames)),
+        stop_([this] { return !options_.progress || options_.progress(fraction_); }) {}
 
   /// Tries grids through the planes of the surface with cells of several sizes; returns the best candidate, if any.
   /// result  receives the numbers of grids and of candidates, and whether the search was cancelled.
@@ -147,6 +153,8 @@ class Search {
   const AutoTemplateOptions& options_;
   double cells_;
   std::vector<Mat3> frames_;
+  double fraction_ = 0;      ///< progress that was told last
+  mutable SearchStop stop_;
 };
 
 /// Cell size for which the inner cells of a grid and a layer around them add up to the requested count.
@@ -154,7 +162,7 @@ double Search::pillowed_size(const Mat3& frame) const {
   constexpr int kHalvings = 10, kLines = 3;
   const double plain = std::cbrt(solid_.volume / cells_);
   double low = plain, high = 4 * plain;
-  for (int i = 0; i < kHalvings; ++i) {
+  for (int i = 0; i < kHalvings && !stop_.is_stopped(); ++i) {
     const double size = std::sqrt(low * high);
     const VoxelGrid grid = placed_grid(solid_.surface, {frame, size, {}});
     const std::vector<double> fractions = solid_fractions(solid_.surface, grid, kLines);
@@ -188,7 +196,8 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
   const std::vector<double> fractions = solid_fractions(solid_.surface, best.grid);
   const std::vector<double> volumes = cell_volumes(best.grid);
   const auto look_at = [&](VoxelStart start, double threshold) {
-    VoxelGoal goal{fractions, threshold, solid_.topology};
+    if (stop_.is_stopped()) return;
+    VoxelGoal goal{fractions, threshold, solid_.topology, &stop_};
     std::optional<VoxelSolid> solid = start_solid(start, best.grid.cells, VertexRule::pillowable, goal);
     if (!solid) return;
     goal.threshold = kWanted;
@@ -274,6 +283,10 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
     std::size_t num_right = 0;
     std::optional<Candidate> found =
         best_in(planes.frame, grid_through(planes.frame, with_spare(std::move(lines), size)), {}, num_right);
+    if (stop_.is_stopped()) {
+      result.cancelled = true;
+      return std::nullopt;
+    }
     if (!found) {
       search.be_finer();
       continue;
@@ -297,14 +310,25 @@ bool Search::run(std::vector<Candidate>& candidates, AutoTemplateResult& result,
   std::size_t right = 0;
   for (std::size_t first = 0; first < all.size() && right < kEnough; first += kBatch) {
     const auto fraction = static_cast<double>(first) / static_cast<double>(all.size());
-    if (options_.progress && !options_.progress(fraction_before + fraction_share * fraction)) return false;
+    fraction_ = fraction_before + fraction_share * fraction;
+    if (options_.progress && !options_.progress(fraction_)) return false;
     const std::size_t count = std::min(kBatch, all.size() - first);
     std::array<std::optional<Candidate>, kBatch> found;
     std::array<std::size_t, kBatch> num_right{};
     ParallelErrors errors;
-#pragma omp parallel for schedule(dynamic)
-    for (std::size_t i = 0; i < count; ++i) errors.guard([&] { found[i] = best_of(all[first + i], num_right[i]); });
+    std::atomic<int> left = static_cast<int>(count);
+#pragma omp parallel
+    {
+#pragma omp for schedule(dynamic) nowait
+      for (std::size_t i = 0; i < count; ++i) {
+        errors.guard([&] { found[i] = best_of(all[first + i], num_right[i]); });
+        --left;
+      }
+#pragma omp master
+      errors.guard([&] { stop_.wait_for(left); });
+    }
     errors.rethrow();
+    if (stop_.is_stopped()) return false;
     for (std::size_t i = 0; i < count; ++i) {
       right += num_right[i];
       if (found[i]) candidates.push_back(std::move(*found[i]));

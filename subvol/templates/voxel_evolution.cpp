@@ -99,6 +99,7 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
   std::optional<Index> best;
   double best_score = 0;
   for (const HandleFlip& flip : flips) {
+    if (goal.is_stopped()) return std::nullopt;
     const int length = loops.length(solid, flip.cell, flip.through_filled, flip.ends);
     if (length == 0) continue;  // the flip would join or split components, or open or close a cavity
     const double measure = std::min(length, kLongLoop);
@@ -124,7 +125,7 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
   };
   for (std::size_t c = 0; c < solid.num_cells(); ++c) offer(static_cast<Index>(c));
   // A cell is flipped at most once: afterwards it is as wanted.
-  while (!queue.empty()) {
+  while (!queue.empty() && !goal.is_stopped()) {
     const Index c = queue.top().second;
     queue.pop();
     waiting[c] = 0;
@@ -142,6 +143,7 @@ bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
     if (!solid.good(static_cast<Index>(p))) bad.push_back(static_cast<Index>(p));
   while (!bad.empty()) {
     // The best flip among all cells at the most recently found bad point.
+    if (goal.is_stopped()) return false;
     const Index p = bad.back();
     if (solid.good(p)) {
       bad.pop_back();
@@ -222,6 +224,7 @@ void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
     if (far.empty()) return;
     std::stable_sort(far.begin(), far.end(), [&](Index a, Index b) { return steps[a] > steps[b]; });
     for (Index end : far) {
+      if (goal.is_stopped()) return;
       path.clear();
       for (Index c = end; !solid.filled(c); c = previous[c]) path.push_back(c);
       if (path.size() < static_cast<std::size_t>(kNear)) continue;

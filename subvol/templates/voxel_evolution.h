@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_topology.h"
 
 #include <optional>
@@ -13,7 +14,9 @@ struct VoxelGoal {
   std::span<const double> fractions;  ///< share of each cell that lies in the shape, in [0, 1]
   double threshold = 0.5;             ///< in (0, 1)
   BettiNumbers topology;
+  SearchStop* stop = nullptr;         ///< if it is stopped, the functions below end early; null: they do not
 
+  bool is_stopped() const { return stop && stop->is_stopped(); }
   bool wants(Index cell) const { return fractions[cell] > threshold; }
   /// Gain of flipping a cell, in [-1, 1]: positive if the cell is not as wanted.
   double gain(const VoxelSolid& solid, Index cell) const {

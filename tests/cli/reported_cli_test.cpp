@@ -110,3 +110,35 @@ TEST_CASE("Reported surfaces are told with their own numbers, and which way they
     CHECK(!has(run.err, "closed surface"));
   }
 }
+
+TEST_CASE("Reported surfaces are diagnosed, repaired, or refused with the place of the cause", "[cli]") {
+  const auto inputs = reported_inputs();
+  if (!inputs) return;
+  const Workplace place;
+  const auto checked = [&](const std::string& name, int status) {
+    const Run run = place.run("check " + *inputs + name + " --json");
+    CAPTURE(name, run.err);
+    REQUIRE(run.status == status);
+    return nlohmann::json::parse(run.out)["findings"];
+  };
+  CHECK(checked("15-shared.off", 0)["vertex_contact"]["first"][0]["at"] == nlohmann::json({0.5, 0.5, 0.0}));
+  CHECK(checked("16-corner_shared.off", 0)["vertex_contact"]["count"] == 1);
+  CHECK(checked("16-edge_separate.off", 0)["edge_contact"]["count"] == 1);
+  CHECK(checked("19-slabs.off", 1)["interface"]["count"] == 16);
+  CHECK(checked("25-two_plates.off", 1)["crossing"]["count"] == 100);
+  CHECK(checked("39-gap0.002.off", 0)["thin_gap"]["first"][0]["width"].get<double>() == Approx(0.002));
+  CHECK(checked("39-outward_wrong.off", 1)["wall_outward"]["count"] == 1);
+  for (const auto& [name, word] :
+       {std::pair("39-overlap.off", "united"), {"39-outward_wrong.off", "turned"}, {"25-two_plates.off", "united"}}) {
+    const Run run = place.run("template auto " + *inputs + name + " --force -o a.mesh");
+    CAPTURE(name, run.err);
+    CHECK(run.status == 0);
+    CHECK(has(run.err, word));
+  }
+  const Run gap = place.run("template auto " + *inputs + "39-gap0.002.off -o b.mesh");
+  CHECK(gap.status == 1);
+  CHECK((has(gap.err, "the thinnest gap is 0.002 wide") && has(gap.err, "thinner than a cell")));
+  const Run slabs = place.run("template auto " + *inputs + "19-slabs.off -o b.mesh");
+  CHECK(slabs.status == 3);
+  CHECK(has(slabs.err, "several regions are not supported yet"));
+}

@@ -492,3 +492,21 @@ TEST_CASE("A surface alone is enough for a fit", "[cli][templates]") {
   CHECK(place.run("fit target.off --order 1 --cells 27 -o out.vtu").status == 0);
   CHECK(place.run("fit target.off --template template.mesh --cells 60 -o x.mesh").status == 2);
 }
+
+TEST_CASE("check of a surface tells whether it can be filled", "[cli]") {
+  const subvol::test::Workplace place;
+  const subvol::test::Run closed = place.run("check target.off --report r.json");
+  CAPTURE(closed.err);
+  CHECK(closed.status == 0);
+  CHECK(closed.out.find("can be filled as it is") != std::string::npos);
+  CHECK(place.json("r.json")["fillable"] == true);
+  place.file("open.off", "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n");
+  const subvol::test::Run open = place.run("check open.off --json");
+  CHECK(open.status == 1);
+  CHECK(nlohmann::json::parse(open.out)["findings"]["open_rim"]["count"] == 1);
+  CHECK(place.run("check open.off --target target.off").status == 2);
+  const subvol::test::Run late = place.run("template auto target.off --cells 100000 --time-limit 0.2 -o late.mesh");
+  CHECK(late.status == 4);
+  CHECK(late.err.find("time limit") != std::string::npos);
+  CHECK(!place.has("late.mesh"));
+}

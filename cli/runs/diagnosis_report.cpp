@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/diagnosis_report.h"
+
+#include "subvol/base/format.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/surface/boundary.h"
+
+#include <sstream>
+
+namespace subvol::cli {
+namespace {
+
+Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
+
+Json numbers_json(const std::array<Index, 2>& numbers) {
+  Json json = Json::array();
+  for (const Index n : numbers)
+    if (n != kNoIndex) json.push_back(n);
+  return json;
+}
+
+/// Name of `SurfacePlace::measure`; null if a fault has none.
+const char* measure_of(SurfaceFault fault) {
+  switch (fault) {
+    case SurfaceFault::open_rim:
+    case SurfaceFault::pinhole: return "length";
+    case SurfaceFault::thin_wall:
+    case SurfaceFault::thin_gap: return "width";
+    case SurfaceFault::sharp_angle: return "degrees";
+    case SurfaceFault::wall_outward:
+    case SurfaceFault::part_inward:
+    case SurfaceFault::part_in_void: return "volume";
+    default: return nullptr;
+  }
+}
+
+Json place_json(const SurfacePlace& place, const SurfaceFinding& finding, double diagonal) {
+  Json json{{"at", point_json(place.at)}};
+  if (place.to) json["to"] = point_json(*place.to);
+  if (const char* name = measure_of(finding.fault)) {
+    json[name] = place.measure;
+    if (name == std::string("length") || name == std::string("width"))
+      json["percent"] = diagonal > 0 ? 100 * place.measure / diagonal : 0;
+  }
+  json["triangles"] = numbers_json(place.triangles);
+  json["parts"] = numbers_json(place.parts);
+  return json;
+}
+
+Json parts_json(const std::vector<SurfacePart>& parts) {
+  Json json = Json::array();
+  for (const SurfacePart& part : parts) {
+    if (json.size() == kMostPlaces) break;
+    Json one{{"triangles", part.triangles}, {"first_triangle", part.first_triangle}, {"closed", part.is_closed}};
+    if (part.is_closed) {
+      one["volume"] = part.volume;
+      one["depth"] = part.depth;
+    }
+    json.push_back(std::move(one));
+  }
+  return json;
+}
+
+std::string place_line(const SurfacePlace& place) {
+  std::string text = std::string(22, ' ') + subvol::to_text(place.at);
+  if (place.to) text += " to " + subvol::to_text(*place.to);
+  if (place.triangles[0] == kNoIndex) return text + '\n';
+  text += place.triangles[1] == kNoIndex ? ", triangle " : ", triangles ";
+  text += std::to_string(place.triangles[0]);
+  if (place.triangles[1] != kNoIndex) text += " and " + std::to_string(place.triangles[1]);
+  return text + '\n';
+}
+
+}  // namespace
+
+FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  FileSurface surface;
+  surface.mesh = triangulate(read_polygon_mesh(path, &warnings), &surface.face_of_triangle);
+  return surface;
+}
+
+void number_by_faces(SurfaceDiagnosis& diagnosis, const FileSurface& surface) {
+  const auto rename = [&](Index& triangle) {
+    if (triangle != kNoIndex) triangle = surface.face_of_triangle[triangle];
+  };
+  for (SurfaceFinding& finding : diagnosis.findings)
+    for (SurfacePlace& place : finding.places)
+      for (Index& triangle : place.triangles) rename(triangle);
+  for (SurfacePart& part : diagnosis.parts) rename(part.first_triangle);
+}
+
+Json diagnosis_json(const SurfaceDiagnosis& diagnosis) {
+  Json findings = Json::object();
+  for (const SurfaceFinding& finding : diagnosis.findings) {
+    Json places = Json::array();
+    for (const SurfacePlace& place : finding.places) places.push_back(place_json(place, finding, diagnosis.diagonal));
+    findings[to_string(finding.fault)] = {{"count", finding.count},
+                                          {"complete", finding.is_complete},
+                                          {"prevents_filling", prevents_filling(finding.fault)},
+                                          {"first", std::move(places)}};
+  }
+  Json json{{"fillable", diagnosis.is_fillable()},
+            {"triangles", diagnosis.num_triangles},
+            {"vertices", diagnosis.num_vertices},
+            {"diagonal", diagnosis.diagonal},
+            {"volume", diagnosis.volume},
+            {"num_parts", diagnosis.parts.size()},
+            {"parts", parts_json(diagnosis.parts)},
+            {"findings", std::move(findings)}};
+  if (diagnosis.is_cancelled) json["ended_early"] = true;
+  return json;
+}
+
+std::string to_text(const SurfaceDiagnosis& diagnosis) {
+  std::ostringstream text;
+  text << formatted("%-20s", "surface") << diagnosis.num_triangles << " triangles, " << diagnosis.num_vertices
+       << " vertices, " << diagnosis.parts.size() << (diagnosis.parts.size() == 1 ? " part" : " parts")
+       << formatted(", diagonal %.6g, volume %.6g\n", diagnosis.diagonal, diagnosis.volume);
+  std::string reasons;
+  for (const SurfaceFinding& finding : diagnosis.findings) {
+    text << formatted("%-20s", to_string(finding.fault).c_str()) << subvol::to_text(finding, diagnosis.diagonal) << '\n';
+    for (std::size_t i = 1; i < finding.places.size(); ++i) text << place_line(finding.places[i]);
+    if (prevents_filling(finding.fault)) reasons += (reasons.empty() ? "" : ", ") + to_string(finding.fault);
+  }
+  if (reasons.empty()) text << "can be filled as it is\n";
+  else text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
+  return text.str();
+}
+
+void add_remarks(const SurfaceRepair& repair, std::vector<std::string>& warnings) {
+  warnings.insert(warnings.end(), repair.done.begin(), repair.done.end());
+  warnings.insert(warnings.end(), repair.notes.begin(), repair.notes.end());
+}
+
+}  // namespace subvol::cli

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "cli/runs/run_options.h"
+#include "fit/target/surface_diagnosis.h"
+#include "fit/target/surface_repair.h"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace subvol::cli {
+
+/// A surface in a file, face by face: nothing of what it holds is dropped but faces without three different corners.
+struct FileSurface {
+  TriangleMesh mesh;
+  std::vector<Index> face_of_triangle;  ///< the face of the file that each triangle is cut from, from 0
+};
+
+/// Reads a surface file. InputError: as `read_polygon_mesh`.
+FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
+
+/// Names the triangles of a diagnosis by the faces of the file.
+void number_by_faces(SurfaceDiagnosis& diagnosis, const FileSurface& surface);
+
+/// Entries of a report.
+Json diagnosis_json(const SurfaceDiagnosis& diagnosis);
+
+/// Text for people: a line for each finding, the places of those that prevent filling, and a verdict.
+std::string to_text(const SurfaceDiagnosis& diagnosis);
+
+/// Adds what was repaired, and what was left, to warnings.
+void add_remarks(const SurfaceRepair& repair, std::vector<std::string>& warnings);
+
+}  // namespace subvol::cli

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/geometry/thinnest_place.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kSamples = 20'000;
+constexpr int kMostParts = 6;         // an edge of a triangle is cut into at most so many parts
+constexpr double kMostCosine = -0.5;  // of the angle between the points that a ball touches, seen from its center
+
+/// A point of a triangle.
+struct Sample {
+  Index triangle;
+  Vec3 point;
+};
+
+/// Returns the centers of the parts of evenly spread triangles.
+std::vector<Sample> samples_of(const TriangleMesh& mesh) {
+  const std::size_t n = mesh.triangles.size();
+  if (n == 0) return {};
+  const std::size_t wanted = std::min(n, kSamples);
+  const int parts = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(kSamples) / static_cast<double>(n))), 1,
+                               kMostParts);
+  std::vector<Sample> samples;
+  for (std::size_t i = 0; i < wanted; ++i) {
+    const auto t = static_cast<Index>(i * n / wanted);
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vec3 &p = mesh.positions[a], u = (mesh.positions[b] - p) / parts, v = (mesh.positions[c] - p) / parts;
+    for (int j = 0; j < parts; ++j)
+      for (int k = 0; j + k < parts; ++k) {
+        samples.push_back({t, p + (j + 1.0 / 3) * u + (k + 1.0 / 3) * v});
+        if (j + k + 1 < parts) samples.push_back({t, p + (j + 2.0 / 3) * u + (k + 2.0 / 3) * v});
+      }
+  }
+  return samples;
+}
+
+/// Grows balls from samples.
+class Balls {
+ public:
+  Balls(const TriangleMesh& mesh, const ClosestPoint& tree, ThinSide side) : mesh_(mesh), tree_(tree), side_(side) {
+    Eigen::AlignedBox3d box;
+    for (const auto& t : mesh.triangles)
+      for (Index v : t) box.extend(mesh.positions[v]);
+    diagonal_ = box.diagonal().norm();
+  }
+
+  double diagonal() const { return diagonal_; }
+  /// Returns the place where the ball at a sample, at most of a radius, touches the surface again; width 0: there is
+  /// none that counts.
+  ThinPlace place(const Sample& sample, double radius) const {
+    constexpr int kSteps = 40;
+    constexpr double kTouches = 1e-7;  // share of the radius
+    const auto& t = mesh_.triangles[sample.triangle];
+    const Vec3 normal = (mesh_.positions[t[1]] - mesh_.positions[t[0]])
+                            .cross(mesh_.positions[t[2]] - mesh_.positions[t[0]]).normalized();
+    if (!normal.allFinite() || normal.isZero()) return {};
+    const Vec3 inward = side_ == ThinSide::wall ? Vec3(-normal) : normal;
+    ThinPlace found;
+    Index hint = sample.triangle;
+    for (int step = 0; step < kSteps; ++step) {
+      const Vec3 center = sample.point + radius * inward;
+      const ClosestPoint::Hit hit = tree_.closest(center, hint);
+      hint = hit.triangle;
+      if (hit.triangle == kNoIndex || hit.distance >= (1 - kTouches) * radius) break;
+      const Vec3 to = hit.point - sample.point;
+      const double depth = inward.dot(to);
+      if (!(depth > 0)) return {};
+      radius = to.squaredNorm() / (2 * depth);
+      found = {to.norm(), sample.point, hit.point, {sample.triangle, hit.triangle}};
+    }
+    if (found.triangles[1] == kNoIndex || !faces(found, sample.point + radius * inward)) return {};
+    return found;
+  }
+
+ private:
+  bool faces(const ThinPlace& place, const Vec3& center) const {
+    for (Index v : mesh_.triangles[place.triangles[0]])
+      for (Index w : mesh_.triangles[place.triangles[1]])
+        if (v == w) return false;
+    const Vec3 a = place.at - center, b = place.across - center;
+    return a.dot(b) <= kMostCosine * a.norm() * b.norm();
+  }
+
+  const TriangleMesh& mesh_;
+  const ClosestPoint& tree_;
+  ThinSide side_;
+  double diagonal_ = 0;
+};
+
+}  // namespace
+
+std::optional<ThinPlace> thinnest_place(const TriangleMesh& mesh, const ClosestPoint& tree, ThinSide side,
+                                        const std::function<bool()>& cancelled) {
+  constexpr std::size_t kAtATime = 512;  // samples between two questions whether to go on
+  const std::vector<Sample> samples = samples_of(mesh);
+  const Balls balls(mesh, tree, side);
+  std::vector<ThinPlace> places(samples.size());
+  const ThinPlace* best = nullptr;
+  for (std::size_t first = 0; first < samples.size(); first += kAtATime) {
+    if (cancelled && cancelled()) return std::nullopt;
+    const std::size_t end = std::min(first + kAtATime, samples.size());
+    // A ball that touches two points 120 degrees apart is no larger than their distance over the root of 3.
+    const double radius = best ? best->width / std::sqrt(3.0) : balls.diagonal();
+#pragma omp parallel for schedule(dynamic, 64)
+    for (std::size_t i = first; i < end; ++i) places[i] = balls.place(samples[i], radius);
+    for (std::size_t i = first; i < end; ++i)
+      if (places[i].width > 0 && (!best || places[i].width < best->width)) best = &places[i];
+  }
+  if (!best) return std::nullopt;
+  return *best;
+}
+
+}  // namespace subvol

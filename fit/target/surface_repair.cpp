@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/target/surface_repair.h"
+
+#include "fit/geometry/self_intersection.h"
+#include "fit/geometry/surface_union.h"
+#include "fit/geometry/triangle_meeting.h"
+#include "fit/target/carried_groups.h"
+#include "subvol/base/error.h"
+#include "subvol/surface/part_nesting.h"
+#include "subvol/surface/surface_parts.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// The parts of a surface, some of which are to be united.
+class Union {
+ public:
+  Union(SurfaceParts parts, const std::function<bool()>& cancelled) : parts_(std::move(parts)), cancelled_(cancelled) {
+    nesting_ = part_nesting(mesh(), parts_.part, static_cast<int>(parts_.num_parts()));
+    turn_parts_outward(parts_);
+    group_.resize(parts_.num_parts());
+    std::iota(group_.begin(), group_.end(), 0);
+  }
+  /// Finds out which parts cross or overlap. Returns false if cancelled.
+  bool group();
+  /// Returns the surface of the union, and a sentence for each group in `done`.
+  TriangleMesh made(std::vector<std::string>& done) const;
+
+ private:
+  struct Meeting {
+    std::size_t a, b;  ///< parts
+    Vec3 place;
+  };
+  const TriangleMesh& mesh() const { return parts_.surface.mesh; }
+  std::size_t root(std::size_t p) const {
+    while (group_[p] != p) p = group_[p];
+    return p;
+  }
+  TriangleMesh part(std::size_t p) const;
+  TriangleMesh united_group(std::size_t group) const;
+  std::string text_of(const Meeting& meeting) const {
+    return "parts " + std::to_string(meeting.a) + " and " + std::to_string(meeting.b) + " meet at " +
+           to_text(meeting.place);
+  }
+
+  SurfaceParts parts_;
+  PartNesting nesting_;
+  const std::function<bool()>& cancelled_;
+  std::vector<std::size_t> group_;  ///< another part of the same group, or the part itself
+  std::vector<Meeting> meetings_;   ///< those that joined groups
+};
+
+bool Union::group() {
+  const SelfIntersections found = self_intersections(mesh(), cancelled_);
+  if (cancelled_ && cancelled_()) return false;
+  for (const auto& [t, s] : found.pairs) {
+    const auto a = static_cast<std::size_t>(parts_.part[t]), b = static_cast<std::size_t>(parts_.part[s]);
+    if (root(a) == root(b) || !parts_.is_closed[a] || !parts_.is_closed[b]) continue;
+    const auto corners = [&](Index triangle) {
+      const auto& [i, j, k] = mesh().triangles[triangle];
+      return std::array<Vec3, 3>{mesh().positions[i], mesh().positions[j], mesh().positions[k]};
+    };
+    const TriangleMeeting meeting = meeting_of(corners(t), corners(s));
+    if (meeting.kind != MeetingKind::crossing && meeting.kind != MeetingKind::face) continue;
+    meetings_.push_back({a, b, meeting.place});
+    group_[std::max(root(a), root(b))] = std::min(root(a), root(b));
+  }
+  return true;
+}
+
+TriangleMesh Union::part(std::size_t p) const {
+  TriangleMesh result;
+  std::vector<Index> number(mesh().positions.size(), kNoIndex);
+  for (std::size_t t = 0; t < mesh().triangles.size(); ++t) {
+    if (static_cast<std::size_t>(parts_.part[t]) != p) continue;
+    std::array<Index, 3> corners = mesh().triangles[t];
+    for (Index& v : corners) {
+      if (number[v] == kNoIndex) {
+        number[v] = static_cast<Index>(result.positions.size());
+        result.positions.push_back(mesh().positions[v]);
+      }
+      v = number[v];
+    }
+    result.triangles.push_back(corners);
+  }
+  return result;
+}
+
+TriangleMesh Union::united_group(std::size_t group) const {
+  std::optional<TriangleMesh> whole;
+  for (const bool voids : {false, true})
+    for (std::size_t p = 0; p < group_.size(); ++p) {
+      if (root(p) != group || nesting_.is_void(p) != voids) continue;
+      TriangleMesh next = part(p);
+      if (voids)
+        for (auto& t : next.triangles) std::swap(t[1], t[2]);
+      if (!whole) whole = std::move(next);
+      else whole = voids ? without(*whole, next) : united(*whole, next);
+      if (whole) continue;
+      const auto meeting = std::find_if(meetings_.begin(), meetings_.end(),
+                                        [&](const Meeting& m) { return m.a == p || m.b == p; });
+      throw InputError("target: " + text_of(meeting == meetings_.end() ? meetings_.front() : *meeting) +
+                       " and cannot be united: a part meets itself, or parts also touch along an edge or at a vertex");
+    }
+  return std::move(*whole);
+}
+
+TriangleMesh Union::made(std::vector<std::string>& done) const {
+  TriangleMesh result;
+  for (std::size_t p = 0; p < group_.size(); ++p) {
+    if (root(p) != p) continue;
+    const auto members = std::count_if(meetings_.begin(), meetings_.end(),
+                                       [&](const Meeting& m) { return root(m.a) == p; });
+    TriangleMesh one = members == 0 ? part(p) : united_group(p);
+    const auto first = static_cast<Index>(result.positions.size());
+    result.positions.insert(result.positions.end(), one.positions.begin(), one.positions.end());
+    for (const auto& [a, b, c] : one.triangles) result.triangles.push_back({first + a, first + b, first + c});
+    if (members == 0) continue;
+    const auto meeting = std::find_if(meetings_.begin(), meetings_.end(),
+                                      [&](const Meeting& m) { return root(m.a) == p; });
+    done.push_back("target: " + text_of(*meeting) + "; " + std::to_string(members + 1) +
+                   " parts that cross or overlap are united");
+  }
+  return result;
+}
+
+/// Returns the groups of triangles that lie on those of a surface.
+FaceGroups groups_of_pieces(const TriangleMesh& surface, const TriangleMesh& pieces) {
+  std::vector<Index> numbers(pieces.triangles.size());
+  std::iota(numbers.begin(), numbers.end(), 0);
+  return {surface.face_groups.groups, carried_groups(surface, {pieces, numbers, 0}, numbers.size())};
+}
+
+}  // namespace
+
+SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled) {
+  const SurfaceDiagnosis diagnosis = diagnose(surface, cancelled);
+  SurfaceRepair repair{surface, {}, {}};
+  if (diagnosis.is_cancelled) return repair;
+  const auto words = [&](SurfaceFault fault) {
+    const SurfaceFinding* found = diagnosis.find(fault);
+    return found ? "target: " + to_text(*found, diagnosis.diagonal) : std::string();
+  };
+  if (const std::string regions = words(SurfaceFault::interface); !regions.empty())
+    throw InputError(regions + "; several regions are not supported yet: give the outer surface alone");
+  const bool crosses = diagnosis.find(SurfaceFault::crossing) || diagnosis.find(SurfaceFault::face_contact);
+  const std::string turned = words(SurfaceFault::wall_outward);
+  if (diagnosis.parts.size() > 1 && !diagnosis.find(SurfaceFault::fin) && (crosses || !turned.empty())) {
+    Union parts(surface_parts(surface), cancelled);
+    if (!parts.group()) return repair;
+    TriangleMesh made = parts.made(repair.done);
+    if (!turned.empty()) repair.done.push_back(turned + "; turned");
+    if (!repair.done.empty()) {
+      made.face_groups = groups_of_pieces(surface, made);
+      repair.surface = std::move(made);
+    }
+  }
+  const bool united = repair.done.size() > (turned.empty() ? 0u : 1u);
+  for (const SurfaceFault fault : {SurfaceFault::crossing, SurfaceFault::face_contact})
+    if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": left as it is");
+  for (const SurfaceFault fault : {SurfaceFault::edge_contact, SurfaceFault::vertex_contact})
+    if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": what touches stays apart");
+  if (diagnosis.find(SurfaceFault::pinhole)) repair.notes.push_back(words(SurfaceFault::pinhole) + ": closed");
+  return repair;
+}
+
+std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted) {
+  constexpr double kMostTimes = 20;  // the largest count that `auto_templates` tries, as a multiple of the wanted one
+  const std::string text = "no grid that was tried, of up to 20 times " + std::to_string(cells) +
+                           " cells, has the target's " + to_string(wanted);
+  const SurfaceDiagnosis diagnosis = diagnose(surface);
+  const double cell = std::cbrt(std::abs(diagnosis.volume) / (kMostTimes * static_cast<double>(cells)));
+  const std::string causes = obstacles_for_cells(diagnosis, cell);
+  return causes.empty() ? text : text + ": " + causes;
+}
+
+}  // namespace subvol

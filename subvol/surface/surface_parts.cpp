@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/surface/surface_parts.h"
+
+#include "subvol/surface/part_nesting.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// Sets joined, rims, touching and crowded.
+void sort_edges(SurfaceParts& parts) {
+  const bool outward = signed_volume_of(parts.surface.mesh) >= 0;
+  std::vector<std::array<std::size_t, 2>> pairs;
+  for_each_edge(std::span(std::as_const(parts.sides)), [&](std::span<const SurfaceHalfEdge> run) {
+    const auto first = static_cast<std::size_t>(run.data() - parts.sides.data());
+    if (run.size() == 1) {
+      parts.rims.push_back(first);
+    } else if (run.size() == 2) {
+      parts.joined.push_back({first, first + 1});
+    } else if (pair_around_edge(parts.surface.mesh, run, outward, pairs)) {
+      parts.touching.push_back(first);
+      for (const auto& [i, j] : pairs) parts.joined.push_back({first + i, first + j});
+    } else {
+      parts.crowded.push_back(first);
+    }
+  });
+}
+
+/// Sets part and is_closed.
+void find_parts(SurfaceParts& parts) {
+  std::vector<Index> root(parts.surface.mesh.triangles.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](Index t) {
+    while (root[t] != t) t = root[t] = root[root[t]];
+    return t;
+  };
+  for (const auto& [i, j] : parts.joined) {
+    const Index a = find(parts.sides[i].triangle), b = find(parts.sides[j].triangle);
+    root[std::max(a, b)] = std::min(a, b);
+  }
+  parts.part.assign(root.size(), 0);
+  for (std::size_t t = 0; t < root.size(); ++t) {
+    const auto r = static_cast<std::size_t>(find(static_cast<Index>(t)));
+    if (r == t) {
+      parts.part[t] = static_cast<int>(parts.is_closed.size());
+      parts.is_closed.push_back(1);
+    } else {
+      parts.part[t] = parts.part[r];
+    }
+  }
+  for (const std::size_t side : parts.rims) parts.is_closed[parts.part[parts.sides[side].triangle]] = 0;
+  for (const std::size_t first : parts.crowded)
+    for (const SurfaceHalfEdge& side : parts.edge(first)) parts.is_closed[parts.part[side.triangle]] = 0;
+}
+
+}  // namespace
+
+std::span<const SurfaceHalfEdge> SurfaceParts::edge(std::size_t first) const {
+  std::size_t last = first;
+  while (last < sides.size() && sides[last].low == sides[first].low && sides[last].high == sides[first].high) ++last;
+  return std::span(sides).subspan(first, last - first);
+}
+
+SurfaceParts surface_parts(const TriangleMesh& surface) {
+  SurfaceParts parts;
+  parts.surface = welded(surface);
+  parts.sides = sorted_half_edges(parts.surface.mesh.triangles, parts.surface.mesh.positions.size());
+  sort_edges(parts);
+  find_parts(parts);
+  return parts;
+}
+
+std::size_t turn_parts_outward(SurfaceParts& parts) {
+  if (parts.num_parts() == 0) return 0;
+  const PartNesting nesting = part_nesting(parts.surface.mesh, parts.part, static_cast<int>(parts.num_parts()));
+  std::vector<char> turned(parts.num_parts(), 0);
+  for (std::size_t p = 0; p < turned.size(); ++p) turned[p] = parts.is_closed[p] && !nesting.faces_out(p);
+  for (std::size_t t = 0; t < parts.part.size(); ++t)
+    if (turned[parts.part[t]]) std::swap(parts.surface.mesh.triangles[t][1], parts.surface.mesh.triangles[t][2]);
+  for (SurfaceHalfEdge& side : parts.sides)
+    if (turned[parts.part[side.triangle]]) side.forward = !side.forward;
+  return static_cast<std::size_t>(std::count(turned.begin(), turned.end(), 1));
+}
+
+}  // namespace subvol

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/surface/welded_surface.h"
+
+#include "subvol/base/error.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// Returns, for each vertex that a triangle names, the smallest number of a vertex in the same place; kNoIndex for the
+/// others.
+std::vector<Index> first_in_place(const TriangleMesh& surface) {
+  std::vector<char> used(surface.positions.size(), 0);
+  for (const auto& t : surface.triangles)
+    for (Index v : t) {
+      if (v < 0 || static_cast<std::size_t>(v) >= used.size() || !surface.positions[v].allFinite())
+        throw InputError("surface: a triangle names a vertex that is not there, or whose position is not finite");
+      used[v] = 1;
+    }
+  std::vector<Index> order;
+  for (std::size_t v = 0; v < used.size(); ++v)
+    if (used[v]) order.push_back(static_cast<Index>(v));
+  const auto compared = [&](Index a, Index b) {
+    const Vec3 &p = surface.positions[a], &q = surface.positions[b];
+    for (int i = 0; i < 3; ++i)
+      if (p[i] != q[i]) return p[i] < q[i] ? -1 : 1;
+    return 0;
+  };
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+    const int c = compared(a, b);
+    return c != 0 ? c < 0 : a < b;
+  });
+  std::vector<Index> first(used.size(), kNoIndex);
+  for (std::size_t i = 0; i < order.size(); ++i)
+    first[order[i]] = i > 0 && compared(order[i - 1], order[i]) == 0 ? first[order[i - 1]] : order[i];
+  return first;
+}
+
+}  // namespace
+
+WeldedSurface welded(const TriangleMesh& surface) {
+  const std::vector<Index> first = first_in_place(surface);
+  const std::vector<Index>& groups = surface.face_groups.of_face;
+  WeldedSurface result;
+  result.mesh.face_groups.groups = surface.face_groups.groups;
+  std::vector<Index> number(surface.positions.size(), kNoIndex);
+  const auto vertex = [&](Index v) {
+    Index& n = number[first[v]];
+    if (n == kNoIndex) {
+      n = static_cast<Index>(result.mesh.positions.size());
+      result.mesh.positions.push_back(surface.positions[v]);
+      result.vertex_numbers.push_back(first[v]);
+    }
+    return n;
+  };
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    const auto& [a, b, c] = surface.triangles[t];
+    const std::array<Index, 3> corners{vertex(a), vertex(b), vertex(c)};
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) {
+      ++result.dropped;
+    } else {
+      result.mesh.triangles.push_back(corners);
+      result.triangle_numbers.push_back(static_cast<Index>(t));
+      if (!groups.empty()) result.mesh.face_groups.of_face.push_back(groups[t]);
+    }
+  }
+  return result;
+}
+
+std::vector<SurfaceHalfEdge> sorted_half_edges(std::span<const std::array<Index, 3>> triangles,
+                                               std::size_t num_vertices) {
+  std::vector<std::size_t> begin(num_vertices + 1, 0);
+  const auto for_each_side = [&](auto&& visit) {
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+      for (std::size_t e = 0; e < 3; ++e) {
+        const Index v = triangles[t][e], w = triangles[t][(e + 1) % 3];
+        visit(SurfaceHalfEdge{std::min(v, w), std::max(v, w), static_cast<Index>(t), v < w});
+      }
+  };
+  for_each_side([&](const SurfaceHalfEdge& side) { ++begin[static_cast<std::size_t>(side.low) + 1]; });
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<SurfaceHalfEdge> sides(3 * triangles.size());
+  std::vector<std::size_t> end(begin.begin(), begin.end() - 1);
+  for_each_side([&](const SurfaceHalfEdge& side) { sides[end[side.low]++] = side; });
+  for (std::size_t v = 0; v < num_vertices; ++v)
+    std::sort(sides.begin() + static_cast<std::ptrdiff_t>(begin[v]),
+              sides.begin() + static_cast<std::ptrdiff_t>(begin[v + 1]),
+              [](const SurfaceHalfEdge& a, const SurfaceHalfEdge& b) {
+                return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+              });
+  return sides;
+}
+
+bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides, bool outward,
+                      std::vector<std::array<std::size_t, 2>>& pairs) {
+  pairs.clear();
+  if (sides.size() % 2 != 0) return false;
+  const Vec3& from = mesh.positions[sides[0].low];
+  const Vec3 along = (mesh.positions[sides[0].high] - from).normalized();
+  const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
+  std::vector<std::pair<double, std::size_t>> order;  // angle around the edge, position in sides
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const auto& t = mesh.triangles[sides[i].triangle];
+    const Index third = t[0] + t[1] + t[2] - sides[i].low - sides[i].high;
+    const Vec3 across = mesh.positions[third] - from;
+    order.emplace_back(std::atan2(across.dot(y), across.dot(x)), i);
+  }
+  std::sort(order.begin(), order.end());
+  // A triangle that runs forward has its normal on the side of larger angles: the solid is on the other side. Of two
+  // triangles in one place, with a solid on each side, the one whose solid lies before comes first.
+  constexpr double kSameAngle = 1e-9;  // radians; beyond the rounding of angles between vertices of any usual numbers
+  for (std::size_t i = 0; i + 1 < order.size(); ++i)
+    if (order[i + 1].first - order[i].first < kSameAngle && sides[order[i].second].forward != outward &&
+        sides[order[i + 1].second].forward == outward)
+      std::swap(order[i], order[i + 1]);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::size_t at = order[i].second;
+    if (!sides[at].forward) continue;
+    const std::size_t n = order.size(), other = order[(i + (outward ? n - 1 : 1)) % n].second;
+    if (sides[other].forward) return false;
+    pairs.push_back({at, other});
+  }
+  return 2 * pairs.size() == sides.size();
+}
+
+double signed_volume_of(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) return 0;
+  const Vec3 origin = mesh.positions[mesh.triangles[0][0]];
+  double sum = 0;
+  for (const auto& t : mesh.triangles)
+    sum += (mesh.positions[t[0]] - origin).dot((mesh.positions[t[1]] - origin).cross(mesh.positions[t[2]] - origin));
+  return sum / 6;
+}
+
+}  // namespace subvol

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/surface/triangle_mesh.h"
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// A surface whose vertices of equal position are one vertex.
+struct WeldedSurface {
+  TriangleMesh mesh;                  ///< only vertices that a triangle names, in the order in which they are named
+  std::vector<Index> vertex_numbers;  ///< the smallest number that each vertex has in the input
+  std::vector<Index> triangle_numbers;  ///< the number of each triangle in the input, ascending
+  std::size_t dropped = 0;            ///< triangles with two corners in one place
+};
+
+/// Merges the vertices of equal position and drops the triangles with two corners in one place. Triangles keep their
+/// groups.
+///
+/// InputError: a triangle names a vertex that is not there, or whose position is not finite. Cost: a sort of the
+/// vertices.
+WeldedSurface welded(const TriangleMesh& surface);
+
+/// One side of a triangle.
+struct SurfaceHalfEdge {
+  Index low, high;  ///< its vertices, the smaller number first
+  Index triangle;
+  bool forward;     ///< true if the triangle runs from `low` to `high`
+};
+
+/// Returns the sides of all triangles, those of one edge in succession: sorted by `low`, `high` and `triangle`.
+///
+/// triangles  of vertices 0 .. num_vertices - 1, with three different corners each. Cost: almost linear.
+std::vector<SurfaceHalfEdge> sorted_half_edges(std::span<const std::array<Index, 3>> triangles,
+                                               std::size_t num_vertices);
+
+/// Calls visit(sides) with the sides of each edge in turn. half_edges: as `sorted_half_edges` returns them.
+template <class Visit>
+void for_each_edge(std::span<const SurfaceHalfEdge> half_edges, Visit&& visit) {
+  for (std::size_t first = 0, last; first < half_edges.size(); first = last) {
+    const SurfaceHalfEdge& edge = half_edges[first];
+    last = first + 1;
+    while (last < half_edges.size() && half_edges[last].low == edge.low && half_edges[last].high == edge.high) ++last;
+    visit(half_edges.subspan(first, last - first));
+  }
+}
+
+/// Pairs the sides at an edge of more than two triangles, such that solids that only touch there stay apart.
+///
+/// The triangles are sorted by their angle around the edge. Each one that runs forward is paired with the one across the
+/// wedge of solid behind it.
+///
+/// sides     the sides of one edge.
+/// outward   true if the triangles' normals point out of the solid, false if they point into it.
+/// pairs     receives positions in `sides`.
+/// returns   false if no such pairs exist: as many triangles must run forward as backward, in turn.
+bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides, bool outward,
+                      std::vector<std::array<std::size_t, 2>>& pairs);
+
+/// Returns 1/6 sum of det(a, b, c) over the triangles, relative to their first corner: the volume that a closed surface
+/// encloses, negative if its normals point inward.
+double signed_volume_of(const TriangleMesh& mesh);
+
+}  // namespace subvol
