@@ -23,6 +23,7 @@ struct NodeSpace {
   int order = 1;
   bool is_continuous = true;
   NodeSpacing spacing = NodeSpacing::lobatto;
+  bool is_old_cubic = false;  ///< "Cubic", which runs around the inner nodes of a hex, not along rows
 };
 
 class MfemParser {
@@ -160,7 +161,7 @@ class MfemParser {
     NodeSpace space;
     if (name == "Linear") return space;
     if (name == "Quadratic") return {2, true, NodeSpacing::equal};
-    if (name == "Cubic") return {3, true, NodeSpacing::equal};
+    if (name == "Cubic") return {3, true, NodeSpacing::equal, true};
     for (const auto& [prefix, is_continuous] : {std::pair{"H1_3D_P", true}, {"H1@G_3D_P", true}, {"L2_T1_3D_P", false}}) {
       if (!name.starts_with(prefix)) continue;
       const auto order = parse_integer(std::string_view(name).substr(std::string_view(prefix).size()));
@@ -186,12 +187,23 @@ class MfemParser {
                           ? number_mfem_nodes(num_vertices, kinds_, offsets_, corners_, space.order)
                           : separate_nodes(space.order);
     std::vector<Vec3> values = read_values(nodes.count, ordering == "1");
+    if (space.is_old_cubic) turn_inner_nodes(nodes);
     if (!space.is_continuous) join_corners(num_vertices, nodes, values);
     mesh_.positions = std::move(values);
     mesh_.kinds = kinds_;
     mesh_.orders.assign(kinds_.size(), space.order);
     mesh_.offsets = std::move(nodes.offsets);
     mesh_.nodes = std::move(nodes.nodes);
+  }
+
+  /// The last eight nodes of a hex of order 3, in rows, are its inner ones.
+  void turn_inner_nodes(MfemNodes& nodes) const {
+    for (std::size_t c = 0; c < kinds_.size(); ++c) {
+      if (kinds_[c] != CellKind::hex) continue;
+      const std::size_t first = nodes.offsets[c + 1] - 8;
+      std::swap(nodes.nodes[first + 2], nodes.nodes[first + 3]);
+      std::swap(nodes.nodes[first + 6], nodes.nodes[first + 7]);
+    }
   }
 
   std::vector<Vec3> read_values(std::size_t count, bool by_node) {
