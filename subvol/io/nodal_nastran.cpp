@@ -162,6 +162,9 @@ class NastranParser {
     return *value;
   }
 
+  /// Some programs leave the property out.
+  std::int64_t property() const { return field(2).empty() ? 0 : whole(2, "the number of a property"); }
+
   void read_grid() {
     const std::int64_t number = whole(1, "the number of a point");
     if (const auto system = parse_integer(field(2)); !field(2).empty() && (!system || *system != 0))
@@ -187,7 +190,7 @@ class NastranParser {
   };
 
   void read_solid(const SolidCard& solid) {
-    Element element{&solid, whole(2, "the number of a property"), {}, card_line_};
+    Element element{&solid, property(), {}, card_line_};
     for (std::size_t i = 0; i < solid.num_nodes; ++i) {
       const bool is_corner = i < solid.num_corners, is_blank = field(3 + i).empty() || field(3 + i) == "0";
       element.nodes.push_back(!is_corner && is_blank ? 0 : whole(3 + i, "the number of a point"));
@@ -196,7 +199,7 @@ class NastranParser {
   }
 
   void read_shell(std::size_t num_corners) {
-    Element element{nullptr, whole(2, "the number of a property"), {}, card_line_};
+    Element element{nullptr, property(), {}, card_line_};
     for (std::size_t i = 0; i < num_corners; ++i) element.nodes.push_back(whole(3 + i, "the number of a point"));
     elements_.push_back(std::move(element));
   }
