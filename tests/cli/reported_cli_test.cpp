@@ -67,11 +67,16 @@ TEST_CASE("Reported files of cells give the references that are meant, and are t
     CHECK(subvol::read_volume_mesh(place / "a.mesh").references == std::vector<int>{7, 9});
   }
   for (const char* name : {"04-m.msh", "05-m.inp"}) {
-    const Run run = place.run("convert " + *inputs + name + " -o b.mesh");
+    const Run run = place.run("convert " + *inputs + name + " --force -o b.mesh");
     CAPTURE(name, run.err);
-    CHECK(run.status == 3);
-    CHECK(has(run.err, "unknown extension"));
+    REQUIRE(run.status == 0);
+    CHECK(subvol::read_volume_mesh(place / "b.mesh").num_cells() == 1);
   }
+  const Run curved = place.run("convert " + *inputs + "06-hex20.vtk -o curved.msh -o curved.inp");
+  CAPTURE(curved.err);
+  CHECK(has(curved.err, "warning") == false);
+  CHECK(curved.status == 0);
+  CHECK(place.run("check curved.msh").status == 0);
   const Run mirrored = place.run("optimize " + *inputs + "09-all_mirrored.mesh -o b.mesh");
   CAPTURE(mirrored.err);
   CHECK(mirrored.status == 0);
