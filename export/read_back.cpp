@@ -194,7 +194,7 @@ void compare_msh(const WrittenFile& file, const CellView& wanted) {
     const std::size_t type = whole("a type"), size = whole("a number of elements");
     if (dimension == 2) {
       num_grouped += size;
-      for (std::size_t k = 0; k < size; ++k) scan.line();
+      for (std::size_t k = 0; k <= size; ++k) scan.line();  // the first call ends the line of the block
       continue;
     }
     for (std::size_t k = 0; k < size; ++k, ++element) {

@@ -4,6 +4,7 @@
 #include "python/keywords.h"
 #include "subvol/mesh/face_groups.h"
 
+#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
 #include <cstddef>

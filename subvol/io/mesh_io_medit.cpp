@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 namespace subvol {
 
@@ -67,6 +69,22 @@ struct Sharpness {
   Numbered item;
   double value;
 };
+
+/// Sorts the groups by number, so that a file that is written again is the same.
+void sort_by_number(VolumeFaceGroups& groups) {
+  std::vector<Index> order(groups.groups.size()), place(order.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::sort(order.begin(), order.end(),
+            [&](Index a, Index b) { return groups.groups[a].number < groups.groups[b].number; });
+  std::vector<Group> sorted;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    place[order[i]] = static_cast<Index>(i);
+    sorted.push_back(std::move(groups.groups[order[i]]));
+  }
+  groups.groups = std::move(sorted);
+  for (GroupedFace& entry : groups.faces) entry.group = place[entry.group];
+  normalise(groups);
+}
 
 class MeditParser {
  public:
@@ -264,7 +282,7 @@ class MeditParser {
     for (const Group& named : face_names_) places.push_back(face_groups_.by_number(named.number));
     groups.groups = face_groups_.take();
     for (std::size_t i = 0; i < places.size(); ++i) groups.groups[places[i]].name = face_names_[i].name;
-    normalise(groups);
+    sort_by_number(groups);
     parsed_.mesh.regions = std::move(cell_names_);
   }
 

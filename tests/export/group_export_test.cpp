@@ -82,7 +82,7 @@ TEST_CASE("a .msh has a physical surface for each group, behind the cells") {
 }
 
 TEST_CASE("faces of curved cells have the points of the cells") {
-  PointSource source;
+  PointSource source(1);
   const VolumeMesh cells = grouped_cells();
   for (const int order : {1, 2}) {
     const HighOrderMesh mesh = random_mesh(ElementSpace(cells, Basis::legendre, order), source);
@@ -110,7 +110,7 @@ TEST_CASE("faces of curved cells have the points of the cells") {
 }
 
 TEST_CASE("groups go through a .vtu of curved cells and back, and to the linear cells") {
-  PointSource source;
+  PointSource source(1);
   const VolumeMesh cells = grouped_cells();
   const HighOrderMesh mesh = random_mesh(ElementSpace(cells, Basis::legendre, 2), source);
   const HighOrderFileOptions options{
@@ -129,7 +129,7 @@ TEST_CASE("groups go through a .vtu of curved cells and back, and to the linear 
 }
 
 TEST_CASE("field data of groups that does not fit together is refused") {
-  PointSource source;
+  PointSource source(1);
   VolumeMesh cells = grouped_cells();
   const HighOrderMesh mesh = random_mesh(ElementSpace(cells, Basis::legendre, 1), source);
   cells.face_groups.faces[0].face = {0, 1, 2, 1000};

@@ -102,7 +102,7 @@ TEST_CASE("groups of faces and names of references go through a .mesh and back")
   const TemporaryFolder folder;
   VolumeMesh mesh = with_floor_and_roof(lattice(2, 2, 1), 1);
   mesh.face_groups.groups[0].name = "the floor";
-  mesh.face_groups.groups[1].number = -12;
+  mesh.face_groups.groups[1].number = 12;
   mesh.references = {1, 1, 2, 2};
   mesh.regions = {{"steel", 1, 3}, {"cast iron", 2, 3}};
   write_volume_mesh(folder / "a.mesh", mesh);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/mesh/face_groups.h"
 
+#include "subvol/mesh/features.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/subdivision/subdivision.h"
 #include "subvol/surface/boundary.h"
@@ -67,7 +68,9 @@ TEST_CASE("the boundary, its triangles and its polygons have the groups of the f
 
 TEST_CASE("subdivision and edits of templates keep the groups of faces") {
   const VolumeMesh mesh = with_floor_and_roof(lattice(3, 3, 2), 2);
-  check_floor_and_roof(subdivide(mesh, BoundaryRule::averaging).fine, 2);
+  VolumeMesh creased = mesh;  // stays a box
+  creased.tags = features_by_angle(mesh, 40);
+  check_floor_and_roof(subdivide(creased, BoundaryRule::averaging).fine, 2);
   check_floor_and_roof(split_into_tets(mesh), 2);
   check_floor_and_roof(split_into_prisms(mesh, 0, 1), 2);
   check_floor_and_roof(split_into_prisms(mesh, 0, 4), 2);
