@@ -246,6 +246,53 @@ PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, doub
   return cloud;
 }
 
+PolygonMesh plate_surface() {
+  constexpr double kLength = 2, kWidth = 1, kThickness = 0.1, kRadius = 0.25;
+  constexpr int kAcross = 16, kAlong = 32, kRings = 8, kSides = kAcross + kAlong;
+  const std::vector<Group> groups{{"symmetry_x", 1}, {"symmetry_y", 2}, {"symmetry_z", 3}, {"hole", 4},
+                                  {"loaded", 5},     {"side", 6},       {"top", 7}};
+  const auto group = [&](const char* name) {
+    const auto found = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == name; });
+    return static_cast<Index>(found - groups.begin());
+  };
+  PolygonMesh plate;
+  plate.face_groups.groups = groups;
+  // Points on rays from the hole to the outline, at the bottom and at the top.
+  for (const double z : {0.0, kThickness})
+    for (int ring = 0; ring <= kRings; ++ring)
+      for (int side = 0; side <= kSides; ++side) {
+        const Vec3 outline = side <= kAcross ? Vec3(kLength, kWidth * side / kAcross, 0)
+                                             : Vec3(kLength * (kSides - side) / kAlong, kWidth, 0);
+        const Vec3 rim = kRadius * outline.normalized();
+        const double share = static_cast<double>(ring) / kRings;
+        plate.positions.push_back((1 - share) * rim + share * outline + z * Vec3::UnitZ());
+      }
+  const auto vertex = [](int layer, int ring, int side) { return (layer * (kRings + 1) + ring) * (kSides + 1) + side; };
+  const auto add = [&](const char* name, std::array<Index, 4> corners) {
+    plate.face_vertices.insert(plate.face_vertices.end(), corners.begin(), corners.end());
+    plate.face_offsets.push_back(plate.face_vertices.size());
+    plate.face_groups.of_face.push_back(group(name));
+  };
+  for (int ring = 0; ring < kRings; ++ring) {
+    for (int side = 0; side < kSides; ++side)
+      for (const int layer : {0, 1}) {
+        std::array<Index, 4> corners{vertex(layer, ring, side), vertex(layer, ring + 1, side),
+                                     vertex(layer, ring + 1, side + 1), vertex(layer, ring, side + 1)};
+        if (layer == 0) std::reverse(corners.begin(), corners.end());
+        add(layer == 0 ? "symmetry_z" : "top", corners);
+      }
+    add("symmetry_y", {vertex(0, ring, 0), vertex(0, ring + 1, 0), vertex(1, ring + 1, 0), vertex(1, ring, 0)});
+    add("symmetry_x", {vertex(0, ring + 1, kSides), vertex(0, ring, kSides), vertex(1, ring, kSides),
+                       vertex(1, ring + 1, kSides)});
+  }
+  for (int side = 0; side < kSides; ++side) {
+    add(side < kAcross ? "loaded" : "side", {vertex(0, kRings, side), vertex(0, kRings, side + 1),
+                                             vertex(1, kRings, side + 1), vertex(1, kRings, side)});
+    add("hole", {vertex(0, 0, side + 1), vertex(0, 0, side), vertex(1, 0, side), vertex(1, 0, side + 1)});
+  }
+  return plate;
+}
+
 std::string xyz_text(const PointCloud& cloud) {
   std::string text;
   for (const Vec3& p : cloud.points) {
