@@ -56,7 +56,7 @@ class BoxTree {
   std::vector<Eigen::AlignedBox3d> hulls_;  ///< bounding box of the branch that begins at each place
 };
 
-constexpr std::size_t kPoints = 16;      // points of a part that are asked for
+constexpr std::size_t kTriangles = 16;   // triangles of a part whose corners and centers are asked for
 constexpr double kClearlyWhole = 0.2;    // farthest from a whole number: ten times the error of two winding numbers
 
 /// The triangles of each part.
@@ -88,12 +88,13 @@ struct Parts {
     }
     return result;
   }
-  /// Returns centers of triangles, evenly spread over the part's list.
+  /// Returns centers and corners of triangles, evenly spread over the part's list.
   std::vector<Vec3> points(std::size_t p) const {
     std::vector<Vec3> result;
-    const std::size_t n = triangles[p].size(), wanted = std::min(n, kPoints);
+    const std::size_t n = triangles[p].size(), wanted = std::min(n, kTriangles);
     for (std::size_t i = 0; i < wanted; ++i) {
       const auto& [a, b, c] = mesh.triangles[triangles[p][i * n / wanted]];
+      for (const Index v : {a, b, c}) result.push_back(mesh.positions[v]);
       result.emplace_back((mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3);
     }
     return result;

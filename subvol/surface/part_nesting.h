@@ -29,7 +29,8 @@ struct PartNesting {
 /// part       number of the part of each triangle, in [0, count).
 /// count      number of parts; each has triangles, closed and consistently oriented. If a part has holes, its depth is
 ///            an estimate.
-/// Deterministic. Cost: that of the winding numbers at 16 points of each part whose box lies in another part's.
+/// Deterministic. Cost: that of the winding numbers at the corners and centers of 16
+/// triangles of each part whose box lies in another part's.
 PartNesting part_nesting(const TriangleMesh& mesh, std::span<const int> part, int count);
 
 /// Returns the smallest part that contains another part, or -1. nesting: as `part_nesting` returns it. Cost: that of

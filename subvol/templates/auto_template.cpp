@@ -199,10 +199,11 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
     if (stop_.is_stopped()) return;
     VoxelGoal goal{fractions, threshold, solid_.topology, &stop_};
     std::optional<VoxelSolid> solid = start_solid(start, best.grid.cells, VertexRule::pillowable, goal);
-    if (!solid) return;
+    if (!solid || stop_.is_stopped()) return;
     goal.threshold = kWanted;
     evolve(*solid, goal);
     reach_thin_parts(*solid, goal);
+    if (stop_.is_stopped()) return;
     const double share = count_of(*solid) / cells_;
     if (!range.holds(share)) return;
     ++num_right;

@@ -205,6 +205,7 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
     if (!cell) return false;
     solid.flip(*cell);
     evolve(solid, goal);
+    if (goal.is_stopped()) return false;
   }
   return solid.topology() == goal.topology;
 }
@@ -244,14 +245,16 @@ std::optional<VoxelSolid> start_solid(VoxelStart start, const std::array<int, 3>
   };
   if (start == VoxelStart::cut) {
     fill([&](Index c) { return goal.wants(c); });
-    if (solid.num_filled() == 0 || !make_points_good(solid, goal) || !drop_surplus(solid, goal)) return std::nullopt;
+    if (solid.num_filled() == 0 || !make_points_good(solid, goal) || goal.is_stopped() ||
+        !drop_surplus(solid, goal))
+      return std::nullopt;
   } else {
     if (goal.topology.components != 1 || goal.topology.cavities != 0) return std::nullopt;
     const auto fullest = std::max_element(goal.fractions.begin(), goal.fractions.end()) - goal.fractions.begin();
     fill([&](Index c) { return start == VoxelStart::shrunk || c == fullest; });
     evolve(solid, goal);
   }
-  if (!match_handles(solid, goal)) return std::nullopt;
+  if (goal.is_stopped() || !match_handles(solid, goal)) return std::nullopt;
   return solid;
 }
 
