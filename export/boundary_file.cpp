@@ -22,7 +22,9 @@ void require_boundary(const PolygonMesh& boundary, const BoundaryOrigin& origin)
 
 std::uint8_t type_of(std::size_t corners) { return corners == 3 ? 5 : corners == 4 ? 9 : 7; }
 
-std::size_t corners_of(const PolygonMesh& mesh, std::size_t f) { return mesh.face_offsets[f + 1] - mesh.face_offsets[f]; }
+std::size_t corners_of(const PolygonMesh& mesh, std::size_t f) {
+  return mesh.face_offsets[f + 1] - mesh.face_offsets[f];
+}
 
 /// Returns the groups with positive numbers.
 std::vector<Group> positive_groups(std::vector<Group> groups) {
@@ -55,8 +57,8 @@ void append_groups(std::string& text, const std::vector<Group>& groups) {
   std::vector<std::int32_t> numbers;
   for (const Group& group : groups) numbers.push_back(group.number);
   text += "    <FieldData>\n";
-  append_data_array<std::int32_t>(text, "Name=\"group_numbers\" NumberOfTuples=\"" + std::to_string(groups.size()) + '"',
-                                  numbers);
+  const std::string size = std::to_string(groups.size());
+  append_data_array<std::int32_t>(text, "Name=\"group_numbers\" NumberOfTuples=\"" + size + '"', numbers);
   append_names(text, groups);
   text += "    </FieldData>\n";
 }

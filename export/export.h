@@ -27,8 +27,8 @@ struct SurfaceSceneOptions {
   UpAxis up_axis = UpAxis::y;
   std::string source{};                 ///< file that the result was made from; stored in the extras
   SceneValues options{};                ///< options in force; stored in the extras
-  /// Groups of the boundary faces, in the order of `MeshTopology::boundary_faces()`: each becomes a part of the surface.
-  /// Scenes of polygons take those of the polygons in place of these.
+  /// Groups of the boundary faces, in the order of `MeshTopology::boundary_faces()`: each becomes a part of the
+  /// surface. Scenes of polygons take those of the polygons in place of these.
   FaceGroups face_groups{};
 };
 

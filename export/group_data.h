@@ -27,8 +27,8 @@ struct FileGroups {
   std::vector<Group> regions;
 };
 
-/// Reads them; a file without them has none. num_points: bound of the points of faces. InputError: lists of wrong length,
-/// numbers out of range.
+/// Reads them; a file without them has none. num_points: bound of the points of faces. InputError: lists of wrong
+/// length, numbers out of range.
 FileGroups read_groups(const VtuArrays& file, std::size_t num_points);
 
 }  // namespace subvol

@@ -3,8 +3,11 @@
 
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/geometry/closest_point.h"
+#include "fit/target/soup_topology.h"
+#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/solid_topology.h"
 
 #include <Eigen/Geometry>
 
@@ -18,8 +21,8 @@ namespace subvol {
 
 namespace {
 
-/// Cosine of the largest angle between normals that agree: 60 degrees. Faces of a coarse mesh deviate from the surface by
-/// some 30; sides of a sharp edge that matter here are further apart.
+/// Cosine of the largest angle between normals that agree: 60 degrees. Faces of a coarse mesh deviate from the surface
+/// by some 30; sides of a sharp edge that matter here are further apart.
 constexpr double kAgrees = 0.5;
 
 /// Twice the area of a triangle times its normal.
@@ -70,10 +73,26 @@ std::vector<Vec3> directions() {
   return found;
 }
 
+/// A target whose triangles agree about the outside, if that can be had.
+struct OrientedTarget {
+  TriangleMesh surface;
+  bool is_oriented;  ///< false: a normal may point either way
+};
+
+/// Files often orient their groups one by one, some outward and some inward.
+OrientedTarget oriented(const TriangleMesh& target) {
+  try {
+    return {solid_boundary(target).surface, true};
+  } catch (const InputError&) {  // it bounds no solid
+    return {target, soup_topology(target.positions, target.triangles).turned_edges == 0};
+  }
+}
+
 /// Finds the triangle of the target that each sample lies on.
 class TriangleFinder {
  public:
-  explicit TriangleFinder(const TriangleMesh& target) : target_(target), normals_(normals_of(target)) {}
+  explicit TriangleFinder(const OrientedTarget& target)
+      : target_(target.surface), normals_(normals_of(target.surface)), is_oriented_(target.is_oriented) {}
 
   std::vector<Index> find(const Samples& samples, const std::vector<double>& reach) {
     std::vector<ClosestPoint::Hit> hits(samples.points.size());
@@ -95,7 +114,10 @@ class TriangleFinder {
   }
 
  private:
-  bool agrees(Index triangle, const Vec3& normal) const { return normals_[triangle].dot(normal) >= kAgrees; }
+  bool agrees(Index triangle, const Vec3& normal) const {
+    const double cosine = normals_[triangle].dot(normal);
+    return (is_oriented_ ? cosine : std::abs(cosine)) >= kAgrees;
+  }
 
   /// Turns the normals of a target that is oriented inward.
   void orient(const Samples& samples, const std::vector<ClosestPoint::Hit>& hits) {
@@ -132,6 +154,7 @@ class TriangleFinder {
 
   const TriangleMesh& target_;
   std::vector<Vec3> normals_;
+  bool is_oriented_;
 };
 
 /// Area of a face that lies on one group.
@@ -166,11 +189,12 @@ std::vector<Index> carried_groups(const TriangleMesh& target, const CurvedBounda
   std::vector<double> reach(num_faces, 0);
   for (std::size_t i = 0; i < samples.faces.size(); ++i) reach[samples.faces[i]] += samples.areas[i];
   for (double& area : reach) area = std::sqrt(area);
-  const std::vector<Index> triangles = TriangleFinder(target).find(samples, reach);
+  const OrientedTarget surface = oriented(target);
+  const std::vector<Index> triangles = TriangleFinder(surface).find(samples, reach);
+  const std::vector<Index>& groups = surface.surface.face_groups.of_face;
   std::vector<Share> shares;
   for (std::size_t i = 0; i < triangles.size(); ++i)
-    if (triangles[i] != kNoIndex)
-      shares.push_back({samples.faces[i], target.face_groups.of_face[triangles[i]], samples.areas[i]});
+    if (triangles[i] != kNoIndex) shares.push_back({samples.faces[i], groups[triangles[i]], samples.areas[i]});
   return largest_shares(std::move(shares), target.face_groups.groups, num_faces);
 }
 

@@ -17,8 +17,9 @@ namespace subvol {
 /// the face's, if there is one within a face's size of the closest triangle of all; else in the group of that one. The
 /// face gets the group with the largest share of its area; of equal shares, the one with the lowest number.
 ///
-/// target     its groups; empty: the result is empty. Triangles may be oriented outward, inward or inconsistently; in
-///            the last case normals help less. InputError: as `ClosestPoint`.
+/// target     its groups; empty: the result is empty. Triangles may be oriented in any way: they are made to agree
+///            (`solid_boundary`); if they bound no solid and disagree, normals count without their sign. InputError: as
+///            `ClosestPoint`.
 /// boundary   triangles of the boundary and the face of each of them.
 /// num_faces  number of boundary faces.
 /// Same bits for any number of threads. Cost: about ten closest points for each face.
@@ -44,8 +45,8 @@ struct CarriedGroup {
   bool is_lost() const { return faces == 0; }
 };
 
-/// Largest difference of a group's areas that is not reported: a share of the group's area on the target, or of the area
-/// of the whole target, whichever is larger. An edge of the mesh beside the border of a group costs as much.
+/// Largest difference of a group's areas that is not reported: a share of the group's area on the target, or of the
+/// area of all groups, whichever is larger. An edge of the mesh beside the border of a group costs as much.
 inline constexpr double kMostAreaDifference = 0.02, kMostShareOfWhole = 0.001;
 
 /// Returns the groups of the target that have triangles, with their areas. Arguments as above.

@@ -10,7 +10,8 @@ namespace subvol {
 
 namespace {
 
-/// Largest number of colors that become groups. CAD programs color some dozens of faces; a scan has thousands of colors.
+/// Largest number of colors that become groups. CAD programs color some dozens of faces; a scan has thousands of
+/// colors.
 constexpr std::size_t kMostColors = 256;
 
 }  // namespace

@@ -50,7 +50,8 @@ VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopolog
          entry != old.faces.end() && entry->face[0] == smallest; ++entry)
       if (holds(entry->face, vertices)) result.faces.push_back({face_key(corners), entry->group});
   };
-  // The smallest vertex of an old face need not be among those of a part of it, so all faces around one vertex are tried.
+  // The smallest vertex of an old face need not be among those of a part of it, so all faces around one vertex are
+  // tried.
   std::vector<std::pair<Index, Index>> smallest_around;  // a vertex of an old face, and the face's smallest vertex
   for (const GroupedFace& entry : old.faces)
     for (const Index v : entry.face)

@@ -67,8 +67,8 @@ TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimi
   const Workplace place(sample);
   place.file("halves.obj", obj_with_halves(sample.target));
   const Run fit = place.run(
-      "fit halves.obj --template template.mesh --levels 1 --max-iterations 5 --tolerance 10 -o fit.mesh -o fit.msh -o fit.glb "
-      "-o fit.usda -o cage:cage.mesh -o boundary:faces.vtu -o boundary:faces.vtk --report fit.json");
+      "fit halves.obj --template template.mesh --levels 1 --max-iterations 5 --tolerance 10 -o fit.mesh -o fit.msh "
+      "-o fit.glb -o fit.usda -o cage:cage.mesh -o boundary:faces.vtu -o boundary:faces.vtk --report fit.json");
   INFO(fit.err);
   REQUIRE((fit.status == 0 || fit.status == 4));
   check_halves(read_volume_mesh(place / "fit.mesh"));
@@ -84,7 +84,8 @@ TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimi
   CHECK(groups[1]["faces"].get<int>() > 0);
   CHECK(groups[1]["area"].get<double>() == Approx(groups[1]["target_area"].get<double>()).epsilon(0.2));
 
-  const Run curve = place.run("fit halves.obj --template template.mesh --order 2 --max-iterations 3 -o c.vtu -o c.msh -o c.obj");
+  const Run curve = place.run(
+      "fit halves.obj --template template.mesh --order 2 --max-iterations 3 -o c.vtu -o c.msh -o c.obj");
   INFO(curve.err);
   REQUIRE((curve.status == 0 || curve.status == 4));
   HighOrderFile file = read_high_order(place / "c.vtu");

@@ -50,7 +50,8 @@ class Groups(InFolder):
                        {"grouped_faces": [FLOOR], "face_groups": [1], "group_names": ["a"]},
                        {"grouped_faces": [[0, 1, 2, 8]], "face_groups": [0], "group_names": ["a"]},
                        {"grouped_faces": [[0, 1, -1, -1]], "face_groups": [0], "group_names": ["a"]},
-                       {"grouped_faces": [FLOOR], "face_groups": [0], "group_names": ["a", "b"], "group_numbers": [1, 1]}):
+                       {"grouped_faces": [FLOOR], "face_groups": [0], "group_names": ["a", "b"],
+                        "group_numbers": [1, 1]}):
             with self.assertRaises(subvol.InputError, msg=str(arrays)):
                 subvol.VolumeMesh(CUBE_POINTS, hexes=CUBE, **arrays)
         with self.assertRaises(TypeError):

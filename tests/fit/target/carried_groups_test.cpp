@@ -70,7 +70,11 @@ TEST_CASE("a target that is oriented inward or not at all gives the same groups"
   const Carried outward = carry(target, mesh);
   for (auto& t : target.triangles) std::swap(t[0], t[1]);
   CHECK(carry(target, mesh).groups == outward.groups);
-  for (std::size_t t = 0; t < target.triangles.size(); t += 2) std::swap(target.triangles[t][0], target.triangles[t][1]);
+  for (std::size_t t = 0; t < target.triangles.size(); ++t)  // side by side, as CAD programs do
+    if (target.face_groups.of_face[t] % 2 == 0) std::swap(target.triangles[t][0], target.triangles[t][1]);
+  CHECK(carry(target, mesh).groups == outward.groups);
+  target.triangles.push_back(target.triangles[0]);  // bounds no solid
+  target.face_groups.of_face.push_back(target.face_groups.of_face[0]);
   CHECK(carry(target, mesh).groups == outward.groups);
 }
 

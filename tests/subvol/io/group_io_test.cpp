@@ -52,7 +52,8 @@ TEST_CASE("groups of an .obj are named by g, else by materials, else by several 
 
 TEST_CASE("dropped faces take their groups along") {
   const TemporaryFolder folder;
-  const auto file = folder.file("a.obj", kCorners + "g a\nf 1 3 2\ng b\nf 1 1 2\ng c\nf 1 2 4\ng d\nf 2 4 1\ng e\nf 2 3 4\n");
+  const auto file = folder.file("a.obj", kCorners + "g a\nf 1 3 2\ng b\nf 1 1 2\ng c\nf 1 2 4\ng d\nf 2 4 1\n"
+                                                    "g e\nf 2 3 4\n");
   CHECK(labels(read_polygon_mesh(file).face_groups) == Labels{"a", "c", "d", "e"});
   CHECK(labels(read_triangle_mesh(file).face_groups) == Labels{"a", "c", "e"});
 }
@@ -89,7 +90,8 @@ TEST_CASE("labels and colors of the faces of a .ply and an .off are groups") {
 
 TEST_CASE("a repaired surface keeps its groups, and holes that are closed have none") {
   const TemporaryFolder folder;
-  const auto file = folder.file("a.obj", kCorners + "g a\nf 1 3 2\ng b\nf 1 4 2\ng c\nf 2 3 4\n");  // one flipped, a hole
+  // One triangle is flipped, and there is a hole.
+  const auto file = folder.file("a.obj", kCorners + "g a\nf 1 3 2\ng b\nf 1 4 2\ng c\nf 2 3 4\n");
   const SolidBoundary solid = solid_boundary(read_triangle_mesh(file));
   CHECK(solid.flipped_triangles == 1);
   const Labels found = labels(solid.surface.face_groups);
