@@ -35,8 +35,8 @@ namespace {
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
 constexpr double kGoodMerit = 0.1;           // no other template is tried below it ...
-/// ... nor if the quality is what keeps the merit above it, and reaches this share of the goal: larger templates have the
-/// same angles at sharp edges and irregular vertices.
+/// ... nor if the quality is what keeps the merit above it, and reaches this share of the goal: larger templates have
+/// the same angles at sharp edges and irregular vertices.
 constexpr double kEnoughQuality = 0.85;
 constexpr double kQualityWeight = 5;         // of the share of the quality in the merit
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
@@ -135,6 +135,8 @@ class AutomaticFit {
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
   bool fit_level(int level, const QualitySchedule& schedule, const char* what);
+  std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
+  std::optional<CreaseDistance> distance_of_edges() const;
   bool judge(AutomaticFitTrial trial);
   void note_missed_edges();
   void conclude();
@@ -147,7 +149,7 @@ class AutomaticFit {
 
   AutomaticFitOptions options_;
   bool follows_edges_;
-  TriangleMesh original_;             ///< the target; if edges are followed, all its triangles agree about what is inside
+  TriangleMesh original_;             ///< the target; if edges are followed, its triangles agree about what is inside
   FitTarget target_;
   Edges edges_;
   FlatFacets facets_;                 ///< of `target_.mesh`, if edges are followed
@@ -265,14 +267,45 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   return going;
 }
 
-/// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the fit must end.
-bool AutomaticFit::judge(AutomaticFitTrial trial) {
+/// Returns how far a trial is from its aims: the formula in the header.
+double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
   constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
+  const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
+  const double missed = trial.feature_miss ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
+  return excess(trial.max_percent, options.max_tolerance_percent) +
+         excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
+         kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
+         (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
+}
+
+/// Returns the largest miss of the target's small features by a surface, in the target's unit and coordinates.
+std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surface) const {
+  std::optional<FeatureMiss> miss = largest_feature_miss(features_, ClosestPoint(surface));
+  if (!miss) return miss;
+  miss->place = target_.normalisation.from_unit({miss->place})[0];
+  miss->distance *= target_.normalisation.diagonal;
+  miss->size *= target_.normalisation.diagonal;
+  return miss;
+}
+
+/// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
+std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
+  if (edges_.features.curves.empty()) return std::nullopt;
+  const std::vector<CreaseSegment> none;
+  CreaseDistance distance =
+      crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
+  distance.farthest = target_.normalisation.from_unit({distance.farthest})[0];
+  return distance;
+}
+
+/// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
+/// fit must end.
+bool AutomaticFit::judge(AutomaticFitTrial trial) {
   if (follows_edges_) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
-  trial.feature_miss = largest_feature_miss(features_, ClosestPoint(surface));
+  trial.feature_miss = feature_miss(surface);
   trial.cells = mesh_.num_cells();
   trial.mean_percent = 100 * distance.mean();
   trial.max_percent = 100 * distance.max();
@@ -281,32 +314,19 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.least_share = least_share_;
   trial.uncertified = quality.certificate.not_certified.size();
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
-  std::optional<CreaseDistance> creases;
-  if (!edges_.features.curves.empty()) {
-    const std::vector<CreaseSegment> none;
-    creases = crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
-    creases->farthest = target_.normalisation.from_unit({creases->farthest})[0];
-    trial.curves = creases->num_curves;
-    trial.followed_curves = creases->num_followed;
-    trial.within_share = creases->within_share();
+  const std::optional<CreaseDistance> edges = distance_of_edges();
+  if (edges) {
+    trial.curves = edges->num_curves;
+    trial.followed_curves = edges->num_followed;
+    trial.within_share = edges->within_share();
   }
-  double missed = 0;
-  if (trial.feature_miss) {
-    missed = std::clamp(trial.feature_miss->share / kAutomaticFeatureShare - 1, 0.0, kMostMiss);
-    trial.feature_miss->place = target_.normalisation.from_unit({trial.feature_miss->place})[0];
-    trial.feature_miss->distance *= target_.normalisation.diagonal;
-    trial.feature_miss->size *= target_.normalisation.diagonal;
-  }
-  trial.merit = missed + std::max(0.0, trial.max_percent / options_.max_tolerance_percent - 1) +
-                std::max(0.0, trial.mean_percent / options_.mean_tolerance_percent - 1) +
-                kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
-                (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
+  trial.merit = merit_of(trial, options_);
   result_.trials.push_back(trial);
   const bool going = trial.self_intersections.has_value();
   if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return going;
   result_.chosen = result_.trials.size() - 1;
   result_.mesh = mesh_;
-  result_.report.creases = creases;
+  result_.report.creases = edges;
   note_missed_edges();
   return going;
 }
@@ -432,8 +452,8 @@ void AutomaticFit::conclude() {
                                         options_.max_tolerance_percent) + found);
   if (best.feature_miss && best.feature_miss->share > kAutomaticFeatureShare) {
     const FeatureMiss& miss = *best.feature_miss;
-    report.warnings.push_back(formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, %.0f %% "
-                                        "of its size, at (%.6g, %.6g, %.6g); more --cells may hold it",
+    report.warnings.push_back(formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
+                                        "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
                                         miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(),
                                         miss.place.z()));
   }
