@@ -247,7 +247,7 @@ PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, doub
 }
 
 PolygonMesh plate_surface() {
-  constexpr double kLength = 2, kWidth = 1, kThickness = 0.1, kRadius = 0.25;
+  constexpr double kLength = 2, kWidth = 1, kThickness = 0.02, kRadius = 0.25;
   constexpr int kAcross = 16, kAlong = 32, kRings = 8, kSides = kAcross + kAlong;
   const std::vector<Group> groups{{"symmetry_x", 1}, {"symmetry_y", 2}, {"symmetry_z", 3}, {"hole", 4},
                                   {"loaded", 5},     {"side", 6},       {"top", 7}};

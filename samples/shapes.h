@@ -32,7 +32,7 @@ std::vector<Sample> all_samples();
 /// A rippled bowl to grow shells on: 5 n^2 quads, open at the top, outward.
 PolygonMesh bowl_surface(int n = 12);
 
-/// A quarter of a plate with a hole, for a static analysis: 2 x 1 x 0.1, its hole of radius 0.25 around the origin.
+/// A quarter of a plate with a hole, for a static analysis: 2 x 1 x 0.02, its hole of radius 0.25 around the origin.
 /// Quads with the groups symmetry_x, symmetry_y and symmetry_z (where x, y or z is 0), hole, loaded (x = 2), side and top;
 /// outward.
 PolygonMesh plate_surface();

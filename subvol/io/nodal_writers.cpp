@@ -36,11 +36,24 @@ std::size_t num_written(CellKind kind, int order) {
 
 int reference_of(const NodalMesh& mesh, std::size_t c) { return mesh.references.empty() ? 0 : mesh.references[c]; }
 
-void append_position(std::string& text, const Vec3& p, const char* separator) {
-  for (int k = 0; k < 3; ++k) {
-    text += separator;
-    append_number(text, p[k]);
+/// The text of a number that is closest to it, of at most so many characters. form: makes a format's text of a plain one.
+template <class Form>
+std::string number_within(double value, std::size_t width, const Form& form) {
+  std::string exact;
+  append_number(exact, value);
+  std::string text = form(exact);
+  char buffer[40];
+  for (int digits = 16; text.size() > width && digits > 0; --digits) {
+    std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
+    text = form(buffer);
   }
+  return text;
+}
+
+/// CalculiX reads twenty characters of a number, and refuses longer ones.
+void append_inp_position(std::string& text, const Vec3& p) {
+  constexpr std::size_t kWidth = 20;
+  for (int k = 0; k < 3; ++k) text += ", " + number_within(p[k], kWidth, [](const std::string& plain) { return plain; });
 }
 
 std::vector<bool> used_nodes(const NodalMesh& mesh, int order) {
@@ -188,21 +201,12 @@ std::string padded(std::string text, std::size_t width) {
 /// The shortest text of at most sixteen characters that is closest to a number, with a decimal point as Nastran
 /// requires it.
 std::string nastran_field(double value) {
-  const auto with_point = [](std::string text) {
+  constexpr std::size_t kWidth = 16;
+  return number_within(value, kWidth, [](std::string text) {
     const std::size_t e = text.find('e');
     if (text.find('.') == std::string::npos) text.insert(e == std::string::npos ? text.size() : e, ".");
     return text;
-  };
-  constexpr std::size_t kWidth = 16;
-  std::string exact;
-  append_number(exact, value);
-  std::string text = with_point(exact);
-  char buffer[40];
-  for (int digits = 16; text.size() > kWidth && digits > 0; --digits) {
-    std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
-    text = with_point(buffer);
-  }
-  return text;
+  });
 }
 
 }  // namespace
@@ -227,7 +231,7 @@ std::string inp_text(const NodalMesh& mesh) {
   for (std::size_t n = 0; n < mesh.positions.size(); ++n) {
     if (!used[n]) continue;
     text += std::to_string(n + 1);
-    append_position(text, mesh.positions[n], ", ");
+    append_inp_position(text, mesh.positions[n]);
     text += '\n';
   }
   append_inp_elements(text, mesh, order);

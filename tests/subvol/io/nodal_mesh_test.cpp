@@ -257,6 +257,16 @@ TEST_CASE("nodal_mesh: what is wrong with a .inp is said with its line", "[io]")
   CHECK_THAT(refusal("a.inp", nodes + "*PART, NAME=a\n*PART, NAME=b\n"), Contains("one part"));
 }
 
+TEST_CASE("nodal_mesh: numbers of a .inp have twenty characters at most, which is what CalculiX reads", "[io]") {
+  VolumeMesh mesh;
+  mesh.positions = {{-5.528368325320092e-06, 0, 0}, {1, -1.2345678901234567e-300, 0}, {0, 1, 0}, {0, 0, 1.0 / 3}};
+  mesh.add_cell(CellKind::tet, std::vector<Index>{0, 1, 2, 3});
+  const std::string text = inp_text(nodal_mesh(mesh));
+  CHECK(text.find("1, -5.5283683253201e-06, 0, 0\n") != std::string::npos);
+  const NodalMesh back = read("b.inp", text);
+  for (std::size_t v = 0; v < 4; ++v) CHECK((back.positions[v] - mesh.positions[v]).norm() <= 1e-15);
+}
+
 TEST_CASE("nodal_mesh: groups and references come back from a .inp", "[io]") {
   NodalMesh mesh = read("a.msh", kMsh41);
   mesh.references = {-4};
