@@ -38,7 +38,7 @@ constexpr const char* kFit = "fit target.off --template template.mesh ";
 
 }  // namespace
 
-TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the truth", "[cli]") {
+TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the truth", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
       std::string(kFit) + "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
@@ -78,7 +78,7 @@ TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the t
   CHECK(report.at("stages").back().at("energy").at("total") > 0);
 }
 
-TEST_CASE("A report becomes a page that needs nothing else", "[cli]") {
+TEST_CASE("A report becomes a page that needs nothing else", "[cli][slow]") {
   const Workplace place;
   REQUIRE(place.run(std::string(kFit) + "--levels 1 -o a&b.mesh -o cage:cage.mesh --report report.json").status == 0);
   const auto words = place.json("report.json").at("command_line");
@@ -135,7 +135,7 @@ TEST_CASE("What is no report is refused, and nothing is written", "[cli]") {
   CHECK(place.run("report none.json -o page.html").status == 3);
 }
 
-TEST_CASE("A fit of curved elements goes from files to files that check agrees with", "[cli]") {
+TEST_CASE("A fit of curved elements goes from files to files that check agrees with", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--order 3 -o out.vtu -o out.glb -o out.mesh --report report.json");
   INFO(run.err);
@@ -152,7 +152,7 @@ TEST_CASE("A fit of curved elements goes from files to files that check agrees w
   CHECK(nlohmann::json::parse(checked.out).at("distance") == report.at("distance"));
 }
 
-TEST_CASE("An adaptive fit goes from files to files", "[cli]") {
+TEST_CASE("An adaptive fit goes from files to files", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
       std::string(kFit) + "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
@@ -163,7 +163,7 @@ TEST_CASE("An adaptive fit goes from files to files", "[cli]") {
   CHECK(place.run("check out.vtu --target target.off").status == 0);
 }
 
-TEST_CASE("Points are fitted and checked one way, and what makes no sense with them is refused", "[cli]") {
+TEST_CASE("Points are fitted and checked one way, and what makes no sense with them is refused", "[cli][slow]") {
   const auto sample = subvol::samples::ball_sample();
   const Workplace place(sample);
   place.file("points.xyz", subvol::samples::xyz_text(subvol::samples::scattered_points(sample.target, 1500)));
@@ -208,7 +208,7 @@ TEST_CASE("Points are fitted and checked one way, and what makes no sense with t
   refused("template auto points.xyz -o no.mesh", 3, "points without faces");
 }
 
-TEST_CASE("A template with a few inverted cells is untangled before a fit, a mirrored one is refused", "[cli]") {
+TEST_CASE("A template with a few inverted cells is untangled before a fit, a mirrored one is refused", "[cli][slow]") {
   auto sample = subvol::samples::torus_sample();
   subvol::VolumeMesh& mesh = sample.template_mesh;
   const subvol::MeshTopology topology(mesh);
@@ -236,7 +236,7 @@ TEST_CASE("A template with a few inverted cells is untangled before a fit, a mir
   CHECK(mirrored.run(std::string(kFit) + "--levels 1 -o out.mesh").status == 3);
 }
 
-TEST_CASE("The report tells the state of a target and whether the template can become it", "[cli]") {
+TEST_CASE("The report tells the state of a target and whether the template can become it", "[cli][slow]") {
   auto sample = subvol::samples::torus_sample();
   sample.template_mesh = subvol::samples::ball_sample().template_mesh;
   std::swap(sample.target.triangles[5][0], sample.target.triangles[5][1]);
@@ -251,7 +251,7 @@ TEST_CASE("The report tells the state of a target and whether the template can b
   CHECK(target.at("volume_source") == "mended surface");
 }
 
-TEST_CASE("A fit is the same bits for one thread and for two", "[cli]") {
+TEST_CASE("A fit is the same bits for one thread and for two", "[cli][slow]") {
   const Workplace place;
   REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 1 -o one.mesh -o one.obj").status == 0);
   REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 2 -o two.mesh -o two.obj").status == 0);
@@ -259,7 +259,7 @@ TEST_CASE("A fit is the same bits for one thread and for two", "[cli]") {
   CHECK(content_of(place / "one.obj") == content_of(place / "two.obj"));
 }
 
-TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "[cli]") {
+TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--levels 1 --tolerance 0.000001 -o out.mesh --report report.json");
   INFO(run.err);
@@ -268,7 +268,7 @@ TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "
   CHECK(place.json("report.json").at("converged") == false);
 }
 
-TEST_CASE("A fit converges only where its file and its limit surface are within the tolerance", "[cli]") {
+TEST_CASE("A fit converges only where its file and its limit surface are within the tolerance", "[cli][slow]") {
   const Workplace place;
   const std::string fit = std::string(kFit) + "--levels 1 --chord 5 --force -o out.mesh -o out.glb --report r.json ";
   const auto farthest = [](const nlohmann::json& report) {
@@ -289,7 +289,7 @@ TEST_CASE("A fit converges only where its file and its limit surface are within 
   }
 }
 
-TEST_CASE("A time limit ends with status 4 and the best result", "[cli]") {
+TEST_CASE("A time limit ends with status 4 and the best result", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--levels 3 --time-limit 0.01 -o out.mesh --report report.json");
   INFO(run.err);
@@ -391,7 +391,7 @@ TEST_CASE("One file is no two outputs, whatever links lead to it", "[cli]") {
   CHECK_FALSE(place.has("a.mesh"));
 }
 
-TEST_CASE("An output that cannot be written does not cost the others", "[cli]") {
+TEST_CASE("An output that cannot be written does not cost the others", "[cli][slow]") {
   const Workplace place;
   std::filesystem::create_symlink("/dev/full", place / "full.mesh");
   for (const char* verb : {"convert template.mesh", "subdivide template.mesh --report r.json",
@@ -416,7 +416,7 @@ TEST_CASE("A name that is too long is found before the work", "[cli]") {
   CHECK(run.err.find(" s  ") == std::string::npos);  // no progress was told
 }
 
-TEST_CASE("A file that somebody makes during the work is not replaced without --force", "[cli]") {
+TEST_CASE("A file that somebody makes during the work is not replaced without --force", "[cli][slow]") {
   const Workplace place;
   const pid_t child = place.start(std::string(kFit) + "--levels 1 --progress json -o out.mesh");
   for (int i = 0; i < 600 && content_of(place / "stdout.txt").empty() && content_of(place / "stderr.txt").empty(); ++i)
@@ -495,7 +495,7 @@ TEST_CASE("check says what is wrong with a mesh, in words and in JSON", "[cli]")
   CHECK(nlohmann::json::parse(bad.out).at("quality").at("inverted_cells") == 7);
 }
 
-TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][data]") {
+TEST_CASE("Bad files are refused by every verb, and without a trace", "[cli][data][slow]") {
   const auto data = subvol::test::require_data();
   if (!data) return;
   const Workplace place;

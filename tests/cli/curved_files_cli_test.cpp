@@ -38,7 +38,7 @@ std::string with_points_of(std::string text, const std::string& other) {
 }  // namespace
 
 TEST_CASE("convert: Fourier cells become polynomials within the tolerance, or the status says that they did not",
-          "[cli]") {
+          "[cli][slow]") {
   const Workplace place;
   write_volume(place / "low.vtu", waved_hex(Basis::fourier, 3, 2, 0.02));
   const Run low = place.run("convert low.vtu -o low.msh -o again.vtu");
@@ -56,7 +56,8 @@ TEST_CASE("convert: Fourier cells become polynomials within the tolerance, or th
   CHECK(place.run("convert high.vtu -o refused.vtu --map-tolerance -1").status == 2);
 }
 
-TEST_CASE("fit: the report tells of the polynomial cells of Fourier fits, and needs none for Legendre fits", "[cli]") {
+TEST_CASE("fit: the report tells of the polynomial cells of Fourier fits, and needs none for Legendre fits",
+          "[cli][slow]") {
   const Workplace place;
   const std::string fit = "fit target.off --template template.mesh --order 2 --max-iterations 3 ";
   place.run(fit + "--basis fourier -o f.vtu --report f.json");

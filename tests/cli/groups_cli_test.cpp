@@ -62,7 +62,7 @@ void check_halves(const VolumeMesh& mesh) {
 
 }  // namespace
 
-TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimized meshes", "[cli]") {
+TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimized meshes", "[cli][slow]") {
   const samples::Sample sample = samples::ball_sample();
   const Workplace place(sample);
   place.file("halves.obj", obj_with_halves(sample.target));
@@ -103,7 +103,7 @@ TEST_CASE("Groups of the target are on the boundary of fitted, curved and optimi
   check_halves(read_volume_mesh(place / "s.mesh"));
 }
 
-TEST_CASE("An automatic fit carries the groups of its target", "[cli]") {
+TEST_CASE("An automatic fit carries the groups of its target", "[cli][slow]") {
   const samples::Sample sample = samples::ball_sample();
   const Workplace place(sample);
   place.file("halves.obj", obj_with_halves(sample.target));

@@ -37,7 +37,7 @@ bool appears(const fs::path& file) {
 
 }  // namespace
 
-TEST_CASE("A run that is killed goes on from its checkpoint to the same bytes", "[cli][checkpoint]") {
+TEST_CASE("A run that is killed goes on from its checkpoint to the same bytes", "[cli][checkpoint][slow]") {
   const auto [name, words] = GENERATE(table<std::string, std::string>(
       {{"out.mesh", kFit + "--levels 2 --max-iterations 3 -o out.mesh -o cage:cage.mesh"},
        {"out.vtu", kFit + "--order 2 --max-iterations 3 -o out.vtu"},
@@ -58,7 +58,7 @@ TEST_CASE("A run that is killed goes on from its checkpoint to the same bytes", 
   CHECK(place.json("r.json").at("recalled_stages") >= 1);
 }
 
-TEST_CASE("A run that was interrupted leaves a checkpoint and goes on", "[cli][checkpoint]") {
+TEST_CASE("A run that was interrupted leaves a checkpoint and goes on", "[cli][checkpoint][slow]") {
   const int signal = GENERATE(SIGINT, SIGTERM);
   const Workplace place;
   const std::string words = kFit + "--levels 2 --max-iterations 3 -o out.mesh";
@@ -73,7 +73,8 @@ TEST_CASE("A run that was interrupted leaves a checkpoint and goes on", "[cli][c
   CHECK(content_of(place / "out.mesh") == wanted);
 }
 
-TEST_CASE("A run that was interrupted before anything was done leaves a checkpoint all the same", "[cli][checkpoint]") {
+TEST_CASE("A run that was interrupted before anything was done leaves a checkpoint all the same",
+          "[cli][checkpoint][slow]") {
   const Workplace place;
   place.file("c", "something else");
   const pid_t child = place.start(kFit + "--levels 3 --progress json -o out.mesh --checkpoint c --force");
@@ -85,7 +86,7 @@ TEST_CASE("A run that was interrupted before anything was done leaves a checkpoi
   CHECK(place.run(kFit + "--levels 3 --time-limit 1 -o out.mesh --resume c --force").status == 4);
 }
 
-TEST_CASE("A checkpoint whose template depends on the time is kept with a warning", "[cli][checkpoint]") {
+TEST_CASE("A checkpoint whose template depends on the time is kept with a warning", "[cli][checkpoint][slow]") {
   const Workplace place;
   const auto is_warned = [&](const std::string& words) {
     return place.run("fit target.off --levels 1 --report r.json --force " + words).err.find("--resume") !=
@@ -96,7 +97,7 @@ TEST_CASE("A checkpoint whose template depends on the time is kept with a warnin
   CHECK_FALSE(is_warned("--time-limit 0.1 --checkpoint c --template template.mesh"));
 }
 
-TEST_CASE("A checkpoint of another run is refused, and said why", "[cli][checkpoint]") {
+TEST_CASE("A checkpoint of another run is refused, and said why", "[cli][checkpoint][slow]") {
   const Workplace place;
   REQUIRE(place.run(kShort + "--levels 1 --report r.json --checkpoint c").status == kStepsRanOut);
   const auto refused = [&](const std::string& words, const char* why) {
@@ -132,7 +133,7 @@ TEST_CASE("A checkpoint is an output like others", "[cli][checkpoint]") {
   CHECK(!place.has("r.json"));
 }
 
-TEST_CASE("A fit ends before the level that would take more memory than it may", "[cli][memory]") {
+TEST_CASE("A fit ends before the level that would take more memory than it may", "[cli][memory][slow]") {
   if (memory_cannot_be_limited()) return;
   const Workplace place;
   const Run run = place.run(kFit + "--levels 6 --max-iterations 3 --memory-limit 200M --chord 1 -o out.mesh "
@@ -147,7 +148,7 @@ TEST_CASE("A fit ends before the level that would take more memory than it may",
   CHECK(report.at("quality").at("certified_cells") == cells);
 }
 
-TEST_CASE("Where memory ends the program, files are whole or not there", "[cli][memory]") {
+TEST_CASE("Where memory ends the program, files are whole or not there", "[cli][memory][slow]") {
   if (memory_cannot_be_limited()) return;
   const Workplace place;
   for (const std::string& words : {kShort + "--levels 3 -o out.mesh -o out.glb", kShort + "--order 8 -o out.vtu"}) {
@@ -166,7 +167,7 @@ TEST_CASE("A limit of memory that makes no sense is a usage error", "[cli][memor
   CHECK(place.run(kFit + "--memory-limit lots -o out.obj").status == 2);
 }
 
-TEST_CASE("A process that gets no memory ends in order, wherever that is", "[cli][memory]") {
+TEST_CASE("A process that gets no memory ends in order, wherever that is", "[cli][memory][slow]") {
   if (memory_cannot_be_limited()) return;
   const Workplace place;
   for (const std::string& words : {kShort + "--levels 2 -o out.mesh -o out.glb", kShort + "--order 4 -o out.vtu"})
@@ -206,7 +207,7 @@ TEST_CASE("A disk without room leaves what stood there, for every kind of output
     }
 }
 
-TEST_CASE("A report or checkpoint without room costs nothing else", "[cli][disk]") {
+TEST_CASE("A report or checkpoint without room costs nothing else", "[cli][disk][slow]") {
   const Workplace place;
   fs::create_symlink("/dev/full", place / "full.json");
   const Run run = place.run(kShort + "--levels 1 --force -o out.mesh --report full.json");

@@ -77,7 +77,7 @@ TEST_CASE("Reported files of cells give the references that are meant, and are t
   CHECK(has(curved.err, "warning") == false);
   CHECK(curved.status == 0);
   CHECK(place.run("check curved.msh").status == 0);
-  const Run mirrored = place.run("optimize " + *inputs + "09-all_mirrored.mesh -o b.mesh");
+  const Run mirrored = place.run("optimize " + *inputs + "09-all_mirrored.mesh -o mirrored.mesh");
   CAPTURE(mirrored.err);
   CHECK(mirrored.status == 0);
   CHECK(has(mirrored.err, "numbered anew"));
@@ -116,7 +116,7 @@ TEST_CASE("Reported surfaces are told with their own numbers, and which way they
   }
 }
 
-TEST_CASE("Reported surfaces are diagnosed, repaired, or refused with the place of the cause", "[cli]") {
+TEST_CASE("Reported surfaces are diagnosed, repaired, or refused with the place of the cause", "[cli][slow]") {
   const auto inputs = reported_inputs();
   if (!inputs) return;
   const Workplace place;

@@ -33,7 +33,7 @@ std::vector<std::string> node_names(const GlbFile& file) {
 
 }  // namespace
 
-TEST_CASE("A fit writes a cutaway and its own animation beside the surface", "[cli]") {
+TEST_CASE("A fit writes a cutaway and its own animation beside the surface", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--levels 2 -o out.glb -o cutaway:cut.glb -o animation:steps.glb "
                                                 "-o out.mesh --cut x:0.4 --report report.json");
@@ -56,7 +56,7 @@ TEST_CASE("A fit writes a cutaway and its own animation beside the surface", "[c
   CHECK(again.binary == steps.binary);
 }
 
-TEST_CASE("A fit of curved cells writes a cutaway and its own animation", "[cli]") {
+TEST_CASE("A fit of curved cells writes a cutaway and its own animation", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--order 2 -o out.vtu -o cutaway:cut.glb -o animation:steps.glb");
   INFO(run.err);
@@ -95,7 +95,7 @@ TEST_CASE("Parts that there are not are refused before any work", "[cli]") {
   CHECK(!place.has("a.glb"));
 }
 
-TEST_CASE("Scripts are told of every step, of the time left, and of the work after the solve", "[cli]") {
+TEST_CASE("Scripts are told of every step, of the time left, and of the work after the solve", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(std::string(kFit) + "--levels 2 --max-iterations 2 -o out.glb --progress json");
   std::istringstream lines(run.out);

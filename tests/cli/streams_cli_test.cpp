@@ -55,7 +55,7 @@ TEST_CASE("Names that are not UTF-8 are written with a sign in place of what is 
   CHECK(place.json("r.json").at("outputs").size() == 5);
 }
 
-TEST_CASE("A standard output that cannot be written to is an error, and costs no file", "[cli]") {
+TEST_CASE("A standard output that cannot be written to is an error, and costs no file", "[cli][slow]") {
   const Workplace place;
   const std::string check = "\"$SUBVOL\" check template.mesh --json 2> err";
   if (fs::exists("/dev/full")) {
@@ -125,7 +125,7 @@ TEST_CASE("A link to the standard output is written through, to a file and to a 
   CHECK(place.json("r.json")["command"] == "template grid");
 }
 
-TEST_CASE("A pipe that nobody reads is waited for until a signal comes", "[cli]") {
+TEST_CASE("A pipe that nobody reads is waited for until a signal comes", "[cli][slow]") {
   const Workplace place;
   REQUIRE(mkfifo((place / "pipe").c_str(), 0600) == 0);
   CHECK(place.run(kFit + "--levels 1 --checkpoint pipe -o out.mesh").status == 2);
@@ -148,7 +148,7 @@ TEST_CASE("An option without a value is a usage error, not one that was not give
   CHECK_FALSE(place.has("a.mesh"));
 }
 
-TEST_CASE("What cannot be done is said before a template is made", "[cli][templates]") {
+TEST_CASE("What cannot be done is said before a template is made", "[cli][templates][slow]") {
   const Workplace place;
   place.file("other.checkpoint", "OFF\n");
   REQUIRE(place.run(kFit + "--levels 1 --max-iterations 1 --report r.json --checkpoint c").status == 4);

@@ -134,7 +134,7 @@ TEST_CASE("No verb takes a mesh that is a point", "[cli]") {
   }
 }
 
-TEST_CASE("A shell of curved cells goes to its files with its thickness, and is what the files say", "[cli]") {
+TEST_CASE("A shell of curved cells goes to its files with its thickness, and is what the files say", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
       "shell target.off --thickness 2% --side both --order 2 -o cage:cage.vtu -o shell.vtu -o shell.msh -o shell.glb "
@@ -180,7 +180,7 @@ TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property
   CHECK(place.run("shell tet.ply --thickness-attribute wall --thickness 1 -o c.mesh").status == 2);
 }
 
-TEST_CASE("A shell is a control mesh that can be subdivided", "[cli]") {
+TEST_CASE("A shell is a control mesh that can be subdivided", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run("shell target.off --thickness 3% --crease-angle 60 -o cage:cage.mesh --report report.json");
   INFO(run.err);
@@ -324,7 +324,7 @@ TEST_CASE("Reports number cells as their file does", "[cli]") {
     }
 }
 
-TEST_CASE("The distances that optimize decides by are those of its file", "[cli]") {
+TEST_CASE("The distances that optimize decides by are those of its file", "[cli][slow]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "tangled.mesh", subvol::samples::tangled_ball());
   const std::string with_target = "template.mesh --target target.off";
@@ -344,7 +344,7 @@ TEST_CASE("The distances that optimize decides by are those of its file", "[cli]
   }
 }
 
-TEST_CASE("A fit of curved cells converges only where its file is within the tolerance", "[cli]") {
+TEST_CASE("A fit of curved cells converges only where its file is within the tolerance", "[cli][slow]") {
   const Workplace place;
   const std::string fit = "fit target.off --template template.mesh --order 3 --force --progress none -o c.vtu ";
   place.run(fit + "--report r.json");
@@ -360,7 +360,7 @@ TEST_CASE("A fit of curved cells converges only where its file is within the tol
   }
 }
 
-TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
+TEST_CASE("optimize curves a straight mesh to a surface", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
       "optimize template.mesh --target target.off --order 2 --tolerance 0.5 -o curved.vtu --report report.json "
@@ -376,7 +376,7 @@ TEST_CASE("optimize curves a straight mesh to a surface", "[cli]") {
   CHECK(place.run("optimize template.mesh --target target.off --order 2 -o b.vtu --progress none").status == 4);
 }
 
-TEST_CASE("The report of optimize has the same entries for straight and for curved cells", "[cli]") {
+TEST_CASE("The report of optimize has the same entries for straight and for curved cells", "[cli][slow]") {
   const Workplace place;
   const std::string optimize = "optimize template.mesh --target target.off --max-iterations 1 ";
   place.run(optimize + "-o straight.mesh --report straight.json");
@@ -397,7 +397,7 @@ TEST_CASE("The report of optimize has the same entries for straight and for curv
   CHECK_FALSE(curved.at("options").contains("max-tolerance"));
 }
 
-TEST_CASE("Linear cells in the place of curved ones are judged on their own", "[cli]") {
+TEST_CASE("Linear cells in the place of curved ones are judged on their own", "[cli][slow]") {
   const Workplace place;
   const std::string fit = "fit target.off --template template.mesh --order 2 --max-iterations 3 --progress none ";
   place.run(fit + "-o both.vtu --report curved.json");
@@ -415,7 +415,7 @@ TEST_CASE("Linear cells in the place of curved ones are judged on their own", "[
   CHECK(b.at("stop_reason") == "tolerance_missed");
 }
 
-TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][templates]") {
+TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][templates][slow]") {
   const Workplace place;
   const Run made = place.run("template auto target.off --cells 60 -o made.mesh --report made.json");
   INFO(made.err);
@@ -456,7 +456,7 @@ TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][
   CHECK(!place.has("x.mesh"));
 }
 
-TEST_CASE("A fit without a template fills the surface and says how good the cells are", "[cli][templates]") {
+TEST_CASE("A fit without a template fills the surface and says how good the cells are", "[cli][templates][slow]") {
   const Workplace place;
   const Run run = place.run("fit target.off --cells 1500 -o out.mesh -o out.glb --report report.json");
   INFO(run.err);
@@ -470,13 +470,13 @@ TEST_CASE("A fit without a template fills the surface and says how good the cell
   CHECK(place.run("fit target.off --crease-angle sharp -o x.mesh").status == 2);
   CHECK(place.run("fit target.off --levels 1 --max-tolerance 1 -o x.mesh").status == 2);
   CHECK(place.run("fit target.off --quality 0.95 -o x.mesh").status == 2);
-  CHECK(place.run("fit target.off --levels 1 --size 1 -o x.mesh").status == 2);
-  const Run too_small = place.run("fit target.off --size 1e-9 -o x.mesh");
+  CHECK(place.run("fit target.off --levels 1 --size 1 -o tiny.mesh").status == 2);
+  const Run too_small = place.run("fit target.off --size 1e-9 -o tiny.mesh");
   CHECK(too_small.status == 2);
   CHECK(too_small.err.find("--size 1e-09: the target would need") != std::string::npos);
 }
 
-TEST_CASE("A surface alone is enough for a fit", "[cli][templates]") {
+TEST_CASE("A surface alone is enough for a fit", "[cli][templates][slow]") {
   const Workplace place;
   place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 216\nlevels = 1\n");
   const Run run = place.run("fit target.off --config options.toml -o out.mesh --report report.json");

@@ -41,7 +41,7 @@ double roughness(const std::vector<Vec3>& positions) {
 
 }  // namespace
 
-TEST_CASE("a fit keeps its states by the numbers of the last cage, if asked to", "[animation]") {
+TEST_CASE("a fit keeps its states by the numbers of the last cage, if asked to", "[animation][slow]") {
   const FitResult fit = short_fit(true);
   REQUIRE(fit.states.size() >= 2);
   CHECK(fit.states[0].name == "template");
@@ -59,7 +59,7 @@ TEST_CASE("a fit keeps its states by the numbers of the last cage, if asked to",
   CHECK(without.cage.positions == fit.cage.positions);
 }
 
-TEST_CASE("the animation of a fit goes from the template's limit surface to the fitted one", "[animation]") {
+TEST_CASE("the animation of a fit goes from the template's limit surface to the fitted one", "[animation][slow]") {
   const TemporaryFolder folder;
   const FitResult fit = short_fit(true);
   const Scene scene = animation_scene(fit.cage, fit.states, {.name = "ball"});

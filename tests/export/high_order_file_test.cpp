@@ -183,7 +183,7 @@ TEST_CASE("Lagrange cells have their points on the map, and common points once")
   CHECK_THROWS_AS(lagrange_mesh(random_mesh(two, source), std::vector<int>{3}, NodeOrdering::vtk), InputError);
 }
 
-TEST_CASE("a high-order .vtu reloads exactly") {
+TEST_CASE("a high-order .vtu reloads exactly", "[slow]") {
   const TemporaryFolder folder;
   PointSource source(11);
   for (const Basis basis : kBothBases)
@@ -218,7 +218,8 @@ TEST_CASE("orders beyond VTK's reload too") {
   CHECK(read_high_order(folder / "mesh.vtu").mesh.coefficients == mesh.coefficients);
 }
 
-TEST_CASE("high_order_file: VTK reconstructs the cells that are certified, between their points too", "[export]") {
+TEST_CASE("high_order_file: VTK reconstructs the cells that are certified, between their points too",
+          "[export][slow]") {
   PointSource source(5);
   int status = 0;
   for (const Basis basis : kBothBases) {
@@ -234,7 +235,8 @@ TEST_CASE("high_order_file: VTK reconstructs the cells that are certified, betwe
   if (status == kSkippedStatus) WARN("SKIPPED: needs a Python with VTK (python3-vtk9)");
 }
 
-TEST_CASE("high_order_file: Gmsh reconstructs the cells that are certified, between their points too", "[export]") {
+TEST_CASE("high_order_file: Gmsh reconstructs the cells that are certified, between their points too",
+          "[export][slow]") {
   const TemporaryFolder folder;
   PointSource source(6);
   std::vector<std::pair<CellKind, int>> kinds_and_orders;

@@ -139,7 +139,7 @@ TEST_CASE("strips of patches are cut only as finely as they need") {
   CHECK(*std::max_element(counts.begin(), counts.end()) >= 64);
 }
 
-TEST_CASE("any number of patches may meet at a vertex, smooth or between creases") {
+TEST_CASE("any number of patches may meet at a vertex, smooth or between creases", "[slow]") {
   constexpr Index n = 2000;
   for (const bool creased : {false, true}) {
     VolumeMesh cage = prisms_round_axis(n, true);

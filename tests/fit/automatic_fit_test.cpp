@@ -9,7 +9,7 @@
 
 using namespace subvol;
 
-TEST_CASE("A ball is filled with well shaped cells, no more than allowed") {
+TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slow]") {
   const TriangleMesh ball = test::cube_surface(12, true);
   const AutomaticFitResult result = fit_automatically(ball, {.cells = 3000, .crease_angle_degrees = std::nullopt});
   const MeshCheck check = check_mesh(result.mesh, &ball, {});

@@ -117,7 +117,7 @@ bool has(const std::vector<std::string>& warnings, const std::string& words) {
 
 }  // namespace
 
-TEST_CASE("A damaged target is fitted nearly as well as a clean one, with certified cells") {
+TEST_CASE("A damaged target is fitted nearly as well as a clean one, with certified cells", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const FitOptions options{.levels = 1, .quality = 0, .max_iterations = 6};
   const double clean =
@@ -134,7 +134,7 @@ TEST_CASE("A damaged target is fitted nearly as well as a clean one, with certif
   }
 }
 
-TEST_CASE("Curved elements are fitted to damaged targets as well") {
+TEST_CASE("Curved elements are fitted to damaged targets as well", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const HighOrderFitOptions options{.order = 2, .max_iterations = 6};
   const auto distance = [&](const TriangleMesh& target) {
@@ -153,7 +153,7 @@ TEST_CASE("Curved elements are fitted to damaged targets as well") {
   }
 }
 
-TEST_CASE("What is odd about a target is said, what does not matter to it is not") {
+TEST_CASE("What is odd about a target is said, what does not matter to it is not", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const auto warnings = [&](void (*apply)(TriangleMesh&)) {
     TriangleMesh target = sample.target;
@@ -169,7 +169,7 @@ TEST_CASE("What is odd about a target is said, what does not matter to it is not
   CHECK(has(warnings(add_fins), "edges of three triangles or more"));
 }
 
-TEST_CASE("A template of another topology than its target's is warned of where the target is closed") {
+TEST_CASE("A template of another topology than its target's is warned of where the target is closed", "[slow]") {
   const samples::Sample ball = samples::ball_sample(), torus = samples::torus_sample();
   const auto report = [](const TriangleMesh& target, const VolumeMesh& mesh) {
     return fit_subdivision_volume(target, mesh, {.levels = 1, .max_iterations = 1}).report;

@@ -51,7 +51,7 @@ bool positive(const HighOrderMesh& mesh, int n) {
 
 }  // namespace
 
-TEST_CASE("curved elements reproduce the samples' surfaces, closer with every order, in both bases") {
+TEST_CASE("curved elements reproduce the samples' surfaces, closer with every order, in both bases", "[slow]") {
   for (const samples::Sample& sample : samples::all_samples())
     for (Basis basis : kBothBases) {
       CAPTURE(sample.name, to_string(basis));
@@ -72,7 +72,7 @@ TEST_CASE("curved elements reproduce the samples' surfaces, closer with every or
     }
 }
 
-TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says that it is not") {
+TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says that it is not", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const double plain = percent(fit_high_order(sample.target, sample.template_mesh, of_order(4)).mesh, sample.target);
   HighOrderFitOptions options = of_order(4);
@@ -85,7 +85,7 @@ TEST_CASE("a high-order fit lowers lambda until the tolerance is met, or says th
         StopReason::tolerance_missed);
 }
 
-TEST_CASE("a high-order fit says when the steps allowed were not enough, and when its start was inverted") {
+TEST_CASE("a high-order fit says when the steps allowed were not enough, and when its start was inverted", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   HighOrderFitOptions options = of_order(2);
   options.max_iterations = 1;
@@ -96,7 +96,8 @@ TEST_CASE("a high-order fit says when the steps allowed were not enough, and whe
   CHECK(inverted.stages.back().ended == MinimizerStop::infeasible_start);
 }
 
-TEST_CASE("an adaptive fit raises orders where the target has its detail, and meets the tolerance with fewer nodes") {
+TEST_CASE("an adaptive fit raises orders where the target has its detail, and meets the tolerance with fewer nodes",
+          "[slow]") {
   const VolumeMesh bar = lattice(4, 1, 1);
   HighOrderMesh wanted(ElementSpace(bar, Basis::fourier, 6), bar);
   const MeshTopology& topology = wanted.space.topology();
@@ -127,7 +128,7 @@ TEST_CASE("an adaptive fit raises orders where the target has its detail, and me
   CHECK(last > 4);
 }
 
-TEST_CASE("the worst places of a fit are lifted where that costs little distance") {
+TEST_CASE("the worst places of a fit are lifted where that costs little distance", "[slow]") {
   // Cells of a grid have two faces on the torus, and are flat where these meet.
   const samples::Sample torus = samples::torus_sample();
   const AutoTemplateResult made = auto_templates(torus.target, {.cells = 40});
@@ -151,7 +152,7 @@ TEST_CASE("the worst places of a fit are lifted where that costs little distance
   CHECK(positive(result.mesh, 9));
 }
 
-TEST_CASE("few places far from the target are drawn in where that costs little shape") {
+TEST_CASE("few places far from the target are drawn in where that costs little shape", "[slow]") {
   const auto is_kept_draw = [](const StageRecord& stage) {
     return stage.kept && stage.name.ends_with("% off");
   };
@@ -175,7 +176,7 @@ TEST_CASE("few places far from the target are drawn in where that costs little s
   CHECK(drawn > 0);
 }
 
-TEST_CASE("a high-order fit has the same bits for one and two threads") {
+TEST_CASE("a high-order fit has the same bits for one and two threads", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const int threads = omp_get_max_threads();
   std::vector<std::vector<Vec3>> results;
@@ -187,7 +188,7 @@ TEST_CASE("a high-order fit has the same bits for one and two threads") {
   CHECK(results[0] == results[1]);
 }
 
-TEST_CASE("a high-order fit scales with its inputs, bit for bit where scaling is exact") {
+TEST_CASE("a high-order fit scales with its inputs, bit for bit where scaling is exact", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   samples::Sample scaled = sample;
   for (auto* points : {&scaled.target.positions, &scaled.template_mesh.positions})
@@ -223,7 +224,7 @@ TEST_CASE("a high-order fit refuses what it cannot do") {
   CHECK_THROWS_AS(fit_high_order(sample.target, sample.template_mesh, options), InputError);
 }
 
-TEST_CASE("real templates of prisms and tets are fitted with curved elements") {
+TEST_CASE("real templates of prisms and tets are fitted with curved elements", "[slow]") {
   const auto data = require_data();
   if (!data) return;
   for (const char* name : {"mixed_prismlayer_bone", "tet_hand"}) {

@@ -208,7 +208,7 @@ TEST_CASE("Optimisation refuses options out of range and meshes that are not sou
   CHECK_THROWS_AS(optimize_mesh(VolumeMesh{}, nullptr, {}), InputError);
 }
 
-TEST_CASE("Most cells of a real mesh inverted: all become valid, and the boundary stays") {
+TEST_CASE("Most cells of a real mesh inverted: all become valid, and the boundary stays", "[slow]") {
   const auto data = test::require_data();
   if (!data) return;
   const VolumeMesh start = read_volume_mesh(*data / "optimize" / "block_stress" / "input.mesh", {.check = false});

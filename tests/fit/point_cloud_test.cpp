@@ -174,7 +174,7 @@ TEST_CASE("Points pull at the nearest places alone: value and derivatives") {
   CHECK_THROWS_AS(SurfaceEnergy(target, fitted.triangles, fitted.positions.size(), tau), InputError);
 }
 
-TEST_CASE("Points on a sphere and on a bumpy ball give the surfaces back, with certified cells") {
+TEST_CASE("Points on a sphere and on a bumpy ball give the surfaces back, with certified cells", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const TriangleMesh sphere = cube_surface(24, true);
   for (const TriangleMesh* surface : {&sphere, &sample.target}) {
@@ -196,7 +196,7 @@ TEST_CASE("Points on a sphere and on a bumpy ball give the surfaces back, with c
   }
 }
 
-TEST_CASE("Curved elements follow points, and noise is averaged out") {
+TEST_CASE("Curved elements follow points, and noise is averaged out", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const double percent = 100 / bounding_box_diagonal(sample.target);
   for (double noise : {0.0, 0.01}) {
@@ -213,7 +213,7 @@ TEST_CASE("Curved elements follow points, and noise is averaged out") {
   }
 }
 
-TEST_CASE("Fits to points are the same bits for one and two threads, and as good far from the origin") {
+TEST_CASE("Fits to points are the same bits for one and two threads, and as good far from the origin", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const PointCloud cloud = samples::scattered_points(sample.target, 1000);
   const int threads = omp_get_max_threads();

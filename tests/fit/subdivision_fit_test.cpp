@@ -57,7 +57,7 @@ FitOptions quick(int levels = 2) {
 
 }  // namespace
 
-TEST_CASE("A fit reproduces the samples' surfaces with certified cells") {
+TEST_CASE("A fit reproduces the samples' surfaces with certified cells", "[slow]") {
   for (const samples::Sample& sample : samples::all_samples()) {
     CAPTURE(sample.name);
     const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
@@ -72,7 +72,7 @@ TEST_CASE("A fit reproduces the samples' surfaces with certified cells") {
   }
 }
 
-TEST_CASE("A cage-only fit keeps the template's cells") {
+TEST_CASE("A cage-only fit keeps the template's cells", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
   FitOptions options = quick();
   options.cage_only = true;
@@ -83,7 +83,7 @@ TEST_CASE("A cage-only fit keeps the template's cells") {
   CHECK(limit_percent(result.cage, sample.target) < 0.3 * result.report.initial_distance_mean_percent);
 }
 
-TEST_CASE("The written mesh is the cage subdivided, with its boundary at limit positions") {
+TEST_CASE("The written mesh is the cage subdivided, with its boundary at limit positions", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const FitResult result = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
   const SubdivisionLevel level = subdivide(result.cage);
@@ -92,7 +92,7 @@ TEST_CASE("The written mesh is the cage subdivided, with its boundary at limit p
   for (std::size_t i = 0; i < expected.size(); ++i) CHECK((expected[i] - result.mesh.positions[i]).norm() < 1e-12);
 }
 
-TEST_CASE("A fit scales with its inputs, bit for bit where scaling is exact") {
+TEST_CASE("A fit scales with its inputs, bit for bit where scaling is exact", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const FitResult plain = fit_subdivision_volume(sample.target, sample.template_mesh, quick(1));
   samples::Sample scaled = sample;
@@ -103,7 +103,7 @@ TEST_CASE("A fit scales with its inputs, bit for bit where scaling is exact") {
     CHECK(other.cage.positions[i] == Vec3(1024 * plain.cage.positions[i]));
 }
 
-TEST_CASE("A fit far from the origin is as good as one at it") {
+TEST_CASE("A fit far from the origin is as good as one at it", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const FitResult plain = fit_subdivision_volume(sample.target, sample.template_mesh, quick());
   samples::Sample moved = sample;
@@ -117,7 +117,7 @@ TEST_CASE("A fit far from the origin is as good as one at it") {
   CHECK(volume(other) == Approx(volume(plain)).epsilon(0.01));
 }
 
-TEST_CASE("A fit has the same bits with one and two threads") {
+TEST_CASE("A fit has the same bits with one and two threads", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
@@ -129,7 +129,7 @@ TEST_CASE("A fit has the same bits with one and two threads") {
   CHECK(one.mesh.positions == two.mesh.positions);
 }
 
-TEST_CASE("The plain surface of the paper can be fitted instead of the limit surface") {
+TEST_CASE("The plain surface of the paper can be fitted instead of the limit surface", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   for (BoundaryRule rule : {BoundaryRule::catmull_clark, BoundaryRule::averaging}) {
     FitOptions options = quick();
@@ -146,7 +146,7 @@ TEST_CASE("The plain surface of the paper can be fitted instead of the limit sur
   }
 }
 
-TEST_CASE("L-BFGS decreases the energy as well and ends with certified cells") {
+TEST_CASE("L-BFGS decreases the energy as well and ends with certified cells", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick(1);
   options.solver = SolverKind::lbfgs;
@@ -179,7 +179,8 @@ TEST_CASE(
   CHECK((stages.back().kept || kept->lambda < stages.back().lambda));
 }
 
-TEST_CASE("Quality stages raise the least scaled Jacobian of a fit, the cage stays one, distances stay as they are") {
+TEST_CASE("Quality stages raise the least scaled Jacobian of a fit, the cage stays one, distances stay as they are",
+          "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick(1);
   const FitResult plain = fit_subdivision_volume(sample.target, sample.template_mesh, options);
@@ -195,7 +196,7 @@ TEST_CASE("Quality stages raise the least scaled Jacobian of a fit, the cage sta
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, sample.template_mesh, options), InputError);
 }
 
-TEST_CASE("A tolerance that is met ends the fit, one out of reach is said to be missed") {
+TEST_CASE("A tolerance that is met ends the fit, one out of reach is said to be missed", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick();
   options.tolerance_percent = 0.5;
@@ -234,7 +235,7 @@ TEST_CASE("A time limit ends the fit with a result") {
   CHECK(certify(result.mesh).all_certified());
 }
 
-TEST_CASE("A fit says when the steps allowed were not enough, and when its start was inverted") {
+TEST_CASE("A fit says when the steps allowed were not enough, and when its start was inverted", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick(1);
   options.max_iterations = 4;
@@ -249,7 +250,7 @@ TEST_CASE("A fit says when the steps allowed were not enough, and when its start
   CHECK(inverted.stop_reason == StopReason::stalled);
 }
 
-TEST_CASE("Sharp edges of the target stay sharp, whether an angle or the template's tags tell of them") {
+TEST_CASE("Sharp edges of the target stay sharp, whether an angle or the template's tags tell of them", "[slow]") {
   samples::Sample sample = samples::bracket_sample();
   FitOptions options = quick();
   SECTION("by angle, on a template without tags") {
@@ -266,7 +267,7 @@ TEST_CASE("Sharp edges of the target stay sharp, whether an angle or the templat
   CHECK(result.report.creases->max_percent() < 0.15);
 }
 
-TEST_CASE("A target without sharp edges gets no crease by angle") {
+TEST_CASE("A target without sharp edges gets no crease by angle", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
   FitOptions options = quick(1);
   options.crease_angle_degrees = 40;
@@ -339,7 +340,7 @@ TEST_CASE("Ideal boxes fill the volume asked for and have the cells' own proport
   CHECK(ideal_boxes(cube, std::vector<Vec3>(8, Vec3::Zero()), 1.0, 1)[0].allFinite());
 }
 
-TEST_CASE("Real cases fit with certified cells", "[data]") {
+TEST_CASE("Real cases fit with certified cells", "[data][slow]") {
   const auto data = require_data();
   if (!data) return;
   for (const char* name : {"doubletorus17", "mixed_fandisk"}) {
@@ -353,7 +354,7 @@ TEST_CASE("Real cases fit with certified cells", "[data]") {
   }
 }
 
-TEST_CASE("Sharp edges of real cases stay sharp", "[data]") {
+TEST_CASE("Sharp edges of real cases stay sharp", "[data][slow]") {
   const auto data = require_data();
   if (!data) return;
   // Both gave up corners and edges of thin parts when only the template's angles told of creases.

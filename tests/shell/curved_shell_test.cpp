@@ -61,7 +61,7 @@ TEST_CASE("On a flat surface curved layers stay straight, whatever its faces", "
     }
 }
 
-TEST_CASE("A sphere's curved shell is as thick as its energy says", "[shell]") {
+TEST_CASE("A sphere's curved shell is as thick as its energy says", "[shell][slow]") {
   // One layer of order 2: r(s) = 1 + h s + b s (1 - s) from the surface outward, and
   // E(h, b) = mean over the quadrature's heights s of ln^2(r'(s)/d)/2 + ln^2 r(s).
   const double d = 0.4;
@@ -89,7 +89,7 @@ TEST_CASE("A sphere's curved shell is as thick as its energy says", "[shell]") {
   CHECK(mean_outside(shell.layers, curved.thickness.achieved) == Approx(h).epsilon(0.005));
 }
 
-TEST_CASE("Curved cells bend round sharp edges, valid on every side, and lower the energy", "[shell]") {
+TEST_CASE("Curved cells bend round sharp edges, valid on every side, and lower the energy", "[shell][slow]") {
   const std::vector<Vec3> u = profile({{0, 2, 0}, {0, 0, 0}, {1, 0, 0}, {1, 2, 0}}, 4),
                           l = profile({{0, 2, 0}, {0, 0, 0}, {2, 0, 0}}, 4);
   for (const auto* points : {&u, &l})
@@ -121,7 +121,7 @@ TEST_CASE("Sheets of a curved shell run like the surface, with its edges", "[she
   }
 }
 
-TEST_CASE("A curved shell has the same bits for one thread and for two", "[shell]") {
+TEST_CASE("A curved shell has the same bits for one thread and for two", "[shell][slow]") {
   const ShellResult shell =
       make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .side = ShellSide::both, .layers = 2});
   const int before = omp_get_max_threads();
@@ -140,7 +140,7 @@ TEST_CASE("A shell whose curving is stopped is valid", "[shell]") {
   check_valid(shell, curved);
 }
 
-TEST_CASE("A curved shell says when the steps allowed were not enough", "[shell]") {
+TEST_CASE("A curved shell says when the steps allowed were not enough", "[shell][slow]") {
   const ShellResult shell = make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .layers = 2});
   const CurvedShell curved = curve_shell(shell, {.order = 2, .max_iterations = 1});
   CHECK(curved.report.stop_reason == StopReason::iteration_limit);
@@ -157,7 +157,7 @@ TEST_CASE("Shells that cannot be curved are refused", "[shell]") {
   CHECK_THROWS_AS(curve_shell(shell, {}), InputError);
 }
 
-TEST_CASE("A real surface gets a valid curved shell", "[shell][data]") {
+TEST_CASE("A real surface gets a valid curved shell", "[shell][data][slow]") {
   const auto data = require_data();
   if (!data) return;
   const PolygonMesh surface = read_polygon_mesh(*data / "shell/bumpy_cube/surface.off");

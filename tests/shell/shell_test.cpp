@@ -216,7 +216,7 @@ TEST_CASE("Scaling, moving and turning the surface does the same to its shell", 
     CHECK((moved.mesh.positions[i] - (1e3 * (turn * shell.mesh.positions[i]) + Vec3(1e4, -2e4, 0))).norm() < 1e-5);
 }
 
-TEST_CASE("Walls that face each other share the room between them", "[shell]") {
+TEST_CASE("Walls that face each other share the room between them", "[shell][slow]") {
   // A slot of width 1, outward being into the slot: twice 0.8 does not fit. And an L, whose sides bend towards each
   // other.
   const std::vector<Vec3> u = profile({{0, 2, 0}, {0, 0, 0}, {1, 0, 0}, {1, 2, 0}}, 8);
@@ -445,7 +445,7 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
   CHECK_THROWS_WITH(make_shell(folds, {.thickness = 0.1}), Catch::Contains("at vertices 0"));
 }
 
-TEST_CASE("Real surfaces get valid shells on every side", "[shell][data]") {
+TEST_CASE("Real surfaces get valid shells on every side", "[shell][data][slow]") {
   const auto data = require_data();
   if (!data) return;
   for (const char* name : {"sphere/surface.off", "bumpy_cube/surface.off", "cubespikes_quads/surface.obj",

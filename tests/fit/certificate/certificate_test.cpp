@@ -111,7 +111,7 @@ TEST_CASE("reference cells have the determinant 1 everywhere", "[certificate]") 
   }
 }
 
-TEST_CASE("the certificate never passes an inverted hex with positive corners", "[certificate]") {
+TEST_CASE("the certificate never passes an inverted hex with positive corners", "[certificate][slow]") {
   constexpr std::size_t kNumCells = 100000;
   std::mt19937_64 engine(20240817);
   std::vector<Corners> cells;

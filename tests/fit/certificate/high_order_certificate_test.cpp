@@ -112,7 +112,7 @@ TEST_CASE("affine cells of any order are certified in one box, with their exact 
 }
 
 TEST_CASE("no curved cell is certified against its samples, none refuted without a witness",
-          "[high_order_certificate]") {
+          "[high_order_certificate][slow]") {
   PointSource source(101);
   std::size_t valid = 0, invalid = 0, undecided = 0;
   for (const CellKind kind : kAllKinds)
@@ -142,7 +142,7 @@ TEST_CASE("no curved cell is certified against its samples, none refuted without
   CHECK(invalid > (valid + invalid) / 4);
 }
 
-TEST_CASE("cells that come close to inversion are decided on both sides", "[high_order_certificate]") {
+TEST_CASE("cells that come close to inversion are decided on both sides", "[high_order_certificate][slow]") {
   PointSource source(103);
   for (const CellKind kind : kAllKinds)
     for (const Basis basis : kBothBases)

@@ -39,7 +39,7 @@ TEST_CASE("polynomial_map: a Legendre mesh within the limits is its own polynomi
   CHECK(map.mesh.coefficients == mesh.coefficients);
 }
 
-TEST_CASE("polynomial_map: the bound holds, and raised orders meet the distance asked for", "[elements]") {
+TEST_CASE("polynomial_map: the bound holds, and raised orders meet the distance asked for", "[elements][slow]") {
   PointSource source(2);
   const VolumeMesh cells = renumbered(mixed_cells(), source.random());
   for (int order = 1; order <= 8; ++order)
@@ -81,7 +81,8 @@ TEST_CASE("polynomial_map: refused limits and distances", "[elements]") {
       InputError);
 }
 
-TEST_CASE("lagrange_cells: the polynomials of Lagrange cells are the Legendre cells that they sample", "[export]") {
+TEST_CASE("lagrange_cells: the polynomials of Lagrange cells are the Legendre cells that they sample",
+          "[export][slow]") {
   PointSource source(5);
   for (const CellKind kind : kAllKinds)
     for (int order = 1; order <= 12; ++order)

@@ -241,7 +241,8 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("Every distortion's derivatives over cells of every kind and order agree with differences", "[elements]") {
+TEST_CASE("Every distortion's derivatives over cells of every kind and order agree with differences",
+          "[elements][slow]") {
   PointSource source(6);
   for (CellKind kind : kAllKinds) {
     const VolumeMesh mesh = single_cell(kind);
@@ -265,7 +266,7 @@ TEST_CASE("Every distortion's derivatives over cells of every kind and order agr
   }
 }
 
-TEST_CASE("Fits reach the surface with every distortion, with valid cells") {
+TEST_CASE("Fits reach the surface with every distortion, with valid cells", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   for (Distortion distortion : kAll) {
     CAPTURE(to_string(distortion));

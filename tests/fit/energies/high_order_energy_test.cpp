@@ -79,7 +79,8 @@ TEST_CASE("at order 1, the energy of curved cells is that of linear ones", "[ele
   }
 }
 
-TEST_CASE("gradient and Hessian of curved cells agree with differences for every kind, basis and order", "[elements]") {
+TEST_CASE("gradient and Hessian of curved cells agree with differences for every kind, basis and order",
+          "[elements][slow]") {
   PointSource source(2);
   for (CellKind kind : kAllKinds)
     for (Basis basis : kBothBases)

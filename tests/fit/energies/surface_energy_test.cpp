@@ -196,7 +196,7 @@ TEST_CASE("the surface energy's Hessian is symmetric and positive semidefinite")
   CHECK(values.minCoeff() > -kSinglePrecision * values.maxCoeff());
 }
 
-TEST_CASE("the surface energy has the same bits for one and two threads, and for every history") {
+TEST_CASE("the surface energy has the same bits for one and two threads, and for every history", "[slow]") {
   const TriangleMesh mesh = cube_surface(20, true);
   const TargetSurface target(cube_surface(24, false));
   const int before = omp_get_max_threads();

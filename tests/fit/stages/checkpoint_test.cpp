@@ -69,7 +69,7 @@ SolvedStage small_stage() {
 
 }  // namespace
 
-TEST_CASE("A fit that goes on from a checkpoint ends at the same bits") {
+TEST_CASE("A fit that goes on from a checkpoint ends at the same bits", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   for (const bool cage_only : {false, true})
     check_that_it_resumes([&](StageLog* log) {
@@ -82,7 +82,7 @@ TEST_CASE("A fit that goes on from a checkpoint ends at the same bits") {
     });
 }
 
-TEST_CASE("A fit that was stopped within a minimisation ends at the same bits") {
+TEST_CASE("A fit that was stopped within a minimisation ends at the same bits", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   const auto run = [&](StageLog* log) {
     FitOptions options{.levels = 2};
@@ -108,7 +108,7 @@ TEST_CASE("A fit that was stopped within a minimisation ends at the same bits") 
   }
 }
 
-TEST_CASE("A minimisation that was stopped after cells were densified ends at the same bits") {
+TEST_CASE("A minimisation that was stopped after cells were densified ends at the same bits", "[slow]") {
   const samples::Sample sample = samples::torus_sample();
   const auto run = [&](StageLog* log) {
     HighOrderFitOptions options{
@@ -134,7 +134,7 @@ TEST_CASE("A minimisation that was stopped after cells were densified ends at th
   CHECK_THROWS_WITH(run(&wrong), Catch::Contains("there is no cell 1048576"));
 }
 
-TEST_CASE("A fit with stages that were undone, and with one thread or two, goes on the same way") {
+TEST_CASE("A fit with stages that were undone, and with one thread or two, goes on the same way", "[slow]") {
   const samples::Sample sample = samples::bracket_sample();
   FitOptions options{.levels = 2, .tolerance_percent = 1e-3, .max_iterations = 2};
   StageLog whole;
@@ -149,7 +149,7 @@ TEST_CASE("A fit with stages that were undone, and with one thread or two, goes 
   CHECK(told(result.report) == told(wanted.report));
 }
 
-TEST_CASE("A fit of curved elements that goes on from a checkpoint ends at the same bits") {
+TEST_CASE("A fit of curved elements that goes on from a checkpoint ends at the same bits", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   for (const bool adaptive : {false, true})
     check_that_it_resumes([&](StageLog* log) {
@@ -244,7 +244,7 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
                     Catch::Contains("2 unknowns, expected 3"));
 }
 
-TEST_CASE("A log of another run is refused where it first differs") {
+TEST_CASE("A log of another run is refused where it first differs", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   StageLog log;
   FitOptions options{.levels = 1, .max_iterations = 2};

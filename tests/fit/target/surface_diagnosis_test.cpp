@@ -143,7 +143,7 @@ TEST_CASE("A surface that is inside out is told as inward", "[diagnosis]") {
   CHECK(found.volume == Approx(1));
 }
 
-TEST_CASE("Holes are told with their rims, short ones as pinholes", "[diagnosis]") {
+TEST_CASE("Holes are told with their rims, short ones as pinholes", "[diagnosis][slow]") {
   TriangleMesh open = kUnit;
   open.triangles.pop_back();
   SurfaceDiagnosis found = diagnose(open);

@@ -114,7 +114,7 @@ TEST_CASE("A soup with holes and flipped triangles becomes a solid's boundary", 
   CHECK_THROWS_AS(solid_boundary({{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)}, {{0, 1, 2}}}), InputError);
 }
 
-TEST_CASE("Of many parts, those that lie in an odd number of others are cavities", "[templates]") {
+TEST_CASE("Of many parts, those that lie in an odd number of others are cavities", "[templates][slow]") {
   test::RandomPoints random(5);
   TriangleMesh surface;
   struct Part {
@@ -309,7 +309,7 @@ TEST_CASE("Automatic templates do not depend on chance, and can be cancelled", "
   CHECK_THROWS_AS(auto_templates(comb(), {.cells = 100}, 0), InputError);
 }
 
-TEST_CASE("Of several templates the one that fits best is chosen", "[templates]") {
+TEST_CASE("Of several templates the one that fits best is chosen", "[templates][slow]") {
   const TemplateChoice choice = choose_template(test::cube_surface(6, true), {.cells = 27});
   REQUIRE(choice.mesh.num_cells() > 0);
   REQUIRE(!choice.trials.empty());
