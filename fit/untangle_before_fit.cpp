@@ -9,9 +9,11 @@
 
 namespace subvol {
 
-UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options) {
+UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& given) {
   const std::size_t tangled = certify(mesh).not_certified.size();
   if (tangled == 0) return {};
+  OptimizeOptions options = given;
+  options.quality = 0;  // the fit moves all vertices afterwards, and raises the quality itself
   OptimizeResult result = optimize_mesh(mesh, nullptr, options);
   const std::vector<Index>& left = result.uncertified;
   const StopReason reason = result.report.stop_reason;

@@ -25,6 +25,7 @@ struct UntangledStart {
 
 /// Makes tangled cells of a mesh valid within its own boundary, before the mesh is fitted to a target.
 ///
+/// options  as for `optimize_mesh`; `quality` is taken as 0, because the fit that follows moves all vertices anyway.
 /// Does nothing if no cell is tangled. InputError: as `optimize_mesh`, and if cells could not be made valid, with their
 /// number and the first of them.
 UntangledStart untangle_before_fit(VolumeMesh& mesh, const OptimizeOptions& options);
