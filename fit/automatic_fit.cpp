@@ -154,7 +154,6 @@ class AutomaticFit {
   Edges edges_;
   FlatFacets facets_;                 ///< of `target_.mesh`, if edges are followed
   FeatureSizes features_;             ///< of the target, in normalized coordinates
-  std::vector<double> exaggeration_;  ///< of each triangle of the target (`QualityBoundary`); empty: no small features
   VolumeMesh mesh_;
   std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
@@ -183,17 +182,9 @@ void AutomaticFit::find_edges() {
 
 /// Finds the features that are so small that a distance within the tolerance may be too large there.
 void AutomaticFit::find_features() {
-  constexpr double kMostExaggeration = 5;  // the smallest features must not outweigh the quality of all cells
   target_.sample(0);
   features_ = feature_sizes(target_.surface, *target_.tree,
                             options_.max_tolerance_percent / 100 / kAutomaticFeatureShare);
-  if (features_.points.empty()) return;
-  exaggeration_.assign(target_.surface.triangles().size(), 1);
-  for (std::size_t i = 0; i < features_.points.size(); ++i) {
-    const double aim = kAutomaticFeatureShare * features_.sizes[i];
-    double& factor = exaggeration_[features_.triangles[i]];
-    factor = std::max(factor, std::min(kMostExaggeration, options_.max_tolerance_percent / 100 / aim));
-  }
 }
 
 /// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
@@ -246,7 +237,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1);
   QualityBoundary boundary{.samples = std::move(samples.positions), .triangles = samples.triangles,
-                           .triangle_faces = samples.triangle_faces, .exaggeration = exaggeration_};
+                           .triangle_faces = samples.triangle_faces};
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
     boundary.group_of_face = layout_->group_of_face;

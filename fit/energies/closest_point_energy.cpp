@@ -76,15 +76,6 @@ void ClosestPointEnergy::set_groups(std::vector<Index> of_triangle, std::span<co
   surface_tree_.reset();
 }
 
-void ClosestPointEnergy::exaggerate(std::span<const double> factors) {
-  if (factors.size() != target_->triangles().size())
-    throw InputError("ClosestPointEnergy: one factor is expected for each triangle of the target");
-  for (const double factor : factors)
-    if (!(factor >= 1) || !std::isfinite(factor)) throw InputError("ClosestPointEnergy: factors must be 1 or more");
-  sample_exaggeration_.clear();
-  for (const Index t : target_->sample_triangles()) sample_exaggeration_.push_back(factors[t]);
-}
-
 void ClosestPointEnergy::weigh(std::vector<double> factors) {
   if (factors.size() != triangles().size())
     throw InputError("ClosestPointEnergy: one factor is expected for each sample triangle");
@@ -251,11 +242,7 @@ std::vector<double> ClosestPointEnergy::triangle_distances() const {
     double& largest = result[surface_links_[q].triangle];
     largest = std::max(largest, surface_distances_[q]);
   }
-  for (std::size_t j = 0; j < target_hits_.size(); ++j) {
-    const double factor = sample_exaggeration_.empty() ? 1 : sample_exaggeration_[j];
-    double& largest = result[target_hits_[j].triangle];
-    largest = std::max(largest, factor * target_hits_[j].distance);
-  }
+  for (const ClosestPoint::Hit& hit : target_hits_) result[hit.triangle] = std::max(result[hit.triangle], hit.distance);
   return result;
 }
 

@@ -61,10 +61,6 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// sample triangle, else InputError.
   void weigh(std::vector<double> factors);
 
-  /// Distances from the target's triangles count so many times in `triangle_distances`, where its features are small.
-  /// One factor >= 1 per triangle of the target, else InputError.
-  void exaggerate(std::span<const double> factors);
-
   /// Lets only parts of the same group correspond: patches of the fitted surface, and the regions of the target between
   /// sharp edges that they are to reproduce.
   /// of_triangle, of_target  group of each sample triangle and of each of the target's triangles, >= 0; parts of a group
@@ -88,7 +84,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
     double mean, max;
   };
   Distance assigned_distance() const;
-  /// Returns the largest of these distances at each sample triangle, exaggerated where features are small.
+  /// Returns the largest of these distances at each sample triangle.
   std::vector<double> triangle_distances() const;
   /// The same, but the distances of the triangles' corners from the target count, too. Cost: a query per sample.
   std::vector<double> triangle_distances_with_corners() const;
@@ -114,7 +110,6 @@ class ClosestPointEnergy final : public SurfaceTerm {
   std::optional<GroupedClosestPoint> surface_tree_;  ///< tree over S~
   std::vector<Index> groups_, sample_groups_;        ///< of each sample triangle and target sample; empty: no groups
   Index group(std::size_t triangle) const { return groups_.empty() ? 0 : groups_[triangle]; }
-  std::vector<double> sample_exaggeration_;        ///< per target sample; empty: all 1
   std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 

@@ -88,7 +88,6 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
       for (const Index f : boundary.triangle_faces) groups.push_back(boundary.group_of_face[f]);
       surface->set_groups(std::move(groups), boundary.group_of_triangle);
     }
-    if (!boundary.exaggeration.empty()) surface->exaggerate(boundary.exaggeration);
     surface_ = surface.get();
     if (creases) {
       surface->discount_disagreeing();

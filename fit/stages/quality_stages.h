@@ -59,9 +59,6 @@ struct QualityBoundary {
   /// Groups of each face of the mesh and of each of the target's triangles (`ClosestPointEnergy::set_groups`); empty:
   /// none.
   std::vector<Index> group_of_face, group_of_triangle;
-  /// How many times distances from each of the target's triangles count in the lift (`ClosestPointEnergy::exaggerate`);
-  /// empty: once.
-  std::vector<double> exaggeration;
 };
 
 /// Runs the minimizations of one level on one problem.

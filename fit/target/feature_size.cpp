@@ -46,7 +46,6 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
     if (sizes[i] >= most) continue;
     features.points.push_back(samples[i]);
     features.sizes.push_back(sizes[i]);
-    features.triangles.push_back(surface.sample_triangles()[i]);
   }
   return features;
 }

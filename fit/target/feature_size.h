@@ -12,8 +12,7 @@ namespace subvol {
 /// Sizes of the small features of a surface at sample points: holes, pins, walls, slots.
 struct FeatureSizes {
   std::vector<Vec3> points;
-  std::vector<double> sizes;     ///< radius at each point, in the surface's unit
-  std::vector<Index> triangles;  ///< of the surface, in which each point lies
+  std::vector<double> sizes;  ///< radius at each point, in the surface's unit
 };
 
 /// Finds where two sides of a surface are close and opposite: the radius of the ball that touches the surface at a point
