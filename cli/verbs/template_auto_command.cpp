@@ -57,7 +57,8 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const AutoTemplateResult result = make(arguments, target);
   if (result.cancelled && interrupted()) return kInterrupted;
   if (result.cancelled) {
-    std::cerr << "subvol: the time limit was reached before a template was made\n";
+    std::cerr << "subvol: the time limit was reached before a template was made; "
+              << why_no_grid(target, arguments.options.cells, result.wanted) << '\n';
     return kNotConverged;
   }
   if (result.templates.empty()) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace subvol {
@@ -13,7 +14,12 @@ namespace {
 
 constexpr std::size_t kSamples = 20'000;
 constexpr int kMostParts = 6;         // an edge of a triangle is cut into at most so many parts
-constexpr double kMostCosine = -0.5;  // of the angle between the points that a ball touches, seen from its center
+/// A ball counts as empty if a smaller one is, by this factor. The center of the smaller one is not as far from many
+/// triangles as from the closest, as the center of a round solid is: the search stays short.
+constexpr double kSmaller = 0.75;
+constexpr double kNarrower = 0.99;    // share of the best width below which a place is looked at closely
+constexpr double kMostCosine = -0.5;   // of the angle between the normals of two stretches that face each other
+constexpr double kLeastCosine = 0.866; // of the angle between the normal and the line across: 30 degrees
 
 /// A point of a triangle.
 struct Sample {
@@ -52,42 +58,47 @@ class Balls {
     diagonal_ = box.diagonal().norm();
   }
 
-  double diagonal() const { return diagonal_; }
-  /// Returns the place where the ball at a sample, at most of a radius, touches the surface again; width 0: there is
-  /// none that counts.
-  ThinPlace place(const Sample& sample, double radius) const {
+  /// Returns the place where the ball at a sample touches the surface again, if it is narrower than `most`; width 0:
+  /// there is none that counts.
+  ThinPlace place(const Sample& sample, double most) const {
+    const Vec3 front = normal(sample.triangle);
+    if (!front.allFinite() || front.isZero()) return {};
+    const Vec3 inward = side_ == ThinSide::wall ? Vec3(-front) : front;
+    // The line across is within 30 degrees of the normal: the ball is no larger than the width over the root of 3.
+    const double radius = std::min(diagonal_, most / std::sqrt(3.0) / kSmaller);
+    ThinPlace found;
+    if (!shrink(sample, inward, radius, found) || !faces(found, inward)) return {};
+    return found;
+  }
+
+ private:
+  /// Shrinks a ball until the surface is outside of `kSmaller` times it. Returns false if it never touches the surface.
+  bool shrink(const Sample& sample, const Vec3& inward, double radius, ThinPlace& found) const {
     constexpr int kSteps = 40;
     constexpr double kTouches = 1e-7;  // share of the radius
-    const auto& t = mesh_.triangles[sample.triangle];
-    const Vec3 normal = (mesh_.positions[t[1]] - mesh_.positions[t[0]])
-                            .cross(mesh_.positions[t[2]] - mesh_.positions[t[0]]).normalized();
-    if (!normal.allFinite() || normal.isZero()) return {};
-    const Vec3 inward = side_ == ThinSide::wall ? Vec3(-normal) : normal;
-    // A ball that is a little smaller shows as well that nothing is inside. Its center is not as far from many triangles
-    // as from the closest, as the center of a round solid is, so that the search is short.
-    constexpr double kSmaller = 0.95;
-    ThinPlace found;
     for (int step = 0; step < kSteps; ++step) {
       const double smaller = kSmaller * radius;
       const ClosestPoint::Hit hit = tree_.closest(sample.point + smaller * inward, sample.triangle);
       if (hit.triangle == kNoIndex || hit.distance >= (1 - kTouches) * smaller) break;
       const Vec3 to = hit.point - sample.point;
       const double depth = inward.dot(to);
-      if (!(depth > 0)) return {};
+      if (!(depth > 0)) return false;
       radius = to.squaredNorm() / (2 * depth);
       found = {to.norm(), sample.point, hit.point, {sample.triangle, hit.triangle}};
     }
-    if (found.triangles[1] == kNoIndex || !faces(found, sample.point + radius * inward)) return {};
-    return found;
+    return found.triangles[1] != kNoIndex;
   }
-
- private:
-  bool faces(const ThinPlace& place, const Vec3& center) const {
+  Vec3 normal(Index triangle) const {
+    const auto& t = mesh_.triangles[triangle];
+    const Vec3& a = mesh_.positions[t[0]];
+    return (mesh_.positions[t[1]] - a).cross(mesh_.positions[t[2]] - a).normalized();
+  }
+  bool faces(const ThinPlace& place, const Vec3& inward) const {
     for (Index v : mesh_.triangles[place.triangles[0]])
       for (Index w : mesh_.triangles[place.triangles[1]])
         if (v == w) return false;
-    const Vec3 a = place.at - center, b = place.across - center;
-    return a.dot(b) <= kMostCosine * a.norm() * b.norm();
+    const double opposite = normal(place.triangles[0]).dot(normal(place.triangles[1]));
+    return opposite <= kMostCosine && inward.dot(place.across - place.at) >= kLeastCosine * place.width;
   }
 
   const TriangleMesh& mesh_;
@@ -108,10 +119,9 @@ std::optional<ThinPlace> thinnest_place(const TriangleMesh& mesh, const ClosestP
   for (std::size_t first = 0; first < samples.size(); first += kAtATime) {
     if (cancelled && cancelled()) return std::nullopt;
     const std::size_t end = std::min(first + kAtATime, samples.size());
-    // A ball that touches two points 120 degrees apart is no larger than their distance over the root of 3.
-    const double radius = best ? best->width / std::sqrt(3.0) : balls.diagonal();
+    const double most = best ? kNarrower * best->width : std::numeric_limits<double>::infinity();
 #pragma omp parallel for schedule(dynamic, 64)
-    for (std::size_t i = first; i < end; ++i) places[i] = balls.place(samples[i], radius);
+    for (std::size_t i = first; i < end; ++i) places[i] = balls.place(samples[i], most);
     for (std::size_t i = first; i < end; ++i)
       if (places[i].width > 0 && (!best || places[i].width < best->width)) best = &places[i];
   }
