@@ -262,7 +262,8 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
   constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
-  const double missed = trial.feature_miss ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
+  const bool counts_misses = trial.feature_miss && trial.curves > 0;
+  const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
   return excess(trial.max_percent, options.max_tolerance_percent) +
          excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
          kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +

@@ -97,7 +97,7 @@ struct AutomaticFitResult {
 /// The best trial is kept:
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
-///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1))
+///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
 ///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
 ///         + 1 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
