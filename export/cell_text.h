@@ -40,7 +40,7 @@ int max_gmsh_order(CellKind kind);
 /// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted); VTK's for Lagrange cells of a
 /// kind.
 int gmsh_type(CellKind kind, int order);
-/// The same for a face of 3 or 4 corners, of an order from 1 to 10.
+/// Returns Gmsh's type number of a face of 3 or 4 corners, of an order from 1 to 10.
 int gmsh_face_type(std::size_t num_corners, int order);
 std::uint8_t vtk_type(CellKind kind);
 /// VTK's type number of a linear cell.

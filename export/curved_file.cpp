@@ -18,30 +18,6 @@ CellView view_of(const NodalMesh& mesh) {
   return {mesh.positions, mesh.kinds, mesh.orders, mesh.offsets, mesh.nodes, {}};
 }
 
-/// The cells by their corners, whose vertices are the nodes that are corners, in their order.
-/// number  receives the vertex of each node, or kNoIndex.
-VolumeMesh corners_of(const NodalMesh& mesh, std::vector<Index>& number) {
-  number.assign(mesh.positions.size(), kNoIndex);
-  const auto corners = [&](std::size_t c) {
-    return mesh.cell(c).first(static_cast<std::size_t>(cell_topology(mesh.kinds[c]).num_vertices));
-  };
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    for (const Index node : corners(c)) number[node] = 0;
-  VolumeMesh result;
-  for (std::size_t n = 0; n < number.size(); ++n) {
-    if (number[n] == kNoIndex) continue;
-    number[n] = static_cast<Index>(result.positions.size());
-    result.positions.push_back(mesh.positions[n]);
-  }
-  std::vector<Index> cell;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    cell.clear();
-    for (const Index node : corners(c)) cell.push_back(number[node]);
-    result.add_cell(mesh.kinds[c], cell);
-  }
-  return result;
-}
-
 void require_sound(const std::string& name, const VolumeMesh& corners) {
   for (const MeshDefect& defect : validate(corners))
     if (defect.kind != MeshDefect::Kind::inverted_cell && defect.kind != MeshDefect::Kind::unused_vertex)
@@ -90,7 +66,7 @@ HighOrderFile curved_mesh(const std::string& name, NodalMesh mesh, std::vector<s
     throw InputError(name + ": cells of order " + std::to_string(order) + ", expected at most " +
                      std::to_string(kMaxOrder));
   std::vector<Index> number;
-  const VolumeMesh corners = corners_of(mesh, number);
+  const VolumeMesh corners = corner_mesh(mesh, false, number);
   require_sound(name, corners);
   std::vector<int> references = std::move(mesh.references);
   VolumeFaceGroups face_groups = renumbered(mesh.face_groups, number);

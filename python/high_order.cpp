@@ -68,18 +68,7 @@ Straight cells to begin with.)");
     const auto& references = self.cast<const CurvedMesh&>().references;
     return shown(references.data(), {static_cast<py::ssize_t>(references.size())}, self);
   }, "Group number of each cell: (n,) int32; without entries where all are 0. A view.");
-  type.def_property_readonly("group_names", [](const CurvedMesh& curved) {
-    return names_of(curved.face_groups.groups);
-  }, kNamesHelp);
-  type.def_property_readonly("group_numbers", [](const py::object& self) {
-    return numbers_of(self.cast<const CurvedMesh&>().face_groups.groups, self);
-  }, kNumbersHelp);
-  type.def_property_readonly("grouped_faces", [](const py::object& self) {
-    return faces_shown(self.cast<const CurvedMesh&>().face_groups, self);
-  }, kFacesHelp);
-  type.def_property_readonly("face_groups", [](const py::object& self) {
-    return places_shown(self.cast<const CurvedMesh&>().face_groups, self);
-  }, kPlacesHelp);
+  add_groups(type);
   type.def_property_readonly("region_names", [](const CurvedMesh& curved) { return region_names(curved.regions); },
                              "Names of references: dict of number and name.");
   type.def("point_map", [](const CurvedMesh& curved, const py::object& cells, const py::object& points) {

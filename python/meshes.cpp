@@ -101,22 +101,6 @@ void add_tags(py::class_<Mesh, Extra...>& type) {
   }, "As crease_sharpness, of the corners: (n,) float64. A view.");
 }
 
-/// Adds the groups of the faces of a VolumeMesh.
-template <class Mesh, class... Extra>
-void add_groups(py::class_<Mesh, Extra...>& type) {
-  type.def_property_readonly("group_names", [](const Mesh& mesh) { return names_of(mesh.face_groups.groups); },
-                             kNamesHelp);
-  type.def_property_readonly("group_numbers", [](const py::object& self) {
-    return numbers_of(self.cast<const Mesh&>().face_groups.groups, self);
-  }, kNumbersHelp);
-  type.def_property_readonly("grouped_faces", [](const py::object& self) {
-    return faces_shown(self.cast<const Mesh&>().face_groups, self);
-  }, kFacesHelp);
-  type.def_property_readonly("face_groups", [](const py::object& self) {
-    return places_shown(self.cast<const Mesh&>().face_groups, self);
-  }, kPlacesHelp);
-}
-
 // --- Volume meshes --------------------------------------------------------------------------------------------------
 
 struct KindName {

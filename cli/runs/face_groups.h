@@ -12,13 +12,14 @@
 
 namespace subvol::cli {
 
-/// What has become of the groups of a target, and warnings about it. Both are empty if the target has no groups.
+/// The groups of a target as they arrived on a result, and the warnings about them. Both are empty if the target has no
+/// groups.
 struct GroupsFound {
   std::vector<CarriedGroup> groups;
   std::vector<std::string> warnings;
 };
 
-/// Give each boundary face of a result the group of the target that it lies on (`carried_groups`). Groups that the mesh
+/// These functions give each boundary face of a result the group of the target that it lies on (`carried_groups`). Groups that the mesh
 /// has already stay where the target gives none. Points have no groups.
 GroupsFound carry_groups(const Target& target, VolumeMesh& mesh);
 GroupsFound carry_groups(const Target& target, HighOrderFile& file);

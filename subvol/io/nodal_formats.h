@@ -25,7 +25,7 @@ NodalMesh parse_mfem(const std::string& name, std::string_view bytes, const std:
 /// True if the bytes begin as an MFEM mesh; a .mesh may also be Medit's.
 bool is_mfem(std::string_view bytes);
 
-/// What became of a cell of a VTK type.
+/// Tells if `add_vtk_cell` added a cell, or left it out because it is a point, a line or a face.
 enum class VtkCellUse { added, lower_dimension };
 
 /// Appends a cell of a VTK type, linear, quadratic or Lagrange, to a mesh.

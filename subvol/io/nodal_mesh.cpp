@@ -171,6 +171,28 @@ VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh) {
   return linear;
 }
 
+VolumeMesh corner_mesh(const NodalMesh& mesh, bool keeps_unused, std::vector<Index>& number) {
+  number.assign(mesh.positions.size(), keeps_unused ? 0 : kNoIndex);
+  const auto corners = [&](std::size_t c) {
+    return mesh.cell(c).first(static_cast<std::size_t>(cell_topology(mesh.kinds[c]).num_vertices));
+  };
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+    for (const Index node : corners(c)) number[static_cast<std::size_t>(node)] = 0;
+  VolumeMesh result;
+  for (std::size_t n = 0; n < number.size(); ++n) {
+    if (number[n] == kNoIndex) continue;
+    number[n] = static_cast<Index>(result.positions.size());
+    result.positions.push_back(mesh.positions[n]);
+  }
+  std::vector<Index> cell;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    cell.clear();
+    for (const Index node : corners(c)) cell.push_back(number[static_cast<std::size_t>(node)]);
+    result.add_cell(mesh.kinds[c], cell);
+  }
+  return result;
+}
+
 void turn_over_mirrored(NodalMesh& mesh) {
   std::size_t num_mirrored = 0, num_prisms = 0, num_mirrored_prisms = 0;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {

@@ -96,6 +96,13 @@ bool holds_curved_cells(const std::filesystem::path& path);
 /// Returns the cells as linear ones; nodes keep their numbers. InputError: a cell of order 2 or more.
 VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh);
 
+/// Returns the cells by their corners, without groups and references. The vertices are the nodes that are corners, in the
+/// order of the nodes.
+///
+/// keeps_unused  true: nodes of no cell become vertices, too, as do all others that are no corners.
+/// number        receives the vertex of each node, or kNoIndex.
+VolumeMesh corner_mesh(const NodalMesh& mesh, bool keeps_unused, std::vector<Index>& number);
+
 /// Renumbers the nodes of all cells, or of all prisms, as `read_volume_mesh` does if each of them is left-handed at
 /// every corner, with a warning.
 void turn_over_mirrored(NodalMesh& mesh);

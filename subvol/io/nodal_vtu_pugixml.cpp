@@ -210,22 +210,8 @@ class VtuParser {
     } catch (const InputError& error) {
       fail(error.what());
     }
-    const auto is_chosen = [&](const CellNumbers& array) {
-      return chosen && array.values == arrays_[*chosen].values;
-    };
-    LeftOut left_out;
-    left_out.add("data arrays", num_left_out_ + num_arrays_ -
-                                    static_cast<std::size_t>(std::count_if(arrays_.begin(), arrays_.end(), is_chosen)));
-    left_out.tell(mesh_.warnings);
-    if (!chosen) return;
-    const auto rivals = std::count_if(arrays_.begin(), arrays_.end(), [&](const CellNumbers& array) {
-      return may_be_references(array) && !is_chosen(array);
-    });
-    if (rivals > 0 && asked_.empty())
-      mesh_.warnings.push_back("references are taken from the cell data " + in_quotes(arrays_[*chosen].name) +
-                               "; there are " + std::to_string(rivals) +
-                               " more of whole numbers, of which --references NAME chooses another");
-    take_references(arrays_[*chosen].values);
+    tell_of_references(arrays_, chosen, !asked_.empty(), num_left_out_ + num_arrays_, mesh_.warnings);
+    if (chosen) take_references(arrays_[*chosen].values);
   }
 
   void take_references(const std::vector<std::int64_t>& values) {

@@ -14,26 +14,10 @@ namespace subvol {
 
 namespace {
 
-/// The cells by their corners, with the corners numbered in the order of the nodes.
+/// Returns the cells by their corners, with their groups. Vertices of no linear cell keep their place.
 VolumeMesh corner_cells(const NodalMesh& mesh) {
-  std::vector<Index> number(mesh.positions.size(), mesh.max_order() == 1 ? 0 : kNoIndex);
-  const auto corners = [&](std::size_t c) {
-    return mesh.cell(c).first(static_cast<std::size_t>(cell_topology(mesh.kinds[c]).num_vertices));
-  };
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    for (const Index node : corners(c)) number[static_cast<std::size_t>(node)] = 0;
-  VolumeMesh result;
-  for (std::size_t n = 0; n < number.size(); ++n) {
-    if (number[n] == kNoIndex) continue;
-    number[n] = static_cast<Index>(result.positions.size());
-    result.positions.push_back(mesh.positions[n]);
-  }
-  std::vector<Index> cell;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    cell.clear();
-    for (const Index node : corners(c)) cell.push_back(number[static_cast<std::size_t>(node)]);
-    result.add_cell(mesh.kinds[c], cell);
-  }
+  std::vector<Index> number;
+  VolumeMesh result = corner_mesh(mesh, mesh.max_order() == 1, number);
   result.face_groups = renumbered(mesh.face_groups, number);
   return result;
 }

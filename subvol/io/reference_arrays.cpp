@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
 
 #include <algorithm>
 #include <iterator>
@@ -80,6 +81,23 @@ std::optional<std::size_t> choose_references(const std::vector<CellNumbers>& arr
   throw InputError("no cell data " + in_quotes(name) + " of whole numbers to take references from; there are " +
                    (names.empty() ? "none" : listed(names)) +
                    (others.empty() ? "" : ", and these of fractions or of several components: " + listed(others)));
+}
+
+void tell_of_references(const std::vector<CellNumbers>& arrays, std::optional<std::size_t> chosen, bool was_asked,
+                        std::size_t num_arrays, std::vector<std::string>& warnings) {
+  // An array may stand in a file twice, under two names.
+  const auto is_chosen = [&](const CellNumbers& array) { return chosen && array.values == arrays[*chosen].values; };
+  const auto num_chosen = std::count_if(arrays.begin(), arrays.end(), is_chosen);
+  LeftOut left_out;
+  left_out.add("data arrays", num_arrays - static_cast<std::size_t>(num_chosen));
+  left_out.tell(warnings);
+  if (!chosen || was_asked) return;
+  const auto rivals = std::count_if(arrays.begin(), arrays.end(), [&](const CellNumbers& array) {
+    return may_be_references(array) && !is_chosen(array);
+  });
+  if (rivals > 0)
+    warnings.push_back("references are taken from the cell data " + in_quotes(arrays[*chosen].name) + "; there are " +
+                       std::to_string(rivals) + " more of whole numbers, of which --references NAME chooses another");
 }
 
 }  // namespace subvol

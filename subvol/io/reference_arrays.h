@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <string_view>
 #include <vector>
 
 namespace subvol {
@@ -27,6 +26,14 @@ struct CellNumbers {
 /// InputError (without the file's name): there is no array of that name; the message lists `arrays` and `others`.
 std::optional<std::size_t> choose_references(const std::vector<CellNumbers>& arrays, const std::string& name,
                                              const std::vector<std::string>& others = {});
+
+/// Appends warnings about the arrays of cell data that did not become references: their number, and that others might be
+/// meant if none was asked for.
+///
+/// chosen      from `choose_references`.  was_asked  true if an array was asked for by name.
+/// num_arrays  number of all arrays of cell data in the file.
+void tell_of_references(const std::vector<CellNumbers>& arrays, std::optional<std::size_t> chosen, bool was_asked,
+                        std::size_t num_arrays, std::vector<std::string>& warnings);
 
 /// Returns the place of a name in the list of names that programs give to materials and regions, the most telling name
 /// first; nothing if it is not in the list. Case, separators and a plural's s do not count.

@@ -27,7 +27,7 @@ VertexSupport support_of(std::span<const Index> vertices);
 VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopology& refined,
                                   std::span<const VertexSupport> support);
 
-/// The same for a refinement that adds no vertices and keeps the numbers of the old ones.
+/// Returns the groups after a refinement that adds no vertices and keeps the numbers of the old ones.
 VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopology& refined);
 
 }  // namespace subvol
