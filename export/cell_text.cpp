@@ -223,17 +223,22 @@ void append_elements(std::string& text, const CellView& mesh, const Blocks& bloc
   text += "$EndElements\n";
 }
 
-void append_element_data(std::string& text, const Blocks& blocks, std::span<const double> cell_minima) {
+/// Appends the values of all elements; a face has that of its cell. Readers such as meshio expect one for each element.
+void append_element_data(std::string& text, const CellView& mesh, const Blocks& blocks, const FaceBlocks& face_blocks,
+                         std::span<const double> cell_minima) {
   text += "$ElementData\n1\n\"scaled_jacobian\"\n1\n0\n3\n0\n1\n";
-  append_line(text, {cell_minima.size()});
+  append_line(text, {cell_minima.size() + (mesh.faces ? mesh.faces->num_faces() : 0)});
   std::size_t number = 0;
+  const auto append = [&](double value) {
+    append_number(text, ++number);
+    text += ' ';
+    append_number(text, value);
+    text += '\n';
+  };
   for (const auto& [key, cells] : blocks)
-    for (const std::size_t c : cells) {
-      append_number(text, ++number);
-      text += ' ';
-      append_number(text, cell_minima[c]);
-      text += '\n';
-    }
+    for (const std::size_t c : cells) append(cell_minima[c]);
+  for (const auto& [key, faces] : face_blocks)
+    for (const std::size_t f : faces) append(cell_minima[static_cast<std::size_t>(mesh.faces->cells[f])]);
   text += "$EndElementData\n";
 }
 
@@ -313,10 +318,13 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   if (!orders.empty()) append_data_array<std::int32_t>(text, "Name=\"order\"", orders);
   if (!references.empty()) append_data_array<std::int32_t>(text, "Name=\"reference\"", references);
   if (!cell_minima.empty()) append_data_array(text, "Name=\"scaled_jacobian\"", cell_minima);
-  text += "      </CellData>\n    </Piece>\n  </UnstructuredGrid>\n";
-  // Behind the grid, where VTK and MFEM pass over it: MFEM reads a grid only if it has nothing but its piece.
-  if (!field_data.empty() || !group_data.empty())
-    text += "  <FieldData>\n" + field_data + group_data + "  </FieldData>\n";
+  text += "      </CellData>\n    </Piece>\n";
+  // The groups of linear cells stand in the grid, where meshio and VTK read them; meshio refuses a file with more than
+  // a grid. Data of curved cells stand behind it, since MFEM reads a grid only if it has nothing but its piece.
+  if (is_linear && !group_data.empty()) text += "    <FieldData>\n" + group_data + "    </FieldData>\n";
+  text += "  </UnstructuredGrid>\n";
+  const std::string behind = is_linear ? field_data : field_data + group_data;
+  if (!behind.empty()) text += "  <FieldData>\n" + behind + "  </FieldData>\n";
   return text + "</VTKFile>\n";
 }
 
@@ -332,7 +340,7 @@ std::string msh_document(const CellView& mesh, std::span<const double> cell_mini
   append_entities(text, mesh, surfaces, volumes, groups);
   append_nodes(text, mesh);
   append_elements(text, mesh, blocks, volumes, face_blocks, surfaces);
-  if (!cell_minima.empty()) append_element_data(text, blocks, cell_minima);
+  if (!cell_minima.empty()) append_element_data(text, mesh, blocks, face_blocks, cell_minima);
   for (const VertexField& field : fields) append_node_data(text, field);
   return text;
 }

@@ -30,8 +30,8 @@ struct CellView {
 };
 
 /// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13) without `orders`, else of version 2.2 with Lagrange cells
-/// and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty; they stand behind the
-/// grid, because some readers stop at field data before it.
+/// and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty. They stand behind the
+/// grid, because some readers stop at field data before it; the groups of plain cells stand at its end.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {}, const std::string& group_data = {});
 

@@ -84,6 +84,7 @@ GroupedFaces collected(const MeshTopology& topology, const VolumeFaceGroups& gro
     if (found.empty()) continue;
     faces.of_face.push_back(std::move(found));
     faces.sizes.push_back(static_cast<std::uint8_t>(corners.size()));
+    faces.cells.push_back(topology.face_cells(f)[0]);
     add(faces, f, corners);
     faces.offsets.push_back(faces.nodes.size());
   }
@@ -99,7 +100,7 @@ std::vector<std::array<int, 2>> gmsh_face_lattice(std::size_t num_corners, int o
 }
 
 GroupedFaces grouped_faces(const VolumeMesh& mesh) {
-  if (mesh.face_groups.faces.empty()) return {mesh.face_groups.groups, {}, {}, {}, {0}, {}};
+  if (mesh.face_groups.faces.empty()) return {.groups = mesh.face_groups.groups};
   const MeshTopology topology(mesh);
   return collected(topology, mesh.face_groups, [](GroupedFaces& faces, Index, std::span<const Index> corners) {
     faces.orders.push_back(1);

@@ -264,7 +264,7 @@ std::string nastran_text(const NodalMesh& mesh) {
             padded(std::to_string(properties.of(reference_of(mesh, c))), 8);
     const std::size_t count = num_written(kind, order);
     for (std::size_t i = 0; i < count; ++i) {
-      if ((i + 2) % 8 == 0) text += "\n        ";
+      if ((i + 2) % 8 == 0) text += "+\n+       ";  // some readers take no blank as the mark of a continuation
       const std::size_t place = kind == CellKind::hex ? kHex[i] : kind == CellKind::prism ? kPrism[i] : i;
       text += padded(std::to_string(mesh.cell(c)[place] + 1), 8);
     }
