@@ -16,7 +16,9 @@ endif()
 if(SUBVOL_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   find_program(SUBVOL_CCACHE_PROGRAM ccache)
   if(SUBVOL_CCACHE_PROGRAM)
-    set(CMAKE_CXX_COMPILER_LAUNCHER "${SUBVOL_CCACHE_PROGRAM}")
+    # Paths count relative to the build folder, so that all checkouts share what one of them has compiled.
+    set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env "CCACHE_BASEDIR=${PROJECT_SOURCE_DIR}" CCACHE_NOHASHDIR=1
+      "${SUBVOL_CCACHE_PROGRAM}")
   endif()
 endif()
 
