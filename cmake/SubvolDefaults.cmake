@@ -23,6 +23,8 @@ if(SUBVOL_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
 endif()
 
 add_library(subvol_defaults INTERFACE)
+# Headers that are no part of the library are named from the root of the project.
+target_include_directories(subvol_defaults INTERFACE "${PROJECT_SOURCE_DIR}")
 # Options are set by designated initialisers; what is left out has its default.
 target_compile_options(subvol_defaults INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-missing-field-initializers)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)

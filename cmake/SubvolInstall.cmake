@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the library, its headers, the program and a package config that find_package(subvol) understands.
+# Installs the library, its public headers, the program and a package config that find_package(subvol) understands.
 
 include(CMakePackageConfigHelpers)
 set(SUBVOL_CONFIG_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/subvol")
@@ -7,9 +7,11 @@ set(SUBVOL_CONFIG_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/subvol")
 install(TARGETS subvol EXPORT subvol-targets
   ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
   LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
-foreach(folder subvol fit shell export)
-  install(DIRECTORY "${PROJECT_SOURCE_DIR}/${folder}/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/subvol/${folder}"
-    FILES_MATCHING PATTERN "*.h")
+install(FILES "${SUBVOL_INCLUDE_DIR}/subvol/version_macros.h" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/subvol")
+foreach(header ${SUBVOL_PUBLIC_HEADERS})
+  get_filename_component(folder "${header}" DIRECTORY)
+  string(REGEX REPLACE "^subvol/" "" folder "${folder}")
+  install(FILES "${PROJECT_SOURCE_DIR}/${header}" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/subvol/${folder}")
 endforeach()
 if(TARGET subvol_cli)
   install(TARGETS subvol_cli RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")

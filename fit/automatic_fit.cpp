@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/automatic_fit.h"
+#include "subvol/fit/automatic_fit.h"
 
-#include "fit/certificate/certificate.h"
-#include "fit/elements/boundary_samples.h"
-#include "fit/features/crisp_edges.h"
-#include "fit/features/edge_layout.h"
-#include "fit/features/flat_facets.h"
-#include "fit/fits/flat_faces.h"
-#include "fit/fits/smooth_refinement.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/self_intersection.h"
-#include "fit/quality/quality.h"
-#include "fit/target/fit_target.h"
-#include "fit/target/surface_repair.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/features/crisp_edges.h"
+#include "subvol/fit/features/edge_layout.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/flat_facets.h"
+#include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/smooth_refinement.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/stages/quality_stages.h"
+#include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/surface_repair.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/auto_template.h"
@@ -229,13 +232,14 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
 
 /// Fits the present mesh. Returns false if the fit must end.
 bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what) {
-  constexpr int kIntervals = 2, kSamplesPerQuad = 4;
+  constexpr int kIntervals = 2;
+  constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
   const std::size_t faces = MeshTopology(mesh_).boundary_faces().size();
   const double h = std::sqrt(target_.surface.area() / static_cast<double>(faces));
   const std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
   BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
-  target_.sample(kSamplesPerQuad * faces, 1);
+  target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
   QualityBoundary boundary{.samples = std::move(samples.positions), .triangles = samples.triangles,
                            .triangle_faces = samples.triangle_faces};
   std::function<CreaseEnergy(double)> creases;

@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/subdivision_fit.h"
+#include "subvol/fit/subdivision_fit.h"
 
-#include "fit/certificate/certificate.h"
-#include "fit/elements/ideal_boxes.h"
-#include "fit/energies/make_surface_term.h"
-#include "fit/energies/volume_energy.h"
-#include "fit/features/followed_creases.h"
-#include "fit/fits/fit_level.h"
-#include "fit/fits/fit_schedule.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/quality/quality.h"
-#include "fit/stages/memory_budget.h"
-#include "fit/stages/quality_stages.h"
-#include "fit/stages/stage_runner.h"
-#include "fit/stages/staged_fit.h"
-#include "fit/target/fit_target.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/elements/ideal_boxes.h"
+#include "subvol/fit/energies/make_surface_term.h"
+#include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/features/followed_creases.h"
+#include "subvol/fit/fits/fit_level.h"
+#include "subvol/fit/fits/fit_schedule.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/stages/memory_budget.h"
+#include "subvol/fit/stages/quality_stages.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/stages/staged_fit.h"
+#include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/subdivision/audit.h"
@@ -72,6 +72,8 @@ class SubdivisionFit : StagedFit {
   bool has_room();
   bool end_for_memory(const std::string& why);
   void prepare_level();
+  void sample_target();
+  bool fit_all_samples();
   bool start_level();
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;
   bool run_stage(const Stage& stage, const std::string& name);
@@ -98,6 +100,7 @@ class SubdivisionFit : StagedFit {
 
   FitOptions options_;
   FitTarget target_;               ///< sampled for the current level
+  bool samples_all_ = true;        ///< false: only some of the target's samples are used
   VolumeMesh template_;            ///< normalized, with its creases
   VolumeMesh control_;             ///< the control mesh (for cage-only fits, its last refinement)
   VolumeMesh cage_;                ///< the mesh whose vertices are the degrees of freedom
@@ -153,10 +156,40 @@ void SubdivisionFit::prepare_level() {
                           finest());
   limit_check_.reset();
   creases_.refine(level_.parent_creases);
-  target_.sample(level_.samples.num_rows());
+  sample_target();
   ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.surface.volume(),
                              number_ == 1 ? own_box_share_ : 1);
   seconds_["levels"] += runner_.seconds() - begin;
+}
+
+/// Samples the target as densely as the level can follow it: more correspondences cost time and change nothing. On the
+/// finest level, a target that has far more detail counts fully in the end only (`fit_all_samples`).
+void SubdivisionFit::sample_target() {
+  constexpr std::size_t kPerQuad = 6, kLeastCoarse = 3000;  // target samples of a level below the finest
+  constexpr std::size_t kMostPerSample = 4;                 // target samples for each sample of the fitted surface
+  constexpr std::size_t kFarTooMany = 8;                    // the same, from which on the finest level is thinned
+  const std::size_t samples = level_.samples.num_rows();
+  samples_all_ = true;
+  if (finest()) {
+    target_.sample(samples);
+    if (target_.surface.samples().size() <= kFarTooMany * samples) return;
+    samples_all_ = target_.surface.is_cloud();
+    target_.surface.thin(kMostPerSample * samples);
+  } else {
+    const std::size_t quads = MeshTopology(level_.mesh).boundary_faces().size();
+    target_.sample(samples, std::clamp(kPerQuad * quads, kLeastCoarse, kLeastTargetSamples), kMostPerSample * samples);
+  }
+}
+
+/// Ends a fit to some of the target's samples with a few steps towards all of them. Returns false if the fit must end.
+bool SubdivisionFit::fit_all_samples() {
+  constexpr int kSteps = 2;
+  if (samples_all_) return true;
+  target_.sample(level_.samples.num_rows());
+  samples_all_ = true;
+  Stage stage = schedule_.final_stage(lambda_);
+  stage.max_iterations = kSteps;
+  return run_stage(stage, stage_name(stage) + ", all of the target");
 }
 
 std::string SubdivisionFit::stage_name(const Stage& stage) const {
@@ -325,11 +358,22 @@ struct SubdivisionFit::Measured {
     return largest;
   }
   bool gains_on(const Measured& before, std::optional<double> tolerance_percent) const {
-    constexpr double kFarther = 1.05;  // distances may rise by 5 %, but not past the tolerance
+    // Distances may rise by 5 %, but not past the tolerance; those of the surface that is nearer by a quarter. It gives
+    // way first, because the stages before put it as near as they could.
+    constexpr double kFarther = 1.05, kNearerFarther = 1.25;
+    double farthest_mean = 0, farthest_max = 0;
+    for (const SurfaceDistance& distance : before.distances) {
+      farthest_mean = std::max(farthest_mean, distance.mean());
+      farthest_max = std::max(farthest_max, distance.max());
+    }
+    const auto most = [](double distance, double farthest) {
+      return std::max(kFarther * distance, std::min(kNearerFarther * distance, farthest));
+    };
     for (std::size_t i = 0; i < distances.size(); ++i) {
       const double mean = distances[i].mean(), mean_before = before.distances[i].mean();
       const bool misses = tolerance_percent && 100 * mean > *tolerance_percent && mean > mean_before;
-      if (misses || mean > kFarther * mean_before || distances[i].max() > kFarther * before.distances[i].max())
+      if (misses || mean > most(mean_before, farthest_mean) ||
+          distances[i].max() > most(before.distances[i].max(), farthest_max))
         return false;
     }
     return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;
@@ -367,22 +411,28 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
   return going;
 }
 
-/// Raises the lowest scaled Jacobians of the finest mesh; if the distances suffer, the surface counts more in another
-/// attempt. Rolls back if they suffer still. Returns false if the fit must end.
+/// Raises the lowest scaled Jacobians of the finest mesh: by a lift alone or, if that brings nothing, by all quality
+/// stages. If the distances suffer, the surface counts more in another attempt. Rolls back if they suffer still. Returns
+/// false if the fit must end.
 bool SubdivisionFit::raise_quality() {
   // A cage has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free.
-  constexpr std::array<double, 2> kMoreSurface{100, 1000};
+  struct Attempt {
+    double more_surface;
+    bool only_lift;
+  };
+  constexpr std::array<Attempt, 4> kAttempts{{{10, true}, {100, true}, {1000, true}, {100, false}}};
   constexpr double kMaxMargin = 0.8;  // samples miss the farthest places
   const StageRecord* last = result_.report.last_kept_stage();
   if (options_.quality == 0 || (last && last->ended == MinimizerStop::infeasible_start)) return true;
   const std::optional<Measured> before = measure();
   if (!before) return false;
   if (before->least_jacobian >= options_.quality) return true;
-  for (const double more : kMoreSurface) {
-    QualitySchedule schedule = fine_quality_schedule(options_.quality);
-    schedule.most_distance = kMaxMargin * before->largest();
-    for (QualityStage& stage : schedule.stages) stage.surface *= more;
-    schedule.lift.surface *= more;
+  for (const Attempt& attempt : kAttempts) {
+    QualitySchedule schedule =
+        attempt.only_lift ? late_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
+    schedule.most_distance = (attempt.only_lift ? 1 : kMaxMargin) * before->largest();
+    for (QualityStage& stage : schedule.stages) stage.surface *= attempt.more_surface;
+    schedule.lift.surface *= attempt.more_surface;
     FitSnapshot start = snapshot();
     const bool going = or_back(start, [&] { return run_quality_stages(schedule); });
     const std::optional<Measured> now = going ? measure() : std::nullopt;
@@ -401,7 +451,8 @@ bool SubdivisionFit::run_stages() {
   }
   if (!finest()) return true;
   std::optional<std::size_t> pairs = intersecting_pairs();
-  return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs) && raise_quality();
+  return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs) && fit_all_samples() &&
+         raise_quality();
 }
 
 /// Stores the whole state or nothing, since memory may run out here.

@@ -84,6 +84,13 @@ struct Source {
   std::vector<std::string> libraries{};    ///< of others' files: <...>
 };
 
+/// Path from the root of the project of a header of the library, which is included as it is installed.
+std::string path_of(const std::string& include) {
+  for (const char* folder : {"fit/", "shell/", "export/"})
+    if (include.starts_with(std::string("subvol/") + folder)) return include.substr(std::string_view("subvol/").size());
+  return include;
+}
+
 /// Whether a path is this file, or is in this folder or in one inside it.
 bool is_in(std::string_view path, std::string_view place) {
   return path.starts_with(place) && (path.size() == place.size() || path[place.size()] == '/');
@@ -162,7 +169,8 @@ std::vector<std::string> cycles(const std::vector<Source>& sources) {
   return wrong;
 }
 
-/// Includes of files that are not there by this name: each is to be named from the root of the project.
+/// Includes of files that are not there by this name: each is to be named from the root of the project, and those of the
+/// library as they are installed.
 std::vector<std::string> unknown_files(const std::vector<Source>& sources) {
   std::vector<std::string> wrong;
   for (const Source& source : sources)
@@ -180,7 +188,11 @@ Source read_source(const fs::path& root, const fs::path& file) {
   for (std::string line; std::getline(stream, line);) {
     if (!line.starts_with("#include ")) continue;
     const auto open = line.find_first_of("\"<"), close = line.find_last_of("\">");
-    (line[open] == '"' ? source.includes : source.libraries).push_back(line.substr(open + 1, close - open - 1));
+    const std::string name = line.substr(open + 1, close - open - 1);
+    if (line[open] == '"' || name.starts_with("subvol/"))
+      source.includes.push_back(path_of(name));
+    else
+      source.libraries.push_back(name);
   }
   return source;
 }

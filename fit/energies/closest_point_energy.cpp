@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/closest_point_energy.h"
+#include "subvol/fit/energies/closest_point_energy.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace subvol {
 
@@ -58,7 +60,49 @@ ClosestPointEnergy::ClosestPointEnergy(const TargetSurface& target, std::vector<
   if (points_per_triangle != 1 && points_per_triangle != 3)
     throw InputError("ClosestPointEnergy: points_per_triangle must be 1 or 3");
   for (std::size_t t = 0; t <= triangles().size(); ++t) surface_offsets_.push_back(points_per_triangle * t);
-  if (!target.is_cloud()) target_tree_.emplace(TriangleMesh{target.positions(), target.triangles()});
+  target_tree_ = target.tree();
+}
+
+namespace {
+
+std::vector<std::array<Index, 3>> renumbered(std::span<const std::array<Index, 3>> triangles,
+                                             std::span<const Index> which, std::span<const Index> numbers) {
+  std::vector<std::array<Index, 3>> result;
+  for (const Index t : which) {
+    result.push_back(triangles[t]);
+    for (Index& corner : result.back()) corner = numbers[corner];
+  }
+  return result;
+}
+
+}  // namespace
+
+ClosestPointEnergy::ClosestPointEnergy(const ClosestPointEnergy& whole, std::span<const Index> triangles,
+                                       std::span<const Index> numbers, const std::vector<std::uint8_t>& is_free)
+    : SurfaceTerm(renumbered(whole.triangles(), triangles, numbers), is_free.size()),
+      target_(whole.target_),
+      target_tree_(whole.target_tree_),
+      is_part_(true),
+      tau_(whole.tau_),
+      scale_(whole.scale_),
+      inverse_far_(whole.inverse_far_),
+      pull_(whole.pull_),
+      discounts_(whole.discounts_) {
+  std::vector<std::uint8_t> is_inside(whole.triangles().size(), 0);
+  surface_offsets_.push_back(0);
+  for (const Index t : triangles) {
+    is_inside[t] = 1;
+    surface_offsets_.push_back(surface_offsets_.back() + whole.surface_offsets_[t + 1] - whole.surface_offsets_[t]);
+    if (!whole.groups_.empty()) groups_.push_back(whole.groups_[t]);
+    if (!whole.factors_.empty()) factors_.push_back(whole.factors_[t]);
+  }
+  for (std::size_t j = 0; j < whole.target_hits_.size(); ++j) {
+    if (!is_inside[whole.target_hits_[j].triangle]) continue;
+    used_.push_back(static_cast<Index>(whole.target_point(j)));
+    used_points_.push_back(target_->samples()[used_.back()]);
+    if (!whole.sample_groups_.empty()) sample_groups_.push_back(whole.sample_groups_[j]);
+  }
+  if (whole.creases()) add_creases(whole.creases()->part(numbers, is_free));
 }
 
 void ClosestPointEnergy::emphasize_far(double length) {
@@ -72,7 +116,8 @@ void ClosestPointEnergy::set_groups(std::vector<Index> of_triangle, std::span<co
   groups_ = std::move(of_triangle);
   sample_groups_.clear();
   for (const Index t : target_->sample_triangles()) sample_groups_.push_back(of_target[t]);
-  target_tree_.emplace(TriangleMesh{target_->positions(), target_->triangles()}, of_target);
+  target_tree_ = std::make_shared<const GroupedClosestPoint>(
+      TriangleMesh{target_->positions(), target_->triangles()}, of_target);
   surface_tree_.reset();
 }
 
@@ -100,7 +145,7 @@ void ClosestPointEnergy::refine(std::span<const std::uint8_t> refined) {
 
 void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
   const bool straight = pull_ == SurfacePull::straight_both_ways;
-  const std::vector<Vec3>& points = target_->samples();
+  const std::vector<Vec3>& points = is_part_ ? used_points_ : target_->samples();
   if (surface_tree_) {
     surface_tree_->move(samples);
   } else {
@@ -123,8 +168,8 @@ void ClosestPointEnergy::link_target(std::span<const Vec3> samples) {
                                 barycentric(target_hits_[j].point, samples[q[0]], samples[q[1]], samples[q[2]]),
                                 points[j],
                                 has_direction ? Vec3((points[j] - target_hits_[j].point) / distance)
-                                              : target_->sample_normals()[j],
-                                factor(t) * emphasis(distance) * target_->sample_areas()[j],
+                                              : target_->sample_normals()[target_point(j)],
+                                factor(t) * emphasis(distance) * target_->sample_areas()[target_point(j)],
                                 tau_};
   }
 }
@@ -223,7 +268,7 @@ void ClosestPointEnergy::forget() {
 ClosestPointEnergy::Distance ClosestPointEnergy::assigned_distance() const {
   double to_surface = 0, to_target = 0, area = 0, max = 0;
   for (std::size_t j = 0; j < target_hits_.size(); ++j) {
-    to_surface += target_->sample_areas()[j] * target_hits_[j].distance;
+    to_surface += target_->sample_areas()[target_point(j)] * target_hits_[j].distance;
     max = std::max(max, target_hits_[j].distance);
   }
   for (std::size_t q = 0; q < surface_distances_.size(); ++q) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/surface_term.h"
-#include "fit/geometry/grouped_closest_point.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/energies/surface_term.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/grouped_closest_point.h"
+#include "subvol/fit/target/target_surface.h"
 
+#include <memory>
 #include <optional>
 
 namespace subvol {
@@ -47,6 +49,17 @@ class ClosestPointEnergy final : public SurfaceTerm {
   ClosestPointEnergy(const TargetSurface& target, std::vector<std::array<Index, 3>> sample_triangles,
                      std::size_t num_samples, double tangential_weight, int points_per_triangle,
                      SurfacePull pull = SurfacePull::along_normals);
+
+  /// The part of an energy that some of its sample triangles have: as if all others were where they are at the last
+  /// `assign` of the whole, which must have been called. Points of the target belong to it if they correspond to one of
+  /// these triangles there.
+  ///
+  /// triangles    of the whole, ascending.
+  /// numbers      number in the part of each sample of the whole; kNoIndex for those outside. Corners of `triangles` and
+  ///              ends of creases must be inside.
+  /// is_free      one entry per sample of the part: 1 if it moves; all its triangles must belong to the part.
+  ClosestPointEnergy(const ClosestPointEnergy& whole, std::span<const Index> triangles, std::span<const Index> numbers,
+                     const std::vector<std::uint8_t>& is_free);
 
   /// From the next `assign` on, a correspondence of length d counts 1 + (d / length)^2 times: distant points are drawn
   /// more strongly than the mean requires, which keeps the largest distance down. length > 0 in the target's unit, else
@@ -99,6 +112,10 @@ class ClosestPointEnergy final : public SurfaceTerm {
     double tangential;  ///< tau; 0 over a boundary
   };
 
+  /// Number of points of the target that are used, and the place of each in its samples.
+  std::size_t num_target_points() const { return is_part_ ? used_.size() : target_->samples().size(); }
+  std::size_t target_point(std::size_t j) const { return is_part_ ? static_cast<std::size_t>(used_[j]) : j; }
+
   void link_target(std::span<const Vec3> samples);
   void link_surface(std::span<const Vec3> samples);
   bool over_rim(const ClosestPoint::Hit& hit) const;
@@ -106,10 +123,13 @@ class ClosestPointEnergy final : public SurfaceTerm {
   void add_link(const Link& link, const Incidence& incidence, Row& row, double& value) const;
 
   const TargetSurface* target_;
-  std::optional<GroupedClosestPoint> target_tree_;   ///< empty for a cloud
+  std::shared_ptr<const GroupedClosestPoint> target_tree_;  ///< null for a cloud
   std::optional<GroupedClosestPoint> surface_tree_;  ///< tree over S~
   std::vector<Index> groups_, sample_groups_;        ///< of each sample triangle and target sample; empty: no groups
   Index group(std::size_t triangle) const { return groups_.empty() ? 0 : groups_[triangle]; }
+  bool is_part_ = false;                           ///< only the target's samples in used_ count
+  std::vector<Index> used_;
+  std::vector<Vec3> used_points_;                  ///< their positions
   std::vector<ClosestPoint::Hit> target_hits_;     ///< s(y_j)
   double emphasis(double distance) const { return 1 + distance * distance * inverse_far_ * inverse_far_; }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/quality_energy.h"
+#include "subvol/fit/energies/quality_energy.h"
 
-#include "fit/certificate/certificate.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
 
 #include <Eigen/Geometry>
 
@@ -145,6 +145,20 @@ QualityEnergy::QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengt
   std::vector<std::size_t> next(color_offsets_.begin(), color_offsets_.end() - 1);
   order_.resize(colors.size());
   for (std::size_t c = 0; c < colors.size(); ++c) order_[next[colors[c]]++] = static_cast<Index>(c);
+}
+
+QualityEnergy::QualityEnergy(const QualityEnergy& whole, const VolumeMesh& part, std::span<const Index> cells)
+    : QualityEnergy(part, [&] {
+        std::vector<Vec3> lengths;
+        for (const Index c : cells) lengths.push_back(whole.lengths_[c]);
+        return lengths;
+      }()) {
+  weights_ = whole.weights_;
+  caps_ = whole.caps_;
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    dense_[c] = whole.dense_[cells[c]];
+    if (!whole.caps_of_cell_.empty()) caps_of_cell_.push_back(whole.caps_of_cell_[cells[c]]);
+  }
 }
 
 void QualityEnergy::set_weights(const QualityWeights& weights) {
@@ -384,7 +398,7 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
   for (std::size_t c = 0; c < least.size(); ++c) {
     state.least = std::min(state.least, least[c]);
     state.least_share = std::min(state.least_share, shares[c]);
-    if (shares[c] < 1) ++state.below;
+    if (shares[c] < 1) state.poor.push_back(static_cast<Index>(c));
   }
   return state;
 }

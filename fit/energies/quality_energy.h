@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/element_rule.h"
-#include "fit/energies/cell_blocks.h"
-#include "fit/energies/volume_term.h"
-#include "fit/features/quality_caps.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/cell_blocks.h"
+#include "subvol/fit/energies/volume_term.h"
+#include "subvol/fit/features/quality_caps.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
@@ -51,6 +51,10 @@ class QualityEnergy final : public VolumeTerm {
   /// lengths  h_i of each cell: positive and finite, in the unit of the nodes, else InputError.
   QualityEnergy(const VolumeMesh& mesh, std::span<const Vec3> lengths);
 
+  /// The energy of some cells of another one, with their lengths, caps and numbers of points, the weights, and no
+  /// emphasis. part: a mesh of these cells in this order, which must outlive the energy.
+  QualityEnergy(const QualityEnergy& whole, const VolumeMesh& part, std::span<const Index> cells);
+
   /// InputError: a weight that is negative or not finite, a threshold above 1.
   void set_weights(const QualityWeights& weights);
 
@@ -62,7 +66,7 @@ class QualityEnergy final : public VolumeTerm {
   struct State {
     double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
     double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached; <= 1
-    std::size_t below = 0;   ///< number of cells with a point below its goal
+    std::vector<Index> poor{};  ///< cells with a point below its goal, ascending
   };
   /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
   /// below; elsewhere it falls back by 3 % towards 1. At most 1000.

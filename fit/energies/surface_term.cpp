@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/surface_term.h"
+#include "subvol/fit/energies/surface_term.h"
 
 #include "subvol/base/error.h"
 
@@ -55,6 +55,7 @@ void SurfaceTerm::begin_assign(std::span<const Vec3> samples) {
 
 void SurfaceTerm::add_creases(CreaseEnergy creases) {
   for (const CreaseSegment& segment : creases.segments()) {
+    if (!creases.moves(segment.ends)) continue;
     const auto [a, b] = segment.ends;
     const bool known = static_cast<std::size_t>(std::max(a, b)) < num_samples();
     if (!known || hessian_.find(a, b) == hessian_.num_entries())

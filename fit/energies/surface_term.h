@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/block_sparse.h"
-#include "fit/features/crease_energy.h"
+#include "subvol/fit/energies/block_sparse.h"
+#include "subvol/fit/features/crease_energy.h"
 
 #include <omp.h>
 
@@ -32,7 +32,8 @@ class SurfaceTerm {
   /// depend on it. The next assignment is then a function of the samples alone.
   virtual void forget() {}
 
-  /// Adds creases whose segments are edges of sample triangles (else InputError); to be called before `assign`.
+  /// Adds creases whose segments that move are edges of sample triangles (else InputError); to be called before
+  /// `assign`.
   void add_creases(CreaseEnergy creases);
 
   /// E(z) with frozen correspondences. It is computed relative to the assigned samples, so that differences of nearby
@@ -49,6 +50,7 @@ class SurfaceTerm {
   double surface_to_target() const { return surface_to_target_; }
   std::size_t num_samples() const { return incidence_offsets_.size() - 1; }
   std::span<const std::array<Index, 3>> triangles() const { return triangles_; }
+  const std::optional<CreaseEnergy>& creases() const { return creases_; }
 
  protected:
   /// One corner of a sample triangle, as seen from its sample: `entries` are the places of its blocks in that sample's

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/crease_distance.h"
+#include "subvol/fit/features/crease_distance.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <cmath>
 #include <optional>

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/crease_energy.h"
+#include "subvol/fit/features/crease_energy.h"
 
 #include "subvol/base/error.h"
 
 #include <algorithm>
 #include <map>
 #include <string>
+#include <utility>
 
 namespace subvol {
 
@@ -47,6 +48,19 @@ CreaseEnergy::CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegmen
   }
 }
 
+CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const {
+  CreaseEnergy result = *this;
+  result.links_.clear();
+  result.link_numbers_.clear();
+  result.offsets_.assign(is_free.size() + 1, 0);
+  result.is_free_ = std::move(is_free);
+  for (CreaseSegment& segment : result.segments_)
+    for (Index& end : segment.ends) end = numbers[end];
+  for (Curve& curve : result.curves_)
+    for (Index& end : curve.ends) end = numbers[end];
+  return result;
+}
+
 /// Displacements along the curve count with tau only, those at the ends of an open curve fully.
 Mat3 CreaseEnergy::metric(const Curve& curve, Index segment, const Vec3& closest) const {
   const Vec3 &a = curve.points[segment], &b = curve.points[segment + 1];
@@ -67,7 +81,7 @@ void CreaseEnergy::link_target(const Curve& curve, std::span<const Vec3> samples
     const ClosestPoint::Hit hit = tree.closest(y);
     const std::array<Index, 2> ends = segments_[curve.segments[hit.triangle]].ends;
     const double at = place_on_segment(hit.point, samples[ends[0]], samples[ends[1]]);
-    links_.push_back({ends, at, width_ * length, y, m});
+    add_link({ends, at, width_ * length, y, m});
   };
   for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
     const Vec3 &a = curve.points[i], &b = curve.points[i + 1];
@@ -86,7 +100,7 @@ void CreaseEnergy::link_creases(const Curve& curve, std::span<const Vec3> sample
     for (int k = 0; k < kPointsPerSegment; ++k) {
       const double at = (k + 0.5) / kPointsPerSegment;
       const ClosestPoint::Hit hit = curve.tree.closest(a + at * (b - a));
-      links_.push_back({ends, at, width_ * length, hit.point, metric(curve, hit.triangle, hit.point)});
+      add_link({ends, at, width_ * length, hit.point, metric(curve, hit.triangle, hit.point)});
     }
   }
 }
@@ -105,7 +119,7 @@ void CreaseEnergy::link_ends(const Curve& curve, std::span<const Vec3> samples) 
         const std::array<Index, 2>& tips = segments_[s].ends;
         if (tips[k] != ends[e]) continue;
         const double length = (samples[tips[1]] - samples[tips[0]]).norm();
-        links_.push_back({tips, double(k), width_ * length, e == 0 ? front : back, Mat3::Identity()});
+        add_link({tips, double(k), width_ * length, e == 0 ? front : back, Mat3::Identity()});
       }
 }
 

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/feature_curves.h"
-#include "fit/geometry/closest_point.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/features/feature_curves.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,11 @@ class CreaseEnergy {
   CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegment> segments, std::size_t num_samples, double width,
                double tangential_weight);
 
+  /// Returns the same energy over other samples, some of which are fixed. Segments between two of these are known to the
+  /// correspondences, but have none themselves.
+  /// numbers  new number of each sample that is an end of a segment.  is_free  of each new sample: 1 if it moves.
+  CreaseEnergy part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const;
+
   /// Finds the correspondences for these samples and freezes them.
   void assign(std::span<const Vec3> samples);
 
@@ -51,6 +57,10 @@ class CreaseEnergy {
   }
   const Link& link(Index number) const { return links_[number]; }
   std::span<const CreaseSegment> segments() const { return segments_; }
+  /// True if an end of a segment may move.
+  bool moves(const std::array<Index, 2>& ends) const {
+    return is_free_.empty() || is_free_[ends[0]] != 0 || is_free_[ends[1]] != 0;
+  }
 
  private:
   struct Curve {
@@ -64,11 +74,15 @@ class CreaseEnergy {
   void link_target(const Curve& curve, std::span<const Vec3> samples);
   void link_creases(const Curve& curve, std::span<const Vec3> samples);
   void link_ends(const Curve& curve, std::span<const Vec3> samples);
+  void add_link(const Link& link) {
+    if (moves(link.ends)) links_.push_back(link);
+  }
   Mat3 metric(const Curve& curve, Index segment, const Vec3& closest) const;
 
   std::vector<Curve> curves_;
   std::vector<CreaseSegment> segments_;
   double width_, tau_;
+  std::vector<std::uint8_t> is_free_;  ///< of each sample; empty: all are
   std::vector<Link> links_;
   std::vector<std::size_t> offsets_;  ///< where each sample begins in link_numbers_
   std::vector<Index> link_numbers_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/polyline.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -9,6 +9,9 @@
 #include <vector>
 
 namespace subvol {
+
+/// Default angle in degrees: sharper edges are features.
+inline constexpr double kUsualCreaseAngle = 40;
 
 /// A polyline along sharp edges of a surface. It is closed if the first vertex is repeated at the end.
 struct FeatureCurve {

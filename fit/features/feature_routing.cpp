@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/feature_routing.h"
+#include "subvol/fit/features/feature_routing.h"
 
-#include "fit/features/polyline.h"
-#include "fit/features/routing_graph.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/polyline.h"
+#include "subvol/fit/features/routing_graph.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <algorithm>
 #include <array>
@@ -538,19 +539,6 @@ void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, const Jun
 }
 
 }  // namespace
-
-std::string to_string(NotFollowed reason) {
-  switch (reason) {
-    case NotFollowed::excluded: return "excluded";
-    case NotFollowed::too_acute: return "too acute";
-    case NotFollowed::shorter_than_cell: return "shorter than a cell";
-    case NotFollowed::no_vertex_at_corner: return "no vertex near its corner";
-    case NotFollowed::too_many_edges_at_corner: return "too many sharp edges at its corner";
-    case NotFollowed::no_path_nearby: return "no path nearby";
-    case NotFollowed::lost_to_neighbor: return "lost to a neighbor";
-  }
-  return "unknown";
-}
 
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options) {
   return Router(mesh, features, options).run();

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
 #include "subvol/base/types.h"
 
 #include <span>
 #include <vector>
 
 namespace subvol {
+
+class ClosestPoint;
 
 /// Functions of polylines: at least two points in all of them.
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/fit_level.h"
+#include "subvol/fit/fits/fit_level.h"
 
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -13,7 +13,9 @@ namespace subvol {
 
 namespace {
 
-constexpr int kMaxSampleRefinements = 3;
+/// Most refinements of the boundary for samples, on the finest level and on those below, which follow the target only
+/// roughly.
+constexpr int kMaxSampleRefinements = 3, kMaxCoarseRefinements = 1;
 /// kMeshShare: position of the finest level's samples between the limit surface (0) and the mesh (1). kMostGap: largest
 /// mean gap between the two for which the mesh is considered (in the mesh's unit; in a fit, shares of the target's
 /// diagonal). A coarser mesh cannot follow the target anyway and would only draw the limit surface away from it.
@@ -92,7 +94,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   const MeshTopology topology(level.mesh);
   std::size_t boundary_faces = topology.boundary_faces().size();
   int refinements = 0;
-  while (boundary_faces < min_samples && refinements < kMaxSampleRefinements) {
+  while (boundary_faces < min_samples && refinements < (finest ? kMaxSampleRefinements : kMaxCoarseRefinements)) {
     boundary_faces *= 4;
     ++refinements;
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_options.h"
+#include "subvol/fit/stages/fit_options.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/sparse_map.h"
 
@@ -40,8 +40,9 @@ struct FitLevel {
 /// control            the last refined mesh with its tags. `from_unknowns` maps the degrees of freedom to its vertices
 ///                    (the identity except in cage-only fits), and `previous_nodes` maps them to the nodes of its
 ///                    finite element mesh.
-/// min_samples        wanted number of boundary samples. At most three refinements are made to reach it, and exactly
-///                    one if the samples lie between the limit surface and the mesh.
+/// min_samples        wanted number of boundary samples. At most three refinements are made to reach it on the
+///                    finest level and one below, and exactly one if the samples lie between the limit surface and the
+///                    mesh.
 /// finest             true for the last level.
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);

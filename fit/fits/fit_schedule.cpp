@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/fit_schedule.h"
+#include "subvol/fit/fits/fit_schedule.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,18 @@ constexpr double kCoarseLambda = 0.05;
 /// Lambda if creases are drawn to the target from the start: stiffer cells swell beside the creases, and the folds that
 /// this makes do not disappear later.
 constexpr double kHeldLambda = 0.01;
+/// Stages that take many steps solve roughly and keep the cells' Hessian: bone87 ends 1.4 times as fast at the same
+/// distances. A continuation, whose few steps must free every cell, does neither.
+constexpr double kRoughTolerance = 0.3;
+constexpr int kHessianLife = 4;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
+
+Stage rough_stage(double lambda, double tangential_weight) {
+  Stage stage{lambda, tangential_weight};
+  stage.linear_tolerance = kRoughTolerance;
+  stage.hessian_life = kHessianLife;
+  return stage;
+}
 
 }  // namespace
 
@@ -26,7 +37,7 @@ std::vector<Stage> FitSchedule::stages(int number) const {
   return result;
 }
 
-Stage FitSchedule::final_stage(double lambda) const { return {lambda, kCloseTangentialWeight}; }
+Stage FitSchedule::final_stage(double lambda) const { return rough_stage(lambda, kCloseTangentialWeight); }
 
 double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
 
@@ -39,8 +50,8 @@ FitSchedule make_schedule(const FitOptions& options, double distance, bool creas
   schedule.levels = options.levels;
   schedule.own_box_shares = own_box_shares(distance);
   const double coarse = std::max(creases_hold ? kHeldLambda : kCoarseLambda, options.lambda_close);
-  schedule.first = {{coarse, kFarTangentialWeight}, {coarse, kCloseTangentialWeight}};
-  schedule.middle = {{coarse, kCloseTangentialWeight}};
+  schedule.first = {rough_stage(coarse, kFarTangentialWeight), rough_stage(coarse, kCloseTangentialWeight)};
+  schedule.middle = {rough_stage(coarse, kCloseTangentialWeight)};
   schedule.last = {schedule.final_stage(options.lambda_close)};
   schedule.continuation = {coarse, kFarTangentialWeight, 4};
   return schedule;

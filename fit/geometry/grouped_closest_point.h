@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <optional>
 #include <span>
@@ -18,6 +18,9 @@ class GroupedClosestPoint {
   /// groups  group of each triangle, from 0 on; empty: all in group 0. InputError: another number of groups than of
   ///         triangles, and as `ClosestPoint`. Cost: that of `ClosestPoint`, plus a copy of the positions per group.
   explicit GroupedClosestPoint(const TriangleMesh& mesh, std::span<const Index> groups = {});
+
+  /// As `ClosestPoint::order`.
+  std::span<const Index> order() const { return all_.order(); }
 
   /// As `ClosestPoint::move`.
   void move(std::span<const Vec3> positions);

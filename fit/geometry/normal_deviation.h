@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
 #include "subvol/surface/triangle_mesh.h"
 
 namespace subvol {
+
+class ClosestPoint;
 
 /// Angles between the normals of a fitted surface and those of its target, in [0, 90] degrees. A surface of flat facets
 /// and one with waves may be as near as a smooth one; their normals are not.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/surface_distance.h"
+#include "subvol/fit/geometry/surface_distance.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <Eigen/Geometry>
 #include <cmath>

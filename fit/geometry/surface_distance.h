@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
 #include "subvol/surface/point_cloud.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <algorithm>
 #include <span>
 
 namespace subvol {
+
+class ClosestPoint;
 
 struct SurfaceDistanceOptions {
   int num_samples = 50000;  ///< approximate number of points of each mean, spread by area; >= 1

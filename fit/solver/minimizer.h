@@ -44,6 +44,9 @@ struct MinimizerOptions {
   double relative_decrease = 1e-3;  ///< converged if two steps in a row decrease E by less than this share of E
   double cg_tolerance = 0.1;        ///< relative, of the preconditioned residual
   int cg_max_iterations = 200;
+  /// Newton's method only: steps for which the cells' Hessian is kept, 1 to 4. It changes slowly after the first steps,
+  /// and what a step aims at is decided by the gradient, which is always that of the present state.
+  int hessian_life = 1;
   /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
   double longest_move = 0;
   double first_damping = kFirstDamping;  ///< the same: mu of the first step, > 0

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/newton.h"
+#include "subvol/fit/solver/newton.h"
 
-#include "fit/solver/reduced_hessian.h"
-#include "fit/solver/vector_math.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/solver/reduced_hessian.h"
+#include "subvol/fit/solver/vector_math.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +13,9 @@
 namespace subvol {
 
 namespace {
+
+/// Steps below this share of a whole one mean that the model of the energy is poor.
+constexpr double kShortStep = 0.5;
 
 /// One minimization by Newton's method.
 class NewtonRun {
@@ -84,7 +87,6 @@ bool NewtonRun::find_direction(IterationRecord& record) {
 }
 
 NewtonRun::Search NewtonRun::find_step(IterationRecord& record) {
-  constexpr double kShortStep = 0.5;
   constexpr int kMaxStiffenings = 5;
   blocking_.clear();
   is_stiffened_ = false;
@@ -154,6 +156,7 @@ bool NewtonRun::is_done(const IterationRecord& record) {
 
 MinimizerResult NewtonRun::run() {
   constexpr int kPreconditionerLife = 4;
+  bool is_refined = false;  // the quadrature of cells, since the Hessian was computed
   const auto end = [&](MinimizerStop why, std::string explanation) {
     stop(why, std::move(explanation));
     return std::move(result_);
@@ -166,7 +169,10 @@ MinimizerResult NewtonRun::run() {
       uncertified_ = problem_.volume->uncertified(y_);
       if (options_.keep) options_.keep(x_, result_);
     }
-    energy_ = linearized_.linearize(problem_, y_, z_);
+    const bool is_old = iteration < 2 || iteration % options_.hessian_life == 0 || is_stiffened_ || is_refined ||
+                        t_ < kShortStep;
+    energy_ = linearized_.linearize(problem_, y_, z_, !is_old);
+    is_refined = false;
     if (!std::isfinite(energy_))
       return end(MinimizerStop::infeasible_start, "the start has a cell that is inverted at a quadrature point");
     if (iteration < 2 || is_stiffened_) inverse_diagonal_.clear();  // later it changes slowly
@@ -175,6 +181,7 @@ MinimizerResult NewtonRun::run() {
     if (found == Search::ended) return std::move(result_);
     if (found == Search::level) return end(MinimizerStop::converged, "the gradient vanishes");
     if (!blocking_.empty()) {
+      is_refined = true;
       problem_.volume->densify(blocking_, y_);
       result_.densified.push_back(std::move(blocking_));
       result_.densified_at = x_;

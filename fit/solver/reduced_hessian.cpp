@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/reduced_hessian.h"
+#include "subvol/fit/solver/reduced_hessian.h"
 
-#include "fit/solver/vector_math.h"
+#include "subvol/fit/solver/vector_math.h"
 
 #include <Eigen/LU>
 
@@ -9,13 +9,16 @@
 
 namespace subvol {
 
-double Linearization::linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z) {
+double Linearization::linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z,
+                                bool keeps_hessian) {
   SurfaceTerm* surface = problem.surface.get();
   if (surface) surface->assign(z);
   node_gradient_.assign(y.size(), Vec3::Zero());
   gradient_.resize(problem.nodes.num_cols);
   const double distance = surface ? surface->value(z) : 0;
-  const double energy = distance + problem.lambda * problem.volume->linearize(y, problem.lambda, node_gradient_);
+  const double distortion = keeps_hessian ? problem.volume->add_gradient(y, problem.lambda, node_gradient_)
+                                          : problem.volume->linearize(y, problem.lambda, node_gradient_);
+  const double energy = distance + problem.lambda * distortion;
   if (!std::isfinite(energy)) return energy;
   problem.nodes_transposed.apply(node_gradient_, gradient_);
   if (surface) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/solver/fit_problem.h"
-#include "fit/solver/minimizer.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/solver/minimizer.h"
 
 #include <span>
 #include <vector>
@@ -14,8 +14,9 @@ class Linearization {
  public:
   /// Finds the correspondences of the samples z, computes E, its gradient over the degrees of freedom, and the Hessians
   /// over nodes and samples (`ReducedHessian`). Returns E; if it is infinite, nothing else is valid.
-  /// y, z  nodes and samples of the state.
-  double linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z);
+  /// y, z           nodes and samples of the state.
+  /// keeps_hessian  true: the Hessian over the nodes stays that of the call before, at a state nearby.
+  double linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z, bool keeps_hessian = false);
   std::span<const Vec3> gradient() const { return gradient_; }
 
  private:

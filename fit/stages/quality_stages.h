@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/closest_point_energy.h"
-#include "fit/energies/quality_energy.h"
-#include "fit/features/crease_energy.h"
-#include "fit/solver/fit_problem.h"
-#include "fit/stages/stage_runner.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/energies/closest_point_energy.h"
+#include "subvol/fit/energies/quality_energy.h"
+#include "subvol/fit/features/crease_energy.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/stages/quality_patches.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
@@ -34,7 +36,12 @@ struct QualitySchedule {
   /// Largest distance to aim at in the lift, as a share of the diagonal; 0: none. Where the surfaces are farther apart
   /// than most of it, they draw each other more and more, as poor cells are emphasized more and more.
   double most_distance = 0;
+  /// Share of `most_distance` from which on places are emphasized.
+  double far_margin = 0.5;
 };
+
+/// `QualitySchedule::far_margin` of lifts that start from a mesh whose surface is where it should be.
+inline constexpr double kLateFarMargin = 0.9;
 
 /// A schedule for a mesh that is not refined afterwards: the stages of the first, the lift of the second of these.
 QualitySchedule single_quality_schedule(double goal);
@@ -46,6 +53,10 @@ QualitySchedule single_quality_schedule(double goal);
 QualitySchedule smooth_quality_schedule();
 QualitySchedule coarse_quality_schedule(double goal);
 QualitySchedule fine_quality_schedule(double goal);
+
+/// A schedule for a mesh whose surface is where it should be: a lift in which only poor cells exert a force, so that the
+/// surface moves as little as possible.
+QualitySchedule late_quality_schedule(double goal);
 
 /// Share of the pull along the target's tangents and creases.
 inline constexpr double kQualityTangentialWeight = 0.02;
@@ -81,10 +92,12 @@ class QualityStages {
     /// Least share of the goal that a cell reaches, at most 1, less a multiple of the share by which the distance is too
     /// large. 1: all aims are reached.
     double merit = -1e300;
+    std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending
   };
 
-  /// Runs all stages, then the lift. name  of the level, for reports.  record  level and number of cells are set.
-  /// x  the degrees of freedom; after the lift, those of the state with the highest merit.
+  /// Runs all stages, then the lift: on the whole mesh while many cells are poor, then patch by patch (`QualityPatch`).
+  /// name  of the level, for reports.  record  level and number of cells are set.
+  /// x  the degrees of freedom; after the lift, those of the state with the highest merit, on each patch.
   /// returns  false if the fit must end, with its reason in the report.
   bool run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record, double fraction,
            std::vector<Vec3>& x, FitReport& report);
@@ -96,11 +109,17 @@ class QualityStages {
   QualityEnergy& energy() { return *energy_; }
 
  private:
+  /// The minimizations of a patch of a level, whose correspondences must be those of x.
+  QualityStages(const QualityStages& whole, const QualityPatch& patch, std::span<const Vec3> x);
   bool run_stage(const QualityStage& stage, const std::string& name, double relative_decrease, std::vector<Vec3>& x);
   bool lift(const QualitySchedule& schedule, std::vector<Vec3>& x);
+  bool lift_patches(const QualitySchedule& schedule, std::span<const QualityPatch> patches, std::vector<Vec3>& x);
+  std::vector<QualityPatch> patches_of(const State& state, int rings) const;
   State inspect(const QualitySchedule& schedule, std::span<const Vec3> x);
-  double emphasize_far(double most_distance, std::span<const Vec3> x);
+  double emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, std::vector<Index>& far_cells);
 
+  std::unique_ptr<VolumeMesh> patch_mesh_;  ///< of a patch; null: a whole level
+  const VolumeMesh* mesh_;
   double damping_ = kFirstDamping;  ///< for the next stage
   double mean_length_ = 0;  ///< wanted, of the cells at the boundary
   double lambda_one_ = 1;   ///< lambda for w_s = 1
@@ -108,6 +127,7 @@ class QualityStages {
   QualityEnergy* energy_ = nullptr;  ///< owned by the problem, as is the next
   ClosestPointEnergy* surface_ = nullptr;
   std::vector<double> factors_, far_emphasis_;  ///< of each sample triangle
+  std::vector<Index> triangle_cells_;           ///< cell at each sample triangle; empty: a patch
   State state_;
   // These belong to the call of `run` that is in progress.
   const StageRunner* runner_ = nullptr;

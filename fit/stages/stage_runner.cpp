@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/stage_runner.h"
+#include "subvol/fit/stages/stage_runner.h"
 
-#include "fit/geometry/self_intersection.h"
-#include "fit/solver/lbfgs.h"
-#include "fit/solver/levenberg_marquardt.h"
-#include "fit/solver/newton.h"
 #include "subvol/base/fingerprint.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/solver/lbfgs.h"
+#include "subvol/fit/solver/levenberg_marquardt.h"
+#include "subvol/fit/solver/newton.h"
 
 #include <algorithm>
 
@@ -40,6 +40,8 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   minimizer.relative_decrease = stage.relative_decrease;
   minimizer.longest_move = stage.longest_move;
   minimizer.first_damping = stage.first_damping;
+  minimizer.cg_tolerance = stage.linear_tolerance;
+  minimizer.hessian_life = stage.hessian_life;
   if (stage.longest_move > 0) minimizer.cg_tolerance = kLeastSquaresTolerance;
   int iteration = 0;
   minimizer.ended = [this] { return is_to_end(); };

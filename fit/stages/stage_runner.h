@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/solver/fit_problem.h"
-#include "fit/solver/minimizer.h"
-#include "fit/stages/fit_options.h"
-#include "fit/stages/fit_report.h"
-#include "fit/stages/stage.h"
-#include "fit/stages/stage_log.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/solver/minimizer.h"
+#include "subvol/fit/stages/fit_options.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/stage.h"
+#include "subvol/fit/stages/stage_log.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <chrono>
@@ -33,6 +33,13 @@ class StageRunner {
   };
 
   explicit StageRunner(Options options) : options_(std::move(options)) {}
+
+  /// Returns a runner with the same options and clock, but without the log.
+  StageRunner without_log() const {
+    StageRunner result = *this;
+    result.options_.log = nullptr;
+    return result;
+  }
 
   /// Minimizes over x and appends the record to the report. The record's name, level or order, and number of cells must
   /// be set. `fraction` is passed on to the progress callback. If the fit must end, sets the report's stop reason and

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/feature_size.h"
+#include "subvol/fit/target/feature_size.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/target/target_surface.h"
 
 #include <optional>
 #include <vector>
 
 namespace subvol {
+
+class ClosestPoint;
 
 /// Sizes of the small features of a surface at sample points: holes, pins, walls, slots.
 struct FeatureSizes {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/fit_target.h"
+#include "subvol/fit/target/fit_target.h"
 
-#include "fit/target/enclosed_volume.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/target/enclosed_volume.h"
 
 #include <Eigen/Geometry>
 
@@ -70,10 +70,11 @@ FitTarget::FitTarget(const TriangleMesh& target)
 FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
     : normalisation(target), surface(normalised(target, normalisation), weights) {}
 
-void FitTarget::sample(std::size_t num_samples, std::size_t least) {
+void FitTarget::sample(std::size_t num_samples, std::size_t least, std::size_t most) {
   const double count = static_cast<double>(std::max(num_samples, least));
   // The second bound keeps a needle of almost no area from being cut along its length endlessly.
   surface.resample(std::max(1.8 * std::sqrt(surface.area() / count), 0.1 / std::sqrt(count)));
+  surface.thin(most);
 }
 
 SurfaceDistance FitTarget::measure(const TriangleMesh& fitted, bool extremes) const {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/target/target_report.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/target/target_report.h"
+#include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -45,8 +46,9 @@ struct FitTarget {
 
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
   /// surface that belong to a neighboring facet. A cloud keeps its points.
-  /// least  approximate least number of samples; every triangle has at least one.
-  void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples);
+  /// least  approximate least number of samples; every triangle has at least one, unless that makes more than `most`.
+  void sample(std::size_t num_samples, std::size_t least = kLeastTargetSamples,
+              std::size_t most = std::numeric_limits<std::size_t>::max());
 
   /// Symmetric distances to another surface; for a cloud, those of its points to the surface.
   SurfaceDistance distance(const TriangleMesh& fitted) const { return measure(fitted, true); }

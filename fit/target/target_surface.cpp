@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/target_surface.h"
+#include "subvol/fit/target/target_surface.h"
 
-#include "fit/target/cloud_geometry.h"
-#include "fit/target/enclosed_volume.h"
-#include "fit/target/soup_topology.h"
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
+#include "subvol/fit/geometry/grouped_closest_point.h"
+#include "subvol/fit/target/cloud_geometry.h"
+#include "subvol/fit/target/enclosed_volume.h"
+#include "subvol/fit/target/soup_topology.h"
 #include "subvol/surface/solid_topology.h"
 
 #include <Eigen/Geometry>
@@ -14,6 +15,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 
 namespace subvol {
@@ -157,6 +159,11 @@ bool TargetSurface::on_rim(Index triangle, const std::array<double, 3>& barycent
   return false;
 }
 
+std::shared_ptr<const GroupedClosestPoint> TargetSurface::tree() const {
+  if (!tree_ && !is_cloud()) tree_ = std::make_shared<const GroupedClosestPoint>(TriangleMesh{positions_, triangles_});
+  return tree_;
+}
+
 void TargetSurface::resample(double spacing) {
   if (!(spacing >= 0) || !std::isfinite(spacing))
     throw InputError("TargetSurface: sample_spacing must be finite and >= 0");
@@ -172,6 +179,37 @@ void TargetSurface::resample(double spacing) {
   }
   sample_normals_.resize(samples_.size());
   for (std::size_t j = 0; j < samples_.size(); ++j) sample_normals_[j] = normals_[sample_triangles_[j]];
+}
+
+void TargetSurface::thin(std::size_t most) {
+  if (most == 0) throw InputError("TargetSurface::thin: expected at least one sample");
+  if (is_cloud() || samples_.size() <= most) return;
+  std::vector<std::size_t> first(triangles_.size() + 1, 0);  // samples are ordered by their triangles
+  for (const Index t : sample_triangles_) ++first[t + 1];
+  for (std::size_t t = 0; t < triangles_.size(); ++t) first[t + 1] += first[t];
+  const double part = area_ / static_cast<double>(most);
+  const auto middles_before = [part](double area) { return std::floor(area / part + 0.5); };
+  std::vector<double> weights(samples_.size(), 0);
+  double before = 0;
+  for (const Index t : tree()->order())
+    for (std::size_t j = first[t]; j < first[t + 1]; ++j) {
+      const double after = before + sample_areas_[j];
+      weights[j] = part * (middles_before(after) - middles_before(before));
+      before = after;
+    }
+  std::size_t kept = 0;
+  for (std::size_t j = 0; j < weights.size(); ++j) {
+    if (!(weights[j] > 0)) continue;
+    samples_[kept] = samples_[j];
+    sample_triangles_[kept] = sample_triangles_[j];
+    sample_normals_[kept] = sample_normals_[j];
+    sample_areas_[kept] = weights[j];
+    ++kept;
+  }
+  samples_.resize(kept);
+  sample_triangles_.resize(kept);
+  sample_normals_.resize(kept);
+  sample_areas_.resize(kept);
 }
 
 void TargetSurface::add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing) {

@@ -7,9 +7,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 namespace subvol {
+
+class GroupedClosestPoint;
 
 struct TargetSurfaceOptions {
   /// Triangles with longer edges are sampled more than once; > 0, in the mesh's unit. 0: one sample per triangle.
@@ -79,14 +83,22 @@ class TargetSurface {
   /// The unit normal at each sample, and the area that it represents; the areas add up to A.
   const std::vector<Vec3>& sample_normals() const { return sample_normals_; }
   const std::vector<double>& sample_areas() const { return sample_areas_; }
+  /// Tree over the triangles, which all energies share; null for a cloud. Built by the first call, which must not run
+  /// beside another one.
+  std::shared_ptr<const GroupedClosestPoint> tree() const;
   /// Samples the surface anew with another spacing. A cloud keeps its points. InputError: the spacing is negative, not
   /// finite, or far too small.
   void resample(double spacing);
+  /// Keeps at most so many samples, which then stand for all: of the samples in the order of the tree's triangles, where
+  /// neighbors in space are mostly neighbors, those in the middle of equal parts of the area. A cloud keeps its points.
+  /// InputError: most = 0.
+  void thin(std::size_t most);
 
  private:
   void add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing);
   void set_box(const Vec3& low, const Vec3& high);
 
+  mutable std::shared_ptr<const GroupedClosestPoint> tree_;
   std::vector<Vec3> positions_, normals_, samples_, sample_normals_;
   std::vector<std::array<Index, 3>> triangles_;
   std::vector<double> areas_, sample_areas_;

@@ -4,6 +4,8 @@
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/sparse_map.h"
 
+#include <Eigen/Geometry>
+
 #include <array>
 #include <memory>
 #include <span>

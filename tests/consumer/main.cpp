@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/quality/quality.h"
-#include "fit/subdivision_fit.h"
-#include "subvol/base/version.h"
-#include "subvol/mesh/mesh_topology.h"
-#include "subvol/subdivision/subdivision.h"
-#include "subvol/surface/boundary.h"
+#include <subvol/base/version.h>
+#include <subvol/fit/quality/quality.h>
+#include <subvol/fit/subdivision_fit.h>
+#include <subvol/mesh/mesh_topology.h>
+#include <subvol/subdivision/subdivision.h>
+#include <subvol/surface/boundary.h>
+#include <subvol/version_macros.h>
 
 #include <array>
 #include <cstdio>
+
+static_assert(SUBVOL_VERSION_NUMBER >= 100 && SUBVOL_VERSION_MAJOR == 0);
 
 // Fits a cube to its own boundary: every layer of the library is called, and all it links.
 int main() {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/quality_energy.h"
+#include "subvol/fit/energies/quality_energy.h"
 
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/quality/quality.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
@@ -86,14 +86,14 @@ TEST_CASE("Emphasis rises on what is below the goal and falls back where it is n
   const double before = energy.value(mesh.positions);
   REQUIRE(before > 0);
   const QualityEnergy::State state = energy.emphasize_poor(mesh.positions, 0.8);
-  CHECK(state.below == 1);
+  CHECK(state.poor.size() == 1);
   CHECK(state.least < 0.8);
   CHECK(state.least_share == Approx(state.least / 0.8));
   CHECK(energy.value(mesh.positions) > 1.5 * before);
   energy.reset_emphasis();
   CHECK(energy.value(mesh.positions) == Approx(before));
   // Nothing is poor against a goal of nearly nothing.
-  CHECK(energy.emphasize_poor(test::lattice(2, 1, 1).positions, 1e-3).below == 0);
+  CHECK(energy.emphasize_poor(test::lattice(2, 1, 1).positions, 1e-3).poor.empty());
 }
 
 TEST_CASE("Caps lower the threshold and the goal at edges and vertices that cannot be better") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/surface_distance.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/fit_target.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/target_surface.h"
 
-#include "fit/target/enclosed_volume.h"
-#include "fit/target/soup_topology.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/target/enclosed_volume.h"
+#include "subvol/fit/target/soup_topology.h"
 #include "tests/support/surface_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -199,4 +199,27 @@ TEST_CASE("a needle of next to no area is sampled along its length, not without 
     target.sample(1000, 1000);
     CHECK(target.surface.samples().size() < 100000);
   }
+}
+
+TEST_CASE("thinned samples stand for equal parts of the area, all over the surface") {
+  TargetSurface target(cube_surface(12, true));
+  target.resample(0.05);
+  const std::size_t before = target.samples().size();
+  target.thin(2 * before);
+  CHECK(target.samples().size() == before);
+
+  constexpr std::size_t kMost = 500;
+  target.thin(kMost);
+  CHECK(target.samples().size() <= kMost);
+  CHECK(target.samples().size() > kMost / 2);
+  double area = 0;
+  Vec3 moment = Vec3::Zero();
+  for (std::size_t j = 0; j < target.samples().size(); ++j) {
+    area += target.sample_areas()[j];
+    moment += target.sample_areas()[j] * target.samples()[j];
+    CHECK(target.sample_normals()[j] == target.normals()[target.sample_triangles()[j]]);
+  }
+  CHECK(area == Approx(target.area()));
+  CHECK(moment.norm() / area < 0.05);
+  CHECK_THROWS_AS(target.thin(0), InputError);
 }

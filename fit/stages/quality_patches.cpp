@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/stages/quality_patches.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// Cells of each vertex.
+struct VertexCells {
+  explicit VertexCells(const VolumeMesh& mesh) : offsets(mesh.num_vertices() + 1, 0), cells(mesh.cell_vertices.size()) {
+    for (const Index v : mesh.cell_vertices) ++offsets[v + 1];
+    for (std::size_t v = 0; v < mesh.num_vertices(); ++v) offsets[v + 1] += offsets[v];
+    std::vector<std::size_t> next(offsets.begin(), offsets.end() - 1);
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c)
+      for (const Index v : mesh.cell(c)) cells[next[v]++] = static_cast<Index>(c);
+  }
+  std::span<const Index> of(Index v) const { return {cells.data() + offsets[v], offsets[v + 1] - offsets[v]}; }
+
+  std::vector<std::size_t> offsets;
+  std::vector<Index> cells;
+};
+
+std::vector<Index> marked_ones(const std::vector<std::uint8_t>& marks) {
+  std::vector<Index> result;
+  for (std::size_t i = 0; i < marks.size(); ++i)
+    if (marks[i]) result.push_back(static_cast<Index>(i));
+  return result;
+}
+
+/// Sets of degrees of freedom that are united step by step.
+class UnionFind {
+ public:
+  explicit UnionFind(std::size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
+  Index find(Index i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  /// The smaller number becomes the name of both sets.
+  void unite(Index a, Index b) {
+    a = find(a);
+    b = find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<Index> parent_;
+};
+
+}  // namespace
+
+std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProblem& problem,
+                                          std::span<const std::array<Index, 3>> triangles,
+                                          std::span<const Index> centers, int rings, std::size_t most_cells) {
+  const VertexCells cells_of(mesh);
+  std::vector<std::uint8_t> is_core(mesh.num_cells(), 0), is_free(problem.nodes.num_cols, 0);
+  std::vector<Index> front(centers.begin(), centers.end());
+  for (const Index c : front) is_core[c] = 1;
+  for (int ring = 0; ring < rings; ++ring) {
+    std::vector<Index> next;
+    for (const Index c : front)
+      for (const Index v : mesh.cell(c))
+        for (const Index other : cells_of.of(v))
+          if (!std::exchange(is_core[other], std::uint8_t{1})) next.push_back(other);
+    front = std::move(next);
+  }
+  for (const Index c : marked_ones(is_core))
+    for (const Index v : mesh.cell(c))
+      for (const Index j : problem.nodes.row_columns(v)) is_free[j] = 1;
+
+  const std::vector<Index> free = marked_ones(is_free);
+  std::vector<std::uint8_t> moves(mesh.num_vertices(), 0), is_active(mesh.num_cells(), 0);
+  for (const Index j : free)
+    for (const Index v : problem.nodes_transposed.row_columns(j)) moves[v] = 1;
+  for (const Index v : marked_ones(moves))
+    for (const Index c : cells_of.of(v)) is_active[c] = 1;
+  const std::vector<Index> active = marked_ones(is_active);
+  if (active.size() > most_cells) return {};
+
+  UnionFind sets(problem.nodes.num_cols);
+  std::vector<Index> set_of_cell;
+  for (const Index c : active) {
+    Index first = kNoIndex;
+    for (const Index v : mesh.cell(c))
+      for (const Index j : problem.nodes.row_columns(v)) {
+        if (!is_free[j]) continue;
+        if (first == kNoIndex) first = j;
+        sets.unite(first, j);
+      }
+    set_of_cell.push_back(first);
+  }
+  std::vector<Index> free_of_triangle(triangles.size(), kNoIndex);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (const Index sample : triangles[t])
+      for (const Index j : problem.samples.row_columns(sample)) {
+        if (!is_free[j]) continue;
+        if (free_of_triangle[t] == kNoIndex) free_of_triangle[t] = j;
+        sets.unite(free_of_triangle[t], j);
+      }
+  std::vector<QualityPatch> patches;
+  std::vector<Index> patch_of_set(problem.nodes.num_cols, kNoIndex);
+  for (const Index j : free) {
+    Index& patch = patch_of_set[sets.find(j)];
+    if (patch == kNoIndex) {
+      patch = static_cast<Index>(patches.size());
+      patches.emplace_back();
+    }
+    patches[patch].unknowns.push_back(j);
+  }
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    QualityPatch& patch = patches[patch_of_set[sets.find(set_of_cell[i])]];
+    patch.cells.push_back(active[i]);
+    const auto vertices = mesh.cell(active[i]);
+    patch.vertices.insert(patch.vertices.end(), vertices.begin(), vertices.end());
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    if (const Index j = free_of_triangle[t]; j != kNoIndex)
+      patches[patch_of_set[sets.find(j)]].triangles.push_back(static_cast<Index>(t));
+  for (QualityPatch& patch : patches) {
+    std::sort(patch.vertices.begin(), patch.vertices.end());
+    patch.vertices.erase(std::unique(patch.vertices.begin(), patch.vertices.end()), patch.vertices.end());
+  }
+  return patches;
+}
+
+VolumeMesh patch_mesh(const VolumeMesh& mesh, const QualityPatch& patch) {
+  VolumeMesh part;
+  for (const Index v : patch.vertices) part.positions.push_back(mesh.positions[v]);
+  std::vector<Index> corners;
+  for (const Index c : patch.cells) {
+    corners.clear();
+    for (const Index v : mesh.cell(c)) {
+      const auto at = std::lower_bound(patch.vertices.begin(), patch.vertices.end(), v);
+      corners.push_back(static_cast<Index>(at - patch.vertices.begin()));
+    }
+    part.add_cell(mesh.kinds[c], corners);
+  }
+  return part;
+}
+
+SparseMap select(const SparseMap& map, std::span<const Index> rows, std::span<const Index> columns) {
+  SparseMap part;
+  part.num_cols = columns.size();
+  for (const Index row : rows) {
+    const auto entries = map.row_columns(row);
+    const auto values = map.row_values(row);
+    for (std::size_t k = 0; k < entries.size(); ++k) {
+      const auto at = std::lower_bound(columns.begin(), columns.end(), entries[k]);
+      if (at == columns.end() || *at != entries[k]) continue;
+      part.columns.push_back(static_cast<Index>(at - columns.begin()));
+      part.values.push_back(values[k]);
+    }
+    part.offsets.push_back(part.columns.size());
+  }
+  return part;
+}
+
+}  // namespace subvol
