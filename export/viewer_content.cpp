@@ -146,11 +146,19 @@ ViewerMesh viewer_mesh(std::string name, const PolygonMesh& mesh) {
 
 ViewerSurface viewer_surface(const TriangleMesh& mesh) { return {.points = mesh.positions, .triangles = mesh.triangles}; }
 
-ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> cell_minima, double max_chord_error) {
+ViewerSurface viewer_wires(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  ViewerSurface result{.points = mesh.positions};
+  for (std::size_t e = 0; e < topology.num_edges(); ++e)
+    if (topology.is_boundary_edge(static_cast<Index>(e))) result.wires.push_back(topology.edge(static_cast<Index>(e)));
+  return result;
+}
+
+ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> finest_cell_minima, double max_chord_error) {
   const TessellatedSurface surface = tessellate(cage, max_chord_error);
   ViewerSurface result{.points = surface.positions, .wires = surface.wireframe};
   const std::vector<double> quality =
-      cell_minima.empty() ? std::vector<double>() : patch_quality(cage, surface, cell_minima);
+      finest_cell_minima.empty() ? std::vector<double>() : patch_quality(cage, surface, finest_cell_minima);
   if (!quality.empty()) result.values.assign(surface.positions.size(), 1.0f);
   for (std::size_t q = 0; q < surface.quads.size(); ++q) {
     const auto& [a, b, c, d] = surface.quads[q];

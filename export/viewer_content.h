@@ -64,12 +64,13 @@ struct ViewerSurface {
 
 /// All that a page shows.
 struct ViewerContent {
-  std::string title;
+  std::string title{};
   std::vector<ViewerMesh> meshes{};       ///< at least one; if there are two, a slider compares them: before, after
   std::size_t shown = 0;                  ///< the mesh to begin with
   std::string field{};                    ///< the field to begin with; empty: the first one
   std::optional<ViewerSurface> limit{};   ///< the limit surface of a mesh
-  std::size_t limit_of = 0;               ///< that mesh, a control cage
+  std::optional<ViewerSurface> cage{};    ///< drawn with it: wires only
+  std::size_t limit_of = 0;               ///< that mesh: the control cage, or its refinement
   bool shows_limit = false;               ///< true if the page begins with it
   std::optional<ViewerSurface> target{};  ///< shown as a ghost
   bool shows_target = false;              ///< true if the page begins with it
@@ -87,10 +88,12 @@ ViewerMesh viewer_mesh(std::string name, const HighOrderMesh& mesh, int interval
 ViewerMesh viewer_mesh(std::string name, const PolygonMesh& mesh);
 
 ViewerSurface viewer_surface(const TriangleMesh& mesh);
+/// The edges of the boundary of a mesh that `MeshTopology` takes.
+ViewerSurface viewer_wires(const VolumeMesh& mesh);
 
 /// The limit surface of a control cage within a chord error, colored by the least scaled Jacobian of the cells below it.
 ///
-/// cell_minima  of the cage's cells; or empty. max_chord_error: length. InputError: as `tessellate`.
-ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> cell_minima, double max_chord_error);
+/// finest_cell_minima  of the cage's cells, or of those of a refinement; or empty. max_chord_error: length. InputError: as `tessellate`.
+ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> finest_cell_minima, double max_chord_error);
 
 }  // namespace subvol

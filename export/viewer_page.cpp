@@ -54,6 +54,10 @@ class Writer {
       text_ += ",\"limit_of\":" + std::to_string(content_.limit_of) + ",\"shows_limit\":" + flag(content_.shows_limit) + ",\"limit\":";
       add(*content_.limit);
     }
+    if (content_.cage) {
+      text_ += ",\"cage\":";
+      add(*content_.cage);
+    }
     if (content_.target) {
       text_ += std::string(",\"shows_target\":") + flag(content_.shows_target) + ",\"target\":";
       add(*content_.target);

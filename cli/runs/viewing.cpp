@@ -174,6 +174,7 @@ ViewerContent file_content(const std::filesystem::path& path, const ShownMesh& m
     content.meshes.push_back(measured_viewer_mesh(content.title, mesh, {}, path, progress));
   }
   if (options.limit) {
+    content.cage = viewer_wires(*linear_cells_of(mesh));
     content.limit = limit_of(*linear_cells_of(mesh), quality_of(content.meshes.front()), options.chord_percent);
     content.shows_limit = true;
   }
@@ -205,6 +206,7 @@ std::optional<ViewerContent> report_content(const Json& report, const ReportMesh
     content.shown = content.meshes.size() - 1;
     if (meshes.cage) {
       try {
+        content.cage = viewer_wires(*meshes.cage);
         content.limit = limit_of(*meshes.cage, quality_of(content.meshes.back()), options.chord_percent);
         content.limit_of = content.shown;
       } catch (const InputError& error) {

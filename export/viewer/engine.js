@@ -9,7 +9,7 @@ import { build_surface } from "./surface.js";
 import { cell_value, outer_layers, visible_cells } from "./visible.js";
 
 /// Above this number of shown cells, only the outer layers of shrunk cells are drawn: the gaps show no more.
-const MOST_SHRUNK_CELLS = 150000, SHRUNK_LAYERS = 2;
+const MOST_SHRUNK_CELLS = 100000, SHRUNK_LAYERS = 2;
 /// More sides than this (3 GB of arrays would follow) are not drawn.
 const MOST_SIDES = 3000000;
 const BINS = 48;
@@ -29,7 +29,7 @@ export class Engine {
 
   /// Name, range and histogram of a field, by cells.
   summary(field) {
-    const { mesh } = this, value = cell_value(mesh, field), { values, ...rest } = field;
+    const { mesh } = this, value = cell_value(mesh, field), { name, label, map, on, worst, names } = field;
     let low = Infinity, high = -Infinity;
     for (const x of field.values) {
       if (x < low) low = x;
@@ -44,7 +44,7 @@ export class Engine {
       if (!Number.isNaN(x)) ++histogram[Math.max(0, Math.min(BINS - 1, Math.floor(((x - from) / (to - from || 1)) * BINS)))];
     }
     const regions = field.map === "regions" ? count_regions(field.values) : null;
-    return { ...rest, low, high, from, to, histogram, regions };
+    return { name, label, map, on, worst, names, low, high, from, to, histogram, regions };
   }
 
   /// The values of a field as the shader takes them: regions as places in their list.

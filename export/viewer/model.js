@@ -19,8 +19,8 @@ export class Model {
     this.parts = {};
   }
 
-  /// data: the mesh of the page. limit: its limit surface in the page, or null.
-  async open(data, limit) {
+  /// data: the mesh of the page. limit, cage: its limit surface and the cage of that in the page, or null.
+  async open(data, limit, cage) {
     this.name = data.name;
     this.info = await this.ask("open", data);
     this.edge_length.value = this.info.edge_length;
@@ -28,7 +28,7 @@ export class Model {
       const marks = new Points(geometry_of([["position", this.info.marks, 3]]), mark_material(color(INVERTED), mark_pixels(this.info.num_inverted) * devicePixelRatio));
       this.put("marks", marks, 9);
     }
-    if (limit) await this.open_limit(limit);
+    if (limit) await this.open_limit(limit, cage);
     return this;
   }
 
@@ -46,15 +46,14 @@ export class Model {
     this.group.add(object);
   }
 
-  async open_limit(limit) {
+  async open_limit(limit, cage) {
     const { positions, index, lines, values } = await this.ask("surface", limit);
     const geometry = geometry_of([["position", positions, 3], ["value", values ?? new Float32Array(positions.length / 3).fill(1e38), 1]], index);
     geometry.computeVertexNormals();
     this.put("limit", new Mesh(geometry, surface_material(this.shared, this.colors, { smooth: true })));
     const wires = geometry_of([["position", positions, 3]], lines);
     this.put("limit_lines", new LineSegments(wires, line_material(this.shared, { length: this.edge_length })), 1);
-    const cage = await this.ask("boundary");
-    const cage_lines = geometry_of([["position", cage.positions, 3]], cage.lines);
+    const edges = await this.ask("surface", cage), cage_lines = geometry_of([["position", edges.positions, 3]], edges.lines);
     this.put("cage", new LineSegments(cage_lines, line_material(this.shared, { tint: color(CAGE_COLOR), uncut: true, strength: 1 })), 2);
   }
 

@@ -73,7 +73,7 @@ export class Panel {
   show() {
     const { viewer, parts, sections } = this, { state, field, model } = viewer, { info } = model;
     const shown = viewer.models.map((one, i) => [String(i), one.name]);
-    if (viewer.models.length > 1) shown.push([String(viewer.models.length), "Both, with a slider between them"]);
+    if (viewer.models.length > 1) shown.push([String(viewer.models.length), "Both, with a slider"]);
     fill_once(this.shown, shown);
     this.shown.show(String(state.shown));
     sections.shown.hidden = viewer.models.length < 2;

@@ -42,7 +42,8 @@ export class Viewer {
   async open() {
     for (const [i, mesh] of this.data.meshes.entries()) {
       const model = new Model(this.shared);
-      this.models.push(await model.open(mesh, i === this.data.limit_of ? this.data.limit : null));
+      const limit = i === this.data.limit_of ? this.data.limit : null;
+      this.models.push(await model.open(mesh, limit, this.data.cage));
       this.scene.add(model.group);
     }
     if (this.data.target) await this.open_target();
