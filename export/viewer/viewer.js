@@ -205,6 +205,9 @@ export class Viewer {
   resize() {
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
     if (width === 0 || height === 0) return;
+    const { camera } = this, fits = camera.fitting(1);
+    if (this.fits) camera.distance *= fits / this.fits;  // the same share of the picture as before
+    this.fits = fits;
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.draw();
