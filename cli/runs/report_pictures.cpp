@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/report_pictures.h"
 
+#include "cli/runs/scene_chord.h"
 #include "export/cutaway.h"
 #include "export/export.h"
 #include "export/raster.h"
@@ -80,8 +81,7 @@ Shown shown(const VolumeMesh& mesh) {
 }
 
 Shown shown(const HighOrderMesh& mesh) {
-  constexpr double kChordPercent = 0.05;
-  CurvedBoundary boundary = curved_boundary(mesh, kChordPercent);
+  CurvedBoundary boundary = curved_boundary(mesh, kSceneChordPercent);
   Shown result;
   result.quality = at_vertices(boundary.triangles, boundary.faces,
                                boundary_minima(mesh.space.topology(), measure_quality(mesh).cell_minima));
@@ -189,7 +189,7 @@ class Painter {
   /// The limit surface of the cage that was found, with the edges of its faces.
   void add_limit(const VolumeMesh& cage) {
     SurfaceSceneOptions options;
-    options.max_chord_percent = 0.05;
+    options.max_chord_percent = kSceneChordPercent;
     const VolumeMesh* finest = std::get_if<VolumeMesh>(&*meshes_.result);
     add("Result, limit surface: scaled Jacobian of the cells below it", drawn(surface_scene(cage, finest, options)), "0", "1");
   }

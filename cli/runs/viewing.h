@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/runs/report_meshes.h"
+#include "cli/runs/scene_chord.h"
 #include "export/viewer_content.h"
 #include "subvol/base/work_progress.h"
 #include "subvol/surface/triangle_mesh.h"
@@ -17,7 +18,7 @@ namespace subvol::cli {
 struct ViewingOptions {
   const TriangleMesh* target = nullptr;  ///< the surface to measure distances to and to show as a ghost; or null
   bool limit = false;                    ///< the mesh is a control cage: show its limit surface
-  double chord_percent = 0.05;           ///< of that surface, in percent of the diagonal of its box
+  double chord_percent = kSceneChordPercent;  ///< of that surface, in percent of the diagonal of its box
 };
 
 /// Measures a mesh and makes it ready for the viewer: its quality, cells that are inverted or not proved to be valid,

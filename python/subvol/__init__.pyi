@@ -348,7 +348,7 @@ def write(
     path: Path,
     what: Union[VolumeMesh, SurfaceMesh, HighOrderMesh, Result],
     *,
-    chord: float = 0.005,
+    chord: float = 0.05,
     unit: float = 1.0,
     up: Literal["y", "z"] = "y",
     limit: bool = False,
