@@ -83,7 +83,9 @@ int viewer_intervals(const HighOrderMesh& mesh, std::size_t most_points) {
   constexpr int kMost = 10;  // a picture shows no more of a cell
   const MeshTopology& topology = mesh.space.topology();
   int n = std::min(2 * order, kMost);
-  const auto points = [&] { return topology.num_edges() * static_cast<std::size_t>(n - 1) + topology.num_faces() * inner_points(true, n); };
+  const auto points = [&] {
+    return topology.num_edges() * static_cast<std::size_t>(n - 1) + topology.num_faces() * inner_points(true, n);
+  };
   while (n > 2 && points() > most_points) --n;
   return n;
 }
@@ -119,7 +121,8 @@ ViewerMesh viewer_mesh(std::string name, const HighOrderMesh& mesh, int interval
   {
 #pragma omp for schedule(dynamic, 64)
     for (std::size_t e = 0; e < num_edges; ++e)
-      sample_edge(mesh, e, static_cast<std::size_t>(edge_cells[e]), n, &result.points[result.num_vertices + e * per_edge]);
+      sample_edge(mesh, e, static_cast<std::size_t>(edge_cells[e]), n,
+                  &result.points[result.num_vertices + e * per_edge]);
 #pragma omp for schedule(dynamic, 64)
     for (std::size_t f = 0; f < num_faces; ++f)
       if (first[f + 1] > first[f]) sample_face(mesh, f, n, &result.points[first[f]]);
@@ -144,7 +147,9 @@ ViewerMesh viewer_mesh(std::string name, const PolygonMesh& mesh) {
   return result;
 }
 
-ViewerSurface viewer_surface(const TriangleMesh& mesh) { return {.points = mesh.positions, .triangles = mesh.triangles}; }
+ViewerSurface viewer_surface(const TriangleMesh& mesh) {
+  return {.points = mesh.positions, .triangles = mesh.triangles};
+}
 
 ViewerSurface viewer_wires(const VolumeMesh& mesh) {
   const MeshTopology topology(mesh);

@@ -23,18 +23,19 @@ struct ViewerField {
     scale,    ///< from the least to the largest value
     regions   ///< whole numbers, each with a color of its own
   };
-  std::string name;               ///< unique in its mesh
-  std::string label;              ///< for people
+  std::string name;   ///< unique in its mesh
+  std::string label;  ///< for people
   Colors colors = Colors::scale;
-  bool is_on_points = false;      ///< one value per point, else one per cell; not with regions
-  bool is_high_worst = false;     ///< true if large values are bad
-  std::vector<float> values{};    ///< NaN: none
+  bool is_on_points = false;    ///< one value per point, else one per cell; not with regions
+  bool is_high_worst = false;   ///< true if large values are bad
+  std::vector<float> values{};  ///< NaN: none
   std::vector<std::pair<int, std::string>> region_names{};
 };
 
 /// A mesh as the viewer takes it: the points on the edges and faces of its cells, straight or curved.
 ///
-/// With n intervals per edge, every edge has n - 1 inner points, every quad (n - 1)^2 and every triangle (n - 1)(n - 2)/2.
+/// With n intervals per edge, every edge has n - 1 inner points, every quad (n - 1)^2 and every triangle (n - 1)(n -
+/// 2)/2.
 ///
 ///   points   [vertices][inside edges][inside faces]
 ///   edge     from its smaller vertex to the larger
@@ -43,13 +44,14 @@ struct ViewerField {
 ///   triangle a < b < c: point with i steps of n toward b and j toward c, row by row: j = 1 first, i from 1 on
 struct ViewerMesh {
   std::string name;
-  int intervals = 1;                    ///< per edge; 1: straight cells, whose points are their vertices
+  int intervals = 1;  ///< per edge; 1: straight cells, whose points are their vertices
   std::size_t num_vertices = 0;
   std::vector<Vec3> points{};
-  std::vector<std::uint8_t> kinds{};    ///< those of CellKind; a surface has 3 for triangles and 4 for quads
-  std::vector<Index> corners{};         ///< of all cells, one after another
-  std::size_t num_edges = 0;            ///< 0 for straight cells
-  std::vector<Index> edges{}, faces{};  ///< numbers of each cell's edges and faces in local order; empty for straight cells
+  std::vector<std::uint8_t> kinds{};  ///< those of CellKind; a surface has 3 for triangles and 4 for quads
+  std::vector<Index> corners{};       ///< of all cells, one after another
+  std::size_t num_edges = 0;          ///< 0 for straight cells
+  std::vector<Index> edges{},
+      faces{};  ///< numbers of each cell's edges and faces in local order; empty for straight cells
   std::vector<ViewerField> fields{};
   std::vector<Index> inverted{}, undecided{};  ///< cells that are marked as such
 };
@@ -91,9 +93,11 @@ ViewerSurface viewer_surface(const TriangleMesh& mesh);
 /// The edges of the boundary of a mesh that `MeshTopology` takes.
 ViewerSurface viewer_wires(const VolumeMesh& mesh);
 
-/// The limit surface of a control cage within a chord error, colored by the least scaled Jacobian of the cells below it.
+/// The limit surface of a control cage within a chord error, colored by the least scaled Jacobian of the cells below
+/// it.
 ///
-/// finest_cell_minima  of the cage's cells, or of those of a refinement; or empty. max_chord_error: length. InputError: as `tessellate`.
+/// finest_cell_minima  of the cage's cells, or of those of a refinement; or empty. max_chord_error: length. InputError:
+/// as `tessellate`.
 ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> finest_cell_minima, double max_chord_error);
 
 }  // namespace subvol

@@ -19,8 +19,10 @@ std::string quoted(const std::string& text) {
   const std::string json = nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
   std::string result;
   for (const char c : json) {
-    if (c == '<') result += "\\u003c";
-    else result += c;
+    if (c == '<')
+      result += "\\u003c";
+    else
+      result += c;
   }
   return result;
 }
@@ -28,9 +30,12 @@ std::string quoted(const std::string& text) {
 std::string escaped_title(const std::string& text) {
   std::string result;
   for (const char c : text) {
-    if (c == '<') result += "&lt;";
-    else if (c == '&') result += "&amp;";
-    else result += c;
+    if (c == '<')
+      result += "&lt;";
+    else if (c == '&')
+      result += "&amp;";
+    else
+      result += c;
   }
   return result;
 }
@@ -47,11 +52,13 @@ class Writer {
 
   std::string run() {
     const auto flag = [](bool value) { return value ? "true" : "false"; };
-    text_ = "{\"title\":" + quoted(content_.title) + ",\"origin\":" + nlohmann::json({origin_.x(), origin_.y(), origin_.z()}).dump();
+    text_ = "{\"title\":" + quoted(content_.title) +
+            ",\"origin\":" + nlohmann::json({origin_.x(), origin_.y(), origin_.z()}).dump();
     text_ += ",\"shown\":" + std::to_string(content_.shown);
     if (!content_.field.empty()) text_ += ",\"field\":" + quoted(content_.field);
     if (content_.limit) {
-      text_ += ",\"limit_of\":" + std::to_string(content_.limit_of) + ",\"shows_limit\":" + flag(content_.shows_limit) + ",\"limit\":";
+      text_ += ",\"limit_of\":" + std::to_string(content_.limit_of) + ",\"shows_limit\":" + flag(content_.shows_limit) +
+               ",\"limit\":";
       add(*content_.limit);
     }
     if (content_.cage) {
@@ -103,12 +110,15 @@ class Writer {
 
   void add(const ViewerMesh& mesh) {
     text_ += "{\"name\":" + quoted(mesh.name) + ",\"intervals\":" + std::to_string(mesh.intervals) +
-             ",\"num_vertices\":" + std::to_string(mesh.num_vertices) + ",\"num_cells\":" + std::to_string(mesh.kinds.size()) +
-             ",\"num_edges\":" + std::to_string(mesh.num_edges);
-    const bool is_uniform = std::all_of(mesh.kinds.begin(), mesh.kinds.end(), [&](auto kind) { return kind == mesh.kinds.front(); });
+             ",\"num_vertices\":" + std::to_string(mesh.num_vertices) +
+             ",\"num_cells\":" + std::to_string(mesh.kinds.size()) + ",\"num_edges\":" + std::to_string(mesh.num_edges);
+    const bool is_uniform =
+        std::all_of(mesh.kinds.begin(), mesh.kinds.end(), [&](auto kind) { return kind == mesh.kinds.front(); });
     const std::size_t num_cells = std::max<std::size_t>(1, mesh.kinds.size());
-    if (is_uniform) text_ += ",\"kind\":" + std::to_string(mesh.kinds.empty() ? 0 : mesh.kinds.front());
-    else add("kinds", std::vector<Index>(mesh.kinds.begin(), mesh.kinds.end()), 1);
+    if (is_uniform)
+      text_ += ",\"kind\":" + std::to_string(mesh.kinds.empty() ? 0 : mesh.kinds.front());
+    else
+      add("kinds", std::vector<Index>(mesh.kinds.begin(), mesh.kinds.end()), 1);
     add_points("points", mesh.points);
     // Cells often follow one another as rows of a grid: each corner is close to that of the cell before.
     add("corners", mesh.corners, mesh.corners.size() / num_cells);
@@ -147,8 +157,8 @@ class Writer {
 
 std::string element(const ViewerContent& content, const char* place) {
   if (!has_viewer()) throw std::logic_error("viewer_page: built without the viewer");
-  std::string text = std::string("<div class=\"subvol-viewer ") + place + "\"><noscript>The viewer needs JavaScript.</noscript>" +
-                     "<script type=\"application/json\">";
+  std::string text = std::string("<div class=\"subvol-viewer ") + place +
+                     "\"><noscript>The viewer needs JavaScript.</noscript>" + "<script type=\"application/json\">";
   text += Writer(content).run();
   text += "</script></div>\n<script>";
   text += viewer_script();
@@ -163,9 +173,10 @@ std::string viewer_element(const ViewerContent& content) { return element(conten
 
 std::string viewer_page(const ViewerContent& content) {
   return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n"
-         "<title>" + escaped_title(content.title) + "</title>\n</head>\n<body>\n" + element(content, "page") +
-         "</body>\n</html>\n";
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" "
+         "href=\"data:,\">\n"
+         "<title>" +
+         escaped_title(content.title) + "</title>\n</head>\n<body>\n" + element(content, "page") + "</body>\n</html>\n";
 }
 
 }  // namespace subvol

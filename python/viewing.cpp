@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/runs/report_plots.h"
 #include "cli/runs/viewing.h"
+#include "cli/runs/report_plots.h"
 #include "export/viewer_page.h"
 #include "python/keywords.h"
 #include "python/meshes.h"
@@ -45,8 +45,9 @@ View view(const py::object& object, const py::object& target_object, const py::k
   keywords.take("title", title);
   keywords.finish();
   if (!has_viewer())
-    throw std::runtime_error("this module was built without the viewer, which needs node and the npm packages three and "
-                             "esbuild (docs/viewer.md)");
+    throw std::runtime_error(
+        "this module was built without the viewer, which needs node and the npm packages three and "
+        "esbuild (docs/viewer.md)");
   const cli::ShownMesh mesh = shown_mesh(object);
   std::optional<TriangleMesh> target;
   if (!target_object.is_none()) target = triangles_from(target_object, "target");
@@ -64,10 +65,10 @@ std::string frame(const std::string& page) {
 
 void add_show(py::module_& module, const char* name) {
   py::object type = module.attr(name);
-  type.attr("show") = py::cpp_function(
-      [](const py::object& self, const py::object& target, const py::kwargs& given) { return view(self, target, given); },
-      py::name("show"), py::is_method(type), py::arg("target") = py::none(),
-      R"(show(self, target=None, *, limit=False, title='subvol')
+  type.attr("show") = py::cpp_function([](const py::object& self, const py::object& target,
+                                          const py::kwargs& given) { return view(self, target, given); },
+                                       py::name("show"), py::is_method(type), py::arg("target") = py::none(),
+                                       R"(show(self, target=None, *, limit=False, title='subvol')
 --
 
 A View of the mesh: a page in which it can be turned, cut, peeled and filtered. Notebooks show it.
@@ -92,8 +93,9 @@ InputError: arrays that are no mesh. RuntimeError: the module was built without 
 void add_viewing(py::module_& module) {
   py::class_<View> type(module, "View", "A page of the viewer; `show` of meshes returns it.");
   type.def_readonly("html", &View::html, "The page: str. It needs nothing else.");
-  type.def("save", [](const View& page, const py::object& path) { write_file_atomically(path_from(path), page.html); },
-           py::arg("path"), R"(save(self, path)
+  type.def(
+      "save", [](const View& page, const py::object& path) { write_file_atomically(path_from(path), page.html); },
+      py::arg("path"), R"(save(self, path)
 --
 
 Writes the page to a file, which is replaced. IoError: the system refuses.)");

@@ -3,9 +3,9 @@
 
 #include "subvol/base/error.h"
 
+#include <spawn.h>
 #include <cerrno>
 #include <cstring>
-#include <spawn.h>
 #include <string>
 
 extern char** environ;
@@ -23,7 +23,8 @@ void open_in_browser(const std::filesystem::path& page) {
   pid_t child = 0;
   const int status = posix_spawnp(&child, program.c_str(), nullptr, nullptr, arguments, environ);
   if (status != 0)
-    throw IoError(page.string() + " was written, but " + program + " cannot be started to open it: " + std::strerror(status));
+    throw IoError(page.string() + " was written, but " + program +
+                  " cannot be started to open it: " + std::strerror(status));
 }
 
 }  // namespace subvol::cli

@@ -50,7 +50,7 @@ class Loader {
     for (const char* name : names) {
       if (!input.contains(name)) continue;
       const Json& entry = input[name];
-      const std::string path = entry.is_string() ? entry.get<std::string>()
+      const std::string path = entry.is_string()   ? entry.get<std::string>()
                                : entry.is_object() ? entry.value("path", std::string())
                                                    : std::string();
       if (!path.empty()) return load(path);
@@ -85,8 +85,10 @@ class Loader {
       if (meshes.result && meshes.cage) break;
       std::optional<ShownMesh> found = load(name);
       if (!found) continue;
-      if (!meshes.result && static_cast<double>(num_cells(*found)) == said_cells()) meshes.result = std::move(found);
-      else if (auto* cells = std::get_if<VolumeMesh>(&*found); cells && !other) other = std::move(*cells);
+      if (!meshes.result && static_cast<double>(num_cells(*found)) == said_cells())
+        meshes.result = std::move(found);
+      else if (auto* cells = std::get_if<VolumeMesh>(&*found); cells && !other)
+        other = std::move(*cells);
     }
     if (meshes.result && other && is_cage_of(*other, *meshes.result)) meshes.cage = std::move(other);
     if (meshes.result) return;

@@ -135,8 +135,11 @@ RasterSurface cut_open(const ShownMesh& mesh, const RasterView& view) {
   view.towards_viewer.cwiseAbs().maxCoeff(&axis);  // across the line of sight, as far as an axis is
   plane.axis = static_cast<int>(axis);
   const std::vector<double> minima = cell_minima(mesh);
-  if (const auto* file = std::get_if<HighOrderFile>(&mesh)) return drawn(cutaway_scene(file->mesh, minima, plane));
-  return drawn(cutaway_scene(std::get<VolumeMesh>(mesh), minima, plane));
+  SurfaceSceneOptions options;
+  options.wireframe = minima.size() <= kMostWiredFaces;
+  if (const auto* file = std::get_if<HighOrderFile>(&mesh))
+    return drawn(cutaway_scene(file->mesh, minima, plane, options));
+  return drawn(cutaway_scene(std::get<VolumeMesh>(mesh), minima, plane, options));
 }
 
 /// Draws the pictures of one report.
@@ -160,7 +163,9 @@ class Painter {
     if (result && !result->quality.empty()) {
       if (meshes_.cage) attempt([&] { add_limit(*meshes_.cage); });
       else add_quality(*result);
-      attempt([&] { add("Result, cut open: scaled Jacobian of the cells", cut_open(*meshes_.result, view_), "0", "1"); });
+      attempt([&] {
+        add("Result, cut open: scaled Jacobian of the cells", cut_open(*meshes_.result, view_), "0", "1");
+      });
     }
     return std::move(pictures_);
   }
@@ -191,7 +196,8 @@ class Painter {
     SurfaceSceneOptions options;
     options.max_chord_percent = kSceneChordPercent;
     const VolumeMesh* finest = std::get_if<VolumeMesh>(&*meshes_.result);
-    add("Result, limit surface: scaled Jacobian of the cells below it", drawn(surface_scene(cage, finest, options)), "0", "1");
+    add("Result, limit surface: scaled Jacobian of the cells below it", drawn(surface_scene(cage, finest, options)),
+        "0", "1");
   }
 
   void add_quality(const Shown& result) {

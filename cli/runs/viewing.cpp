@@ -166,7 +166,8 @@ ViewerContent file_content(const std::filesystem::path& path, const ShownMesh& m
   if (options.limit && !linear_cells_of(mesh))
     throw InputError(path.string() + ": --limit: only linear cells are a control cage");
   try {
-    content.meshes.push_back(measured_viewer_mesh(options.limit ? "Cage" : content.title, mesh, options, path, progress));
+    content.meshes.push_back(
+        measured_viewer_mesh(options.limit ? "Cage" : content.title, mesh, options, path, progress));
   } catch (const InputError& error) {
     // A mesh whose faces do not fit together has no boundary to measure; it can still be looked at.
     if (!options.target || options.limit) throw;

@@ -33,7 +33,9 @@ struct ViewArguments {
   bool open = false;
 };
 
-bool is_report(const std::string& path) { return lower_case(std::filesystem::path(path).extension().string()) == ".json"; }
+bool is_report(const std::string& path) {
+  return lower_case(std::filesystem::path(path).extension().string()) == ".json";
+}
 
 /// The page's file: the given one, or the input's name with the extension .html in the current folder.
 std::filesystem::path page_path(const ViewArguments& arguments) {
@@ -57,8 +59,7 @@ Subject subject_of_report(const ViewArguments& arguments, const WorkProgress& pr
   if (!arguments.target.empty() || arguments.viewing.limit)
     throw UsageError("--target and --limit are for meshes; a report names its target and its cage");
   Subject subject{parse_report(read_file(arguments.input), arguments.input), {}, {}};
-  subject.meshes =
-      load_report_meshes(subject.report, std::filesystem::path(arguments.input).parent_path(), warnings);
+  subject.meshes = load_report_meshes(subject.report, std::filesystem::path(arguments.input).parent_path(), warnings);
   if (has_viewer()) subject.content = report_content(subject.report, subject.meshes, warnings, progress);
   if (subject.content || !has_viewer()) return subject;
   std::string reasons;
@@ -71,7 +72,8 @@ Subject subject_of_mesh(const ViewArguments& arguments, const WorkProgress& prog
   require_known_file(arguments.input);
   require_choice_of_references(arguments.input, arguments.run.references);
   ViewingOptions options = arguments.viewing;
-  Subject subject{{{"subvol", version()}, {"command", "view"}, {"input", {{"mesh", {{"path", arguments.input}}}}}}, {}, {}};
+  Subject subject{
+      {{"subvol", version()}, {"command", "view"}, {"input", {{"mesh", {{"path", arguments.input}}}}}}, {}, {}};
   subject.meshes.result = load_shown_mesh(arguments.input, warnings, arguments.run.references);
   TriangleMesh target;
   if (!arguments.target.empty()) {
@@ -79,14 +81,16 @@ Subject subject_of_mesh(const ViewArguments& arguments, const WorkProgress& prog
     options.target = &target;
     subject.meshes.target = as_polygons(target);
   }
-  if (has_viewer()) subject.content = file_content(arguments.input, *subject.meshes.result, options, warnings, progress);
+  if (has_viewer())
+    subject.content = file_content(arguments.input, *subject.meshes.result, options, warnings, progress);
   return subject;
 }
 
 /// The page with pictures only, for programs without the viewer.
 std::string picture_page(const Subject& subject, std::vector<std::string>& warnings) {
-  warnings.push_back("this program was built without the viewer, which needs node and the npm packages three and esbuild "
-                     "(docs/viewer.md); the page shows pictures");
+  warnings.push_back(
+      "this program was built without the viewer, which needs node and the npm packages three and esbuild "
+      "(docs/viewer.md); the page shows pictures");
   std::vector<std::string> notes;
   const std::vector<ReportPicture> pictures = report_pictures(subject.report, subject.meshes, notes);
   return report_page(subject.report, {}, pictures, notes);

@@ -11,19 +11,35 @@ const esbuild = createRequire(join(modules, "of_modules.js"))("esbuild");
 const here = dirname(fileURLToPath(import.meta.url));
 
 async function bundle(entry, define) {
-  const result = await esbuild.build({ entryPoints: [join(here, entry)], bundle: true, minify: true, write: false, format: "iife",
-    target: "es2021", charset: "ascii", legalComments: "inline", nodePaths: [modules], loader: { ".css": "text" }, define, logLevel: "error" });
+  const result = await esbuild.build({
+    entryPoints: [join(here, entry)],
+    bundle: true,
+    minify: true,
+    write: false,
+    format: "iife",
+    target: "es2021",
+    charset: "ascii",
+    legalComments: "inline",
+    nodePaths: [modules],
+    loader: { ".css": "text" },
+    define,
+    logLevel: "error",
+  });
   return result.outputFiles[0].text;
 }
 
 const worker = await bundle("worker.js", {});
 // The script stands inside an element of HTML: nothing in it may end that element.
-const script = (await bundle("main.js", { WORKER_SOURCE: JSON.stringify(worker) })).replace(/<\/(script)/gi, "<\\/$1").replace(/<!--/g, "<\\!--");
+const script = (await bundle("main.js", { WORKER_SOURCE: JSON.stringify(worker) }))
+  .replace(/<\/(script)/gi, "<\\/$1")
+  .replace(/<!--/g, "<\\!--");
 
-const PIECE = 8000;  // characters of one literal
+const PIECE = 8000; // characters of one literal
 const literals = [];
 for (let i = 0; i < script.length; i += PIECE) literals.push(`R"subvol(${script.slice(i, i + PIECE)})subvol"`);
-writeFileSync(out, `// Made by export/viewer/build.mjs.
+writeFileSync(
+  out,
+  `// Made by export/viewer/build.mjs.
 #include "export/viewer_script.h"
 
 namespace subvol {
@@ -35,5 +51,6 @@ ${literals.join("\n")};
 }
 
 }  // namespace subvol
-`);
+`
+);
 console.log(`${out}: ${script.length} characters`);

@@ -2,15 +2,29 @@
 // A camera that turns about a target, and the mouse, fingers and keys that move it.
 import { PerspectiveCamera, Quaternion, Vector3 } from "three";
 
-const ANGLE = 30;            // of view, degrees
-const TURN = 0.006;          // radians per pixel
+const ANGLE = 30; // of view, degrees
+const TURN = 0.006; // radians per pixel
 const KEY_TURN = Math.PI / 24;
-const CLICK_PIXELS = 4;      // a pointer that moves less has clicked
+const CLICK_PIXELS = 4; // a pointer that moves less has clicked
 const FLIGHT_MS = 450;
 
 /// Directions to look along: where the camera's right, up and back are.
 const VIEWS = {
-  x: [[0, 1, 0], [0, 0, 1], [1, 0, 0]], y: [[-1, 0, 0], [0, 0, 1], [0, 1, 0]], z: [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  x: [
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 0, 0],
+  ],
+  y: [
+    [-1, 0, 0],
+    [0, 0, 1],
+    [0, 1, 0],
+  ],
+  z: [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ],
 };
 
 export class Camera {
@@ -32,10 +46,16 @@ export class Camera {
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
-  get height() { return Math.max(1, this.canvas.clientHeight); }
-  get width() { return Math.max(1, this.canvas.clientWidth); }
+  get height() {
+    return Math.max(1, this.canvas.clientHeight);
+  }
+  get width() {
+    return Math.max(1, this.canvas.clientWidth);
+  }
   /// Length of the model per pixel at the target.
-  get unit() { return (2 * this.distance * Math.tan((ANGLE * Math.PI) / 360)) / this.height; }
+  get unit() {
+    return (2 * this.distance * Math.tan((ANGLE * Math.PI) / 360)) / this.height;
+  }
 
   /// Sets what `home` shows: a ball.
   surround(center, radius) {
@@ -44,19 +64,21 @@ export class Camera {
   }
 
   home() {
-    const direction = new Vector3(1.1, -1.9, 1.0).normalize();  // z is up, as in most meshes
+    const direction = new Vector3(1.1, -1.9, 1.0).normalize(); // z is up, as in most meshes
     this.fly(this.middle, this.fitting(this.radius), looking(direction, new Vector3(0, 0, 1)), 0);
   }
 
   /// Distance at which a ball fills the canvas.
   fitting(radius) {
-    const angle = (ANGLE * Math.PI) / 360, across = Math.atan(Math.tan(angle) * Math.min(1, this.width / this.height));
+    const angle = (ANGLE * Math.PI) / 360,
+      across = Math.atan(Math.tan(angle) * Math.min(1, this.width / this.height));
     return (1.04 * radius) / Math.sin(across);
   }
 
   /// Looks along an axis; again: from the other side.
   along(axis) {
-    const [right, up, back] = VIEWS[axis].map((v) => new Vector3(...v)), turn = new Quaternion();
+    const [right, up, back] = VIEWS[axis].map((v) => new Vector3(...v)),
+      turn = new Quaternion();
     turn.setFromRotationMatrix(basis(right, up, back));
     const other = new Quaternion().setFromRotationMatrix(basis(right.clone().negate(), up, back.clone().negate()));
     this.fly(this.middle, this.fitting(this.radius), this.turn.angleTo(turn) < 0.01 ? other : turn);
@@ -65,12 +87,14 @@ export class Camera {
   /// Moves there within FLIGHT_MS, or at once.
   fly(target, distance, turn = this.turn, milliseconds = FLIGHT_MS) {
     const from = { target: this.target.clone(), turn: this.turn.clone(), distance: this.distance };
-    const to = { target: target.clone(), turn: turn.clone(), distance }, start = performance.now();
+    const to = { target: target.clone(), turn: turn.clone(), distance },
+      start = performance.now();
     const flight = (this.flight = {});
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches || milliseconds === 0;
     const step = (now) => {
       if (this.flight !== flight) return;
-      const t = still ? 1 : Math.min(1, Math.max(0, (now - start) / milliseconds)), s = t * t * (3 - 2 * t);
+      const t = still ? 1 : Math.min(1, Math.max(0, (now - start) / milliseconds)),
+        s = t * t * (3 - 2 * t);
       this.target.lerpVectors(from.target, to.target, s);
       this.turn.slerpQuaternions(from.turn, to.turn, s);
       this.distance = from.distance * (to.distance / from.distance) ** s;
@@ -81,7 +105,9 @@ export class Camera {
   }
 
   /// Right, up, and back of the camera.
-  axis(k) { return new Vector3().setComponent(k, 1).applyQuaternion(this.turn); }
+  axis(k) {
+    return new Vector3().setComponent(k, 1).applyQuaternion(this.turn);
+  }
 
   rotate(dx, dy) {
     const about_up = new Quaternion().setFromAxisAngle(this.axis(1), -dx);
@@ -100,8 +126,12 @@ export class Camera {
   /// Zooms by a factor about a place of the canvas, or its middle.
   zoom(factor, x = this.width / 2, y = this.height / 2) {
     const distance = Math.max(this.radius * 1e-4, Math.min(this.radius * 50, this.distance / factor));
-    const share = 1 - distance / this.distance, dx = x - this.width / 2, dy = y - this.height / 2;
-    this.target.addScaledVector(this.axis(0), dx * this.unit * share).addScaledVector(this.axis(1), -dy * this.unit * share);
+    const share = 1 - distance / this.distance,
+      dx = x - this.width / 2,
+      dy = y - this.height / 2;
+    this.target
+      .addScaledVector(this.axis(0), dx * this.unit * share)
+      .addScaledVector(this.axis(1), -dy * this.unit * share);
     this.distance = distance;
     this.stop();
   }
@@ -133,7 +163,9 @@ export class Camera {
   move(event) {
     const pointer = this.pointers.get(event.pointerId);
     if (!pointer) return;
-    const before = this.grip(), dx = event.offsetX - pointer.x, dy = event.offsetY - pointer.y;
+    const before = this.grip(),
+      dx = event.offsetX - pointer.x,
+      dy = event.offsetY - pointer.y;
     this.travel += Math.abs(dx) + Math.abs(dy);
     Object.assign(pointer, { x: event.offsetX, y: event.offsetY });
     if (this.travel < CLICK_PIXELS) return;
@@ -154,7 +186,12 @@ export class Camera {
   grip() {
     const [a, b] = [...this.pointers.values()];
     if (!b) return { x: a.x, y: a.y, span: 0, angle: 0 };
-    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, span: Math.hypot(a.x - b.x, a.y - b.y), angle: -Math.atan2(b.y - a.y, b.x - a.x) };
+    return {
+      x: (a.x + b.x) / 2,
+      y: (a.y + b.y) / 2,
+      span: Math.hypot(a.x - b.x, a.y - b.y),
+      angle: -Math.atan2(b.y - a.y, b.x - a.x),
+    };
   }
   wheel(event) {
     if (!this.is_active() && !event.ctrlKey) return;

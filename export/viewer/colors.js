@@ -14,8 +14,20 @@ export const MAPS = {
   gray: ["#303030", "#f0f0f0"],
 };
 
-const REGION_COLORS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#76b7b2", "#edc948", "#b07aa1", "#ff9da7", "#9c755f",
-  "#86bcb6", "#d37295", "#a0cbe8"];
+const REGION_COLORS = [
+  "#4e79a7",
+  "#f28e2b",
+  "#59a14f",
+  "#e15759",
+  "#76b7b2",
+  "#edc948",
+  "#b07aa1",
+  "#ff9da7",
+  "#9c755f",
+  "#86bcb6",
+  "#d37295",
+  "#a0cbe8",
+];
 export const region_color = (place) => REGION_COLORS[place % REGION_COLORS.length];
 
 /// Red, green, blue from 0 to 255 of a color like #d55e00.
@@ -23,8 +35,9 @@ export const rgb = (text) => [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2),
 
 /// Color of a map at t in [0, 1].
 export function at(stops, t) {
-  const x = Math.max(0, Math.min(1, t)) * (stops.length - 1), k = Math.min(Math.floor(x), stops.length - 2);
-  const low = rgb(stops[k]), high = rgb(stops[k + 1]);
+  const x = Math.max(0, Math.min(1, t)) * (stops.length - 1),
+    k = Math.min(Math.floor(x), stops.length - 2);
+  const low = rgb(stops[k]),
+    high = rgb(stops[k + 1]);
   return low.map((c, i) => Math.round(c + (x - k) * (high[i] - c)));
 }
-

@@ -21,8 +21,9 @@ export function connect() {
     if (error) reject(new Error(error));
     else resolve(answer);
   };
-  return (name, argument) => new Promise((resolve, reject) => {
-    waiting.set(++last, { resolve, reject });
-    worker.postMessage({ id: last, name, argument });
-  });
+  return (name, argument) =>
+    new Promise((resolve, reject) => {
+      waiting.set(++last, { resolve, reject });
+      worker.postMessage({ id: last, name, argument });
+    });
 }

@@ -9,7 +9,8 @@ async function inflate(bytes) {
 
 function from_base64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-  const characters = atob(text), bytes = new Uint8Array(characters.length);
+  const characters = atob(text),
+    bytes = new Uint8Array(characters.length);
   for (let i = 0; i < bytes.length; ++i) bytes[i] = characters.charCodeAt(i);
   return bytes;
 }
@@ -17,7 +18,8 @@ function from_base64(text) {
 /// Returns a Float32Array ("f32") or Uint32Array ("u32"); array: {type, size, stride, data}, or null for none.
 export async function decode(array) {
   if (!array) return null;
-  const { type, size, stride } = array, planes = await inflate(from_base64(array.data));
+  const { type, size, stride } = array,
+    planes = await inflate(from_base64(array.data));
   if (planes.length !== 4 * size) throw new Error("the data of the page are damaged");
   const words = new Uint32Array(size);
   for (let i = 0; i < size; ++i) {

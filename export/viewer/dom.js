@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Makes the elements of the page.
 
-/// Makes an element. properties: of the element, besides `class`, `data` and attributes with a dash; children: elements or texts.
+/// Makes an element. properties: of the element, besides `class` and attributes with a dash; children: elements or
+/// texts.
 export function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
@@ -24,7 +25,8 @@ function labelled(text, input, output) {
 }
 
 export function slider(text, { min, max, step }, change, format = (x) => String(x)) {
-  const input = make("input", { type: "range", min, max, step }), output = make("output");
+  const input = make("input", { type: "range", min, max, step }),
+    output = make("output");
   const row = labelled(text, input, output);
   input.addEventListener("input", () => {
     output.textContent = format(Number(input.value));
@@ -47,7 +49,8 @@ export function check(text, change) {
 }
 
 export function choice(text, options, change) {
-  const input = make("select"), row = labelled(text, input);
+  const input = make("select"),
+    row = labelled(text, input);
   row.fill = (entries) => input.replaceChildren(...entries.map(([value, label]) => make("option", { value }, label)));
   row.fill(options);
   input.addEventListener("change", () => change(input.value));
@@ -56,7 +59,8 @@ export function choice(text, options, change) {
 }
 
 export function number(text, change) {
-  const input = make("input", { type: "number", step: "any" }), row = labelled(text, input);
+  const input = make("input", { type: "number", step: "any" }),
+    row = labelled(text, input);
   input.addEventListener("change", () => input.value !== "" && change(Number(input.value)));
   row.show = (value) => document.activeElement !== input && (input.value = Number(value.toPrecision(5)));
   return row;

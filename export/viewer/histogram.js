@@ -2,11 +2,13 @@
 // The color scale with the numbers of cells above it, and handles for the range that is shown.
 import { INVERTED, MAPS, at, region_color } from "./colors.js";
 
-const HEIGHT = 64, BAR = 14;
+const HEIGHT = 64,
+  BAR = 14;
 
 /// Draws on a canvas as wide as it is on the page.
 export function draw_histogram(canvas, field, state, ink) {
-  const ratio = devicePixelRatio || 1, width = canvas.clientWidth || 280;
+  const ratio = devicePixelRatio || 1,
+    width = canvas.clientWidth || 280;
   canvas.width = width * ratio;
   canvas.height = HEIGHT * ratio;
   const paper = canvas.getContext("2d");
@@ -16,8 +18,11 @@ export function draw_histogram(canvas, field, state, ink) {
     if (field.map === "quality" && x <= 0) return INVERTED;
     return `rgb(${at(MAPS[state.map], (x - state.low) / (state.high - state.low || 1)).join(",")})`;
   };
-  const { histogram, from, to } = field, most = Math.log1p(Math.max(1, ...histogram)), top = HEIGHT - BAR - 4;
-  const step = width / histogram.length, value = (i) => from + ((i + 0.5) / histogram.length) * (to - from);
+  const { histogram, from, to } = field,
+    most = Math.log1p(Math.max(1, ...histogram)),
+    top = HEIGHT - BAR - 4;
+  const step = width / histogram.length,
+    value = (i) => from + ((i + 0.5) / histogram.length) * (to - from);
   histogram.forEach((count, i) => {
     const is_out = state.filter.on && (value(i) < state.filter.low || value(i) > state.filter.high);
     paper.globalAlpha = is_out ? 0.25 : 1;

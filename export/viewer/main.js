@@ -7,33 +7,62 @@ import { Panel, summary } from "./panel.js";
 import style from "./style.css";
 import { Viewer } from "./viewer.js";
 
-const LEGEND_TEXT = 13;  // pixels of the page
+const LEGEND_TEXT = 13; // pixels of the page
 
 async function start(root) {
   const data = JSON.parse(root.querySelector("script[type='application/json']").textContent);
   const is_part = root.classList.contains("part");
   root.tabIndex = -1;
-  const canvas = make("canvas", { tabIndex: 0, role: "img", "aria-label": `${data.title}: the mesh in three dimensions. Arrow keys turn it; h lists all keys.` });
-  const line = make("p"), bad = make("p", { class: "bad" }), wait = make("div", { class: "wait", role: "status" }, "Opening the mesh …");
+  const canvas = make("canvas", {
+    tabIndex: 0,
+    role: "img",
+    "aria-label": `${data.title}: the mesh in three dimensions. Arrow keys turn it; h lists all keys.`,
+  });
+  const line = make("p"),
+    bad = make("p", { class: "bad" }),
+    wait = make("div", { class: "wait", role: "status" }, "Opening the mesh …");
   const title = make("div", { class: "title" }, make(is_part ? "h2" : "h1", {}, data.title), line, bad);
   title.setAttribute("aria-live", "polite");
-  const scale = make("div", { class: "legend" }), labels = make("div"), tools = make("div", { class: "tools", role: "toolbar", "aria-label": "Tools" });
-  const divider = make("div", { class: "divider", role: "slider", tabIndex: 0, "aria-label": "Between before and after", "aria-valuemin": "0", "aria-valuemax": "100" });
+  const scale = make("div", { class: "legend" }),
+    labels = make("div"),
+    tools = make("div", { class: "tools", role: "toolbar", "aria-label": "Tools" });
+  const divider = make("div", {
+    class: "divider",
+    role: "slider",
+    tabIndex: 0,
+    "aria-label": "Between before and after",
+    "aria-valuemin": "0",
+    "aria-valuemax": "100",
+  });
   const sides = [make("span", { class: "side" }), make("span", { class: "side" })];
-  const stage = make("div", { class: "stage" }, canvas, ...sides, divider, labels, title, make("div", { class: "foot" }, tools, scale), wait);
+  const stage = make(
+    "div",
+    { class: "stage" },
+    canvas,
+    ...sides,
+    divider,
+    labels,
+    title,
+    make("div", { class: "foot" }, tools, scale),
+    wait
+  );
   root.append(stage);
 
-  let panel, viewer, is_dark = false;
+  let panel,
+    viewer,
+    is_dark = false;
   try {
     viewer = new Viewer(canvas, data, {
       changed: () => panel && viewer.models.length > 0 && refresh(),
-      chosen: () => {},
-      labels: (list) => labels.replaceChildren(...list.map(({ x, y, text }) => {
-        const label = make("span", { class: "label" }, text);
-        label.style.left = `${x}px`;
-        label.style.top = `${y}px`;
-        return label;
-      })),
+      labels: (list) =>
+        labels.replaceChildren(
+          ...list.map(({ x, y, text }) => {
+            const label = make("span", { class: "label" }, text);
+            label.style.left = `${x}px`;
+            label.style.top = `${y}px`;
+            return label;
+          })
+        ),
       is_active: () => !is_part || root.contains(document.activeElement),
     });
   } catch (error) {
@@ -52,18 +81,32 @@ async function start(root) {
 
   const picture = () => {
     viewer.draw_now();
-    const copy = make("canvas", { width: canvas.width, height: canvas.height }), paper = copy.getContext("2d"), ratio = viewer.renderer.getPixelRatio();
+    const copy = make("canvas", { width: canvas.width, height: canvas.height }),
+      paper = copy.getContext("2d"),
+      ratio = viewer.renderer.getPixelRatio();
     paper.drawImage(canvas, 0, 0);
-    const text = LEGEND_TEXT * ratio, ink = getComputedStyle(root).color;
-    if (viewer.field) draw_legend(paper, viewer.field, viewer.state, { x: text, y: copy.height - 3 * text, width: 12 * text, ink, text });
+    const text = LEGEND_TEXT * ratio,
+      ink = getComputedStyle(root).color;
+    if (viewer.field)
+      draw_legend(paper, viewer.field, viewer.state, {
+        x: text,
+        y: copy.height - 3 * text,
+        width: 12 * text,
+        ink,
+        text,
+      });
     return copy;
   };
-  const save = () => picture().toBlob((blob) => {
-    const link = make("a", { href: URL.createObjectURL(blob), download: `${data.title.replace(/[^\w.-]+/g, "_")}.png` });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-  });
-  panel = new Panel(viewer, {});
+  const save = () =>
+    picture().toBlob((blob) => {
+      const link = make("a", {
+        href: URL.createObjectURL(blob),
+        download: `${data.title.replace(/[^\w.-]+/g, "_")}.png`,
+      });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    });
+  panel = new Panel(viewer);
   root.append(panel.element);
   const toggle_panel = () => {
     root.classList.toggle("closed");
@@ -87,9 +130,15 @@ async function start(root) {
   function refresh() {
     const { state, field, models } = viewer;
     panel.show();
-    line.textContent = state.measuring && viewer.measured.length < 2 ? "Click two points to measure between them." : summary(viewer);
+    line.textContent =
+      state.measuring && viewer.measured.length < 2 ? "Click two points to measure between them." : summary(viewer);
     const { num_inverted, num_undecided } = viewer.model.info;
-    bad.textContent = num_inverted > 0 ? `${num_inverted.toLocaleString("en")} inverted` : num_undecided > 0 ? `${num_undecided.toLocaleString("en")} not proved to be valid` : "";
+    bad.textContent =
+      num_inverted > 0
+        ? `${num_inverted.toLocaleString("en")} inverted`
+        : num_undecided > 0
+          ? `${num_undecided.toLocaleString("en")} not proved to be valid`
+          : "";
     root.classList.toggle("measuring", state.measuring);
     buttons.cut.setAttribute("aria-pressed", state.cut.on);
     buttons.measure.setAttribute("aria-pressed", state.measuring);
@@ -99,9 +148,18 @@ async function start(root) {
     if (!scale.hidden) {
       const bar = make("i");
       const inverted = field.map === "quality" && field.low <= 0 ? `${INVERTED} 0 10%, ` : "";
-      bar.style.background = `linear-gradient(90deg, ${inverted}${MAPS[state.map].map((one, i, all) => inverted && i === 0 ? `${one} 10%` : one).join(", ")})`;
-      scale.replaceChildren(make("span", {}, field.label + (field.unit ? `, ${field.unit}` : "")), bar,
-        make("div", {}, make("span", {}, inverted ? "≤ 0 inverted" : digits(state.low)), make("span", {}, digits(state.high))));
+      const stops = MAPS[state.map].map((one, i) => (inverted && i === 0 ? `${one} 10%` : one));
+      bar.style.background = `linear-gradient(90deg, ${inverted}${stops.join(", ")})`;
+      scale.replaceChildren(
+        make("span", {}, field.label + (field.unit ? `, ${field.unit}` : "")),
+        bar,
+        make(
+          "div",
+          {},
+          make("span", {}, inverted ? "≤ 0 inverted" : digits(state.low)),
+          make("span", {}, digits(state.high))
+        )
+      );
     }
     const comparing = viewer.is_comparing;
     divider.hidden = !comparing;
@@ -132,13 +190,20 @@ async function start(root) {
   });
 
   const keys = {
-    e: () => viewer.set({ edges: !viewer.state.edges }), c: () => buttons.cut.click(), m: measure, s: save,
+    e: () => viewer.set({ edges: !viewer.state.edges }),
+    c: () => buttons.cut.click(),
+    m: measure,
+    s: save,
     "[": () => viewer.set({ cut: { on: true, position: Math.max(0, viewer.state.cut.position - 0.02) } }),
     "]": () => viewer.set({ cut: { on: true, position: Math.min(1, viewer.state.cut.position + 0.02) } }),
     p: () => viewer.set({ peel: Math.min(viewer.state.peel + 1, Math.max(0, viewer.model.info.num_layers - 1)) }),
     P: () => viewer.set({ peel: Math.max(0, viewer.state.peel - 1) }),
-    f: () => viewer.set({ filter: { on: !viewer.state.filter.on } }), n: () => panel.next_worst(1), N: () => panel.next_worst(-1),
-    g: () => viewer.set({ target: !viewer.state.target }), l: () => viewer.set({ limit: !viewer.state.limit }), d: () => use_theme(!is_dark),
+    f: () => viewer.set({ filter: { on: !viewer.state.filter.on } }),
+    n: () => panel.next_worst(1),
+    N: () => panel.next_worst(-1),
+    g: () => viewer.set({ target: !viewer.state.target }),
+    l: () => viewer.set({ limit: !viewer.state.limit }),
+    d: () => use_theme(!is_dark),
     Escape: () => (viewer.state.measuring ? measure() : viewer.choose(null)),
   };
   keys.h = keys["?"] = () => {
@@ -148,9 +213,12 @@ async function start(root) {
     if (list.open) list.scrollIntoView({ block: "nearest" });
   };
   root.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName))
+      return;
     if (event.target !== canvas && (event.key === "Enter" || event.key === " " || event.key === "Tab")) return;
-    if (!(viewer.models.length > 0) || !(keys[event.key]?.() !== undefined || keys[event.key] || viewer.camera.key(event))) return;
+    if (!viewer.models.length) return;
+    if (keys[event.key]) keys[event.key]();
+    else if (!viewer.camera.key(event)) return;
     event.preventDefault();
   });
   if (matchMedia("(max-width: 700px)").matches) root.classList.add("closed");
@@ -165,8 +233,12 @@ async function start(root) {
 
 document.head.append(make("style", {}, style));
 /// For scripts and tests: a promise of {viewer, set(change), frames(count), picture()} of the first viewer of the page.
-globalThis.subvolViewer = Promise.all([...document.querySelectorAll(".subvol-viewer")].map((root) => start(root).catch((error) => {
-  const wait = root.querySelector(".wait") ?? root.appendChild(make("div", { class: "wait" }));
-  if (wait.textContent.startsWith("Opening")) wait.textContent = `The mesh cannot be shown: ${error.message}`;
-  return { error };
-}))).then(([first]) => first);
+globalThis.subvolViewer = Promise.all(
+  [...document.querySelectorAll(".subvol-viewer")].map((root) =>
+    start(root).catch((error) => {
+      const wait = root.querySelector(".wait") ?? root.appendChild(make("div", { class: "wait" }));
+      if (wait.textContent.startsWith("Opening")) wait.textContent = `The mesh cannot be shown: ${error.message}`;
+      return { error };
+    })
+  )
+).then(([first]) => first);

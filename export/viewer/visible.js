@@ -8,16 +8,19 @@ import { face_points, side_points } from "./mesh.js";
 ///       range: {field, low, high} or null: cells with a value outside are hidden, hidden_regions: numbers,
 ///       around: {cell, rings} or null}
 export function visible_cells(mesh, wish) {
-  const shown = new Uint8Array(mesh.num_cells).fill(1), { layers, centers } = mesh;
+  const shown = new Uint8Array(mesh.num_cells).fill(1),
+    { layers, centers } = mesh;
   if (wish.peel > 0) for (let c = 0; c < shown.length; ++c) if (layers[c] <= wish.peel) shown[c] = 0;
   if (wish.cut) {
-    const [x, y, z] = wish.cut.normal, d = wish.cut.offset;
+    const [x, y, z] = wish.cut.normal,
+      d = wish.cut.offset;
     for (let c = 0; c < shown.length; ++c)
       if (x * centers[3 * c] + y * centers[3 * c + 1] + z * centers[3 * c + 2] > d) shown[c] = 0;
   }
   const filtered = wish.range && mesh.fields.find((field) => field.name === wish.range.field);
   if (filtered) {
-    const { low, high } = wish.range, value = cell_value(mesh, filtered);
+    const { low, high } = wish.range,
+      value = cell_value(mesh, filtered);
     for (let c = 0; c < shown.length; ++c) {
       const x = value(c);
       if (!(x >= low && x <= high)) shown[c] = 0;
@@ -43,7 +46,8 @@ export function cell_value(mesh, field) {
 }
 
 function worst_of_points(mesh, { values, worst }) {
-  const { kinds, corners, first_corner, num_cells, intervals: n } = mesh, result = new Float32Array(num_cells).fill(NaN);
+  const { kinds, corners, first_corner, num_cells, intervals: n } = mesh,
+    result = new Float32Array(num_cells).fill(NaN);
   const grid = new Uint32Array(face_points(4, n));
   const add = (c, point) => {
     const x = values[point];
@@ -62,7 +66,8 @@ function worst_of_points(mesh, { values, worst }) {
 
 /// Cells that so many steps from cell to cell over common vertices reach.
 function cells_around(mesh, cell, rings) {
-  const { corners, first_corner, num_cells } = mesh, near = new Uint8Array(num_cells);
+  const { corners, first_corner, num_cells } = mesh,
+    near = new Uint8Array(num_cells);
   const touched = new Uint8Array(mesh.num_vertices);
   near[cell] = 1;
   for (let ring = 0; ring < rings; ++ring) {
@@ -76,7 +81,8 @@ function cells_around(mesh, cell, rings) {
 
 /// Of shown cells, those that are at most so many faces away from a hidden one or from the outside.
 export function outer_layers(mesh, shown, layers) {
-  const { neighbors, first_side, num_cells } = mesh, outer = new Uint8Array(num_cells);
+  const { neighbors, first_side, num_cells } = mesh,
+    outer = new Uint8Array(num_cells);
   for (let layer = 1; layer <= layers; ++layer)
     for (let c = 0; c < num_cells; ++c) {
       if (!shown[c] || outer[c]) continue;

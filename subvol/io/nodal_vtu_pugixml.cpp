@@ -59,8 +59,8 @@ class VtuParser {
     for (const bool is_on_points : {false, true})
       for (const pugi::xml_node node : piece.child(is_on_points ? "PointData" : "CellData").children("DataArray")) {
         CellValues one{node.attribute("Name").value(), is_on_points, {}};
-        if (node.attribute("NumberOfComponents").as_int(1) != 1 || lower_case(one.name).find("ghost") != std::string::npos)
-          continue;
+        const bool is_ghost = lower_case(one.name).find("ghost") != std::string::npos;
+        if (node.attribute("NumberOfComponents").as_int(1) != 1 || is_ghost) continue;
         std::vector<double> found;
         try {
           found = decode_vtk_xml_array(described(node), storage_);

@@ -70,9 +70,13 @@ TEST_CASE("Other fields of a .vtu are there to color by", "[cli]") {
 
 TEST_CASE("A curved mesh, a surface, a cage and a report can be viewed", "[cli][slow]") {
   const Workplace place;
-  REQUIRE(place.run("fit target.off --template template.mesh --order 2 -o curved.vtu --report curved.json --quiet").status != 3);
-  REQUIRE(place.run("fit target.off --template template.mesh --levels 1 -o fine.mesh -o cage:cage.mesh --report fine.json "
-                    "--quiet").status == 0);
+  REQUIRE(place.run("fit target.off --template template.mesh --order 2 -o curved.vtu --report curved.json --quiet")
+              .status != 3);
+  REQUIRE(
+      place
+          .run("fit target.off --template template.mesh --levels 1 -o fine.mesh -o cage:cage.mesh --report fine.json "
+               "--quiet")
+          .status == 0);
   const auto viewed = [&](const std::string& words) {
     const Run run = place.run("view " + words + " -o page.html --force");
     INFO(words << '\n' << run.err);
@@ -103,14 +107,16 @@ TEST_CASE("What cannot be viewed is refused, and nothing is written", "[cli]") {
   place.file("points.xyz", "0 0 0\n1 0 0\n0 1 0\n");
   place.file("no.json", "{}");
   place.file("gone.json", R"({"subvol": "1", "command": "fit", "outputs": ["gone.mesh"]})");
-  const std::vector<std::pair<std::string, int>> wrong{
-      {"view none.mesh -o page.html", 3},       {"view target.xyy -o page.html", 3},
-      {"view points.xyz -o page.html", 3},      {"view no.json -o page.html", 3},
-      {"view target.off -o page.htm", 2},       {"view target.off --limit -o page.html", 3},
-      {"view target.off --chord 0 -o page.html", 2},
-      {"view gone.json --target target.off -o page.html", 2},
-      {"view template.mesh --target none.off -o page.html", 3},
-      {"view template.mesh --references x -o page.html", 2}};
+  const std::vector<std::pair<std::string, int>> wrong{{"view none.mesh -o page.html", 3},
+                                                       {"view target.xyy -o page.html", 3},
+                                                       {"view points.xyz -o page.html", 3},
+                                                       {"view no.json -o page.html", 3},
+                                                       {"view target.off -o page.htm", 2},
+                                                       {"view target.off --limit -o page.html", 3},
+                                                       {"view target.off --chord 0 -o page.html", 2},
+                                                       {"view gone.json --target target.off -o page.html", 2},
+                                                       {"view template.mesh --target none.off -o page.html", 3},
+                                                       {"view template.mesh --references x -o page.html", 2}};
   for (const auto& [words, status] : wrong) {
     const Run run = place.run(words);
     INFO(words << '\n' << run.err);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the viewer's page holds: the points of straight and curved cells, packed arrays, fields.
 
+#include "export/viewer_page.h"
 #include "export/packed_array.h"
 #include "export/viewer_content.h"
-#include "export/viewer_page.h"
 #include "subvol/base/base64.h"
 #include "subvol/base/error.h"
 #include "tests/support/sample_meshes.h"
 
+#include <zlib.h>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
-#include <zlib.h>
 
 #include <bit>
 #include <cmath>
@@ -50,8 +50,8 @@ nlohmann::json data_of(const std::string& page) {
 /// A hex, a prism on its side and a tet on that, curved at random.
 HighOrderMesh curved_mixture(Basis basis, int order) {
   VolumeMesh mesh;
-  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1},
-                    {2, 0.5, 0}, {2, 0.5, 1}, {1.7, 0.5, 2}};
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0},   {0, 1, 0},   {0, 0, 1},    {1, 0, 1},
+                    {1, 1, 1}, {0, 1, 1}, {2, 0.5, 0}, {2, 0.5, 1}, {1.7, 0.5, 2}};
   mesh.add_cell(CellKind::tet, std::array<Index, 4>{5, 9, 6, 10});
   mesh.add_cell(CellKind::hex, std::array<Index, 8>{0, 1, 2, 3, 4, 5, 6, 7});
   mesh.add_cell(CellKind::prism, std::array<Index, 6>{1, 8, 2, 5, 9, 6});
@@ -145,7 +145,10 @@ TEST_CASE("A page holds its meshes, and nothing ends its data early", "[viewer]"
   CHECK_THROWS_AS(viewer_page(content), InputError);
   content.meshes.push_back(viewer_mesh("two cells", test::lattice(2, 1, 1)));
   ViewerMesh& mesh = content.meshes.front();
-  mesh.fields.push_back({.name = "region", .label = "Region", .colors = ViewerField::Colors::regions, .values = {3, 4},
+  mesh.fields.push_back({.name = "region",
+                         .label = "Region",
+                         .colors = ViewerField::Colors::regions,
+                         .values = {3, 4},
                          .region_names = {{3, "steel"}}});
   mesh.inverted = {1};
   content.target = viewer_surface({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {}});
