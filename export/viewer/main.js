@@ -11,7 +11,8 @@ const LEGEND_TEXT = 13; // pixels of the page
 
 async function start(root) {
   const data = JSON.parse(root.querySelector("script[type='application/json']").textContent);
-  const is_part = root.classList.contains("part");
+  const is_part = root.classList.contains("part"),
+    is_whole_window = !is_part && window.parent === window;
   root.tabIndex = -1;
   const canvas = make("canvas", {
     tabIndex: 0,
@@ -63,7 +64,7 @@ async function start(root) {
             return label;
           })
         ),
-      is_active: () => !is_part || root.contains(document.activeElement),
+      is_active: () => is_whole_window || root.contains(document.activeElement),
     });
   } catch (error) {
     wait.textContent = "This browser cannot draw in three dimensions (WebGL is missing or switched off).";
@@ -227,7 +228,7 @@ async function start(root) {
   await viewer.open();
   wait.remove();
   refresh();
-  if (!is_part) canvas.focus();
+  if (is_whole_window) canvas.focus();
   return { viewer, picture, set: (change) => viewer.set(change), frames: (count) => viewer.frames(count), use_theme };
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Opens pages of the viewer in headless Chromium, light and dark, wide and as on a phone:
 //   node viewer_view.mjs PAGE.html ... [--pictures FOLDER]
-// Each must draw something that every control changes, fit the screen, ask nothing of the network and say nothing on the
-// console. Exit status 0: all do; 77: the program was built without the viewer.
+// Each must draw something that every control changes, fit the screen, ask nothing of the network and say nothing on
+// the console. Exit status 0: all do; 77: the program was built without the viewer.
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { basename, join } from "node:path";
 import { fail, show, skip } from "./browser.mjs";
@@ -50,7 +50,9 @@ async function visit(width) {
   const { info } = viewer.viewer.model;
   answer.first = look(viewer);
   answer.picture = viewer.picture().toDataURL("image/png");
-  const begin = () => viewer.set({ cut: { on: false }, peel: 0, shrink: 1, edges: true, filter: { on: false }, limit: false, shown: viewer.viewer.data.shown });
+  const { shown } = viewer.viewer.data;
+  const begin = () => viewer.set({ shown, cut: { on: false }, peel: 0, shrink: 1, edges: true, filter: { on: false },
+    limit: false, target: false });
   const key = (name, options = {}) => inside.document.querySelector("canvas").dispatchEvent(
     new inside.KeyboardEvent("keydown", { key: name, bubbles: true, cancelable: true, ...options }));
   const tries = {
@@ -71,7 +73,8 @@ async function visit(width) {
   if (info.num_layers > 1) tries["a peeled layer"] = async () => viewer.set({ peel: 1 });
   if (viewer.viewer.target) tries["the target"] = async () => viewer.set({ target: true });
   if ("limit" in viewer.viewer.model.parts) tries["the limit surface"] = async () => viewer.set({ limit: true });
-  if (viewer.viewer.models.length > 1) tries["the slider"] = async () => viewer.set({ shown: viewer.viewer.models.length, wipe: 0.5 });
+  const num_models = viewer.viewer.models.length;
+  if (num_models > 1) tries["the slider"] = async () => viewer.set({ shown: num_models, wipe: 0.5 });
   if (viewer.viewer.worst.length > 0) tries["a flight to the worst cell"] = async () => {
     inside.document.querySelector(".worst button").click();
     await new Promise((resolve) => setTimeout(resolve, 700));
@@ -101,8 +104,10 @@ async function visit(width) {
   answer.label = inside.document.querySelector(".label")?.textContent ?? "";
   const page = inside.document, root = page.documentElement;
   answer.width = root.scrollWidth;
-  answer.asked = inside.performance.getEntriesByType("resource").filter(({ name }) => !/^(data|blob):/.test(name)).length;
-  answer.unnamed = [...page.querySelectorAll(".subvol-viewer input, .subvol-viewer select, .subvol-viewer button")].filter(
+  const asked = inside.performance.getEntriesByType("resource").map(({ name }) => name);
+  answer.asked = asked.filter((name) => !/^(data|blob):/.test(name)).length;
+  const controls = page.querySelectorAll(".subvol-viewer input, .subvol-viewer select, .subvol-viewer button");
+  answer.unnamed = [...controls].filter(
     (control) => !(control.labels?.length > 0) && !control.textContent && !control.getAttribute("aria-label")).length;
   answer.frames = viewer.frames(5);
   frame.remove();
