@@ -54,7 +54,7 @@ View view(const py::object& object, const py::object& target_object, const py::k
   const py::gil_scoped_release unlocked;
   if (target) options.target = &*target;
   std::vector<std::string> warnings;
-  return {viewer_page(cli::file_content(title, mesh, options, warnings))};
+  return {viewer_page(cli::mesh_content(title, mesh, options, warnings))};
 }
 
 /// A page as a frame inside another.

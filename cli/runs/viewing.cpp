@@ -149,8 +149,6 @@ std::vector<double> quality_of(const ViewerMesh& mesh) {
   return {values.begin(), values.end()};
 }
 
-std::string file_name(const std::filesystem::path& path) { return as_utf8(path.filename().string()); }
-
 }  // namespace
 
 ViewerMesh measured_viewer_mesh(std::string name, const ShownMesh& mesh, const ViewingOptions& options,
@@ -160,21 +158,22 @@ ViewerMesh measured_viewer_mesh(std::string name, const ShownMesh& mesh, const V
   return result;
 }
 
-ViewerContent file_content(const std::filesystem::path& path, const ShownMesh& mesh, const ViewingOptions& options,
-                           std::vector<std::string>& warnings, const WorkProgress& progress) {
-  ViewerContent content{.title = file_name(path)};
-  if (options.limit && !linear_cells_of(mesh))
-    throw InputError(path.string() + ": --limit: only linear cells are a control cage");
+ViewerContent mesh_content(const std::string& title, const ShownMesh& mesh, const ViewingOptions& options,
+                           std::vector<std::string>& warnings, const std::filesystem::path& path,
+                           const WorkProgress& progress) {
+  ViewerContent content{.title = as_utf8(title)};
+  if (options.limit && !linear_cells_of(mesh)) throw InputError(title + ": only linear cells can be a control cage");
   try {
     content.meshes.push_back(
         measured_viewer_mesh(options.limit ? "Cage" : content.title, mesh, options, path, progress));
   } catch (const InputError& error) {
     // A mesh whose faces do not fit together has no boundary to measure; it can still be looked at.
     if (!options.target || options.limit) throw;
-    warnings.push_back(path.string() + ": distances are not shown: " + error.what());
+    warnings.push_back(title + ": distances are not shown: " + error.what());
     content.meshes.push_back(measured_viewer_mesh(content.title, mesh, {}, path, progress));
   }
   if (options.limit) {
+    require_boundary(*linear_cells_of(mesh));
     content.cage = viewer_wires(*linear_cells_of(mesh));
     content.limit = limit_of(*linear_cells_of(mesh), quality_of(content.meshes.front()), options.chord_percent);
     content.shows_limit = true;

@@ -29,9 +29,11 @@ struct ViewingOptions {
 ViewerMesh measured_viewer_mesh(std::string name, const ShownMesh& mesh, const ViewingOptions& options,
                                 const std::filesystem::path& path = {}, const WorkProgress& progress = {});
 
-/// What a page shows of a file. warnings: about what could not be measured. InputError: as above.
-ViewerContent file_content(const std::filesystem::path& path, const ShownMesh& mesh, const ViewingOptions& options,
-                           std::vector<std::string>& warnings, const WorkProgress& progress = {});
+/// What a page shows of a mesh. path, progress: as above. warnings: about what could not be measured. InputError: as
+/// above.
+ViewerContent mesh_content(const std::string& title, const ShownMesh& mesh, const ViewingOptions& options,
+                           std::vector<std::string>& warnings, const std::filesystem::path& path = {},
+                           const WorkProgress& progress = {});
 
 /// What a page shows of a report: before and after, the target, the limit surface. Nothing if there is no mesh.
 std::optional<ViewerContent> report_content(const Json& report, const ReportMeshes& meshes,

@@ -81,8 +81,10 @@ Subject subject_of_mesh(const ViewArguments& arguments, const WorkProgress& prog
     options.target = &target;
     subject.meshes.target = as_polygons(target);
   }
+  const std::filesystem::path path = arguments.input;
   if (has_viewer())
-    subject.content = file_content(arguments.input, *subject.meshes.result, options, warnings, progress);
+    subject.content =
+        mesh_content(path.filename().string(), *subject.meshes.result, options, warnings, path, progress);
   return subject;
 }
 
