@@ -75,16 +75,16 @@ const LIGHT = `
   }
 `;
 
-/// Material of a surface. options: smooth (it has normals), shrunk (it has centers), uncut, closed
-/// (its back is never seen).
-export function surface_material(shared, own, { smooth = false, shrunk = false, uncut = false, closed = false } = {}) {
+/// Material of a surface. options: smooth (it has normals), shrunk (it has centers), closed (its back is never seen),
+/// section (it is flat: evenly lit, and not cut).
+export function surface_material(shared, own, { smooth = false, shrunk = false, closed = false, section = false } = {}) {
   return new ShaderMaterial({
     side: closed ? FrontSide : DoubleSide,
     polygonOffset: true,
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
     uniforms: { ...shared, ...own },
-    defines: defines({ SMOOTH: smooth, SHRUNK: shrunk, UNCUT: uncut }),
+    defines: defines({ SMOOTH: smooth, SHRUNK: shrunk, UNCUT: section }),
     vertexShader: `attribute float value; varying float amount; varying vec3 slope; ${PLACE}
       void main() { put(); amount = value; slope = normalMatrix * normal; }`,
     fragmentShader: `varying float amount; varying vec3 slope; uniform sampler2D map; uniform vec2 range;
@@ -94,7 +94,7 @@ export function surface_material(shared, own, { smooth = false, shrunk = false, 
         vec3 color = texture2D(map, vec2((amount - range.x) / max(range.y - range.x, 1e-30), 0.5)).rgb;
         if (shows_inverted > 0.5 && amount <= 0.0) color = inverted;
         if (amount > 1e30) color = plain;
-        gl_FragColor = vec4(color * light(facing()), 1.0);
+        gl_FragColor = vec4(color * ${section ? "0.94" : "light(facing())"}, 1.0);
       }`,
   });
 }

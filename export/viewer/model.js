@@ -124,7 +124,7 @@ export class Model {
       ];
       this.put(
         "section",
-        new Mesh(geometry_of(arrays, section.index), surface_material(shared, colors, { uncut: true }))
+        new Mesh(geometry_of(arrays, section.index), surface_material(shared, colors, { section: true }))
       );
       const lines = geometry_of([["position", section.lines, 3]]);
       this.put("section_lines", new LineSegments(lines, line_material(shared, { length, uncut: true })), 1);
