@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/outputs.h"
+#include "cli/runs/scene_chord.h"
 #include "cli/runs/shell_output.h"
 #include "cli/runs/writing.h"
 #include "cli/runs/written_result.h"
@@ -38,6 +39,7 @@ py::object read(const py::object& path, const py::kwargs& given) {
 struct Writing {
   Writing(const py::object& path, const py::kwargs& given) {
     Keywords keywords("write", given);
+    options.chord_percent = cli::kSceneChordPercent;
     take_chord(keywords, options);
     keywords.take("unit", options.metres_per_unit);
     keywords.take("up", options.up_axis, {{"y", std::string("y")}, {"z", std::string("z")}});
@@ -61,7 +63,7 @@ struct Writing {
   /// Adds warnings if polynomial cells that were written for curved ones are far from these or not valid.
   void judge(const cli::Output& output, const HighOrderMesh& mesh) {
     const auto check = [&](const HighOrderMesh& cells) {
-      return check_mesh(cells, curved_boundary(cells, options.chord_percent));
+      return check_mesh(cells, curved_boundary(cells, cli::measured_chord_percent(options)));
     };
     for (const cli::PolynomialCells& cells :
          cli::check_polynomial_cells({&output, 1}, mesh, options.map_tolerance_percent, check))
@@ -164,7 +166,7 @@ SurfaceMesh (.off, .obj, .stl, .ply).
 
 check  refuse volume meshes that are not sound, but for inverted cells and unused points)");
   module.def("write", &write, py::arg("path"), py::arg("what"),
-             R"(write(path, what, *, chord=0.005, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True,
+             R"(write(path, what, *, chord=0.05, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True,
     quantize=False, map_tolerance=0.001)
 --
 

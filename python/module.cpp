@@ -80,6 +80,7 @@ PYBIND11_MODULE(_subvol, module) {
   add_shell(module);
   add_templates(module);
   add_checks(module);
+  add_viewing(module);
   add_files(module);
   module.attr("__name__") = own_name;
 }

@@ -16,5 +16,6 @@ void add_optimize(pybind11::module_& module);
 void add_shell(pybind11::module_& module);
 void add_templates(pybind11::module_& module);
 void add_checks(pybind11::module_& module);
+void add_viewing(pybind11::module_& module);
 
 }  // namespace subvol::python

@@ -72,7 +72,7 @@ const std::vector<Library> kLibraries{
     {"opensubdiv/", {"subvol/subdivision", "bench", "tests"}, ".cpp"},
     {"tiny_gltf", {"export"}, ".cpp"},
     {"pugixml", {"subvol/io"}, "_pugixml.cpp"},
-    {"zlib", {"subvol/io", "tests"}, ".cpp"},
+    {"zlib", {"subvol/io", "export", "tests"}, ".cpp"},
     {"lz4", {"subvol/io"}, ".cpp"},
     {"CLI/", {"cli/verbs"}, ""},
     {"pybind11/", {"python"}, ""},

@@ -296,7 +296,7 @@ Json parse_report(std::string_view bytes, const std::string& name) {
   return report;
 }
 
-std::string report_page(const Json& report, std::span<const ReportPicture> pictures,
+std::string report_page(const Json& report, std::string_view viewer, std::span<const ReportPicture> pictures,
                         std::span<const std::string> notes) {
   std::string page = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
                      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
@@ -305,7 +305,9 @@ std::string report_page(const Json& report, std::span<const ReportPicture> pictu
                      "</title>\n<style>";
   page += kStyle;
   page += "</style>\n</head>\n<body>\n";
-  page += heading(report) + gallery(pictures, notes);
+  page += heading(report);
+  page += viewer;
+  page += gallery(pictures, notes);
   page += section("Warnings", warnings(report));
   page += section("Distance", distances(report));
   page += section("Thickness", thicknesses(report));

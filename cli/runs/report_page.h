@@ -17,11 +17,13 @@ Json parse_report(std::string_view bytes, const std::string& name);
 /// Returns a report as one HTML file: verdict, pictures, figures, energies by iteration, histogram, worst cells, times,
 /// command.
 ///
-/// The page loads nothing and runs nothing: pictures are embedded as data, plots are drawn as SVG, and the light or
-/// dark style follows the reader's preference. Sections without data in the report are left out. notes: listed below
-/// the pictures.
+/// The page loads nothing: pictures are embedded as data, plots are drawn as SVG, and the light or dark style follows
+/// the reader's preference. Sections without data in the report are left out.
+///
+/// viewer  HTML of `viewer_element`, shown before the pictures; the only part that runs a script. Empty: none.
+/// notes   listed below the pictures.
 /// nlohmann's exceptions if entries have other types, or fewer parts, than `subvol` gives them.
-std::string report_page(const Json& report, std::span<const ReportPicture> pictures,
+std::string report_page(const Json& report, std::string_view viewer, std::span<const ReportPicture> pictures,
                         std::span<const std::string> notes);
 
 }  // namespace subvol::cli

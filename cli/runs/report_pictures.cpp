@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/report_pictures.h"
 
-#include "cli/runs/loading.h"
+#include "cli/runs/scene_chord.h"
 #include "subvol/base/error.h"
 #include "subvol/export/curved_file.h"
+#include "subvol/export/cutaway.h"
 #include "subvol/export/export.h"
 #include "subvol/export/high_order_file.h"
 #include "subvol/export/raster.h"
@@ -11,7 +12,6 @@
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/quality.h"
-#include "subvol/io/mesh_io.h"
 #include "subvol/surface/boundary.h"
 
 #include <png.h>
@@ -22,8 +22,6 @@
 
 namespace subvol::cli {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr int kWidth = 720, kHeight = 540;
 /// Edges are drawn on boundaries of at most this many faces: on finer ones they would hide everything else.
@@ -69,6 +67,7 @@ std::vector<double> boundary_minima(const MeshTopology& topology, const std::vec
 }
 
 Shown shown(const VolumeMesh& mesh) {
+  require_boundary(mesh);
   const MeshTopology topology(mesh);
   const PolygonMesh boundary = boundary_surface(mesh, topology);
   Shown result;
@@ -84,8 +83,7 @@ Shown shown(const VolumeMesh& mesh) {
 }
 
 Shown shown(const HighOrderMesh& mesh) {
-  constexpr double kChordPercent = 0.05;
-  CurvedBoundary boundary = curved_boundary(mesh, kChordPercent);
+  CurvedBoundary boundary = curved_boundary(mesh, kSceneChordPercent);
   Shown result;
   result.quality = at_vertices(boundary.triangles, boundary.faces,
                                boundary_minima(mesh.space.topology(), measure_quality(mesh).cell_minima));
@@ -94,81 +92,114 @@ Shown shown(const HighOrderMesh& mesh) {
   return result;
 }
 
-/// The file that a report names, relative to the current folder or to that of the report.
-fs::path find_file(const std::string& name, const fs::path& folder) {
-  std::error_code ignored;
-  return fs::exists(name, ignored) ? fs::path(name) : folder / name;
+Shown shown(const PolygonMesh& surface) {
+  Shown result;
+  result.triangles = triangulate(surface);
+  return result;
 }
 
-Shown load_shown(const fs::path& path) {
-  std::vector<std::string> warnings;
-  if (is_high_order_file(path)) return shown(read_curved(path).mesh);
-  if (is_volume_file(path)) return shown(load_volume(path, warnings));
-  Shown result;
-  result.triangles = load_surface(path, warnings);
-  return result;
+Shown shown(const ShownMesh& mesh) {
+  if (const auto* file = std::get_if<HighOrderFile>(&mesh)) return shown(file->mesh);
+  if (const auto* surface = std::get_if<PolygonMesh>(&mesh)) return shown(*surface);
+  return shown(std::get<VolumeMesh>(mesh));
+}
+
+/// Scaled Jacobians of the cells; empty for a surface.
+std::vector<double> cell_minima(const ShownMesh& mesh) {
+  if (const auto* cells = std::get_if<VolumeMesh>(&mesh)) return measure_quality(*cells).cell_minima;
+  if (const auto* file = std::get_if<HighOrderFile>(&mesh)) return measure_quality(file->mesh).cell_minima;
+  return {};
+}
+
+/// Triangles, colors and lines of a scene.
+RasterSurface drawn(const Scene& scene) {
+  RasterSurface surface;
+  for (const SceneNode& node : scene.nodes) {
+    const ScenePrimitive& primitive = node.primitive;
+    const auto first = static_cast<Index>(surface.mesh.positions.size());
+    surface.mesh.positions.insert(surface.mesh.positions.end(), primitive.positions.begin(), primitive.positions.end());
+    for (std::size_t v = 0; v < primitive.positions.size(); ++v)
+      surface.colors.push_back(primitive.colors.empty() ? LinearColor{0, 0, 0, 1} : primitive.colors[v]);
+    const std::vector<Index>& i = primitive.indices;
+    if (primitive.topology == ScenePrimitive::Topology::lines)
+      for (std::size_t k = 0; k + 1 < i.size(); k += 2) surface.wires.push_back({first + i[k], first + i[k + 1]});
+    else
+      for (std::size_t k = 0; k + 2 < i.size(); k += 3)
+        surface.mesh.triangles.push_back({first + i[k], first + i[k + 1], first + i[k + 2]});
+  }
+  return surface;
+}
+
+/// The cells up to a plane, from the side from which the section is seen.
+RasterSurface cut_open(const ShownMesh& mesh, const RasterView& view) {
+  CutPlane plane;
+  Eigen::Index axis = 0;
+  view.towards_viewer.cwiseAbs().maxCoeff(&axis);  // across the line of sight, as far as an axis is
+  plane.axis = static_cast<int>(axis);
+  const std::vector<double> minima = cell_minima(mesh);
+  SurfaceSceneOptions options;
+  options.wireframe = minima.size() <= kMostWiredFaces;
+  if (const auto* file = std::get_if<HighOrderFile>(&mesh))
+    return drawn(cutaway_scene(file->mesh, minima, plane, options));
+  return drawn(cutaway_scene(std::get<VolumeMesh>(mesh), minima, plane, options));
 }
 
 /// Draws the pictures of one report.
 class Painter {
  public:
-  Painter(const Json& report, fs::path folder, std::vector<std::string>& notes)
-      : report_(report), folder_(std::move(folder)), notes_(notes) {}
+  Painter(const Json& report, const ReportMeshes& meshes, std::vector<std::string>& notes)
+      : report_(report), meshes_(meshes), notes_(notes) {}
 
   std::vector<ReportPicture> run() {
-    const std::optional<Shown> target = load_input({"target", "surface"}), before = load_input({"template", "mesh"});
-    const std::optional<Shown> result = load_result();
+    std::optional<Shown> target, before, result;
+    if (meshes_.target) attempt([&] { target = shown(*meshes_.target); });
+    if (meshes_.before) attempt([&] { before = shown(*meshes_.before); });
+    if (meshes_.result) attempt([&] { result = shown(*meshes_.result); });
     const Shown* first = target ? &*target : result ? &*result : before ? &*before : nullptr;
     if (!first) return {};
     view_ = view_of(first->triangles.positions);
     if (target) add("Surface", *target, {});
     if (before) add("Before: the mesh given", *before, {});
     if (result && target && !report_.value("limit_surface_distance", report_.value("distance", Json())).is_null())
-      add_distance(*result, *target);
-    if (result && !result->quality.empty()) add_quality(*result);
+      attempt([&] { add_distance(*result, *target); });
+    if (result && !result->quality.empty()) {
+      if (meshes_.cage) attempt([&] { add_limit(*meshes_.cage); });
+      else add_quality(*result);
+      attempt([&] {
+        add("Result, cut open: scaled Jacobian of the cells", cut_open(*meshes_.result, view_), "0", "1");
+      });
+    }
     return std::move(pictures_);
   }
 
  private:
-  std::optional<Shown> load(const std::string& name) {
+  /// Draws one picture; a mesh with defects may have no boundary or no inside to draw.
+  template <class Draw>
+  void attempt(const Draw& draw) {
     try {
-      return load_shown(find_file(name, folder_));
-    } catch (const std::exception& error) {
+      draw();
+    } catch (const InputError& error) {
       notes_.push_back(std::string("not shown: ") + error.what());
-      return std::nullopt;
     }
   }
 
-  std::optional<Shown> load_input(std::initializer_list<const char*> names) {
-    const Json input = report_.value("input", Json::object());
-    for (const char* name : names)
-      if (input.contains(name) && input[name].is_object())
-        if (const std::string path = input[name].value("path", std::string()); !path.empty()) return load(path);
-    return std::nullopt;
-  }
-
-  std::optional<Shown> load_result() {
-    const Json quality = report_.value("quality", Json::object());
-    const double num_cells = quality.value("cells", 0.0);  // a report may hold any number, even 1e77
-    bool any = false;
-    for (const Json& output : report_.value("outputs", Json::array())) {
-      const std::string name = output.is_string() ? output.get<std::string>() : std::string();
-      if (!is_volume_file(name) && !is_high_order_file(name)) continue;
-      any = true;
-      if (std::optional<Shown> found = load(name); found && static_cast<double>(found->num_cells) == num_cells)
-        return found;
-    }
-    notes_.push_back(any ? "the result is not shown: no output holds as many cells as the report says"
-                         : "the result is not shown: there is no output with cells that can be read (.mesh, .vtk, or "
-                           ".vtu of curved cells)");
-    return std::nullopt;
+  void add(const std::string& title, const RasterSurface& surface, std::string low, std::string high) {
+    pictures_.push_back(
+        {title, png_bytes(rasterize(surface, view_, kWidth, kHeight)), std::move(low), std::move(high)});
   }
 
   void add(const std::string& title, const Shown& what, std::vector<LinearColor> colors, std::string low = {},
            std::string high = {}) {
-    const RasterSurface surface{what.triangles, std::move(colors), what.wires};
-    pictures_.push_back(
-        {title, png_bytes(rasterize(surface, view_, kWidth, kHeight)), std::move(low), std::move(high)});
+    add(title, RasterSurface{what.triangles, std::move(colors), what.wires}, std::move(low), std::move(high));
+  }
+
+  /// The limit surface of the cage that was found, with the edges of its faces.
+  void add_limit(const VolumeMesh& cage) {
+    SurfaceSceneOptions options;
+    options.max_chord_percent = kSceneChordPercent;
+    const VolumeMesh* finest = std::get_if<VolumeMesh>(&*meshes_.result);
+    add("Result, limit surface: scaled Jacobian of the cells below it", drawn(surface_scene(cage, finest, options)),
+        "0", "1");
   }
 
   void add_quality(const Shown& result) {
@@ -193,7 +224,7 @@ class Painter {
   }
 
   const Json& report_;
-  fs::path folder_;
+  const ReportMeshes& meshes_;
   std::vector<std::string>& notes_;
   RasterView view_;
   std::vector<ReportPicture> pictures_;
@@ -201,9 +232,9 @@ class Painter {
 
 }  // namespace
 
-std::vector<ReportPicture> report_pictures(const Json& report, const fs::path& folder,
+std::vector<ReportPicture> report_pictures(const Json& report, const ReportMeshes& meshes,
                                            std::vector<std::string>& notes) {
-  return Painter(report, folder, notes).run();
+  return Painter(report, meshes, notes).run();
 }
 
 }  // namespace subvol::cli

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/runs/report_meshes.h"
 #include "cli/runs/run_options.h"
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -16,13 +16,11 @@ struct ReportPicture {
   std::string low, high;           ///< meanings of the two ends of the color scale; empty: no colors
 };
 
-/// Draws the meshes of a report from the files that it names: the surface, the template, and the result colored by
-/// distance to the surface and by quality.
+/// Draws the meshes of a report: the surface, the mesh that was given, the result colored by distance to the surface and
+/// by quality, and the result cut open. If the result has a control cage, its limit surface is drawn.
 ///
-/// folder   where relative names are looked up besides the current folder.
 /// notes    receives a line for every picture that could not be made, with the reason.
-/// The result is the first output that holds as many cells as the report says.
-std::vector<ReportPicture> report_pictures(const Json& report, const std::filesystem::path& folder,
+std::vector<ReportPicture> report_pictures(const Json& report, const ReportMeshes& meshes,
                                            std::vector<std::string>& notes);
 
 }  // namespace subvol::cli

@@ -17,6 +17,7 @@ constexpr const char* kFooter = R"(Examples:
   subvol template auto bone.off --cells 300 -o bone_template.mesh
   subvol check bone_fine.mesh --target bone.off
   subvol convert cage.mesh -o cage.usda
+  subvol view bone.mesh --open
   subvol report bone.json -o bone.html
 
 Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not converged (best result written);
@@ -41,6 +42,7 @@ void describe_program(CLI::App& app, Action& action) {
   add_template_command(app, action);
   add_check_command(app, action);
   add_convert_command(app, action);
+  add_view_command(app, action);
   add_report_command(app, action);
   add_completion_command(app, action);
 }

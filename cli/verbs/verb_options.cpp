@@ -2,6 +2,7 @@
 #include "cli/verbs/verb_options.h"
 
 #include "cli/runs/exit_status.h"
+#include "cli/runs/scene_chord.h"
 
 #include <algorithm>
 #include <sstream>
@@ -114,6 +115,7 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
 
 void add_writing_options(CLI::App& verb, WritingOptions& options) {
   const auto group = "Surfaces for DCC tools";
+  options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,
                   "Largest distance between a limit surface and its triangles, in per cent of its box's diagonal")
       ->check(number_in(1e-4, 100.0))

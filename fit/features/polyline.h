@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/base/types.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <span>
 #include <vector>

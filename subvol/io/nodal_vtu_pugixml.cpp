@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/cell_values.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/nodal_formats.h"
 #include "subvol/io/reference_arrays.h"
@@ -44,7 +45,36 @@ class VtuParser {
     if (num_skipped_ > 0)
       mesh_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
     choose_references();
+    mesh_size_ = mesh_.positions.size();
     return std::move(mesh_);
+  }
+
+  /// The data of one component, after `parse`. Data that a piece lacks are left out, and so are those of several
+  /// pieces.
+  std::vector<CellValues> cell_values() const {
+    std::vector<CellValues> all;
+    const pugi::xml_node grid = document_.child("VTKFile").child("UnstructuredGrid");
+    const pugi::xml_node piece = grid.child("Piece");
+    if (piece.next_sibling("Piece")) return all;
+    for (const bool is_on_points : {false, true})
+      for (const pugi::xml_node node : piece.child(is_on_points ? "PointData" : "CellData").children("DataArray")) {
+        CellValues one{node.attribute("Name").value(), is_on_points, {}};
+        const bool is_ghost = lower_case(one.name).find("ghost") != std::string::npos;
+        if (node.attribute("NumberOfComponents").as_int(1) != 1 || is_ghost) continue;
+        std::vector<double> found;
+        try {
+          found = decode_vtk_xml_array(described(node), storage_);
+        } catch (const InputError&) {
+          continue;  // what a reader of meshes does not need may be in a form that it does not know
+        }
+        if (found.size() != (is_on_points ? mesh_size_ : is_volume_.size())) continue;
+        if (is_on_points) one.values = std::move(found);
+        else
+          for (std::size_t c = 0; c < found.size(); ++c)
+            if (is_volume_[c]) one.values.push_back(found[c]);
+        all.push_back(std::move(one));
+      }
+    return all;
   }
 
  private:
@@ -235,13 +265,21 @@ class VtuParser {
   std::vector<bool> is_volume_;           ///< of all cells of the file: whether it is one of the mesh
   std::vector<CellNumbers> arrays_;
   std::vector<std::string> others_;
-  std::size_t num_arrays_ = 0, num_left_out_ = 0, num_skipped_ = 0, num_cells_read_ = 0;
+  std::size_t num_arrays_ = 0, num_left_out_ = 0, num_skipped_ = 0, num_cells_read_ = 0, mesh_size_ = 0;
 };
 
 }  // namespace
 
 NodalMesh parse_vtu(const std::string& name, std::string_view bytes, const std::string& references) {
   return VtuParser(name, bytes, references).parse();
+}
+
+std::vector<CellValues> read_cell_values(const std::filesystem::path& path) {
+  if (lower_case(path.extension().string()) != ".vtu") return {};
+  const std::string bytes = read_file(path);
+  VtuParser parser(path.string(), bytes, {});
+  parser.parse();
+  return parser.cell_values();
 }
 
 }  // namespace subvol

@@ -26,7 +26,7 @@ async function look() {
       plots: page.querySelectorAll("svg").length,
       background: frame.contentWindow.getComputedStyle(page.body).backgroundColor,
       asked: frame.contentWindow.performance.getEntriesByType("resource")
-        .filter((entry) => !entry.name.startsWith("data:")).length };
+        .filter((entry) => !/^(data|blob):/.test(entry.name)).length };
     frame.remove();
   }
   await fetch("/answer", { method: "POST", body: JSON.stringify(answer) });

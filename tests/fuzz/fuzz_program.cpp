@@ -24,8 +24,9 @@ void show_report(std::string_view bytes) {
   try {
     const Json report = parse_report(bytes, "report.json");
     std::vector<std::string> notes;
-    const std::vector<ReportPicture> pictures = report_pictures(report, "/no/such/folder", notes);
-    require(report_page(report, pictures, notes).ends_with("</html>\n"));
+    const ReportMeshes meshes = load_report_meshes(report, "/no/such/folder", notes);
+    const std::vector<ReportPicture> pictures = report_pictures(report, meshes, notes);
+    require(report_page(report, {}, pictures, notes).ends_with("</html>\n"));
   } catch (const Json::exception&) {
   }
 }

@@ -227,5 +227,31 @@ class SurfaceMeshes(InFolder):
             subvol.write(b"caf\xe9." + extension.encode(), cube())
 
 
+class Views(InFolder):
+    def test_meshes_are_shown(self):
+        try:
+            view = cube().show(title="a cube")
+        except RuntimeError as error:
+            self.assertIn("npm", str(error))  # built without node
+            self.assertIsNone(cube()._repr_html_())
+            return
+        self.assertIn("a cube", view.html)
+        self.assertTrue(view.html.startswith("<!DOCTYPE html>"))
+        view.save("cube.html")
+        with open("cube.html", encoding="utf-8") as file:
+            self.assertEqual(file.read(), view.html)
+        for mesh in (cube(), cube().boundary(), subvol.HighOrderMesh(cube(), 2)):
+            self.assertTrue(mesh._repr_html_().startswith("<iframe"))
+        self.assertIn("distance", subvol.read("torus_template.mesh").show("torus_target.off").html)
+        self.assertIn("shows_limit", cube().show(limit=True).html)
+        with self.assertRaises(subvol.InputError):
+            cube().boundary().show(limit=True)
+        broken = cube()
+        broken.hexes[0, 0] = 1000
+        with self.assertRaises(subvol.InputError):
+            broken.show()
+        self.assertIsNone(broken._repr_html_())
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Stands for the bundled script in builds without node.
+#include "subvol/export/viewer_script.h"
+
+namespace subvol {
+
+std::string_view viewer_script() { return {}; }
+
+}  // namespace subvol
