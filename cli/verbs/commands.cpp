@@ -18,6 +18,7 @@ constexpr const char* kFooter = R"(Examples:
   subvol check bone_fine.mesh --target bone.off
   subvol convert cage.mesh -o cage.usda
   subvol report bone.json -o bone.html
+  subvol batch parts/*.stl -o out -- --cells 300
 
 Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not converged (best result written);
              130 interrupted (best result written).
@@ -42,6 +43,7 @@ void describe_program(CLI::App& app, Action& action) {
   add_check_command(app, action);
   add_convert_command(app, action);
   add_report_command(app, action);
+  add_batch_command(app, action);
   add_completion_command(app, action);
 }
 
