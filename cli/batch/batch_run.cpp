@@ -123,15 +123,35 @@ class Batch {
     for (const char* name : {"models", "work"}) fs::create_directories(options_.folder / name);
     plan_.begin_run();
     watch_children();
-    while (!jobs_.empty() || (next_ < pending_.size() && !interrupted())) {
-      while (jobs_.size() < static_cast<std::size_t>(options_.jobs) && next_ < pending_.size() && !interrupted())
-        start(pending_[next_++]);
-      if (!jobs_.empty()) wait_for_child(time_to_sleep());
+    while (has_work()) {
+      start_jobs();
+      if (!jobs_.empty() || !elsewhere_.empty()) wait_for_child(time_to_sleep());
       collect();
       enforce_limits();
       records_.flush_if_due();
     }
     result_.is_interrupted = interrupted();
+    result_.num_elsewhere = elsewhere_.size();
+  }
+
+  bool has_work() {
+    return !jobs_.empty() || (!interrupted() && (next_ < pending_.size() || is_patient()));
+  }
+
+  /// True for a while after all else is done, if other processes have claimed models: they may be what a killed batch has
+  /// left, and end soon.
+  bool is_patient() {
+    if (elsewhere_.empty()) return false;
+    if (!patience_end_) patience_end_ = Clock::now() + after(options_.grace_seconds);
+    return Clock::now() < *patience_end_;
+  }
+
+  void start_jobs() {
+    const auto is_full = [&] { return jobs_.size() >= static_cast<std::size_t>(options_.jobs) || interrupted(); };
+    while (!is_full() && next_ < pending_.size())
+      if (const std::uint32_t model = pending_[next_++]; !start(model)) elsewhere_.push_back(model);
+    if (next_ == pending_.size() && jobs_.empty())
+      std::erase_if(elsewhere_, [&](std::uint32_t model) { return !is_full() && start(model); });
   }
 
   fs::path work_folder(const BatchModel& model) const { return options_.folder / "work" / folder_name(model.id); }
@@ -140,17 +160,15 @@ class Batch {
     records_.read_new([&](std::string_view line) { plan_.note(line); });
   }
 
-  void start(std::uint32_t number) {
+  /// Starts a model, unless it has been done meanwhile; returns false if another process has claimed it.
+  bool start(std::uint32_t number) {
     const BatchModel& model = manifest_.models[number];
-    if (!records_.claim(model.id)) {
-      ++result_.num_elsewhere;
-      return tell();
-    }
+    if (!records_.claim(model.id)) return false;
     // Another process may have done the model between the plan and the claim.
     read_new();
     if (plan_.is_done_elsewhere(number)) {
       records_.release(model.id);
-      return tell();
+      return true;
     }
     const fs::path folder = work_folder(model);
     fs::remove_all(folder);  // left by a process that was killed
@@ -169,6 +187,7 @@ class Batch {
                                          ? process.start() + after(options_.time_limit_seconds)
                                          : Clock::time_point::max();
     jobs_.push_back({number, std::move(files), std::move(process), now, end_by});
+    return true;
   }
 
   static Clock::duration after(double seconds) {
@@ -259,7 +278,7 @@ class Batch {
 
   void tell() {
     if (interrupted()) return;
-    const std::size_t num_done = next_ - jobs_.size();
+    const std::size_t num_done = next_ - jobs_.size() - elsewhere_.size();
     teller_.tell_count(num_done, pending_.size(), std::to_string(num_failed_) + " failed");
   }
 
@@ -290,6 +309,8 @@ class Batch {
   std::vector<std::uint32_t> pending_;
   std::size_t next_ = 0, num_failed_ = 0;
   std::vector<Job> jobs_;
+  std::vector<std::uint32_t> elsewhere_;            ///< models that other processes have claimed
+  std::optional<Clock::time_point> patience_end_;   ///< when to leave these to them
   std::unordered_map<std::uint32_t, Outcome> newest_;
   BatchResult result_;
 };

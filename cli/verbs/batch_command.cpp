@@ -70,6 +70,7 @@ class ParserVerbs {
 
 struct BatchArguments {
   std::vector<std::string> words, rows, outputs;
+  std::string words_for_all;  ///< never set: see the option
   std::string verb = "fit", folder, shard, only;
   BatchOptions options;
 };
@@ -341,7 +342,10 @@ void add_batch_command(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<BatchArguments>();
   arguments->options.jobs = 0;
   verb->add_option("MODELS", arguments->words,
-                   "Manifests (.csv, .tsv, .jsonl), inputs, or patterns of inputs; behind --: options for every model");
+                   "Manifests (.csv, .tsv, .jsonl), inputs, or patterns of inputs");
+  // The parser passes words behind -- on to a verb only if one of its positionals is still without a value. MODELS, which
+  // comes first, receives them; this one shows them in the help.
+  verb->add_option("OPTIONS", arguments->words_for_all, "Options for every model, behind --");
   verb->add_option("-o,--output", arguments->folder, "Folder of the batch; it may exist")->type_name("FOLDER");
   verb->add_option("--row", arguments->rows, R"(A model as JSON: {"id": "bone", "input": "bone.off", "cells": 300})")
       ->type_name("JSON")
