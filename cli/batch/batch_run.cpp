@@ -248,7 +248,7 @@ class Batch {
     else publish(folder, options_.folder / "models" / folder_name(model.id));
     fs::remove_all(folder);  // what was published before
     const WorkKey key{options_hash(model, options_.plan.program), job.files.hash, version()};
-    records_.append(record_line(model, key, verdict, end, remains.report, job.files.stamp, job.started));
+    records_.append(record_line(model, key, verdict, end, remains, job.files.stamp, job.started));
     records_.release(model.id);
     ++result_.num_run;
     newest_[job.model] = verdict.outcome;
@@ -258,11 +258,10 @@ class Batch {
   Remains remains_of(const Job& job, const ChildEnd& end, const BatchModel& model, const fs::path& folder) const {
     Remains remains;
     remains.was_timed_out = job.is_timed_out && end.exit_code != kDone;
+    for (const std::string& output : model.outputs)
+      if (std::string file = output_file(output); fs::exists(folder / file)) remains.outputs.push_back(std::move(file));
     // What a wrapper leaves is its own business.
-    remains.has_outputs = !options_.plan.program.empty() ||
-                          std::all_of(model.outputs.begin(), model.outputs.end(), [&](const std::string& output) {
-                            return fs::exists(folder / output_file(output));
-                          });
+    remains.has_outputs = !options_.plan.program.empty() || remains.outputs.size() == model.outputs.size();
     if (fs::is_regular_file(folder / kReportName))
       remains.report = Json::parse(read_file(folder / kReportName), nullptr, false);
     const fs::path messages = folder / kMessagesName;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace subvol::cli {
 
@@ -40,7 +41,8 @@ std::string_view status_of(Outcome outcome);
 /// What a process left behind.
 struct Remains {
   Json report;                  ///< null if it wrote none
-  bool has_outputs = false;     ///< all outputs were written
+  std::vector<std::string> outputs;  ///< files that it wrote
+  bool has_outputs = false;     ///< all that it was to write are there
   bool was_timed_out = false;   ///< the batch ended it because its time was over
   std::string last_message;     ///< last line on standard output or error, without "subvol: "
 };

@@ -128,7 +128,7 @@ class FieldsHandler : public nlohmann::json_sax<Json> {
 }  // namespace
 
 std::string record_line(const BatchModel& model, const WorkKey& key, const Verdict& verdict, const ChildEnd& end,
-                        const Json& report, const std::string& input_stamp, double started) {
+                        const Remains& remains, const std::string& input_stamp, double started) {
   Json record{{"id", model.id},
               {"status", status_of(verdict.outcome)},
               {"class", name_of(verdict.outcome)},
@@ -140,7 +140,7 @@ std::string record_line(const BatchModel& model, const WorkKey& key, const Verdi
               {"signal", end.signal == 0 ? Json() : Json(signal_name(end.signal))}};
   for (const std::string& word : model.options) record["options"].push_back(as_utf8(word));
   double peak = static_cast<double>(end.peak_memory_bytes);
-  if (report.is_object()) {
+  if (const Json& report = remains.report; report.is_object()) {
     for (const Figure& figure : kFigures)
       if (const Json* value = find(report, figure)) record[figure.name] = *value;
     if (record.contains("cells") && record.contains("certified_cells"))
@@ -149,9 +149,7 @@ std::string record_line(const BatchModel& model, const WorkKey& key, const Verdi
     if (const Json* own = find(report, {nullptr, "peak_memory_bytes", nullptr}); own != nullptr && own->is_number())
       peak = own->get<double>();
   }
-  record["outputs"] = Json::array();
-  if (!is_failure(verdict.outcome) || verdict.outcome == Outcome::not_valid)
-    for (const std::string& output : model.outputs) record["outputs"].push_back(output_file(output));
+  record["outputs"] = remains.outputs;
   record["options_hash"] = key.options_hash;
   record["input_hash"] = key.input_hash;
   record["version"] = key.version;

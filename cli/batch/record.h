@@ -23,9 +23,8 @@ struct WorkKey {
 /// differs between two runs of the same work: times, memory, computer.
 ///
 /// started  seconds since 1970.
-/// report   what the verb wrote about its result; null: nothing.
 std::string record_line(const BatchModel& model, const WorkKey& key, const Verdict& verdict, const ChildEnd& end,
-                        const Json& report, const std::string& input_stamp, double started);
+                        const Remains& remains, const std::string& input_stamp, double started);
 
 /// The entries of a record that plans and summaries need. Numbers that a record lacks are NaN.
 struct RecordFields {

@@ -35,7 +35,7 @@ BatchSummary summary_of(const std::vector<Given>& models) {
     ChildEnd end;
     end.cpu_seconds = given.cpu_seconds;
     records.append(record_line({given.id, "fit", "a.off", {}, {}}, {"1", "2", "3"}, {given.outcome, "because <of> it"}, end,
-                               is_failure(given.outcome) ? Json() : report, "", 0));
+                               {.report = is_failure(given.outcome) ? Json() : report}, "", 0));
   }
   return summarize(std::vector{folder.path()});
 }

@@ -26,12 +26,12 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string line_of(const BatchModel& model, Outcome outcome = Outcome::valid, const std::string& input_hash = "1f",
-                    const Json& report = {}) {
+                    const Remains& remains = {}) {
   const WorkKey key{options_hash(model, ""), input_hash, subvol::version()};
   ChildEnd end;
   end.exit_code = 0;
   end.wall_seconds = 1.5;
-  return record_line(model, key, {outcome, ""}, end, report, "", 0);
+  return record_line(model, key, {outcome, ""}, end, remains, "", 0);
 }
 
 BatchModel model_named(const std::string& id) { return {id, "check", "missing.off", {}, {}}; }
@@ -54,7 +54,7 @@ TEST_CASE("A record is one line that gives its fields back", "[cli][batch]") {
                     {"creases", {{"target_curves", 18}, {"followed_curves", 17}}},
                     {"peak_memory_bytes", 12345}};
   const BatchModel model{"a \"b\"\n/c", "fit", "x.off", {"--cells", "3"}, {"mesh"}};
-  const std::string line = line_of(model, Outcome::valid, "1f", report);
+  const std::string line = line_of(model, Outcome::valid, "1f", {.report = report, .outputs = {"result.mesh"}});
   CHECK(line.find('\n') == std::string::npos);
   RecordReader reader;
   const RecordFields* fields = reader.read(line);
