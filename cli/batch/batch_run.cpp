@@ -18,6 +18,7 @@
 #include <cstring>
 #include <fstream>
 #include <iostream>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -322,6 +323,8 @@ std::size_t BatchResult::num_failed() const {
     if (is_failure(static_cast<Outcome>(i))) failed += counts[i];
   return failed;
 }
+
+std::size_t BatchResult::num_recorded() const { return std::accumulate(counts.begin(), counts.end(), std::size_t{0}); }
 
 BatchResult run_batch(const BatchManifest& manifest, const VerbLookup& verbs, const BatchOptions& options) {
   return Batch(manifest, verbs, options).run();

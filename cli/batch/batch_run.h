@@ -34,6 +34,7 @@ struct BatchResult {
   std::size_t num_elsewhere = 0;     ///< claimed by other processes at that time
   bool is_interrupted = false;
   std::size_t num_failed() const;
+  std::size_t num_recorded() const;  ///< models that have a record
 };
 
 /// Runs the models of a manifest that have no record of the same work, each in a process of its own.

@@ -57,6 +57,14 @@ void add_option(BatchModel& model, const std::string& name, const Json& value) {
     model.options.push_back(std::move(word));
 }
 
+void add_options(BatchModel& model, const Json& value) {
+  if (value.is_object()) {
+    for (const auto& [name, its_value] : value.items()) add_option(model, name, its_value);
+    return;
+  }
+  for (std::string& word : words_of(value, "options")) model.options.push_back(std::move(word));
+}
+
 /// Collects models and checks them.
 class Collector {
  public:
@@ -71,18 +79,15 @@ class Collector {
     return {.id = {}, .verb = defaults_.verb, .input = {}, .options = defaults_.options, .outputs = {}, .folder = folder};
   }
 
-  /// Sets what a column or entry of this name says.
+  /// Sets what a column or entry of this name says. An empty text and null count as not given.
   static void set(BatchModel& model, const std::string& name, const Json& value) {
-    const bool is_given = !value.is_null() && value != "";
-    if (name == "id") (void)(is_given && (model.id = text_of(value, name), true));
-    else if (name == "verb") (void)(is_given && (model.verb = text_of(value, name), true));
-    else if (name == "input") (void)(is_given && (model.input = text_of(value, name), true));
-    else if (name == "outputs") model.outputs = is_given ? words_of(value, name) : std::vector<std::string>{};
-    else if (name == "options" && value.is_object())
-      for (const auto& [option, its_value] : value.items()) add_option(model, option, its_value);
-    else if (name == "options" && is_given)
-      for (std::string& word : words_of(value, name)) model.options.push_back(std::move(word));
-    else if (name != "options" && !name.starts_with('#')) add_option(model, name, value);
+    if (name.starts_with('#') || value.is_null() || value == "") return;
+    if (name == "id") model.id = text_of(value, name);
+    else if (name == "verb") model.verb = text_of(value, name);
+    else if (name == "input") model.input = text_of(value, name);
+    else if (name == "outputs") model.outputs = words_of(value, name);
+    else if (name == "options") add_options(model, value);
+    else add_option(model, name, value);
   }
 
   void add(BatchModel model, Place place) {

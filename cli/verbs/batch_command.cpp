@@ -112,12 +112,9 @@ PlanOptions plan_of(const BatchArguments& arguments) {
 void tell_result(const BatchResult& result) {
   std::cerr << result.num_run << " run, " << result.num_kept << " kept";
   if (result.num_elsewhere > 0) std::cerr << ", " << result.num_elsewhere << " taken by other workers";
-  std::size_t known = 0;
-  for (std::size_t i = 0; i < kNumOutcomes; ++i) {
-    known += result.counts[i];
+  for (std::size_t i = 0; i < kNumOutcomes; ++i)
     if (result.counts[i] > 0) std::cerr << "; " << result.counts[i] << ' ' << name_of(static_cast<Outcome>(i));
-  }
-  if (known < result.num_models) std::cerr << "; " << result.num_models - known << " to be run";
+  if (const std::size_t left = result.num_models - result.num_recorded(); left > 0) std::cerr << "; " << left << " to be run";
   std::cerr << '\n';
 }
 
@@ -139,7 +136,8 @@ int run_batch_verb(BatchArguments& arguments, ParserVerbs& parser_verbs) {
   if (result.is_interrupted) return kInterrupted;
   if (options.dry_run) return kDone;
   if (result.num_failed() > 0) return kFailed;
-  return result.counts[static_cast<std::size_t>(Outcome::not_converged)] > 0 ? kNotConverged : kDone;
+  const bool all_valid = result.counts[static_cast<std::size_t>(Outcome::valid)] == result.num_models;
+  return all_valid ? kDone : kNotConverged;
 }
 
 // --- batch report -------------------------------------------------------------------------------------------------------
@@ -326,7 +324,8 @@ input, options and version are kept. Several batches may work on one folder.
 Words behind -- are options for every model. Columns of a .csv or .tsv, and entries of a .jsonl: input,
 and if need be id, verb, options, outputs, and any option by its name.
 
-Exit status 0: all models are valid; 1: some have failed; 4: some have not converged.
+Exit status 0: all models are valid; 1: some have failed; 4: some have not converged, or are still
+to be run by another worker.
 
 Examples:
   subvol batch parts/*.stl -o out -- --cells 300 --time-limit 60
