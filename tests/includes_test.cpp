@@ -52,7 +52,8 @@ const std::vector<Room> kRooms{
     // The result of a fit may be shown, but no energy, no solver and no fit.
     {"export", {"subvol", "fit/elements", "fit/quality", "fit/geometry/curved_boundary.h"}},
     {"cli/runs", {"subvol", "fit", "shell", "export"}},
-    {"cli/verbs", {"subvol", "fit", "shell", "export", "cli/runs"}},
+    {"cli/batch", {"subvol", "cli/runs"}},
+    {"cli/verbs", {"subvol", "fit", "shell", "export", "cli/runs", "cli/batch"}},
     {"python", {"subvol", "fit", "shell", "export", "cli/runs"}},
     {"samples", {"subvol", "fit", "shell", "export"}},
     {"bench", {"subvol", "fit", "shell", "export", "samples"}},

@@ -16,6 +16,9 @@ enum ExitStatus : int {
   kInterrupted = 130,  ///< by Ctrl-C; the best result so far has been written, if there was any
 };
 
+/// What the program says last, with status kFailed, if an allocation fails.
+inline constexpr const char* kOutOfMemory = "out of memory";
+
 /// Thrown if the command line makes no sense in a way that the parser cannot see. Exit status kUsage.
 class UsageError : public std::runtime_error {
  public:

@@ -78,6 +78,8 @@ void require_writable_folder(const fs::path& file) {
 
 }  // namespace
 
+void require_output_kind(const std::string& text) { (void)parse_output(text); }
+
 void require_free(const fs::path& file, bool force) {
   std::error_code ignored;
   const bool exists = fs::exists(file, ignored);

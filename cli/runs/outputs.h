@@ -43,6 +43,9 @@ std::string output_formats();
 /// cannot be written to, a name that is too long.
 std::vector<Output> checked_outputs(const RunOptions& options, const std::vector<Part>& parts);
 
+/// UsageError: an -o of this text names no part and format that there are.
+void require_output_kind(const std::string& text);
+
 /// Checks that one file can be written. UsageError: a folder, an existing file without `force`. IoError: a name that is
 /// too long, a folder that cannot be written to.
 void require_free(const std::filesystem::path& file, bool force);

@@ -68,6 +68,22 @@ void ProgressTeller::tell_work(const char* part, double share) {
   std::fprintf(stderr, "%3.0f%%  %6.1f s  %s\n", 100 * share, seconds(), part);
 }
 
+void ProgressTeller::tell_count(std::size_t done, std::size_t total, const std::string& words) {
+  const double share = total > 0 ? static_cast<double>(done) / static_cast<double>(total) : 1;
+  const std::string text = std::to_string(done) + " of " + std::to_string(total) + "  " + words;
+  if (kind_ == Kind::bar) return draw_bar(share, text);
+  const double left = seconds_left(share);
+  if (kind_ == Kind::json) {
+    Json line{{"done", done}, {"total", total}, {"seconds", seconds()}};
+    if (left >= 0) line["seconds_left"] = left;
+    return print(line.dump() + '\n');
+  }
+  const auto now = Clock::now();
+  if (kind_ != Kind::plain || (now - last_ < kPlainInterval && done < total)) return;
+  last_ = now;
+  std::fprintf(stderr, "%3.0f%%  %6.1f s%s  %s\n", 100 * share, seconds(), left_text(left).c_str(), text.c_str());
+}
+
 void ProgressTeller::finish() {
   if (bar_shown_) std::fputc('\n', stderr);
   bar_shown_ = false;

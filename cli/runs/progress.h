@@ -24,6 +24,9 @@ class ProgressTeller {
   void tell(const FitProgress& progress);
   /// Reports work after the solve: on the bar, as a line at most once a second, or to scripts as "part" and "share".
   void tell_work(const char* part, double share);
+  /// Reports how many of several equal parts are done: on the bar, as a line every ten seconds, or to scripts as "done"
+  /// and "total".
+  void tell_count(std::size_t done, std::size_t total, const std::string& words);
   WorkProgress work() {
     return [this](const char* part, double share) { return tell_work(part, share), true; };
   }

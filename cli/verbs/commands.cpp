@@ -19,6 +19,7 @@ constexpr const char* kFooter = R"(Examples:
   subvol convert cage.mesh -o cage.usda
   subvol view bone.mesh --open
   subvol report bone.json -o bone.html
+  subvol batch parts/*.stl -o out -- --cells 300
 
 Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not converged (best result written);
              130 interrupted (best result written).
@@ -44,6 +45,7 @@ void describe_program(CLI::App& app, Action& action) {
   add_convert_command(app, action);
   add_view_command(app, action);
   add_report_command(app, action);
+  add_batch_command(app, action);
   add_completion_command(app, action);
 }
 

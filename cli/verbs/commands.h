@@ -24,6 +24,7 @@ void add_check_command(CLI::App& app, Action& action);
 void add_convert_command(CLI::App& app, Action& action);
 void add_view_command(CLI::App& app, Action& action);
 void add_report_command(CLI::App& app, Action& action);
+void add_batch_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
 
 }  // namespace subvol::cli

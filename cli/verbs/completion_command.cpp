@@ -52,9 +52,9 @@ std::vector<std::string> words_of(const CLI::Option& option) {
   return words;
 }
 
-/// Appends the lines of a case that offer what a verb accepts: its options, the words of some, and the verbs below it.
+/// Appends the lines of a case, for a pattern of the shell, that offer what a verb accepts: its options, the words of some, and the verbs below it.
 void append_case(std::ostream& out, const CLI::App& verb, const std::string& pattern) {
-  out << "    '" << pattern << "')\n      options='" << joined(options_of(verb)) << "'\n      case \"$before\" in\n";
+  out << "    " << pattern << ")\n      options='" << joined(options_of(verb)) << "'\n      case \"$before\" in\n";
   for (const CLI::Option* option : verb.get_options())
     if (const auto words = words_of(*option); !words.empty())
       out << "        --" << option->get_lnames().front() << ") words='" << joined(words) << "' ;;\n";
@@ -79,8 +79,11 @@ std::string bash_completion(const CLI::App& app) {
   out << "  esac\n"
          "  case \"$verb\" in\n";
   for (const CLI::App* verb : verbs_of(app)) {
-    append_case(out, *verb, verb->get_name());
-    for (const CLI::App* below : verbs_of(*verb)) append_case(out, *below, verb->get_name() + ' ' + below->get_name());
+    const std::string name = '\'' + verb->get_name() + '\'';
+    for (const CLI::App* below : verbs_of(*verb))
+      append_case(out, *below, '\'' + verb->get_name() + ' ' + below->get_name() + '\'');
+    // The word behind the name of a group may also be an argument of the group itself, as of batch.
+    append_case(out, *verb, verbs_of(*verb).empty() ? name : name + " | '" + verb->get_name() + " '*");
   }
   out << "  esac\n"
          "  if [ -n \"$words$verbs\" ] && [ \"${word#-}\" = \"$word\" ]; then\n"

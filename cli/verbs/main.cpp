@@ -27,8 +27,6 @@
 namespace subvol::cli {
 namespace {
 
-constexpr const char* kOutOfMemory = "out of memory";
-
 int complain(const char* what, int status) {
   std::cerr << "subvol: " << what << '\n';
   return status;

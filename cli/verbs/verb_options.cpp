@@ -32,16 +32,20 @@ bool is_excluded(const CLI::Option& option) {
 
 }  // namespace
 
+void add_memory_limit(CLI::App& verb, std::size_t& bytes, const std::string& help) {
+  verb.add_option("--memory-limit", bytes, help)
+      ->transform(CLI::AsSizeValue(false))
+      ->check(CLI::Range(kLeastMemoryLimit, kMostMemoryLimit))
+      ->type_name("SIZE");
+}
+
 void add_resource_options(CLI::App& verb, RunOptions& options) {
   verb.add_option("--threads", options.threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 1024))
       ->type_name("N");
-  verb.add_option("--memory-limit", options.memory_limit,
-                  "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best\n"
-                  "result so far")
-      ->transform(CLI::AsSizeValue(false))
-      ->check(CLI::Range(kLeastMemoryLimit, kMostMemoryLimit))
-      ->type_name("SIZE");
+  add_memory_limit(verb, options.memory_limit,
+                   "Take no more memory: bytes, or 800M, 4G. A fit ends before a level that would, with the best\n"
+                   "result so far");
 }
 
 void add_output_options(CLI::App& verb, RunOptions& options, const std::string& output_help) {

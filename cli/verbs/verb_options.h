@@ -15,6 +15,8 @@ namespace subvol::cli {
 
 // Declares to the parser the options that several verbs share.
 
+/// --memory-limit.
+void add_memory_limit(CLI::App& verb, std::size_t& bytes, const std::string& help);
 /// --threads, --memory-limit.
 void add_resource_options(CLI::App& verb, RunOptions& options);
 /// -o, --force, --quiet, and the above.

@@ -155,5 +155,8 @@ TEST_CASE("A shell completes verbs, options and their words", "[cli]") {
   CHECK(completed("subvol fit a.off --surface l", 4) == "limit");
   CHECK(completed("subvol template pil", 2) == "pillow");
   CHECK(completed("subvol template grid --coun", 3) == "--counts");
+  CHECK(completed("subvol batch rep", 2) == "report");
+  CHECK(completed("subvol batch report --comp", 3) == "--compare");
+  CHECK(completed("subvol batch models.csv --sha", 3) == "--shard");
   CHECK(completed("subvol fit a", 2).empty());  // files are the shell's own
 }
