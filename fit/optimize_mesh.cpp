@@ -4,12 +4,12 @@
 #include "fit/elements/boundary_samples.h"
 #include "fit/elements/ideal_boxes.h"
 #include "fit/energies/closest_point_energy.h"
-#include "fit/features/flat_facets.h"
 #include "fit/fits/flat_faces.h"
 #include "fit/geometry/boundary_triangles.h"
 #include "fit/geometry/self_intersection.h"
 #include "fit/geometry/surface_distance.h"
 #include "fit/quality/quality.h"
+#include "fit/quality/region_quality.h"
 #include "fit/solver/free_nodes.h"
 #include "fit/stages/quality_stages.h"
 #include "fit/stages/stage_runner.h"
@@ -18,6 +18,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 
@@ -48,6 +49,9 @@ constexpr double kPoorJacobian = 0.2;
 constexpr double kMeanMargin = 0.9, kMaxMargin = 0.8;
 /// Least factor to which the weight of a cell is lowered for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
+
+/// Largest relative change of a region's volume.
+constexpr double kMostVolumeChange = 1e-3;
 
 /// State that a round has reached.
 struct Progress {
@@ -103,6 +107,10 @@ class MeshOptimizer {
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
                  options.cancelled, options.log}) {
     target_.normalisation.take_in(mesh_);
+    target_.keep_interfaces(mesh_);
+    interfaces_ = find_interfaces(mesh_, topology_);
+    face_groups_ = groups_of_sheets(mesh_, topology_);
+    start_volumes_ = region_volumes(mesh_);
   }
   OptimizeResult run(const VolumeMesh& original);
 
@@ -112,6 +120,8 @@ class MeshOptimizer {
   std::vector<std::array<Index, 2>> tagged_edges() const;
   void find_features();
   void sample_boundary();
+  BoundarySamples sample_sheets(const ElementSpace& space, int intervals) const;
+  std::vector<Index> sample_groups() const;
   std::vector<std::uint8_t> vertices_of(std::span<const Index> cells) const;
   void release_corners(std::span<const Index> cells);
   void release_features(std::span<const Index> cells);
@@ -127,7 +137,7 @@ class MeshOptimizer {
   struct Measured;
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
-  void flatten();
+  void flatten(double least_jacobian);
   bool run_quality_stages(const QualitySchedule& schedule);
   bool raise_quality(double goal);
   bool raise_quality();
@@ -144,6 +154,9 @@ class MeshOptimizer {
   MeshTopology topology_;
   bool own_boundary_;
   FitTarget target_;
+  Interfaces interfaces_;            ///< between regions; fitted to themselves as they are at the start
+  std::vector<Index> face_groups_;   ///< `groups_of_sheets`; empty without interfaces
+  std::vector<double> start_volumes_;  ///< of the regions
   FollowedCreases creases_;
   BoundarySamples samples_;
   std::vector<Vec3> ideal_boxes_;
@@ -166,21 +179,40 @@ std::vector<std::array<Index, 2>> MeshOptimizer::tagged_edges() const {
   const auto number = [&](Index v) {
     return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
   };
-  for (const CreaseEdge& crease : mesh_.tags.creases) edges.push_back({number(crease.v0), number(crease.v1)});
+  for (const CreaseEdge& crease : mesh_.tags.creases)
+    if (topology_.is_boundary_edge(topology_.find_edge(crease.v0, crease.v1)))
+      edges.push_back({number(crease.v0), number(crease.v1)});
   return edges;
 }
 
 void MeshOptimizer::find_features() {
   if (options_.fixed_boundary) return;
   creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_, tagged_edges());
+  creases_.keep_interfaces(mesh_, options_.crease_angle_degrees, own_boundary_);
   sample_boundary();
   target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
 }
 
 void MeshOptimizer::sample_boundary() {
   constexpr int kIntervals = 2;
-  samples_ = make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
+  const ElementSpace space(mesh_, Basis::legendre, 1);
+  samples_ = interfaces_.empty() ? make_boundary_samples(space, kIntervals, mesh_.tags.creases)
+                                 : sample_sheets(space, kIntervals);
   refined_.assign(samples_.triangles.size(), 0);
+}
+
+/// Samples the boundary and the interfaces, whose triangles are oriented as in the target.
+BoundarySamples MeshOptimizer::sample_sheets(const ElementSpace& space, int intervals) const {
+  std::vector<Index> faces(topology_.boundary_faces().begin(), topology_.boundary_faces().end()), edges;
+  faces.insert(faces.end(), interfaces_.faces.begin(), interfaces_.faces.end());
+  for (const CreaseEdge& crease : mesh_.tags.creases) edges.push_back(topology_.find_edge(crease.v0, crease.v1));
+  BoundarySamples samples = make_face_samples(space, faces, intervals, edges);
+  for (std::size_t t = 0; t < samples.triangles.size(); ++t) {
+    const auto [first, second] = topology_.face_cells(samples.triangle_faces[t]);
+    if (second != kNoIndex && mesh_.references[first] > mesh_.references[second])
+      std::swap(samples.triangles[t][1], samples.triangles[t][2]);
+  }
+  return samples;
 }
 
 /// Marks the vertices of these cells with 1.
@@ -224,16 +256,26 @@ std::vector<std::uint8_t> MeshOptimizer::fixed_vertices(Boundary boundary) const
   std::vector<std::uint8_t> fixed(mesh_.num_vertices(), 0);
   if (boundary == Boundary::fixed) {
     for (std::size_t v = 0; v < fixed.size(); ++v) fixed[v] = topology_.is_boundary_vertex(static_cast<Index>(v));
+    for (const Index f : interfaces_.faces)
+      for (const Index v : topology_.face(f)) fixed[v] = 1;
   } else if (own_boundary_) {
     for (const CornerVertex& corner : mesh_.tags.corners) fixed[corner.vertex] = 1;
   }
   return fixed;
 }
 
+/// Returns the group of each sample triangle.
+std::vector<Index> MeshOptimizer::sample_groups() const {
+  std::vector<Index> groups;
+  for (const Index f : samples_.triangle_faces) groups.push_back(face_groups_[f]);
+  return groups;
+}
+
 std::unique_ptr<SurfaceTerm> MeshOptimizer::surface_term(bool emphasize_far) const {
   const int points = samples_.triangles.size() > target_.surface.triangles().size() ? 1 : 3;
   auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples_.triangles, samples_.points.size(),
                                                       kTangentialWeight, points);
+  if (!interfaces_.empty()) surface->set_groups(sample_groups(), target_.group_of_triangle);
   if (emphasize_far) surface->emphasize_far(kFarDistance);
   surface->refine(refined_);
   if (!creases_.curves().empty())
@@ -372,6 +414,7 @@ bool MeshOptimizer::improve() {
 struct MeshOptimizer::Measured {
   double least_jacobian = -1, mean_jacobian = -1, mean_percent = 0, max_percent = 0;
   std::size_t uncertified = 0, intersections = 0;
+  double volume_change = 0;  ///< largest relative change of a region's volume, if the mesh has several
 };
 
 MeshOptimizer::Measured MeshOptimizer::measure() const {
@@ -383,6 +426,16 @@ MeshOptimizer::Measured MeshOptimizer::measure() const {
   const SurfaceDistance distance = target_.distance(surface);
   result.mean_percent = 100 * distance.mean();
   result.max_percent = 100 * distance.max();
+  if (!interfaces_.empty()) {
+    const SurfaceDistance between = target_.interface_distance(mesh_);
+    result.mean_percent = std::max(result.mean_percent, 100 * between.mean());
+    result.max_percent = std::max(result.max_percent, 100 * between.max());
+    // The volumes of regions change with the boundary if that has a target of its own.
+    const std::vector<double> volumes = region_volumes(mesh_);
+    for (std::size_t r = 0; own_boundary_ && r < volumes.size(); ++r)
+      result.volume_change = std::max(result.volume_change, std::abs(volumes[r] / start_volumes_[r] - 1));
+  }
+  // Certified cells in a boundary that does not meet itself do not overlap, so neither do the interfaces between them.
   // Not to be interrupted: a fraction of a second, without which two states cannot be compared.
   result.intersections = count_intersecting_pairs(surface);
   return result;
@@ -391,6 +444,7 @@ MeshOptimizer::Measured MeshOptimizer::measure() const {
 bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const {
   return now.uncertified <= before.uncertified && now.intersections <= before.intersections &&
          now.least_jacobian > before.least_jacobian &&
+         now.volume_change <= std::max(before.volume_change, kMostVolumeChange) &&
          now.mean_percent <= std::max(before.mean_percent, kMeanMargin * options_.mean_tolerance_percent) &&
          now.max_percent <= std::max(before.max_percent, options_.max_tolerance_percent);
 }
@@ -400,7 +454,7 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
   constexpr double kLeastGain = 1e-6;
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
-  if (now.uncertified > 0 || now.intersections > start.intersections ||
+  if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
       now.mean_percent > std::max(start.mean_percent, mean_limit) ||
       now.max_percent > std::max(start.max_percent, max_limit))
     return false;
@@ -422,6 +476,9 @@ bool MeshOptimizer::run_quality_stages(const QualitySchedule& schedule) {
     boundary.fixed = samples_.positions.apply(free.fixed);
     boundary.triangles = samples_.triangles;
     boundary.triangle_faces = samples_.triangle_faces;
+    boundary.interfaces = interfaces_.faces;
+    boundary.group_of_face = face_groups_;
+    boundary.group_of_triangle = target_.group_of_triangle;
     if (!creases_.curves().empty())
       creases = [&](double width) {
         return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
@@ -470,10 +527,10 @@ bool MeshOptimizer::raise_quality() {
   return raise_quality(std::min(kMostQuality, options_.quality + kBeyond));
 }
 
-/// Makes flat faces exactly so, unless the boundary is fixed.
-void MeshOptimizer::flatten() {
+/// Makes flat faces exactly so, unless the boundary is fixed. least_jacobian: of the start.
+void MeshOptimizer::flatten(double least_jacobian) {
   if (options_.fixed_boundary) return;
-  flatten_faces(mesh_, target_.mesh, *target_.tree, flat_facets(target_.mesh));
+  flatten_sheets(mesh_, target_, std::max(least_jacobian, 0.0));
 }
 
 /// There is nothing to measure if the target is the mesh's own boundary.
@@ -490,6 +547,10 @@ void MeshOptimizer::measure_distance() {
   const SurfaceDistance distance = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
   mean_percent_ = 100 * distance.mean();
   max_percent_ = 100 * distance.max();
+  if (interfaces_.empty()) return;
+  const SurfaceDistance between = target_.interface_distance(mesh_);
+  mean_percent_ = std::max(mean_percent_, 100 * between.mean());
+  max_percent_ = std::max(max_percent_, 100 * between.max());
 }
 
 /// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
@@ -531,7 +592,7 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
-  flatten();
+  flatten(start.least_jacobian);
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {

@@ -21,6 +21,19 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
   return energy;
 }
 
+std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
+                                               const std::vector<std::array<Index, 3>>& sample_triangles,
+                                               std::size_t num_samples, double tangential_weight,
+                                               Correspondence correspondence, const SurfaceGroups& groups) {
+  auto term = make_surface_term(target, sample_triangles, num_samples, tangential_weight, correspondence);
+  if (groups.of_target.empty()) return term;
+  auto* closest = dynamic_cast<ClosestPointEnergy*>(term.get());
+  if (!closest)
+    throw InputError("Correspondence::voronoi: its cells know no regions; a template of several needs closest points");
+  closest->set_groups({groups.of_sample_triangle.begin(), groups.of_sample_triangle.end()}, groups.of_target);
+  return term;
+}
+
 void require_closest(Correspondence correspondence) {
   if (correspondence != Correspondence::closest)
     throw InputError(

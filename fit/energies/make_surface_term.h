@@ -29,6 +29,18 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                double far_length = 0,
                                                std::span<const std::uint8_t> refined = {});
 
+/// Groups of the triangles of both surfaces, as for `ClosestPointEnergy::set_groups`; empty: there are none.
+struct SurfaceGroups {
+  std::span<const Index> of_sample_triangle, of_target;
+};
+
+/// Makes the same, and lets only parts of the same group correspond. InputError: groups with
+/// Correspondence::voronoi, whose cells know none.
+std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
+                                               const std::vector<std::array<Index, 3>>& sample_triangles,
+                                               std::size_t num_samples, double tangential_weight,
+                                               Correspondence correspondence, const SurfaceGroups& groups);
+
 /// Throws InputError unless correspondences are closest points: Voronoi cells of a point cloud have no area.
 void require_closest(Correspondence correspondence);
 
