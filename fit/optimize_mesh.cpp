@@ -109,6 +109,7 @@ class MeshOptimizer {
     target_.normalisation.take_in(mesh_);
     target_.keep_interfaces(mesh_);
     interfaces_ = find_interfaces(mesh_, topology_);
+    marks_ = mark_interfaces(topology_, interfaces_);
     face_groups_ = groups_of_sheets(mesh_, topology_);
     start_volumes_ = region_volumes(mesh_);
   }
@@ -116,6 +117,9 @@ class MeshOptimizer {
 
  private:
   enum class Boundary { fixed, sliding };
+  /// What is held for the sake of the regions' volumes, each after all before: nothing; the volumes, by lowering lambda;
+  /// the vertices of interfaces; those of the boundary.
+  enum class Held { nothing, volumes, interfaces, sheets };
 
   std::vector<std::array<Index, 2>> tagged_edges() const;
   void find_features();
@@ -130,6 +134,9 @@ class MeshOptimizer {
   FitProblem make_problem(Boundary boundary, double lambda, bool untangles, std::vector<Vec3>& x) const;
   std::unique_ptr<SurfaceTerm> surface_term(bool emphasize_far) const;
   StageRecord record(std::string name) const;
+  bool attempt(double least_jacobian);
+  double volume_change() const;
+  bool changes_volumes() const { return volume_change() > kMostVolumeChange; }
   bool untangle_all();
   bool untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options);
   bool improve();
@@ -155,6 +162,8 @@ class MeshOptimizer {
   bool own_boundary_;
   FitTarget target_;
   Interfaces interfaces_;            ///< between regions; fitted to themselves as they are at the start
+  InterfaceMarks marks_;
+  Held held_ = Held::nothing;
   std::vector<Index> face_groups_;   ///< `groups_of_sheets`; empty without interfaces
   std::vector<double> start_volumes_;  ///< of the regions
   FollowedCreases creases_;
@@ -223,10 +232,13 @@ std::vector<std::uint8_t> MeshOptimizer::vertices_of(std::span<const Index> cell
   return marked;
 }
 
-/// Corner vertices of cells that do not improve may slide along the feature curves that end there.
+/// Corner vertices of cells that do not improve may slide along the feature curves that end there, but not those of
+/// interfaces: the volume of a region depends on them.
 void MeshOptimizer::release_corners(std::span<const Index> cells) {
   const std::vector<std::uint8_t> marked = vertices_of(cells);
-  std::erase_if(mesh_.tags.corners, [&](const CornerVertex& corner) { return marked[corner.vertex] != 0; });
+  std::erase_if(mesh_.tags.corners, [&](const CornerVertex& corner) {
+    return marked[corner.vertex] != 0 && !marks_.has_vertex(corner.vertex);
+  });
 }
 
 /// If a boundary is folded, its sharp edges may be those of the folds, so those at the given cells are released.
@@ -256,10 +268,13 @@ std::vector<std::uint8_t> MeshOptimizer::fixed_vertices(Boundary boundary) const
   std::vector<std::uint8_t> fixed(mesh_.num_vertices(), 0);
   if (boundary == Boundary::fixed) {
     for (std::size_t v = 0; v < fixed.size(); ++v) fixed[v] = topology_.is_boundary_vertex(static_cast<Index>(v));
-    for (const Index f : interfaces_.faces)
-      for (const Index v : topology_.face(f)) fixed[v] = 1;
   } else if (own_boundary_) {
     for (const CornerVertex& corner : mesh_.tags.corners) fixed[corner.vertex] = 1;
+  }
+  for (std::size_t v = 0; v < marks_.vertices.size(); ++v) {
+    const bool on_boundary = topology_.is_boundary_vertex(static_cast<Index>(v));
+    if (held_ == Held::sheets && on_boundary) fixed[v] = 1;
+    if ((held_ >= Held::interfaces || boundary == Boundary::fixed) && marks_.vertices[v]) fixed[v] = 1;
   }
   return fixed;
 }
@@ -389,7 +404,8 @@ bool MeshOptimizer::improve() {
   for (int round = 0; round < kMaxRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
-    const bool too_far = mean_percent_ > kMeanMargin * options_.mean_tolerance_percent;
+    const bool too_far = mean_percent_ > kMeanMargin * options_.mean_tolerance_percent ||
+                         (held_ != Held::nothing && changes_volumes());
     if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
       lambda /= 2;
     } else if (!now.gains_on(before, kMaxMargin * options_.max_tolerance_percent)) {
@@ -417,6 +433,17 @@ struct MeshOptimizer::Measured {
   double volume_change = 0;  ///< largest relative change of a region's volume, if the mesh has several
 };
 
+/// Returns the largest relative change of a region's volume; 0 if the boundary has a target of its own, which changes
+/// volumes.
+double MeshOptimizer::volume_change() const {
+  double largest = 0;
+  if (interfaces_.empty() || !own_boundary_) return largest;
+  const std::vector<double> volumes = region_volumes(mesh_);
+  for (std::size_t r = 0; r < volumes.size(); ++r)
+    largest = std::max(largest, std::abs(volumes[r] / start_volumes_[r] - 1));
+  return largest;
+}
+
 MeshOptimizer::Measured MeshOptimizer::measure() const {
   const QualityReport quality = measure_quality(mesh_);
   Measured result{quality.min_scaled_jacobian, quality.mean_scaled_jacobian};
@@ -430,10 +457,7 @@ MeshOptimizer::Measured MeshOptimizer::measure() const {
     const SurfaceDistance between = target_.interface_distance(mesh_);
     result.mean_percent = std::max(result.mean_percent, 100 * between.mean());
     result.max_percent = std::max(result.max_percent, 100 * between.max());
-    // The volumes of regions change with the boundary if that has a target of its own.
-    const std::vector<double> volumes = region_volumes(mesh_);
-    for (std::size_t r = 0; own_boundary_ && r < volumes.size(); ++r)
-      result.volume_change = std::max(result.volume_change, std::abs(volumes[r] / start_volumes_[r] - 1));
+    result.volume_change = volume_change();
   }
   // Certified cells in a boundary that does not meet itself do not overlap, so neither do the interfaces between them.
   // Not to be interrupted: a fraction of a second, without which two states cannot be compared.
@@ -582,17 +606,36 @@ void MeshOptimizer::finish(bool going) {
   }
 }
 
-OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
-  measure_start();
-  const Measured start = measure();
-  std::vector<Vec3> start_positions = mesh_.positions;
+/// Does the whole work on the present mesh. least_jacobian: of the start. Returns false if the work was ended early.
+bool MeshOptimizer::attempt(double least_jacobian) {
+  weights_.clear();
+  relief_.assign(mesh_.num_cells(), 1);
   find_features();
   find_sizes();
   uncertified_ = certify(mesh_).not_certified;
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
-  flatten(start.least_jacobian);
+  flatten(least_jacobian);
+  return going;
+}
+
+OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
+  measure_start();
+  const Measured start = measure();
+  std::vector<Vec3> start_positions = mesh_.positions;
+  bool going = attempt(start.least_jacobian);
+  while (going && !options_.fixed_boundary && held_ != Held::sheets && changes_volumes()) {
+    report_.undo_stages(0, report_.stages.size());
+    mesh_.positions = start_positions;
+    mesh_.tags = original.tags;
+    held_ = static_cast<Held>(static_cast<int>(held_) + 1);
+    going = attempt(start.least_jacobian);
+  }
+  if (held_ >= Held::interfaces)
+    report_.warnings.push_back(
+        formatted("%s between regions were fixed: sliding changed the volume of a region by more than %g %%",
+                  held_ == Held::interfaces ? "interfaces" : "the boundary and interfaces", 100 * kMostVolumeChange));
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {

@@ -63,8 +63,9 @@ struct OptimizeResult {
 ///         shaped or cannot be untangled.
 /// Interfaces between regions (cells of different references) keep their shape as the boundary does without a target:
 /// their vertices slide along them, or stay if the boundary is fixed; their sharp edges, and the curves where they meet
-/// each other or a boundary without a target, stay sharp. Distances then include theirs. Without a target, a result in
-/// which the volume of a region differs by more than 0.1 % counts as no better than the start.
+/// each other or a boundary without a target, stay sharp. Distances then include theirs. Without a target, the volumes of
+/// regions are kept within 0.1 %: if one is off by more in the end, all is done again with lambda lowered while it is,
+/// then with vertices of interfaces fixed, then with those of the boundary fixed, too.
 ///
 /// Faces on flat parts of the target, and flat parts of interfaces, are made exactly flat (`flatten_sheets`) unless the
 /// boundary is fixed.

@@ -11,6 +11,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -301,12 +302,16 @@ TEST_CASE("equal references are one region, and the rows are those of a mesh wit
 
 TEST_CASE("a crease of a material is a tag, one of neither boundary nor interface is a defect", "[regions]") {
   VolumeMesh mesh = lattice_of_regions(4, 4, 4, [](int i, int, int) { return i < 2 ? 1 : 2; });
-  const MeshTopology topology(mesh);
-  const Index inside = 2 + 5 * (2 + 5 * 2), next = 2 + 5 * (3 + 5 * 2), off = 1 + 5 * (2 + 5 * 2);
-  mesh.tags.creases = {{inside, next, kInfiniteSharpness}};
+  const auto crease = [&](const Vec3& p, const Vec3& q) {
+    const auto number = [&](const Vec3& x) {
+      return static_cast<Index>(std::ranges::find(mesh.positions, x) - mesh.positions.begin());
+    };
+    return CreaseEdge{std::min(number(p), number(q)), std::max(number(p), number(q)), kInfiniteSharpness};
+  };
+  mesh.tags.creases = {crease({2, 2, 2}, {2, 3, 2})};
   CHECK(validate(mesh).empty());
   CHECK(distance_from_direct(mesh) <= kRounding);
-  mesh.tags.creases = {{off, inside, kInfiniteSharpness}};
+  mesh.tags.creases = {crease({1, 2, 2}, {2, 2, 2})};
   CHECK(validate(mesh).size() == 1);
   CHECK_THROWS(subdivide(mesh));
 }
