@@ -124,8 +124,6 @@ class MeshOptimizer {
   std::vector<std::array<Index, 2>> tagged_edges() const;
   void find_features();
   void sample_boundary();
-  BoundarySamples sample_sheets(const ElementSpace& space, int intervals) const;
-  std::vector<Index> sample_groups() const;
   std::vector<std::uint8_t> vertices_of(std::span<const Index> cells) const;
   void release_corners(std::span<const Index> cells);
   void release_features(std::span<const Index> cells);
@@ -204,24 +202,8 @@ void MeshOptimizer::find_features() {
 
 void MeshOptimizer::sample_boundary() {
   constexpr int kIntervals = 2;
-  const ElementSpace space(mesh_, Basis::legendre, 1);
-  samples_ = interfaces_.empty() ? make_boundary_samples(space, kIntervals, mesh_.tags.creases)
-                                 : sample_sheets(space, kIntervals);
+  samples_ = make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
   refined_.assign(samples_.triangles.size(), 0);
-}
-
-/// Samples the boundary and the interfaces, whose triangles are oriented as in the target.
-BoundarySamples MeshOptimizer::sample_sheets(const ElementSpace& space, int intervals) const {
-  std::vector<Index> faces(topology_.boundary_faces().begin(), topology_.boundary_faces().end()), edges;
-  faces.insert(faces.end(), interfaces_.faces.begin(), interfaces_.faces.end());
-  for (const CreaseEdge& crease : mesh_.tags.creases) edges.push_back(topology_.find_edge(crease.v0, crease.v1));
-  BoundarySamples samples = make_face_samples(space, faces, intervals, edges);
-  for (std::size_t t = 0; t < samples.triangles.size(); ++t) {
-    const auto [first, second] = topology_.face_cells(samples.triangle_faces[t]);
-    if (second != kNoIndex && mesh_.references[first] > mesh_.references[second])
-      std::swap(samples.triangles[t][1], samples.triangles[t][2]);
-  }
-  return samples;
 }
 
 /// Marks the vertices of these cells with 1.
@@ -279,18 +261,11 @@ std::vector<std::uint8_t> MeshOptimizer::fixed_vertices(Boundary boundary) const
   return fixed;
 }
 
-/// Returns the group of each sample triangle.
-std::vector<Index> MeshOptimizer::sample_groups() const {
-  std::vector<Index> groups;
-  for (const Index f : samples_.triangle_faces) groups.push_back(face_groups_[f]);
-  return groups;
-}
-
 std::unique_ptr<SurfaceTerm> MeshOptimizer::surface_term(bool emphasize_far) const {
   const int points = samples_.triangles.size() > target_.surface.triangles().size() ? 1 : 3;
   auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples_.triangles, samples_.points.size(),
                                                       kTangentialWeight, points);
-  if (!interfaces_.empty()) surface->set_groups(sample_groups(), target_.group_of_triangle);
+  if (!interfaces_.empty()) surface->set_groups(groups_of_triangles(samples_.triangle_faces, face_groups_), target_.group_of_triangle);
   if (emphasize_far) surface->emphasize_far(kFarDistance);
   surface->refine(refined_);
   if (!creases_.curves().empty())

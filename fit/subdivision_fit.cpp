@@ -180,7 +180,8 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
   std::unique_ptr<SurfaceTerm> term =
       make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
-                        options_.correspondence, {level_.sample_groups, target_.group_of_triangle});
+                        options_.correspondence, SurfacePull::along_normals, 0, {},
+                        {level_.sample_groups, target_.group_of_triangle});
   if (!creases_.curves().empty())
     term->add_creases(creases_.energy(level_.crease_edges, level_.samples.num_rows(),
                                       kCreaseWidth * target_.surface.length(), stage.tangential_weight));

@@ -78,7 +78,7 @@ void add_groups(FitLevel& level) {
   const MeshTopology topology(level.mesh);
   level.face_groups = groups_of_sheets(level.mesh, topology);
   if (level.face_groups.empty()) return;
-  for (const Index f : level.sample_faces) level.sample_groups.push_back(level.face_groups[f]);
+  level.sample_groups = groups_of_triangles(level.sample_faces, level.face_groups);
   level.interfaces = find_interfaces(level.mesh, topology).faces;
 }
 

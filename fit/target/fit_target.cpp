@@ -127,6 +127,13 @@ std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& 
   return groups;
 }
 
+std::vector<Index> groups_of_triangles(std::span<const Index> faces, std::span<const Index> group_of_face) {
+  std::vector<Index> groups;
+  if (group_of_face.empty()) return groups;
+  for (const Index f : faces) groups.push_back(group_of_face[f]);
+  return groups;
+}
+
 void FitTarget::sample(std::size_t num_samples, std::size_t least) {
   const double count = static_cast<double>(std::max(num_samples, least));
   // The second bound keeps a needle of almost no area from being cut along its length endlessly.

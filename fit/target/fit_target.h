@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace subvol {
@@ -79,5 +80,8 @@ struct FitTarget {
 /// Returns the group of each face of a mesh, as `FitTarget::group_of_triangle` has them, by `MeshTopology`; kNoIndex for
 /// faces inside a region. Empty if the mesh has no interfaces.
 std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& topology);
+
+/// Returns the groups of triangles on these faces; empty if there are no groups.
+std::vector<Index> groups_of_triangles(std::span<const Index> faces, std::span<const Index> group_of_face);
 
 }  // namespace subvol
