@@ -263,8 +263,8 @@ TriangleMesh SubdivisionFit::limit_triangles() {
   return limit;
 }
 
-/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the larger one of the finite
-/// element mesh's and the limit surface's.
+/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite
+/// element mesh's, of its interfaces', and of the limit surface's.
 double SubdivisionFit::measured_mean() {
   if (mean_) return *mean_;
   const double begin = runner_.seconds();
@@ -273,6 +273,7 @@ double SubdivisionFit::measured_mean() {
   if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
   double mean = 0;
   for (const TriangleMesh& surface : surfaces) mean = std::max(mean, target_.mean_distance(surface));
+  if (target_.has_interfaces()) mean = std::max(mean, target_.interface_distance(mesh).mean());
   mean_ = 100 * mean;
   if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
   seconds_["distance"] += runner_.seconds() - begin;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit/elements/boundary_samples.h"
 #include "fit/fits/flat_faces.h"
 #include "fit/geometry/boundary_triangles.h"
+#include "fit/high_order_fit.h"
 #include "fit/mesh_check.h"
 #include "fit/optimize_mesh.h"
 #include "fit/quality/region_quality.h"
@@ -142,6 +144,37 @@ TEST_CASE("interfaces that bulge are fitted by their subdivision surface", "[reg
     const FitResult result = fit_subdivision_volume(own_boundary(mesh), mesh, options);
     CHECK(certify(result.mesh).all_certified());
     CHECK(volume_change(result.mesh, mesh) <= kMostVolumeChange);
+  }
+}
+
+TEST_CASE("a curved fit keeps the interfaces of its template", "[regions]") {
+  const VolumeMesh mesh = cube_in_cube();
+  HighOrderFitOptions options;
+  options.order = 2;
+  const HighOrderFitResult result = fit_high_order(own_boundary(mesh), mesh, options);
+  const BoundarySamples samples = make_sheet_samples(result.mesh.space, mesh, 3);
+  const std::vector<Vec3> points = samples.positions.apply(result.mesh.coefficients);
+  const MeshTopology& topology = result.mesh.space.topology();
+  double largest = 0;
+  for (std::size_t t = 0; t < samples.triangles.size(); ++t)
+    if (!topology.is_boundary_face(samples.triangle_faces[t]))
+      for (const Index i : samples.triangles[t])
+        largest = std::max(largest, std::abs((points[i] - Vec3(2, 2, 2)).cwiseAbs().maxCoeff() - 1));
+  CHECK(largest <= 5e-3);
+}
+
+TEST_CASE("samples of sheets lie on the boundary and on interfaces, whose normals point to the larger reference",
+          "[regions]") {
+  const VolumeMesh mesh = cube_in_cube();
+  const ElementSpace space(mesh, Basis::legendre, 1);
+  const BoundarySamples samples = make_sheet_samples(space, mesh, 2);
+  const std::vector<Vec3> points = samples.positions.apply(mesh.positions);
+  CHECK(samples.triangles.size() == (96 + 24) * 8);
+  for (std::size_t t = 0; t < samples.triangles.size(); ++t) {
+    const auto& [a, b, c] = samples.triangles[t];
+    const Vec3 normal = (points[b] - points[a]).cross(points[c] - points[a]);
+    const double outward = normal.dot(points[a] + points[b] + points[c] - 3 * Vec3(2, 2, 2));
+    CHECK((outward > 0) == space.topology().is_boundary_face(samples.triangle_faces[t]));
   }
 }
 
