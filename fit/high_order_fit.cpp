@@ -17,6 +17,7 @@
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/staged_fit.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 
@@ -88,6 +89,7 @@ class HighOrderFit : StagedFit {
   bool end_for_memory(const std::string& why);
   void set_orders(const EntityOrders& orders);
   std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space) const;
+  BoundarySamples sheet_samples(const ElementSpace& space) const;
   FitProblem problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
                      const Stage& stage) const;
   bool run_stage(const Stage& stage);
@@ -126,6 +128,7 @@ class HighOrderFit : StagedFit {
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
   BoundarySamples samples_;
+  std::vector<Index> group_of_face_;  ///< `groups_of_sheets`; empty if there are no interfaces, or they are not kept
   int try_ = 0;              ///< number of the current attempt, from 1
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< highest order of any entity
@@ -159,6 +162,11 @@ void HighOrderFit::look_over_template() {
       target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
   report_.note_start(start);
   schedule_ = make_high_order_schedule(options_.lambda_close, start.mean_distance / target_.surface.length());
+  target_.keep_interfaces(template_);
+  if (target_.has_interfaces())
+    group_of_face_ = groups_of_sheets(template_, mesh_.space.topology());
+  else if (region_references(template_).size() > 1)
+    report_.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
 }
 
 /// Returns the number of sample intervals along an edge: about as fine as the target, and fine enough for the curves'
@@ -191,9 +199,16 @@ void HighOrderFit::set_orders(const EntityOrders& orders) {
     state.positions = HighOrderMesh(mesh_.space, std::move(state.positions)).with_orders(orders).coefficients;
   mesh_ = mesh_.with_orders(orders);
   order_ = mesh_.space.max_order();
-  samples_ = make_boundary_samples(mesh_.space, sample_intervals(order_));
+  samples_ = sheet_samples(mesh_.space);
   target_.sample(samples_.points.size());
   mean_.reset();
+}
+
+/// Samples the boundary, and the interfaces if they are kept.
+BoundarySamples HighOrderFit::sheet_samples(const ElementSpace& space) const {
+  const int intervals = sample_intervals(space.max_order());
+  return target_.has_interfaces() ? make_sheet_samples(space, template_, intervals)
+                                  : make_boundary_samples(space, intervals);
 }
 
 std::unique_ptr<HighOrderEnergy> HighOrderFit::volume_energy(const ElementSpace& space) const {
@@ -214,7 +229,9 @@ FitProblem HighOrderFit::problem(const ElementSpace& space, std::unique_ptr<High
   FitProblem problem(identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
                      make_surface_term(target_.surface, samples.triangles, samples.points.size(),
                                        stage.tangential_weight, options_.correspondence, SurfacePull::straight,
-                                       far_length_, samples.at_edges),
+                                       far_length_, samples.at_edges,
+                                       {groups_of_triangles(samples.triangle_faces, group_of_face_),
+                                        target_.group_of_triangle}),
                      stage.lambda);
   problem.tables.emplace(space, samples.points);
   return problem;
@@ -385,7 +402,7 @@ bool HighOrderFit::raise_where_it_pays() {
   if (!has_room(next)) return false;
   const HighOrderMesh raised = mesh_.with_orders(next);
   if (raised.space.num_nodes() == mesh_.space.num_nodes()) return false;
-  const BoundarySamples samples = make_boundary_samples(raised.space, sample_intervals(raised.space.max_order()));
+  const BoundarySamples samples = sheet_samples(raised.space);
   FitProblem raised_problem =
       problem(raised.space, volume_energy(raised.space), samples, schedule_.final_stage(lambda_));
   const EntityValues gains = order_gains(raised_problem, raised.space, mesh_.space.orders(), raised.coefficients);

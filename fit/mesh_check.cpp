@@ -277,6 +277,8 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   check_topology(mesh, topology, check);
   if (!has_any(check.defects, {Kind::bad_tag, Kind::inconsistent_orientation, Kind::nonconforming_face}))
     check.subdivision_audit = audit(mesh);
+  if (RegionReport regions = measure_regions(mesh, &*check.quality); regions.regions.size() > 1)
+    check.regions = std::move(regions);
   if (has_any(check.defects, {Kind::not_finite})) return check;
   std::vector<Index> face_of_triangle;
   const PolygonMesh boundary = boundary_surface(mesh, topology);
@@ -308,6 +310,24 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
     check_boundary(boundary.triangles, boundary.faces, compare, progress, check);
   if (check.has_boundary_geometry) check.chord_error = boundary.chord_error;
   return check;
+}
+
+std::string label_of(int reference, const RegionReport& report) {
+  for (const RegionQuality& region : report.regions)
+    if (region.reference == reference && !region.name.empty()) return region.name;
+  return std::to_string(reference);
+}
+
+void append_regions(std::string& text, const RegionReport& report) {
+  for (const RegionQuality& region : report.regions)
+    append(text, "region %-12s %zu cells, volume %.6g, scaled Jacobian min %.4f\n",
+           label_of(region.reference, report).c_str(), region.num_cells, region.volume, region.min_scaled_jacobian);
+  for (const InterfaceArea& interface : report.interfaces) {
+    const std::string sides =
+        label_of(interface.references[0], report) + " and " + label_of(interface.references[1], report);
+    append(text, "interface           between %s: %zu faces, area %.6g\n", sides.c_str(), interface.num_faces,
+           interface.area);
+  }
 }
 
 }  // namespace
@@ -384,6 +404,7 @@ std::string to_text(const MeshCheck& check) {
       append(text, "warning             %s\n", warning.c_str());
   if (check.quality) append_quality(text, *check.quality);
   append_witnesses(text, check.witnesses);
+  if (check.regions) append_regions(text, *check.regions);
   if (check.has_boundary_geometry) {
     append(text, "volume              %.6g\n", check.volume);
     if (check.chord_error > 0)

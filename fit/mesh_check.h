@@ -7,6 +7,7 @@
 #include "subvol/fit/geometry/normal_deviation.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/audit.h"
@@ -75,6 +76,7 @@ struct MeshCheck {
   std::optional<SubdivisionAudit> subdivision_audit;  ///< findings that degrade a subdivision of the mesh; not defects
 
   std::optional<QualityReport> quality;                      ///< includes the certificate
+  std::optional<RegionReport> regions;  ///< of linear cells with several references; area and volume of each, interfaces
   std::vector<InversionWitness> witnesses;                   ///< one for each of the first ten refuted cells
 
   bool has_boundary_geometry = false;                        ///< true if the numbers below are set

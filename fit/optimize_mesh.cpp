@@ -14,12 +14,14 @@
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/fit/solver/free_nodes.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/untangle.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 
@@ -50,6 +52,9 @@ constexpr double kPoorJacobian = 0.2;
 constexpr double kMeanMargin = 0.9, kMaxMargin = 0.8;
 /// Least factor to which the weight of a cell is lowered for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
+
+/// Largest relative change of a region's volume.
+constexpr double kMostVolumeChange = 1e-3;
 
 /// State that a round has reached.
 struct Progress {
@@ -105,11 +110,19 @@ class MeshOptimizer {
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
                  options.cancelled, options.log}) {
     target_.normalisation.take_in(mesh_);
+    target_.keep_interfaces(mesh_);
+    interfaces_ = find_interfaces(mesh_, topology_);
+    marks_ = mark_interfaces(topology_, interfaces_);
+    face_groups_ = groups_of_sheets(mesh_, topology_);
+    start_volumes_ = region_volumes(mesh_);
   }
   OptimizeResult run(const VolumeMesh& original);
 
  private:
   enum class Boundary { fixed, sliding };
+  /// What is held for the sake of the regions' volumes, each after all before: nothing; the volumes, by lowering lambda;
+  /// the vertices of interfaces; those of the boundary.
+  enum class Held { nothing, volumes, interfaces, sheets };
 
   std::vector<std::array<Index, 2>> tagged_edges() const;
   void find_features();
@@ -122,6 +135,9 @@ class MeshOptimizer {
   FitProblem make_problem(Boundary boundary, double lambda, bool untangles, std::vector<Vec3>& x) const;
   std::unique_ptr<SurfaceTerm> surface_term(bool emphasize_far) const;
   StageRecord record(std::string name) const;
+  bool attempt(double least_jacobian);
+  double volume_change() const;
+  bool changes_volumes() const { return volume_change() > kMostVolumeChange; }
   bool untangle_all();
   bool untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options);
   bool improve();
@@ -129,7 +145,7 @@ class MeshOptimizer {
   struct Measured;
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
-  void flatten();
+  void flatten(double least_jacobian);
   bool run_quality_stages(const QualitySchedule& schedule);
   bool raise_quality(double goal);
   bool raise_quality();
@@ -146,6 +162,11 @@ class MeshOptimizer {
   MeshTopology topology_;
   bool own_boundary_;
   FitTarget target_;
+  Interfaces interfaces_;            ///< between regions; fitted to themselves as they are at the start
+  InterfaceMarks marks_;
+  Held held_ = Held::nothing;
+  std::vector<Index> face_groups_;   ///< `groups_of_sheets`; empty without interfaces
+  std::vector<double> start_volumes_;  ///< of the regions
   FollowedCreases creases_;
   BoundarySamples samples_;
   std::vector<Vec3> ideal_boxes_;
@@ -168,20 +189,23 @@ std::vector<std::array<Index, 2>> MeshOptimizer::tagged_edges() const {
   const auto number = [&](Index v) {
     return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
   };
-  for (const CreaseEdge& crease : mesh_.tags.creases) edges.push_back({number(crease.v0), number(crease.v1)});
+  for (const CreaseEdge& crease : mesh_.tags.creases)
+    if (topology_.is_boundary_edge(topology_.find_edge(crease.v0, crease.v1)))
+      edges.push_back({number(crease.v0), number(crease.v1)});
   return edges;
 }
 
 void MeshOptimizer::find_features() {
   if (options_.fixed_boundary) return;
   creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_, tagged_edges());
+  creases_.keep_interfaces(mesh_, options_.crease_angle_degrees, own_boundary_);
   sample_boundary();
   target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
 }
 
 void MeshOptimizer::sample_boundary() {
   constexpr int kIntervals = 2;
-  samples_ = make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
+  samples_ = make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
   refined_.assign(samples_.triangles.size(), 0);
 }
 
@@ -193,10 +217,13 @@ std::vector<std::uint8_t> MeshOptimizer::vertices_of(std::span<const Index> cell
   return marked;
 }
 
-/// Corner vertices of cells that do not improve may slide along the feature curves that end there.
+/// Corner vertices of cells that do not improve may slide along the feature curves that end there, but not those of
+/// interfaces: the volume of a region depends on them.
 void MeshOptimizer::release_corners(std::span<const Index> cells) {
   const std::vector<std::uint8_t> marked = vertices_of(cells);
-  std::erase_if(mesh_.tags.corners, [&](const CornerVertex& corner) { return marked[corner.vertex] != 0; });
+  std::erase_if(mesh_.tags.corners, [&](const CornerVertex& corner) {
+    return marked[corner.vertex] != 0 && !marks_.has_vertex(corner.vertex);
+  });
 }
 
 /// If a boundary is folded, its sharp edges may be those of the folds, so those at the given cells are released.
@@ -229,6 +256,11 @@ std::vector<std::uint8_t> MeshOptimizer::fixed_vertices(Boundary boundary) const
   } else if (own_boundary_) {
     for (const CornerVertex& corner : mesh_.tags.corners) fixed[corner.vertex] = 1;
   }
+  for (std::size_t v = 0; v < marks_.vertices.size(); ++v) {
+    const bool on_boundary = topology_.is_boundary_vertex(static_cast<Index>(v));
+    if (held_ == Held::sheets && on_boundary) fixed[v] = 1;
+    if ((held_ >= Held::interfaces || boundary == Boundary::fixed) && marks_.vertices[v]) fixed[v] = 1;
+  }
   return fixed;
 }
 
@@ -236,6 +268,7 @@ std::unique_ptr<SurfaceTerm> MeshOptimizer::surface_term(bool emphasize_far) con
   const int points = samples_.triangles.size() > target_.surface.triangles().size() ? 1 : 3;
   auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples_.triangles, samples_.points.size(),
                                                       kTangentialWeight, points);
+  if (!interfaces_.empty()) surface->set_groups(groups_of_triangles(samples_.triangle_faces, face_groups_), target_.group_of_triangle);
   if (emphasize_far) surface->emphasize_far(kFarDistance);
   surface->refine(refined_);
   if (!creases_.curves().empty())
@@ -349,7 +382,8 @@ bool MeshOptimizer::improve() {
   for (int round = 0; round < kMaxRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
-    const bool too_far = mean_percent_ > kMeanMargin * options_.mean_tolerance_percent;
+    const bool too_far = mean_percent_ > kMeanMargin * options_.mean_tolerance_percent ||
+                         (held_ != Held::nothing && changes_volumes());
     if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
       lambda /= 2;
     } else if (!now.gains_on(before, kMaxMargin * options_.max_tolerance_percent)) {
@@ -374,7 +408,19 @@ bool MeshOptimizer::improve() {
 struct MeshOptimizer::Measured {
   double least_jacobian = -1, mean_jacobian = -1, mean_percent = 0, max_percent = 0;
   std::size_t uncertified = 0, intersections = 0;
+  double volume_change = 0;  ///< largest relative change of a region's volume, if the mesh has several
 };
+
+/// Returns the largest relative change of a region's volume; 0 if the boundary has a target of its own, which changes
+/// volumes.
+double MeshOptimizer::volume_change() const {
+  double largest = 0;
+  if (interfaces_.empty() || !own_boundary_) return largest;
+  const std::vector<double> volumes = region_volumes(mesh_);
+  for (std::size_t r = 0; r < volumes.size(); ++r)
+    largest = std::max(largest, std::abs(volumes[r] / start_volumes_[r] - 1));
+  return largest;
+}
 
 MeshOptimizer::Measured MeshOptimizer::measure() const {
   const QualityReport quality = measure_quality(mesh_);
@@ -385,6 +431,13 @@ MeshOptimizer::Measured MeshOptimizer::measure() const {
   const SurfaceDistance distance = target_.distance(surface);
   result.mean_percent = 100 * distance.mean();
   result.max_percent = 100 * distance.max();
+  if (!interfaces_.empty()) {
+    const SurfaceDistance between = target_.interface_distance(mesh_);
+    result.mean_percent = std::max(result.mean_percent, 100 * between.mean());
+    result.max_percent = std::max(result.max_percent, 100 * between.max());
+    result.volume_change = volume_change();
+  }
+  // Certified cells in a boundary that does not meet itself do not overlap, so neither do the interfaces between them.
   // Not to be interrupted: a fraction of a second, without which two states cannot be compared.
   result.intersections = count_intersecting_pairs(surface);
   return result;
@@ -393,6 +446,7 @@ MeshOptimizer::Measured MeshOptimizer::measure() const {
 bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const {
   return now.uncertified <= before.uncertified && now.intersections <= before.intersections &&
          now.least_jacobian > before.least_jacobian &&
+         now.volume_change <= std::max(before.volume_change, kMostVolumeChange) &&
          now.mean_percent <= std::max(before.mean_percent, kMeanMargin * options_.mean_tolerance_percent) &&
          now.max_percent <= std::max(before.max_percent, options_.max_tolerance_percent);
 }
@@ -402,7 +456,7 @@ bool MeshOptimizer::is_better(const Measured& now, const Measured& before) const
 bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start) const {
   constexpr double kLeastGain = 1e-6;
   const double mean_limit = options_.mean_tolerance_percent, max_limit = options_.max_tolerance_percent;
-  if (now.uncertified > 0 || now.intersections > start.intersections ||
+  if (now.uncertified > 0 || now.intersections > start.intersections || now.volume_change > kMostVolumeChange ||
       now.mean_percent > std::max(start.mean_percent, mean_limit) ||
       now.max_percent > std::max(start.max_percent, max_limit))
     return false;
@@ -424,6 +478,9 @@ bool MeshOptimizer::run_quality_stages(const QualitySchedule& schedule) {
     boundary.fixed = samples_.positions.apply(free.fixed);
     boundary.triangles = samples_.triangles;
     boundary.triangle_faces = samples_.triangle_faces;
+    boundary.interfaces = interfaces_.faces;
+    boundary.group_of_face = face_groups_;
+    boundary.group_of_triangle = target_.group_of_triangle;
     if (!creases_.curves().empty())
       creases = [&](double width) {
         return creases_.energy(samples_.crease_edges, samples_.points.size(), width, kQualityTangentialWeight);
@@ -472,10 +529,10 @@ bool MeshOptimizer::raise_quality() {
   return raise_quality(std::min(kMostQuality, options_.quality + kBeyond));
 }
 
-/// Makes flat faces exactly so, unless the boundary is fixed.
-void MeshOptimizer::flatten() {
+/// Makes flat faces exactly so, unless the boundary is fixed. least_jacobian: of the start.
+void MeshOptimizer::flatten(double least_jacobian) {
   if (options_.fixed_boundary) return;
-  flatten_faces(mesh_, target_.mesh, *target_.tree, flat_facets(target_.mesh));
+  flatten_sheets(mesh_, target_, std::max(least_jacobian, 0.0));
 }
 
 /// There is nothing to measure if the target is the mesh's own boundary.
@@ -492,6 +549,10 @@ void MeshOptimizer::measure_distance() {
   const SurfaceDistance distance = target_.distance(refined_triangles(boundary_surface(mesh_, topology_)));
   mean_percent_ = 100 * distance.mean();
   max_percent_ = 100 * distance.max();
+  if (interfaces_.empty()) return;
+  const SurfaceDistance between = target_.interface_distance(mesh_);
+  mean_percent_ = std::max(mean_percent_, 100 * between.mean());
+  max_percent_ = std::max(max_percent_, 100 * between.max());
 }
 
 /// Returns true if the caller's limit of steps, not the schedule's, ended a minimization.
@@ -523,17 +584,36 @@ void MeshOptimizer::finish(bool going) {
   }
 }
 
-OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
-  measure_start();
-  const Measured start = measure();
-  std::vector<Vec3> start_positions = mesh_.positions;
+/// Does the whole work on the present mesh. least_jacobian: of the start. Returns false if the work was ended early.
+bool MeshOptimizer::attempt(double least_jacobian) {
+  weights_.clear();
+  relief_.assign(mesh_.num_cells(), 1);
   find_features();
   find_sizes();
   uncertified_ = certify(mesh_).not_certified;
   bool going = uncertified_.empty() || untangle_all();
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
-  flatten();
+  flatten(least_jacobian);
+  return going;
+}
+
+OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
+  measure_start();
+  const Measured start = measure();
+  std::vector<Vec3> start_positions = mesh_.positions;
+  bool going = attempt(start.least_jacobian);
+  while (going && !options_.fixed_boundary && held_ != Held::sheets && changes_volumes()) {
+    report_.undo_stages(0, report_.stages.size());
+    mesh_.positions = start_positions;
+    mesh_.tags = original.tags;
+    held_ = static_cast<Held>(static_cast<int>(held_) + 1);
+    going = attempt(start.least_jacobian);
+  }
+  if (held_ >= Held::interfaces)
+    report_.warnings.push_back(
+        formatted("%s between regions were fixed: sliding changed the volume of a region by more than %g %%",
+                  held_ == Held::interfaces ? "interfaces" : "the boundary and interfaces", 100 * kMostVolumeChange));
   OptimizeResult result{original, {}, {}};
   const bool wants_other_sizes = options_.sizes == CellSizes::uniform;
   if (start.uncertified > 0 || wants_other_sizes || is_worth_keeping(measure(), start)) {

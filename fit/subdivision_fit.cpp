@@ -11,6 +11,7 @@
 #include "subvol/fit/features/followed_creases.h"
 #include "subvol/fit/fits/fit_level.h"
 #include "subvol/fit/fits/fit_schedule.h"
+#include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/memory_budget.h"
@@ -18,6 +19,7 @@
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/staged_fit.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/subdivision/audit.h"
@@ -66,6 +68,7 @@ class SubdivisionFit : StagedFit {
 
  private:
   void look_over_template();
+  void keep_interfaces();
   void begin(double own_box_share);
   bool run_levels();
   bool run_level();
@@ -85,6 +88,7 @@ class SubdivisionFit : StagedFit {
   std::optional<Measured> measure();
   bool raise_quality();
   bool run_quality_stages(const QualitySchedule& schedule);
+  bool flatten_interfaces();
   TriangleMesh limit_triangles();
   double measured_mean();
   VolumeMesh current_mesh() const;
@@ -148,6 +152,16 @@ void SubdivisionFit::look_over_template() {
   report.note_start(start);
   schedule_ = make_schedule(options_, start.mean_distance / target_.surface.length(),
                             template_creases_.hold_the_surface());
+  keep_interfaces();
+}
+
+/// The interfaces between the template's regions keep their shape, sharp edges included.
+void SubdivisionFit::keep_interfaces() {
+  target_.keep_interfaces(template_);
+  if (target_.has_interfaces())
+    template_creases_.keep_interfaces(template_, options_.crease_angle_degrees.value_or(kUsualCreaseAngle), false);
+  else if (region_references(template_).size() > 1)
+    result_.report.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
 }
 
 void SubdivisionFit::prepare_level() {
@@ -199,7 +213,8 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
   std::unique_ptr<SurfaceTerm> term =
       make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
-                        options_.correspondence);
+                        options_.correspondence, SurfacePull::along_normals, 0, {},
+                        {level_.sample_groups, target_.group_of_triangle});
   if (!creases_.curves().empty())
     term->add_creases(creases_.energy(level_.crease_edges, level_.samples.num_rows(),
                                       kCreaseWidth * target_.surface.length(), stage.tangential_weight));
@@ -268,18 +283,21 @@ bool SubdivisionFit::start_level() {
 /// mesh's.
 TriangleMesh SubdivisionFit::limit_triangles() {
   constexpr int kRefinements = 2;
-  if (!limit_check_) limit_check_ = refine_boundary(level_.mesh, kRefinements);
+  if (!limit_check_) limit_check_ = refine_sheets(level_.mesh, kRefinements);
   TriangleMesh limit;
   limit.positions = limit_check_->positions.apply(level_.refine.apply(from_unknowns_.apply(unknowns_)));
-  for (const auto& q : limit_check_->quads) {
+  const auto num_boundary_faces = static_cast<Index>(limit_check_->faces.size() - level_.interfaces.size());
+  for (std::size_t k = 0; k < limit_check_->quads.size(); ++k) {
+    if (limit_check_->face_of_quad[k] >= num_boundary_faces) break;  // the rest are interfaces
+    const auto& q = limit_check_->quads[k];
     limit.triangles.push_back({q[0], q[1], q[2]});
     limit.triangles.push_back({q[0], q[2], q[3]});
   }
   return limit;
 }
 
-/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the larger one of the finite
-/// element mesh's and the limit surface's.
+/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite
+/// element mesh's, of its interfaces', and of the limit surface's.
 double SubdivisionFit::measured_mean() {
   if (mean_) return *mean_;
   const double begin = runner_.seconds();
@@ -288,6 +306,7 @@ double SubdivisionFit::measured_mean() {
   if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
   double mean = 0;
   for (const TriangleMesh& surface : surfaces) mean = std::max(mean, target_.mean_distance(surface));
+  if (target_.has_interfaces()) mean = std::max(mean, target_.interface_distance(mesh).mean());
   mean_ = 100 * mean;
   if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
   seconds_["distance"] += runner_.seconds() - begin;
@@ -350,7 +369,7 @@ bool SubdivisionFit::lower_lambda(std::size_t pairs) {
 struct SubdivisionFit::Measured {
   double least_jacobian;
   std::size_t uncertified, pairs;
-  std::vector<SurfaceDistance> distances;  ///< of the finest mesh, and of the limit surface if it matters
+  std::vector<SurfaceDistance> distances;  ///< of the finest mesh, of its interfaces, and of the limit surface
 
   double largest() const {
     double largest = 0;
@@ -389,6 +408,7 @@ std::optional<SubdivisionFit::Measured> SubdivisionFit::measure() {
   if (!pairs) return std::nullopt;
   Measured result{quality.min_scaled_jacobian, quality.certificate.not_certified.size(), *pairs, {}};
   result.distances.push_back(target_.distance(surface));
+  if (target_.has_interfaces()) result.distances.push_back(target_.interface_distance(mesh));
   if (options_.surface == FittedSurface::limit) result.distances.push_back(target_.distance(limit_triangles()));
   return result;
 }
@@ -399,7 +419,9 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
   };
   const bool has_creases = !creases_.curves().empty();
   QualityStages stages(level_.mesh, ideal_boxes_, level_.nodes, {},
-                       {level_.samples, {}, level_.sample_triangles, level_.sample_faces}, target_.surface,
+                       {level_.samples, {}, level_.sample_triangles, level_.sample_faces, level_.interfaces,
+                        level_.face_groups, target_.group_of_triangle},
+                       target_.surface,
                        has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
   stages.before_stage = [this] { keep_state(); };
   StageRecord record;
@@ -443,6 +465,26 @@ bool SubdivisionFit::raise_quality() {
   return true;
 }
 
+/// Makes flat interfaces exactly so, unless the cells suffer. Returns false if the fit must end.
+bool SubdivisionFit::flatten_interfaces() {
+  constexpr double kLeastShare = 0.98;  // of the least scaled Jacobian
+  if (!target_.has_interfaces()) return true;
+  const std::optional<Measured> before = measure();
+  if (!before) return false;
+  FitSnapshot start = snapshot();
+  VolumeMesh cage = cage_;
+  cage.positions = unknowns_;
+  if (flatten_interface_patches(cage, target_) == 0) return true;
+  unknowns_ = std::move(cage.positions);
+  mean_.reset();
+  const std::optional<Measured> now = measure();
+  if (now && now->uncertified <= before->uncertified && now->pairs <= before->pairs &&
+      now->least_jacobian >= kLeastShare * before->least_jacobian)
+    return true;
+  go_back(std::move(start));
+  return now.has_value();
+}
+
 bool SubdivisionFit::run_stages() {
   const FitSnapshot start = snapshot();
   for (const Stage& stage : schedule_.stages(number_)) {
@@ -452,7 +494,7 @@ bool SubdivisionFit::run_stages() {
   if (!finest()) return true;
   std::optional<std::size_t> pairs = intersecting_pairs();
   return pairs && unfold(start, kMostUnfoldingLambda, *pairs) && lower_lambda(*pairs) && fit_all_samples() &&
-         raise_quality();
+         raise_quality() && flatten_interfaces();
 }
 
 /// Stores the whole state or nothing, since memory may run out here.

@@ -46,7 +46,8 @@ const std::vector<Room> kRooms{
     {"fit/stages",
      {"subvol", "fit/certificate", "fit/geometry", "fit/target", "fit/features", "fit/energies", "fit/solver"}},
     {"fit/fits",
-     {"subvol", "fit/elements", "fit/quality", "fit/geometry", "fit/features", "fit/solver", "fit/stages"}},
+     {"subvol", "fit/elements", "fit/quality", "fit/geometry", "fit/target", "fit/features", "fit/solver",
+      "fit/stages"}},
     {"fit", {"subvol"}},  // and every room of fit
     {"shell", {"subvol", "fit"}},
     // The result of a fit may be shown, but no energy, no solver and no fit.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
 
+#include "cli/runs/run_options.h"
 #include "subvol/base/format.h"
 #include "subvol/export/high_order_file.h"
 #include "subvol/fit/elements/polynomial_map.h"
@@ -123,6 +124,7 @@ Json check_json(const MeshCheck& check) {
                                 {"percentile_95_degrees", check.normals->percentile_95_degrees}};
   if (check.orders) json["orders"] = orders_json(*check.orders);
   if (check.quality) json["quality"] = quality_json(*check.quality);
+  if (check.regions) json["regions"] = regions_json(*check.regions);
   if (!check.witnesses.empty()) json["inverted_at"] = witnesses_json(check.witnesses);
   if (check.has_boundary_geometry) {
     json["boundary_self_intersections"] = check.num_intersecting_triangle_pairs;
@@ -135,6 +137,31 @@ Json check_json(const MeshCheck& check) {
   json["defects"] = defects_json(check);
   if (const Json unused = unused_vertices_json(check); !unused.empty()) json["unused_vertices"] = unused;
   return json;
+}
+
+Json regions_json(const RegionReport& report, const RegionReport* start) {
+  Json regions = Json::array(), interfaces = Json::array();
+  for (const RegionQuality& region : report.regions) {
+    Json one{{"reference", region.reference},
+             {"cells", region.num_cells},
+             {"not_certified", region.num_uncertified},
+             {"volume", region.volume},
+             {"boundary_area", region.area},
+             {"min_scaled_jacobian", region.min_scaled_jacobian}};
+    if (!region.name.empty()) one["name"] = as_utf8(region.name);
+    if (start)
+      for (const RegionQuality& before : start->regions)
+        if (before.reference == region.reference) one["start_volume"] = before.volume;
+    regions.push_back(std::move(one));
+  }
+  for (const InterfaceArea& interface : report.interfaces) {
+    Json one{{"references", interface.references}, {"faces", interface.num_faces}, {"area", interface.area}};
+    if (start)
+      for (const InterfaceArea& before : start->interfaces)
+        if (before.references == interface.references) one["start_area"] = before.area;
+    interfaces.push_back(std::move(one));
+  }
+  return {{"cells", std::move(regions)}, {"interfaces", std::move(interfaces)}};
 }
 
 Json audit_json(const SubdivisionAudit& found) {

@@ -10,8 +10,11 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/sheets.h"
+#include "subvol/templates/template_edit.h"
 
 #include <algorithm>
 #include <array>
@@ -95,10 +98,13 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
   const auto number = [&](Index v) {
     return static_cast<Index>(std::lower_bound(volume_vertex.begin(), volume_vertex.end(), v) - volume_vertex.begin());
   };
-  for (const CreaseEdge& crease : mesh.tags.creases)
+  // Where interfaces reach the boundary, the cage is sharp without a tag.
+  const bool has_regions = !find_interfaces(mesh, topology).empty();
+  const FeatureTags tags = has_regions ? boundary_tags(mesh, topology) : mesh.tags;
+  for (const CreaseEdge& crease : tags.creases)
     if (const Index e = topology.find_edge(crease.v0, crease.v1); e != kNoIndex && topology.is_boundary_edge(e))
       boundary.tags.creases.push_back({number(crease.v0), number(crease.v1), crease.sharpness});
-  for (const CornerVertex& corner : mesh.tags.corners)
+  for (const CornerVertex& corner : tags.corners)
     if (topology.is_boundary_vertex(corner.vertex))
       boundary.tags.corners.push_back({number(corner.vertex), corner.sharpness});
   return boundary;
@@ -108,6 +114,23 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
                        const std::string& references) {
   require_cell_file(path);
   return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
+}
+
+VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
+  const std::vector<int> references = region_references(mesh);
+  const auto is_wanted = [&](int reference) {
+    return region == std::to_string(reference) || region == region_label(mesh, reference);
+  };
+  const auto wanted = std::ranges::find_if(references, is_wanted);
+  if (wanted == references.end()) {
+    std::string known;
+    for (const int reference : references)
+      known += (known.empty() ? "" : ", ") + std::to_string(reference) + " (" + region_label(mesh, reference) + ")";
+    throw UsageError("--region: the mesh has no region " + in_quotes(region) + "; it has " + known);
+  }
+  std::vector<char> kept(mesh.num_cells());
+  for (std::size_t c = 0; c < kept.size(); ++c) kept[c] = reference_of(mesh, c) == *wanted;
+  return kept_cells(mesh, kept);
 }
 
 HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings,

@@ -56,6 +56,10 @@ TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vect
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
 
+/// Returns the cells of one region, which is given by its name or its number. UsageError: there is none; the message lists
+/// the regions.
+VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region);
+
 /// `read_curved`; InputError also if the whole mesh is at one point. warnings: may be null.
 HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr,
                               const std::string& references = {});

@@ -20,13 +20,14 @@ namespace {
 struct ConvertArguments {
   RunOptions run;
   WritingOptions writing;
-  std::string input;
+  std::string input, region;
   bool limit = false;
 };
 
 void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outputs,
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
-  const VolumeMesh mesh = load_volume(arguments.input, warnings, true, arguments.run.references);
+  VolumeMesh mesh = load_volume(arguments.input, warnings, true, arguments.run.references);
+  if (!arguments.region.empty()) mesh = cells_of_region(mesh, arguments.region);
   warn_of_losses(marks_of(mesh), marks_of(mesh), outputs, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) {
     if (arguments.limit && output.extension == ".obj") {
@@ -85,9 +86,12 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   int status = kDone;
   require_known_file(arguments.input);
   require_choice_of_references(arguments.input, arguments.run.references);
+  const bool is_linear = is_volume_file(arguments.input);
+  if (!arguments.region.empty() && !is_linear)
+    throw UsageError("--region: " + arguments.input + " holds no linear cells to choose from");
   if (is_high_order_file(arguments.input)) {
     status = convert_high_order(arguments, outputs, writing, warnings);
-  } else if (is_volume_file(arguments.input)) {
+  } else if (is_linear) {
     convert_volume(arguments, outputs, writing, warnings);
   } else {
     convert_surface(arguments, outputs, writing, warnings);
@@ -108,6 +112,8 @@ void add_convert_command(CLI::App& app, Action& action) {
       ->type_name("FILE");
   verb->add_flag("--limit", arguments->limit,
                  "Surface formats show the limit surface of the mesh as a control cage, not its flat faces");
+  verb->add_option("--region", arguments->region, "Write the cells of this region only: its name or reference")
+      ->type_name("NAME");
   verb->add_option("--intervals", arguments->writing.linear_intervals,
                    "Of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order")
       ->check(CLI::Range(0, 64))

@@ -211,6 +211,10 @@ Json FitRun::report() const {
   if (choice_) json["template"] = choice_json(*choice_);
   json.update(fit_json(report));
   json.update(check_json(mesh_check_));
+  if (mesh_check_.regions) {
+    const RegionReport start = measure_regions(template_mesh_, nullptr);
+    json["regions"] = regions_json(*mesh_check_.regions, &start);
+  }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
   json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;

@@ -113,6 +113,10 @@ Json OptimizeRun::report() const {
   if (target_) json["input"]["target"] = describe(arguments_.target, *target_);
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
+  if (mesh_check_.regions) {
+    const RegionReport start = measure_regions(mesh_, &before_);
+    json["regions"] = regions_json(*mesh_check_.regions, &start);
+  }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   checkpointing_->describe(json);
   json["not_certified_cells"] = not_certified_cells(mesh_check_);

@@ -2,6 +2,7 @@
 #include "subvol/fit/elements/boundary_samples.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/interfaces.h"
 
 #include <algorithm>
 #include <string>
@@ -187,6 +188,23 @@ BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Ind
     if (!sampler.add_edge(e))
       throw InputError("make_face_samples: edge " + std::to_string(e) + " belongs to none of the faces");
   return sampler.take();
+}
+
+BoundarySamples make_sheet_samples(const ElementSpace& space, const VolumeMesh& mesh, int intervals,
+                                   std::span<const CreaseEdge> creases) {
+  const MeshTopology& topology = space.topology();
+  const Interfaces interfaces = find_interfaces(mesh, topology);
+  if (interfaces.empty()) return make_boundary_samples(space, intervals, creases);
+  std::vector<Index> faces(topology.boundary_faces().begin(), topology.boundary_faces().end()), edges;
+  faces.insert(faces.end(), interfaces.faces.begin(), interfaces.faces.end());
+  for (const CreaseEdge& crease : creases) edges.push_back(topology.find_edge(crease.v0, crease.v1));
+  BoundarySamples samples = make_face_samples(space, faces, intervals, edges);
+  for (std::size_t t = 0; t < samples.triangles.size(); ++t) {
+    const auto [first, second] = topology.face_cells(samples.triangle_faces[t]);
+    if (second != kNoIndex && mesh.references[first] > mesh.references[second])
+      std::swap(samples.triangles[t][1], samples.triangles[t][2]);
+  }
+  return samples;
 }
 
 }  // namespace subvol

@@ -3,6 +3,7 @@
 
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/mesh/feature_tags.h"
+#include "subvol/mesh/volume_mesh.h"
 
 #include <array>
 #include <cstdint>
@@ -39,5 +40,13 @@ BoundarySamples make_boundary_samples(const ElementSpace& space, int intervals,
 /// InputError: intervals < 1, a number out of range, an edge that belongs to none of the faces.
 BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Index> faces, int intervals,
                                   std::span<const Index> edges = {});
+
+/// Samples the boundary and the interfaces between regions (cells of different references). The normals of an interface's
+/// triangles point from the smaller to the larger reference. Without interfaces: as `make_boundary_samples`.
+///
+/// mesh     the mesh that the space was made of, with its references.
+/// creases  edges of the boundary or of interfaces. InputError: as above.
+BoundarySamples make_sheet_samples(const ElementSpace& space, const VolumeMesh& mesh, int intervals,
+                                   std::span<const CreaseEdge> creases = {});
 
 }  // namespace subvol

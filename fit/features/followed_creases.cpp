@@ -2,6 +2,7 @@
 #include "subvol/fit/features/followed_creases.h"
 
 #include "subvol/mesh/features.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/subdivision/audit.h"
 
 #include <algorithm>
@@ -29,6 +30,51 @@ FollowedCreases::FollowedCreases(const TriangleMesh& target, std::optional<doubl
 FollowedCreases::FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh)
     : curves_(std::move(curves)), paths_(std::move(paths)) {
   mesh.tags = tags_of_paths(paths_, curves_);
+  find_curves_of_creases(mesh);
+}
+
+void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, bool with_rims) {
+  const MeshTopology topology(mesh);
+  const InterfaceMarks marks = mark_interfaces(topology, find_interfaces(mesh, topology));
+  if (marks.edges.empty()) return;
+  using Edge = std::array<Index, 2>;
+  std::set<Edge> of_boundary, of_interfaces;
+  const auto add = [&](const CreaseEdge& crease) {
+    const Index e = topology.find_edge(crease.v0, crease.v1);
+    if (topology.is_boundary_edge(e))
+      of_boundary.insert(topology.edge(e));
+    else
+      of_interfaces.insert(topology.edge(e));
+  };
+  for (const CreaseEdge& crease : mesh.tags.creases) add(crease);
+  for (const CreaseEdge& crease : features_by_angle(mesh, angle_degrees).creases)
+    if (!topology.is_boundary_edge(topology.find_edge(crease.v0, crease.v1))) add(crease);
+  for (std::size_t i = 0; i < marks.curves.size(); ++i) {
+    const Index e = static_cast<Index>(i);
+    const bool on_boundary = topology.is_boundary_edge(e);
+    if (marks.curves[i] && (!on_boundary || with_rims) && !of_boundary.contains(topology.edge(e)))
+      of_interfaces.insert(topology.edge(e));
+  }
+  std::vector<Edge> all(of_boundary.begin(), of_boundary.end());
+  all.insert(all.end(), of_interfaces.begin(), of_interfaces.end());
+  const FeatureCurves found = feature_curves({mesh.positions, {}}, angle_degrees, all);
+  FeatureTags tags;
+  for (const FeatureCurve& curve : found.curves) {
+    const auto [low, high] = std::minmax(curve.vertices[0], curve.vertices[1]);
+    if (of_boundary.contains({low, high})) continue;
+    for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i)
+      tags.creases.push_back({curve.vertices[i], curve.vertices[i + 1]});
+    for (const Index end : {curve.vertices.front(), curve.vertices.back()}) {
+      const auto at = std::ranges::lower_bound(found.corners, end);
+      const bool is_corner = at != found.corners.end() && *at == end;
+      if (is_corner && found.corner_edges[static_cast<std::size_t>(at - found.corners.begin())] > 1)
+        tags.corners.push_back({end});
+    }
+    paths_.push_back({static_cast<Index>(curves_.curves.size()), curve.vertices});
+    curves_.curves.push_back(curve);
+  }
+  mesh.tags = merge_tags(mesh.tags, tags);
+  curve_of_crease_.clear();
   find_curves_of_creases(mesh);
 }
 

@@ -35,6 +35,11 @@ class FollowedCreases {
   /// With paths that are known: tags the mesh along them, with no other tags.
   FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh);
 
+  /// Adds the sharp edges of the interfaces between a mesh's regions, which follow themselves as they are, and tags the
+  /// mesh with them: edges sharper than the angle, creases of its tags, and inner feature curves.
+  /// with_rims  also the feature curves where interfaces end at the boundary, if these are to stay where they are.
+  void keep_interfaces(VolumeMesh& mesh, double angle_degrees, bool with_rims);
+
   const FeatureCurves& curves() const { return curves_; }
   /// True if most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
   bool hold_the_surface() const;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/fit_level.h"
 
+#include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/features.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
@@ -21,12 +23,11 @@ constexpr int kMaxSampleRefinements = 3, kMaxCoarseRefinements = 1;
 /// diagonal). A coarser mesh cannot follow the target anyway and would only draw the limit surface away from it.
 constexpr double kMeshShare = 0.3, kMostGap = 5e-4;
 
-/// Takes the boundary vertices of a hex mesh as samples, without the limit map.
+/// Takes the vertices of the boundary and of interfaces of a hex mesh as samples, without the limit map.
 void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLevel& level) {
   const MeshTopology topology(mesh);
   std::vector<Index> sample_of(mesh.num_vertices(), kNoIndex), rows;
-  for (Index f : topology.boundary_faces()) {
-    const auto face = topology.face(f);
+  const auto add_face = [&](Index f, std::span<const Index> face) {
     std::array<Index, 4> quad;
     for (int i = 0; i < 4; ++i) {
       Index& sample = sample_of[face[i]];
@@ -39,7 +40,9 @@ void sample_plain_boundary(const VolumeMesh& mesh, const SparseMap& nodes, FitLe
     level.sample_triangles.push_back({quad[0], quad[1], quad[2]});
     level.sample_triangles.push_back({quad[0], quad[2], quad[3]});
     level.sample_faces.insert(level.sample_faces.end(), 2, f);
-  }
+  };
+  for (const Index f : topology.boundary_faces()) add_face(f, topology.face(f));
+  for (const Index f : find_interfaces(mesh, topology).faces) add_face(f, oriented_face(mesh, topology, f));
   level.samples = select_rows(nodes, rows);
   for (const CreaseEdge& crease : mesh.tags.creases)
     level.crease_edges.push_back({sample_of[crease.v0], sample_of[crease.v1]});
@@ -73,6 +76,14 @@ SparseMap bilinear_refinement(const BoundaryRefinement& once, std::size_t num_no
   return map;
 }
 
+void add_groups(FitLevel& level) {
+  const MeshTopology topology(level.mesh);
+  level.face_groups = groups_of_sheets(level.mesh, topology);
+  if (level.face_groups.empty()) return;
+  level.sample_groups = groups_of_triangles(level.sample_faces, level.face_groups);
+  level.interfaces = find_interfaces(level.mesh, topology).faces;
+}
+
 }  // namespace
 
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
@@ -87,6 +98,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   if (options.surface == FittedSurface::mesh) {
     level.nodes = fine_from_unknowns;
     sample_plain_boundary(level.mesh, level.nodes, level);
+    add_groups(level);
     return level;
   }
   const SparseMap limit = limit_map(level.mesh);
@@ -101,7 +113,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   BoundaryRefinement boundary;
   std::optional<SparseMap> towards_mesh;
   if (finest) {
-    boundary = refine_boundary(level.mesh, 1);
+    boundary = refine_sheets(level.mesh, 1);
     const SparseMap bilinear = bilinear_refinement(boundary, level.mesh.num_vertices());
     const std::vector<Vec3> fine = level.refine.apply(control.positions);
     const std::vector<Vec3> on_limit = boundary.positions.apply(fine), on_mesh = bilinear.apply(limit.apply(fine));
@@ -111,7 +123,7 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     if (options.tolerance_percent || gap <= kMostGap * static_cast<double>(on_limit.size()))
       towards_mesh = compose(bilinear, level.nodes);
   }
-  if (!towards_mesh) boundary = refine_boundary(level.mesh, finest ? std::max(refinements, 1) : refinements);
+  if (!towards_mesh) boundary = refine_sheets(level.mesh, finest ? std::max(refinements, 1) : refinements);
   level.samples = compose(boundary.positions, fine_from_unknowns);
   if (towards_mesh) level.samples = blend(level.samples, *towards_mesh, kMeshShare);
   level.crease_edges = std::move(boundary.crease_edges);
@@ -119,8 +131,9 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
     const auto& q = boundary.quads[k];
     level.sample_triangles.push_back({q[0], q[1], q[2]});
     level.sample_triangles.push_back({q[0], q[2], q[3]});
-    level.sample_faces.insert(level.sample_faces.end(), 2, topology.boundary_faces()[boundary.face_of_quad[k]]);
+    level.sample_faces.insert(level.sample_faces.end(), 2, boundary.faces[boundary.face_of_quad[k]]);
   }
+  add_groups(level);
   return level;
 }
 

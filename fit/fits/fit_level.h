@@ -29,6 +29,9 @@ struct FitLevel {
   SparseMap samples;             ///< N
   std::vector<std::array<Index, 3>> sample_triangles;
   std::vector<Index> sample_faces;  ///< face of the mesh of each of these triangles, as MeshTopology numbers it
+  /// Interfaces between regions are sampled like the boundary. Group of each face of the mesh (`groups_of_sheets`) and of
+  /// each sample triangle, and the faces of interfaces; empty without interfaces.
+  std::vector<Index> face_groups, sample_groups, interfaces;
   /// Edges between samples along the creases of the mesh, in the order of its tags, with the same number for each
   /// crease.
   std::vector<std::array<Index, 2>> crease_edges;

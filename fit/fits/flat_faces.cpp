@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/flat_faces.h"
 
+#include "subvol/fit/geometry/grouped_closest_point.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <Eigen/Dense>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <vector>
@@ -20,36 +24,42 @@ namespace {
 
 constexpr double kSameDirection = 0.9;  // cosine of 25 degrees
 
-/// Returns the facet that a boundary face lies on, or kNoIndex.
-Index facet_of_face(std::span<const Index> corners, const VolumeMesh& mesh, const ClosestPoint& tree,
+/// Finds the closest triangle of the surface that a sheet is to reproduce; the hint is a triangle or kNoIndex.
+using Closest = std::function<ClosestPoint::Hit(const Vec3& point, Index group, Index hint)>;
+
+/// Returns the facet that a face lies on, or kNoIndex.
+Index facet_of_face(std::span<const Index> corners, Index group, const VolumeMesh& mesh, const Closest& closest,
                     const FlatFacets& facets) {
   Vec3 centre = Vec3::Zero();
   for (const Index v : corners) centre += mesh.positions[v] / static_cast<double>(corners.size());
-  const ClosestPoint::Hit hit = tree.closest(centre);
+  const ClosestPoint::Hit hit = closest(centre, group, kNoIndex);
   const Index facet = hit.triangle == kNoIndex ? kNoIndex : facets.of_triangle[hit.triangle];
   if (facet == kNoIndex) return kNoIndex;
   Vec3 normal = Vec3::Zero();
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vec3 &p = mesh.positions[corners[i]], &next = mesh.positions[corners[(i + 1) % corners.size()]];
     normal += (p - centre).cross(next - centre);
-    const ClosestPoint::Hit halfway = tree.closest(0.5 * (centre + p), hit.triangle);
+    const ClosestPoint::Hit halfway = closest(0.5 * (centre + p), group, hit.triangle);
     if (halfway.triangle == kNoIndex || facets.of_triangle[halfway.triangle] != facet) return kNoIndex;
   }
   return std::abs(normal.normalized().dot(facets.planes[facet].normal)) >= kSameDirection ? facet : kNoIndex;
 }
 
-/// Returns the facets whose planes each vertex must lie in.
+/// Returns the facets whose planes each vertex must lie in. group: of each face of the topology; kNoIndex: on no sheet.
 std::vector<std::vector<Index>> facets_of_vertices(const VolumeMesh& mesh, const MeshTopology& topology,
-                                                   const ClosestPoint& tree, const FlatFacets& facets) {
-  const auto boundary = topology.boundary_faces();
-  std::vector<Index> of_face(boundary.size());
+                                                   std::span<const Index> group, const Closest& closest,
+                                                   const FlatFacets& facets) {
+  std::vector<Index> faces;
+  for (std::size_t f = 0; f < group.size(); ++f)
+    if (group[f] != kNoIndex) faces.push_back(static_cast<Index>(f));
+  std::vector<Index> of_face(faces.size());
 #pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t i = 0; i < boundary.size(); ++i)
-    of_face[i] = facet_of_face(topology.face(boundary[i]), mesh, tree, facets);
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    of_face[i] = facet_of_face(topology.face(faces[i]), group[faces[i]], mesh, closest, facets);
   std::vector<std::vector<Index>> result(mesh.num_vertices());
-  for (std::size_t i = 0; i < boundary.size(); ++i) {
+  for (std::size_t i = 0; i < faces.size(); ++i) {
     if (of_face[i] == kNoIndex) continue;
-    for (const Index v : topology.face(boundary[i])) {
+    for (const Index v : topology.face(faces[i])) {
       auto& list = result[v];
       if (std::find(list.begin(), list.end(), of_face[i]) == list.end()) list.push_back(of_face[i]);
     }
@@ -89,30 +99,28 @@ std::vector<double> shortest_edges(const VolumeMesh& mesh, const MeshTopology& t
   return shortest;
 }
 
-/// Puts vertices of cells that have suffered back. Returns false if there are none.
-bool put_back(VolumeMesh& mesh, std::span<const Vec3> before, const QualityReport& quality_before) {
+/// Puts vertices of cells that have suffered back: that are poorer than before and than `least`. Returns false if there
+/// are none.
+bool put_back(VolumeMesh& mesh, std::span<const Vec3> before, const QualityReport& quality_before, double least) {
   const QualityReport now = measure_quality(mesh);
   std::vector<Index> bad = now.certificate.not_certified;
   const auto& known = quality_before.certificate.not_certified;
   std::erase_if(bad, [&](Index c) { return std::binary_search(known.begin(), known.end(), c); });
   for (std::size_t c = 0; c < now.cell_minima.size(); ++c)
-    if (now.cell_minima[c] < std::min(quality_before.cell_minima[c], quality_before.min_scaled_jacobian))
+    if (now.cell_minima[c] < std::min(quality_before.cell_minima[c], least))
       bad.push_back(static_cast<Index>(c));
   for (const Index c : bad)
     for (const Index v : mesh.cell(static_cast<std::size_t>(c))) mesh.positions[v] = before[v];
   return !bad.empty();
 }
 
-}  // namespace
-
-std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
-                          const FlatFacets& facets) {
+/// Moves vertices into their planes, as far as cells allow. tolerance: distance from a plane that counts as in it.
+std::size_t flatten(VolumeMesh& mesh, const MeshTopology& topology, std::span<const Index> group,
+                    const Closest& closest, const FlatFacets& facets, double tolerance, double least_jacobian) {
   constexpr double kLongest = 0.1;  // of the shortest edge
   constexpr int kMostRounds = 20;
-  const MeshTopology topology(mesh);
-  const std::vector<std::vector<Index>> wanted = facets_of_vertices(mesh, topology, tree, facets);
+  const std::vector<std::vector<Index>> wanted = facets_of_vertices(mesh, topology, group, closest, facets);
   const std::vector<double> shortest = shortest_edges(mesh, topology);
-  const double tolerance = kFlatTolerance * bounding_box_diagonal(target);
   const std::vector<Vec3> before = mesh.positions;
   const QualityReport quality = measure_quality(mesh);
   for (std::size_t v = 0; v < wanted.size(); ++v) {
@@ -121,7 +129,7 @@ std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const Cl
     if (way && way->norm() <= kLongest * shortest[v]) mesh.positions[v] += *way;
   }
   int round = 0;
-  while (put_back(mesh, before, quality))
+  while (put_back(mesh, before, quality, std::min(quality.min_scaled_jacobian, least_jacobian)))
     if (++round == kMostRounds) {
       mesh.positions = before;
       break;
@@ -132,6 +140,99 @@ std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const Cl
       return std::abs(facets.planes[f].normal.dot(mesh.positions[v]) - facets.planes[f].offset) <= tolerance;
     });
   return flat;
+}
+
+std::vector<Index> boundary_group(const MeshTopology& topology) {
+  std::vector<Index> group(topology.num_faces(), kNoIndex);
+  for (const Index f : topology.boundary_faces()) group[f] = 0;
+  return group;
+}
+
+}  // namespace
+
+std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
+                          const FlatFacets& facets) {
+  const MeshTopology topology(mesh);
+  return flatten(mesh, topology, boundary_group(topology),
+                 [&](const Vec3& point, Index, Index hint) { return tree.closest(point, hint); }, facets,
+                 kFlatTolerance * bounding_box_diagonal(target), 1);
+}
+
+std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double least_jacobian) {
+  FlatFacets facets = flat_facets(target.mesh);
+  if (!target.has_interfaces()) return flatten_faces(mesh, target.mesh, *target.tree, facets);
+  const MeshTopology topology(mesh);
+  const FlatFacets inner = flat_facets(target.interfaces);
+  const auto first_plane = static_cast<Index>(facets.planes.size());
+  const auto first_triangle = static_cast<Index>(facets.of_triangle.size());
+  facets.planes.insert(facets.planes.end(), inner.planes.begin(), inner.planes.end());
+  for (const Index f : inner.of_triangle) facets.of_triangle.push_back(f == kNoIndex ? kNoIndex : first_plane + f);
+  const GroupedClosestPoint tree(target.interfaces, target.group_of_interface_triangle);
+  const Closest closest = [&](const Vec3& point, Index group, Index hint) {
+    if (group == 0) return target.tree->closest(point, hint);
+    ClosestPoint::Hit hit = tree.closest(point, group, hint == kNoIndex ? kNoIndex : hint - first_triangle);
+    if (hit.triangle != kNoIndex) hit.triangle += first_triangle;
+    return hit;
+  };
+  return flatten(mesh, topology, groups_of_sheets(mesh, topology), closest, facets,
+                 kFlatTolerance * bounding_box_diagonal(target.mesh), least_jacobian);
+}
+
+std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target) {
+  const MeshTopology topology(cage);
+  const Interfaces interfaces = find_interfaces(cage, topology);
+  if (interfaces.empty() || !target.has_interfaces()) return 0;
+  const FlatFacets facets = flat_facets(target.interfaces);
+  const GroupedClosestPoint tree(target.interfaces, target.group_of_interface_triangle);
+  const Closest closest = [&](const Vec3& point, Index group, Index hint) { return tree.closest(point, group, hint); };
+  const std::vector<Index> groups = groups_of_sheets(cage, topology);
+
+  const InterfaceMarks marks = mark_interfaces(topology, interfaces);
+  std::vector<char> is_sharp = marks.curves;
+  for (const CreaseEdge& crease : cage.tags.creases) is_sharp[topology.find_edge(crease.v0, crease.v1)] = 1;
+  std::vector<Index> patch(interfaces.faces.size());
+  std::iota(patch.begin(), patch.end(), 0);
+  const auto find = [&](Index i) {
+    while (patch[i] != i) i = patch[i] = patch[patch[i]];
+    return i;
+  };
+  std::vector<Index> first_face(topology.num_edges(), kNoIndex);
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    const auto face = topology.face(interfaces.faces[i]);
+    for (std::size_t k = 0; k < face.size(); ++k) {
+      const Index e = topology.find_edge(face[k], face[(k + 1) % face.size()]);
+      if (is_sharp[e]) continue;
+      if (first_face[e] == kNoIndex)
+        first_face[e] = static_cast<Index>(i);
+      else
+        patch[find(static_cast<Index>(i))] = find(first_face[e]);
+    }
+  }
+  constexpr Index kUnknown = -2;
+  std::vector<Index> facet_of_patch(patch.size(), kUnknown);
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    const Index f = interfaces.faces[i];
+    const Index facet = facet_of_face(topology.face(f), groups[f], cage, closest, facets);
+    Index& common = facet_of_patch[find(static_cast<Index>(i))];
+    common = common == kUnknown || common == facet ? facet : kNoIndex;
+  }
+  std::vector<std::vector<Index>> wanted(cage.num_vertices());
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    const Index facet = facet_of_patch[find(static_cast<Index>(i))];
+    if (facet == kNoIndex) continue;
+    for (const Index v : topology.face(interfaces.faces[i]))
+      if (std::find(wanted[v].begin(), wanted[v].end(), facet) == wanted[v].end()) wanted[v].push_back(facet);
+  }
+  std::size_t moved = 0;
+  for (std::size_t v = 0; v < wanted.size(); ++v) {
+    if (wanted[v].empty()) continue;
+    const auto way = way_to_planes(cage.positions[v], wanted[v], facets,
+                                   kFlatTolerance * bounding_box_diagonal(target.mesh));
+    if (!way) continue;
+    cage.positions[v] += *way;
+    ++moved;
+  }
+  return moved;
 }
 
 }  // namespace subvol

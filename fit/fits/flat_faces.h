@@ -3,6 +3,7 @@
 
 #include "subvol/fit/features/flat_facets.h"
 #include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -29,5 +30,19 @@ namespace subvol {
 /// Cost: five closest points for each boundary face, and the quality of the mesh some times.
 std::size_t flatten_faces(VolumeMesh& mesh, const TriangleMesh& target, const ClosestPoint& tree,
                           const FlatFacets& facets);
+
+/// Does the same for the boundary and for the interfaces between regions: vertices that lie in both satisfy the planes of
+/// both. With interfaces, a cell may become as poor as `least_jacobian`, even if no cell of the mesh was before.
+///
+/// target  with the interfaces that the mesh is to keep; the mesh is in its coordinates.
+std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double least_jacobian);
+
+/// Moves the control vertices of flat interfaces into their planes, so that their subdivision surfaces are flat, up to
+/// rounding: those of each patch of interface faces between creases and feature curves that lies on one flat facet of the
+/// target's interfaces. A vertex of several patches moves as in `flatten_faces`.
+///
+/// cage  a control mesh, in the target's coordinates. Its cells are not looked at: the caller must.
+/// returns the number of vertices that were moved. Cost: five closest points for each interface face.
+std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target);
 
 }  // namespace subvol

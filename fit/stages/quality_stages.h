@@ -67,6 +67,7 @@ struct QualityBoundary {
   std::vector<Vec3> fixed;                        ///< what is added to the samples if vertices are fixed; else empty
   std::vector<std::array<Index, 3>> triangles;    ///< of samples
   std::vector<Index> triangle_faces;              ///< face of the mesh of each triangle, by `MeshTopology`
+  std::vector<Index> interfaces;                  ///< faces between regions that have sample triangles, too
   /// Groups of each face of the mesh and of each of the target's triangles (`ClosestPointEnergy::set_groups`); empty:
   /// none.
   std::vector<Index> group_of_face, group_of_triangle;

@@ -3,7 +3,10 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/target/enclosed_volume.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/surface/sheets.h"
 
 #include <Eigen/Geometry>
 
@@ -69,6 +72,67 @@ FitTarget::FitTarget(const TriangleMesh& target)
 
 FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
     : normalisation(target), surface(normalised(target, normalisation), weights) {}
+
+void FitTarget::keep_interfaces(const VolumeMesh& start) {
+  if (surface.is_cloud()) return;
+  const MeshTopology topology(start);
+  const Interfaces found = find_interfaces(start, topology);
+  if (found.empty()) return;
+  std::vector<Index> face_of_triangle;
+  interfaces = fan_triangles(interface_surface(start, topology, found), &face_of_triangle);
+  for (const Index f : face_of_triangle) group_of_interface_triangle.push_back(1 + found.pair_of_face[f]);
+
+  TriangleMesh all{surface.positions(), surface.triangles()};  // without triangles that have no area
+  group_of_triangle.assign(all.triangles.size(), 0);
+  const auto first = static_cast<Index>(all.positions.size());
+  all.positions.insert(all.positions.end(), interfaces.positions.begin(), interfaces.positions.end());
+  for (std::size_t t = 0; t < interfaces.triangles.size(); ++t) {
+    const auto& [a, b, c] = interfaces.triangles[t];
+    const std::vector<Vec3>& x = interfaces.positions;
+    if (!((x[b] - x[a]).cross(x[c] - x[a]).norm() > 0)) continue;
+    all.triangles.push_back({first + a, first + b, first + c});
+    group_of_triangle.push_back(group_of_interface_triangle[t]);
+  }
+  surface = TargetSurface(all, {.volume = surface.volume()});
+}
+
+SurfaceDistance FitTarget::interface_distance(const VolumeMesh& fitted) const {
+  const MeshTopology topology(fitted);
+  const Interfaces found = find_interfaces(fitted, topology);
+  std::vector<Index> face_of_triangle;
+  const TriangleMesh now = fan_triangles(interface_surface(fitted, topology, found), &face_of_triangle);
+  SurfaceDistance largest;
+  for (std::size_t pair = 0; pair < found.pairs.size(); ++pair) {
+    TriangleMesh a{now.positions, {}}, b{interfaces.positions, {}};
+    for (std::size_t t = 0; t < now.triangles.size(); ++t)
+      if (found.pair_of_face[face_of_triangle[t]] == static_cast<Index>(pair)) a.triangles.push_back(now.triangles[t]);
+    for (std::size_t t = 0; t < interfaces.triangles.size(); ++t)
+      if (group_of_interface_triangle[t] == 1 + static_cast<Index>(pair)) b.triangles.push_back(interfaces.triangles[t]);
+    if (a.triangles.empty() || b.triangles.empty()) continue;
+    const SurfaceDistance distance = surface_distance(a, b);
+    largest.mean_a_to_b = std::max(largest.mean_a_to_b, distance.mean_a_to_b);
+    largest.mean_b_to_a = std::max(largest.mean_b_to_a, distance.mean_b_to_a);
+    if (distance.max_a_to_b.distance > largest.max_a_to_b.distance) largest.max_a_to_b = distance.max_a_to_b;
+    if (distance.max_b_to_a.distance > largest.max_b_to_a.distance) largest.max_b_to_a = distance.max_b_to_a;
+  }
+  return largest;
+}
+
+std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& topology) {
+  const Interfaces interfaces = find_interfaces(mesh, topology);
+  if (interfaces.empty()) return {};
+  std::vector<Index> groups(topology.num_faces(), kNoIndex);
+  for (const Index f : topology.boundary_faces()) groups[f] = 0;
+  for (std::size_t i = 0; i < interfaces.faces.size(); ++i) groups[interfaces.faces[i]] = 1 + interfaces.pair_of_face[i];
+  return groups;
+}
+
+std::vector<Index> groups_of_triangles(std::span<const Index> faces, std::span<const Index> group_of_face) {
+  std::vector<Index> groups;
+  if (group_of_face.empty()) return groups;
+  for (const Index f : faces) groups.push_back(group_of_face[f]);
+  return groups;
+}
 
 void FitTarget::sample(std::size_t num_samples, std::size_t least, std::size_t most) {
   const double count = static_cast<double>(std::max(num_samples, least));

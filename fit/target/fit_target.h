@@ -5,11 +5,13 @@
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/target/target_report.h"
 #include "subvol/fit/target/target_surface.h"
+#include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace subvol {
@@ -39,10 +41,21 @@ struct FitTarget {
   TriangleMesh mesh;                 ///< without triangles: the target is a cloud
   std::optional<ClosestPoint> tree;  ///< tree over the triangles; none for a cloud
   TargetSurface surface;             ///< with the samples of the last `sample`
+  /// The interfaces between the regions of a mesh, as they are to stay: fans of their faces (`interface_surface`).
+  TriangleMesh interfaces;
+  std::vector<Index> group_of_interface_triangle;  ///< as in group_of_triangle
+  /// Group of each triangle of `surface`, which consists of the target's triangles and those of the interfaces: 0 for the
+  /// target, 1 + the place of its pair of regions in `Interfaces::pairs` for an interface. Empty without interfaces.
+  std::vector<Index> group_of_triangle;
 
   /// InputError: as for `Normalisation`.
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);
+
+  /// Makes the interfaces of a mesh, in normalized coordinates, part of the target; does nothing if there are none, or
+  /// if the target is a cloud. `mesh`, `tree` and distances remain those of the target alone.
+  void keep_interfaces(const VolumeMesh& start);
+  bool has_interfaces() const { return !interfaces.triangles.empty(); }
 
   /// Samples the surface about as densely as the fitted one: sparse sites on large facets would claim points of the
   /// surface that belong to a neighboring facet. A cloud keeps its points.
@@ -54,6 +67,10 @@ struct FitTarget {
   SurfaceDistance distance(const TriangleMesh& fitted) const { return measure(fitted, true); }
   double mean_distance(const TriangleMesh& fitted) const { return measure(fitted, false).mean(); }
 
+  /// Returns the symmetric distances between the interfaces and those of a mesh with the same pairs of regions: the
+  /// largest of all pairs.
+  SurfaceDistance interface_distance(const VolumeMesh& fitted) const;
+
   /// Measures the distance of a template's boundary to the target and describes the state of the target, with area and
   /// volume in the target's unit. If the target encloses nothing, the volume in the template is used as its volume.
   StartComparison compare_start(const TriangleMesh& boundary);
@@ -61,5 +78,12 @@ struct FitTarget {
  private:
   SurfaceDistance measure(const TriangleMesh& fitted, bool extremes) const;
 };
+
+/// Returns the group of each face of a mesh, as `FitTarget::group_of_triangle` has them, by `MeshTopology`; kNoIndex for
+/// faces inside a region. Empty if the mesh has no interfaces.
+std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& topology);
+
+/// Returns the groups of triangles on these faces; empty if there are no groups.
+std::vector<Index> groups_of_triangles(std::span<const Index> faces, std::span<const Index> group_of_face);
 
 }  // namespace subvol

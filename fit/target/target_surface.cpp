@@ -113,9 +113,13 @@ TargetSurface::TargetSurface(const TriangleMesh& mesh, const TargetSurfaceOption
   if (triangles_.empty()) throw InputError("target: no triangle has an area");
   set_box(low, high);  // positions that no triangle uses are ignored
   rim_parts_ = rim_parts(positions_, triangles_);
-  const Volume volume = find_volume(positions_, triangles_, area_);
-  volume_ = volume.value;
-  volume_source_ = volume.source;
+  if (options.volume != 0) {
+    set_volume(options.volume);
+  } else {
+    const Volume volume = find_volume(positions_, triangles_, area_);
+    volume_ = volume.value;
+    volume_source_ = volume.source;
+  }
   resample(options.sample_spacing);
 }
 

@@ -18,6 +18,9 @@ class GroupedClosestPoint;
 struct TargetSurfaceOptions {
   /// Triangles with longer edges are sampled more than once; > 0, in the mesh's unit. 0: one sample per triangle.
   double sample_spacing = 0;
+  /// Enclosed volume, > 0, if it is known: of the boundary alone, if the triangles of interfaces are among them. 0: it is
+  /// found.
+  double volume = 0;
 };
 
 /// The weight of each point of a cloud.

@@ -6,6 +6,7 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/mesh_formats.h"
 #include "subvol/io/nodal_formats.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 
@@ -67,15 +68,16 @@ bool is_warning(const MeshDefect& defect) {
   return defect.kind == MeshDefect::Kind::inverted_cell || defect.kind == MeshDefect::Kind::unused_vertex;
 }
 
-/// Drops tags off the boundary: other programs also mark edges between subdomains. Returns the number of dropped tags.
+/// Drops tags off the boundary and off interfaces between regions: other programs also mark edges between subdomains. Returns the number of dropped tags.
 std::size_t drop_inner_tags(VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
+  const InterfaceMarks interfaces = mark_interfaces(topology, find_interfaces(mesh, topology));
   const std::size_t dropped_edges = std::erase_if(mesh.tags.creases, [&](const CreaseEdge& crease) {
     const Index e = topology.find_edge(crease.v0, crease.v1);
-    return e == kNoIndex || !topology.is_boundary_edge(e);
+    return e == kNoIndex || (!topology.is_boundary_edge(e) && !interfaces.has_edge(e));
   });
   return dropped_edges + std::erase_if(mesh.tags.corners, [&](const CornerVertex& corner) {
-           return !topology.is_boundary_vertex(corner.vertex);
+           return !topology.is_boundary_vertex(corner.vertex) && !interfaces.has_vertex(corner.vertex);
          });
 }
 

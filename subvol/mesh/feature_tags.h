@@ -10,21 +10,21 @@ namespace subvol {
 /// Sharpness at and above which a crease or corner never softens (OpenSubdiv's convention).
 inline constexpr double kInfiniteSharpness = 10.0;
 
-/// A boundary edge kept sharp through `sharpness` refinements (fractions blend; >= kInfiniteSharpness: forever).
+/// An edge of the boundary, or of an interface between regions, kept sharp through `sharpness` refinements (fractions blend; >= kInfiniteSharpness: forever).
 struct CreaseEdge {
   Index v0, v1;  ///< v0 < v1
   double sharpness = kInfiniteSharpness;
   friend bool operator==(const CreaseEdge&, const CreaseEdge&) = default;
 };
 
-/// A boundary vertex kept in its place through `sharpness` refinements (likewise).
+/// A vertex of one of these kept in its place through `sharpness` refinements (likewise).
 struct CornerVertex {
   Index vertex;
   double sharpness = kInfiniteSharpness;
   friend bool operator==(const CornerVertex&, const CornerVertex&) = default;
 };
 
-/// Features of a mesh's boundary. Every edge and vertex occurs at most once; both lists are sorted; sharpness > 0.
+/// Features of a mesh's boundary and of its interfaces. Every edge and vertex occurs at most once; both lists are sorted; sharpness > 0.
 struct FeatureTags {
   std::vector<CreaseEdge> creases;
   std::vector<CornerVertex> corners;

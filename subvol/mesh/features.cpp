@@ -2,6 +2,7 @@
 #include "subvol/mesh/features.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <Eigen/Geometry>
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <span>
 
 namespace subvol {
 
@@ -28,27 +30,36 @@ Vec3 face_normal(const VolumeMesh& mesh, std::span<const Index> face) {
   return d0.cross(d1).normalized();
 }
 
-std::vector<CreaseEdge> creases_by_angle(const VolumeMesh& mesh, const MeshTopology& topology, double angle_degrees) {
+/// Finds the sharp edges of two faces each, of the boundary or of an interface.
+std::vector<CreaseEdge> creases_by_angle(const VolumeMesh& mesh, const MeshTopology& topology,
+                                         const Interfaces& interfaces, const InterfaceMarks& marks,
+                                         double angle_degrees) {
   std::vector<std::array<Index, 2>> edge_faces(topology.num_edges(), {kNoIndex, kNoIndex});
-  for (const Index f : topology.boundary_faces()) {
-    const auto face = topology.face(f);
+  std::vector<Vec3> normals(topology.num_faces());
+  const auto add_face = [&](Index f, std::span<const Index> face) {
+    normals[f] = face_normal(mesh, face);
     for (std::size_t i = 0; i < face.size(); ++i) {
       auto& faces = edge_faces[topology.find_edge(face[i], face[(i + 1) % face.size()])];
       (faces[0] == kNoIndex ? faces[0] : faces[1]) = f;
     }
+  };
+  for (const Index f : topology.boundary_faces()) add_face(f, topology.face(f));
+  for (const Index f : interfaces.faces) {
+    const auto corners = oriented_face(mesh, topology, f);
+    add_face(f, std::span(corners).first(topology.face(f).size()));
   }
   std::vector<CreaseEdge> creases;
   for (std::size_t e = 0; e < edge_faces.size(); ++e) {
     const auto [f0, f1] = edge_faces[e];
-    if (f1 == kNoIndex) continue;
-    const Vec3 n0 = face_normal(mesh, topology.face(f0)), n1 = face_normal(mesh, topology.face(f1));
+    if (f1 == kNoIndex || marks.is_curve(static_cast<Index>(e))) continue;
     const auto [v0, v1] = topology.edge(static_cast<Index>(e));
-    if (angle_between_degrees(n0, n1) > angle_degrees) creases.push_back({v0, v1});
+    if (angle_between_degrees(normals[f0], normals[f1]) > angle_degrees) creases.push_back({v0, v1});
   }
   return creases;
 }
 
-std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const std::vector<CreaseEdge>& creases,
+std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const MeshTopology& topology,
+                                     const std::vector<CreaseEdge>& creases, const InterfaceMarks& marks,
                                      double angle_degrees) {
   struct Spokes {
     int count = 0;
@@ -61,6 +72,11 @@ std::vector<CornerVertex> corners_of(const VolumeMesh& mesh, const std::vector<C
     ++s.count;
   };
   for (const CreaseEdge& crease : creases) add(crease.v0, crease.v1), add(crease.v1, crease.v0);
+  for (std::size_t e = 0; e < marks.curves.size(); ++e) {
+    if (!marks.curves[e]) continue;
+    const auto [a, b] = topology.edge(static_cast<Index>(e));
+    add(a, b), add(b, a);
+  }
 
   std::vector<CornerVertex> corners;
   for (std::size_t v = 0; v < spokes.size(); ++v) {
@@ -90,8 +106,10 @@ FeatureTags features_by_angle(const VolumeMesh& mesh, double angle_degrees) {
     throw InputError("features_by_angle: angle_degrees must be in [0, 180], got " + std::to_string(angle_degrees));
   const MeshTopology topology(mesh);
   FeatureTags tags;
-  tags.creases = creases_by_angle(mesh, topology, angle_degrees);
-  tags.corners = corners_of(mesh, tags.creases, angle_degrees);
+  const Interfaces interfaces = find_interfaces(mesh, topology);
+  const InterfaceMarks marks = mark_interfaces(topology, interfaces);
+  tags.creases = creases_by_angle(mesh, topology, interfaces, marks, angle_degrees);
+  tags.corners = corners_of(mesh, topology, tags.creases, marks, angle_degrees);
   return merge_tags(tags, {});
 }
 

@@ -8,13 +8,15 @@
 
 namespace subvol {
 
-/// Finds the creases and corners of a mesh's boundary by one angle; all of them are infinitely sharp.
+/// Finds the creases and corners of a mesh's boundary, and of its interfaces between regions, by one angle; all of them
+/// are infinitely sharp.
 ///
-///   crease  boundary edge whose two faces' normals n0, n1 differ by more than the angle: |angle(n0, n1)| > angle
-///   corner  boundary vertex of three or more creases, or of two whose directions differ by more than the angle
+///   crease  edge whose two faces' normals n0, n1 differ by more than the angle: |angle(n0, n1)| > angle
+///   corner  vertex of three or more creases, or of two whose directions differ by more than the angle
 ///
-/// A face's normal is the direction of its area vector, so a warped quad counts with its mean plane. Convex and reflex
-/// edges count alike. A vertex where a single crease ends stays smooth, as on subdivision surfaces.
+/// Feature curves, where an interface ends at other sheets (`InterfaceMarks`), are sharp without a tag; for corners, they
+/// count as creases. A face's normal is the direction of its area vector, so a warped quad counts with its mean plane.
+/// Convex and reflex edges count alike. A vertex where a single crease ends stays smooth, as on subdivision surfaces.
 ///
 /// mesh           passes `validate` except for `unused_vertex` and `inverted_cell`; its own tags are not read.
 /// angle_degrees  deviation from flat, in [0, 180]; outside or NaN: InputError. 180 tags nothing.

@@ -2,6 +2,7 @@
 #include "subvol/mesh/validate.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <Eigen/Geometry>
@@ -336,16 +337,19 @@ class Validator {
 
   void check_tags_on(const MeshTopology& topology) {
     const auto known = [&](Index v) { return v >= 0 && static_cast<std::size_t>(v) < mesh_.num_vertices(); };
+    if (mesh_.tags.empty()) return;
+    const InterfaceMarks marks = mark_interfaces(topology, find_interfaces(mesh_, topology));
     for (const CreaseEdge& crease : mesh_.tags.creases) {
       if (!known(crease.v0) || !known(crease.v1)) continue;
       const Index e = topology.find_edge(crease.v0, crease.v1);
-      if (e == kNoIndex || !topology.is_boundary_edge(e))
+      if (e == kNoIndex || (!topology.is_boundary_edge(e) && !marks.has_edge(e)))
         add(Kind::bad_tag, crease.v0,
-            "crease " + list(std::array{crease.v0, crease.v1}) + " is no edge of the boundary");
+            "crease " + list(std::array{crease.v0, crease.v1}) + " is no edge of the boundary or of an interface");
     }
     for (const CornerVertex& corner : mesh_.tags.corners)
-      if (known(corner.vertex) && !topology.is_boundary_vertex(corner.vertex))
-        add(Kind::bad_tag, corner.vertex, "corner " + std::to_string(corner.vertex) + " is not on the boundary");
+      if (known(corner.vertex) && !topology.is_boundary_vertex(corner.vertex) && !marks.has_vertex(corner.vertex))
+        add(Kind::bad_tag, corner.vertex,
+            "corner " + std::to_string(corner.vertex) + " is not on the boundary or on an interface");
   }
 
   void check_tag_values() {

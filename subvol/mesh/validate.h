@@ -24,7 +24,7 @@ struct MeshDefect {
     nonmanifold_vertex,       ///< a boundary vertex whose boundary faces form more than one fan
     inconsistent_orientation, ///< two cells that see their common face from the same side
     inverted_cell,            ///< a cell whose Jacobian determinant is <= 0 at a corner
-    bad_tag,                  ///< a tag off the boundary, out of order or repeated, or with sharpness <= 0 or NaN
+    bad_tag,                  ///< a tag off all sheets, out of order or repeated, or with sharpness <= 0 or NaN
     unused_vertex             ///< a vertex that no cell names
   };
   Kind kind;

@@ -2,6 +2,7 @@
 #include "subvol/subdivision/audit.h"
 
 #include "subvol/subdivision/surface_refinement.h"
+#include "subvol/surface/sheets.h"
 
 #include <Eigen/Geometry>
 
@@ -72,10 +73,22 @@ void find_flattened(const VolumeMesh& mesh, const MeshTopology& topology, Subdiv
     const Index e = topology.find_edge(crease.v0, crease.v1);
     if (e != kNoIndex) sharp[e] = 1;
   }
+  const InterfaceMarks interfaces = mark_interfaces(topology, find_interfaces(mesh, topology));
+  // Of the two regions at a smooth edge of an interface, the number of cells of the first cell's, and of the other.
+  std::vector<std::array<int, 2>> counts(interfaces.edges.size(), {0, 0});
+  std::vector<int> first(interfaces.edges.size(), 0);
+  for (std::size_t c = 0; c < mesh.num_cells() && !counts.empty(); ++c)
+    for (const Index e : topology.cell_edges(c)) {
+      if (counts[e][0] == 0) first[e] = mesh.references[c];
+      ++counts[e][mesh.references[c] != first[e]];
+    }
   for (std::size_t i = 0; i < topology.num_edges(); ++i) {
     const Index e = static_cast<Index>(i);
-    if (topology.is_boundary_edge(e) && topology.num_edge_cells(e) == 1 && !sharp[i])
-      result.flattened_edges.push_back(topology.edge(e));
+    if (sharp[i] || interfaces.is_curve(e)) continue;
+    const bool of_boundary = topology.is_boundary_edge(e) && topology.num_edge_cells(e) == 1;
+    const bool of_interface = interfaces.has_edge(e) && std::min(counts[i][0], counts[i][1]) == 1;
+    result.num_interface_edges += interfaces.has_edge(e);
+    if (of_boundary || of_interface) result.flattened_edges.push_back(topology.edge(e));
   }
   std::sort(result.flattened_edges.begin(), result.flattened_edges.end());
 }
@@ -109,7 +122,7 @@ std::vector<Index> folding_edges(const SurfaceTopology& surface, Index v, std::s
   const auto edge = [&](Index h) { return surface.corner_edges[h]; };
   const auto sharp = [&](Index h) { return surface.edge_sharpness[edge(h)] > 0; };
   const Index first = surface.vertex_corners[v];
-  Index start = first;
+  Index start = first;  // of an open fan, the edge of the first corner is sharp
   while (!sharp(start)) {
     start = surface.rotate(start);
     if (start == first) return {};
@@ -119,31 +132,35 @@ std::vector<Index> folding_edges(const SurfaceTopology& surface, Index v, std::s
   do {
     double span = corner_angle(surface, h, points);
     std::vector<Index> inside;
-    for (h = surface.rotate(h); !sharp(h); h = surface.rotate(h)) {
+    for (h = surface.rotate(h); h != kNoIndex && !sharp(h); h = surface.rotate(h)) {
       span += corner_angle(surface, h, points);
       inside.push_back(edge(h));
     }
     if (span > std::numbers::pi + kSlack) folding.insert(folding.end(), inside.begin(), inside.end());
-  } while (h != start);
+  } while (h != start && h != kNoIndex);
   return folding;
 }
 
 void find_reflex(const VolumeMesh& mesh, const MeshTopology& topology, SubdivisionAudit& result) {
-  const BoundarySurface boundary = tagged_boundary(mesh, topology);
-  const SurfaceTopology& surface = boundary.topology;
+  const SheetSurface sheets = tagged_sheets(mesh, topology);
+  const SurfaceTopology& surface = sheets.topology;
   std::vector<Vec3> points;
-  for (Index v : boundary.vertices) points.push_back(mesh.positions[v]);
+  for (Index v : sheets.vertices) points.push_back(mesh.positions[v]);
   for (std::size_t e = 0; e < surface.num_edges(); ++e)
-    if (surface.edge_sharpness[e] > 0 && is_reflex(surface, static_cast<Index>(e), points))
-      result.reflex_creases.push_back(topology.edge(boundary.edges[e]));
+    if (topology.is_boundary_edge(sheets.edges[e]) && surface.edge_sharpness[e] > 0 &&
+        surface.twins[surface.edge_corners[e]] != kNoIndex && is_reflex(surface, static_cast<Index>(e), points))
+      result.reflex_creases.push_back(topology.edge(sheets.edges[e]));
   std::sort(result.reflex_creases.begin(), result.reflex_creases.end());
   for (std::size_t i = 0; i < surface.num_vertices(); ++i) {
     const Index v = static_cast<Index>(i);
     if (!vertex_weights_at(surface, v, BoundaryRule::catmull_clark).fixed()) continue;
     const std::vector<Index> edges = folding_edges(surface, v, points);
-    if (!edges.empty()) result.folding_corners.push_back(boundary.vertices[i]);
-    for (Index e : edges) result.folding_edges.push_back(topology.edge(boundary.edges[e]));
+    if (!edges.empty()) result.folding_corners.push_back(sheets.vertices[i]);
+    for (Index e : edges) result.folding_edges.push_back(topology.edge(sheets.edges[e]));
   }
+  std::sort(result.folding_corners.begin(), result.folding_corners.end());
+  result.folding_corners.erase(std::unique(result.folding_corners.begin(), result.folding_corners.end()),
+                               result.folding_corners.end());
   std::sort(result.folding_edges.begin(), result.folding_edges.end());
   result.folding_edges.erase(std::unique(result.folding_edges.begin(), result.folding_edges.end()),
                              result.folding_edges.end());
@@ -165,8 +182,11 @@ SubdivisionAudit audit(const VolumeMesh& mesh) {
   warn(result, result.nonmanifold_edges.size(), "boundary edges lie between other than two boundary faces");
   warn(result, result.nonmanifold_vertices.size(), "boundary vertices have more than one fan of boundary faces");
   warn(result, result.flattened_edges.size(),
-       "of " + std::to_string(result.num_boundary_edges) +
-           " boundary edges are smooth and have one cell: cells flatten there with every refinement");
+       "of " + std::to_string(result.num_boundary_edges) + " boundary edges" +
+           (result.num_interface_edges > 0
+                ? " and " + std::to_string(result.num_interface_edges) + " edges between regions"
+                : "") +
+           " are smooth and have one cell: cells flatten there with every refinement");
   warn(result, result.folding_corners.size(),
        "corners have a smooth reflex span: the subdivision surface folds there; crease the edges within the span");
   return result;

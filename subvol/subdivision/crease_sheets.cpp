@@ -7,13 +7,13 @@
 
 namespace subvol {
 
-CreaseSheets::CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology, const BoundarySurface& boundary)
+CreaseSheets::CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology, const SheetSurface& sheets)
     : topology_(topology) {
-  const SurfaceTopology& surface = boundary.topology;
+  const SurfaceTopology& surface = sheets.topology;
   std::vector<double> crease_shares(topology.num_edges(), 0.0);
   bool any = false;
   for (std::size_t i = 0; i < surface.num_edges(); ++i) {
-    const Index e = boundary.edges[i];
+    const Index e = sheets.edges[i];
     if (!(surface.edge_sharpness[i] > 0) || topology.num_edge_cells(e) < kMinCells) continue;
     crease_shares[e] = std::min(1.0f, surface.edge_sharpness[i]);
     any = true;
@@ -23,11 +23,15 @@ CreaseSheets::CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology,
   edge_shares_.assign(topology.num_edges(), 0.0);
   fixed_.assign(mesh.num_vertices(), 0);
   for (std::size_t v = 0; v < surface.num_vertices(); ++v)
-    fixed_[boundary.vertices[v]] =
+    fixed_[sheets.vertices[v]] =
         vertex_weights_at(surface, static_cast<Index>(v), BoundaryRule::catmull_clark).fixed();
 
+  on_sheet_.assign(topology.num_edges(), 0);
+  for (const Index e : sheets.edges) on_sheet_[e] = 1;
+  std::vector<char> face_on_sheet(topology.num_faces(), 0);
+  for (const Index f : sheets.faces) face_on_sheet[f] = 1;
   for (std::size_t f = 0; f < topology.num_faces(); ++f)
-    if (!topology.is_boundary_face(static_cast<Index>(f))) visit_face(static_cast<Index>(f), crease_shares);
+    if (!face_on_sheet[f]) visit_face(static_cast<Index>(f), crease_shares);
   const auto key = [](const EdgeFace& a) { return std::pair(a.edge, a.face); };
   std::sort(edge_faces_.begin(), edge_faces_.end(),
             [&](const EdgeFace& a, const EdgeFace& b) { return key(a) < key(b); });
@@ -46,7 +50,7 @@ void CreaseSheets::visit_face(Index f, const std::vector<double>& crease_shares)
     if (share == 0) continue;
     face_shares_[f] = std::max(face_shares_[f], share);
     for (const Index e : {edges[(j + 1) % n], edges[(j + n - 1) % n]}) {
-      if (topology_.is_boundary_edge(e)) continue;
+      if (on_sheet_[e]) continue;
       edge_shares_[e] = std::max(edge_shares_[e], share);
       edge_faces_.push_back({e, f});
     }

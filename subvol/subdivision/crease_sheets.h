@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/subdivision/surface_refinement.h"
+#include "subvol/surface/sheets.h"
 
 #include <vector>
 
@@ -29,12 +30,15 @@ namespace subvol {
 /// around a crease stay so. The rows depend on topology and tags alone. Boundary rows are unchanged, so the boundary
 /// remains that of OpenSubdiv; inside, the map is only continuous across sheets at the crease. Weights stay >= 0, rows
 /// sum to 1, and lattices are reproduced.
+///
+/// Interfaces between regions are sheets with rows of their own, like the boundary. Their creases, and the feature curves
+/// at which they end, are treated as those of the boundary are.
 class CreaseSheets {
  public:
   /// Creases of at least this many cells are treated.
   static constexpr int kMinCells = 2;
 
-  CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology, const BoundarySurface& boundary);
+  CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology, const SheetSurface& sheets);
 
   /// Return the share, 0 to 1, of the sheet's rule in the row of an interior face or edge: min(1, sharpness) of its
   /// crease, the largest if it has several.
@@ -52,6 +56,7 @@ class CreaseSheets {
 
   const MeshTopology& topology_;
   std::vector<double> face_shares_, edge_shares_;
+  std::vector<char> on_sheet_;        // true for edges of the boundary and of interfaces
   std::vector<char> fixed_;           // true for vertices that stay in place
   std::vector<EdgeFace> edge_faces_;  // sheet faces of each treated edge, sorted
 };

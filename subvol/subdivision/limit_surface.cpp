@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/subdivision/limit_masks.h"
 #include "subvol/subdivision/surface_refinement.h"
+#include "subvol/surface/sheets.h"
 
 #include <Eigen/Geometry>
 
@@ -17,83 +18,88 @@ namespace {
 constexpr int kMaxBoundaryLevels = 8;
 constexpr BoundaryRule kRule = BoundaryRule::catmull_clark;
 
-/// Returns the corners around a vertex, counter-clockwise: corner i lies in the face between edges i and i + 1.
-std::vector<Index> corners_around(const SurfaceTopology& surface, Index v) {
-  std::vector<Index> corners;
-  const Index start = surface.vertex_corners[v];
-  Index h = start;
-  do {
-    corners.push_back(h);
-    h = surface.rotate(h);
-  } while (h != start);
-  return corners;
+/// An edge that leaves a vertex, and the face between it and the next edge; kNoIndex: there is none, at the border.
+struct Spoke {
+  Index edge, neighbor, face;
+};
+
+/// Returns the spokes of a vertex, counter-clockwise.
+std::vector<Spoke> spokes_of(const SurfaceTopology& surface, Index v) {
+  std::vector<Spoke> spokes;
+  visit_ring(surface, v, [&](int, Index edge, Index neighbor, Index face) { spokes.push_back({edge, neighbor, face}); });
+  return spokes;
 }
 
-RingSharpness ring_sharpness(const SurfaceTopology& surface, Index v, std::span<const Index> corners) {
+RingSharpness ring_sharpness(const SurfaceTopology& surface, Index v, std::span<const Spoke> spokes) {
   RingSharpness ring{surface.vertex_sharpness[v], {}};
-  for (Index h : corners) ring.edges.push_back(surface.edge_sharpness[surface.corner_edges[h]]);
+  for (const Spoke& spoke : spokes) ring.edges.push_back(surface.edge_sharpness[spoke.edge]);
   return ring;
 }
 
-bool all_quads(const SurfaceTopology& surface, std::span<const Index> corners) {
-  return std::all_of(corners.begin(), corners.end(),
-                     [&](Index h) { return surface.face_size(surface.corner_faces[h]) == 4; });
+bool all_quads(const SurfaceTopology& surface, std::span<const Spoke> spokes) {
+  return std::all_of(spokes.begin(), spokes.end(), [&](const Spoke& spoke) {
+    return spoke.face == kNoIndex || surface.face_size(spoke.face) == 4;
+  });
 }
 
 /// Turns ring masks of a vertex into rows: directly if all its faces are quads, otherwise through its children, whose
-/// faces are.
+/// faces are. The missing face of an open fan lies between two sharp edges, so that no mask of the fan's faces has a
+/// weight for it.
 class RingRow {
  public:
   RingRow(const SurfaceTopology& surface, Index v, std::span<const Index> columns)
       : surface_(surface),
         vertex_(v),
         columns_(columns),
-        corners_(corners_around(surface, v)),
-        direct_(all_quads(surface, corners_)),
-        sharpness_(ring_sharpness(surface, v, corners_)) {
+        spokes_(spokes_of(surface, v)),
+        direct_(all_quads(surface, spokes_)),
+        sharpness_(ring_sharpness(surface, v, spokes_)) {
     if (direct_) return;
     sharpness_.corner = child_sharpness(sharpness_.corner);
     for (float& s : sharpness_.edges) s = child_sharpness(s);
   }
 
   const RingSharpness& sharpness() const { return sharpness_; }
-  std::span<const Index> corners() const { return corners_; }
+  std::span<const Spoke> spokes() const { return spokes_; }
 
   void add(const RingMask& mask, RowBuilder& row) const {
-    const std::size_t n = corners_.size();
+    const std::size_t n = spokes_.size();
     if (mask[0] != 0) add_vertex(mask[0], row);
     for (std::size_t i = 0; i < n; ++i) {
-      if (mask[1 + i] != 0) add_edge(corners_[i], mask[1 + i], row);
-      if (mask[1 + n + i] != 0) add_face(corners_[i], mask[1 + n + i], row);
+      if (mask[1 + i] != 0) add_edge(spokes_[i], mask[1 + i], row);
+      if (mask[1 + n + i] != 0 && spokes_[i].face != kNoIndex) add_face(spokes_[i].face, mask[1 + n + i], row);
     }
   }
 
  private:
-  Index column_of(Index h) const { return columns_[surface_.corner_vertices[h]]; }
-
   void add_vertex(double weight, RowBuilder& row) const {
     if (direct_)
       row.add(columns_[vertex_], weight);
     else
       add_vertex_child(surface_, vertex_, {kRule, columns_, row, weight});
   }
-  void add_edge(Index h, double weight, RowBuilder& row) const {
+  void add_edge(const Spoke& spoke, double weight, RowBuilder& row) const {
     if (direct_)
-      row.add(column_of(surface_.next(h)), weight);
+      row.add(columns_[spoke.neighbor], weight);
     else
-      add_edge_child(surface_, surface_.corner_edges[h], {kRule, columns_, row, weight});
+      add_edge_child(surface_, spoke.edge, {kRule, columns_, row, weight});
   }
-  void add_face(Index h, double weight, RowBuilder& row) const {
+  void add_face(Index f, double weight, RowBuilder& row) const {
     if (direct_)
-      row.add(column_of(surface_.next(surface_.next(h))), weight);
+      row.add(columns_[opposite(f)], weight);
     else
-      add_face_child(surface_, surface_.corner_faces[h], {kRule, columns_, row, weight});
+      add_face_child(surface_, f, {kRule, columns_, row, weight});
+  }
+  /// Returns the corner of a quad opposite to the vertex.
+  Index opposite(Index f) const {
+    const auto face = surface_.face(f);
+    return face[(std::find(face.begin(), face.end(), vertex_) - face.begin() + 2) % 4];
   }
 
   const SurfaceTopology& surface_;
   Index vertex_;
   std::span<const Index> columns_;
-  std::vector<Index> corners_;
+  std::vector<Spoke> spokes_;
   bool direct_;
   RingSharpness sharpness_;
 };
@@ -135,9 +141,14 @@ Tangents tangent_rows(const SurfaceTopology& surface, std::span<const Index> col
   for (std::size_t v = 0; v < surface.num_vertices(); ++v) {
     const RingRow ring(surface, static_cast<Index>(v), columns);
     for (const TangentSector& sector : tangent_sectors(ring.sharpness())) {
+      if (ring.spokes()[sector.first].face == kNoIndex) continue;  // beyond the border
       const Index site = static_cast<Index>(tangents.u.num_rows());
-      for (int i = 0; i < sector.count; ++i)
-        tangents.corner_sites[ring.corners()[(sector.first + i) % ring.corners().size()]] = site;
+      for (int i = 0; i < sector.count; ++i) {
+        const Index f = ring.spokes()[(sector.first + i) % ring.spokes().size()].face;
+        const auto face = surface.face(f);
+        tangents.corner_sites[surface.face_offsets[f] + (std::find(face.begin(), face.end(), static_cast<Index>(v)) - face.begin())] =
+            site;
+      }
       const std::array<RingMask, 2> masks = tangent_masks(ring.sharpness(), sector);
       ring.add(masks[0], row);
       append_row(tangents.u, row);
@@ -162,9 +173,11 @@ std::vector<std::array<Index, 2>> refined_creases(const VolumeMesh& mesh, const 
   std::vector<std::array<Index, 2>> creases;
   if (mesh.tags.creases.empty()) return creases;
   std::vector<Index> surface_edge(topology.num_edges(), kNoIndex);
-  for (std::size_t e = 0; e < volume_edges.size(); ++e) surface_edge[volume_edges[e]] = static_cast<Index>(e);
+  for (std::size_t e = volume_edges.size(); e-- > 0;) surface_edge[volume_edges[e]] = static_cast<Index>(e);
   for (const CreaseEdge& crease : mesh.tags.creases) {
-    const Index first = surface_edge[topology.find_edge(crease.v0, crease.v1)] << levels;
+    const Index edge = surface_edge[topology.find_edge(crease.v0, crease.v1)];
+    if (edge == kNoIndex) continue;  // on an interface, if only the boundary is refined
+    const Index first = edge << levels;
     for (Index e = first; e < first + (Index{1} << levels); ++e) {
       const Index h = refined.edge_corners[e];
       creases.push_back({refined.corner_vertices[h], refined.corner_vertices[refined.next(h)]});
@@ -176,30 +189,32 @@ std::vector<std::array<Index, 2>> refined_creases(const VolumeMesh& mesh, const 
 }  // namespace
 
 SparseMap limit_map(const VolumeMesh& mesh) {
-  const BoundarySurface boundary = tagged_boundary(mesh, MeshTopology(mesh));
+  const SheetSurface sheets = tagged_sheets(mesh, MeshTopology(mesh));
   std::vector<Index> surface_vertex(mesh.num_vertices(), kNoIndex);
-  for (std::size_t i = 0; i < boundary.vertices.size(); ++i)
-    surface_vertex[boundary.vertices[i]] = static_cast<Index>(i);
+  for (std::size_t i = sheets.vertices.size(); i-- > 0;)  // copies of a vertex have the same row
+    surface_vertex[sheets.vertices[i]] = static_cast<Index>(i);
   return assemble_rows(mesh.num_vertices(), mesh.num_vertices(), [&](std::size_t i, RowBuilder& row) {
     if (surface_vertex[i] == kNoIndex)
       row.add(static_cast<Index>(i), 1);
     else
-      add_limit_row(boundary.topology, surface_vertex[i], boundary.vertices, row);
+      add_limit_row(sheets.topology, surface_vertex[i], sheets.vertices, row);
   });
 }
 
-BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with_tangents) {
+namespace {
+
+BoundaryRefinement refine(const VolumeMesh& mesh, const MeshTopology& topology, BoundarySurface boundary, int levels,
+                          bool with_tangents) {
   if (levels < 0 || levels > kMaxBoundaryLevels)
     throw InputError("refine_boundary: levels must be 0 to " + std::to_string(kMaxBoundaryLevels) + ", got " +
                      std::to_string(levels));
-  const MeshTopology topology(mesh);
-  BoundarySurface boundary = tagged_boundary(mesh, topology);
   SurfaceTopology surface = std::move(boundary.topology);
   std::vector<Index> columns = boundary.vertices;
   std::size_t num_cols = mesh.num_vertices();
 
   BoundaryRefinement result;
   result.vertices = boundary.vertices;
+  result.faces = boundary.faces;
   result.face_of_quad = iota(surface.num_faces());
   SparseMap refined;  // children of the last level x control vertices; empty at level 0
   for (int level = 0; level < levels; ++level) {
@@ -225,6 +240,18 @@ BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with
   for (std::size_t f = 0; f < surface.num_faces(); ++f)
     result.quad_sites.push_back(face_entries(surface, static_cast<Index>(f), tangents.corner_sites));
   return result;
+}
+
+}  // namespace
+
+BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with_tangents) {
+  const MeshTopology topology(mesh);
+  return refine(mesh, topology, tagged_boundary(mesh, topology), levels, with_tangents);
+}
+
+BoundaryRefinement refine_sheets(const VolumeMesh& mesh, int levels, bool with_tangents) {
+  const MeshTopology topology(mesh);
+  return refine(mesh, topology, tagged_sheets(mesh, topology), levels, with_tangents);
 }
 
 std::vector<Vec3> limit_normals(const BoundaryRefinement& refinement, std::span<const Vec3> control,

@@ -13,10 +13,10 @@
 
 namespace subvol {
 
-/// Returns the map from control vertices to nodes: boundary vertices go to their positions on the Catmull-Clark limit
-/// surface, interior vertices stay.
+/// Returns the map from control vertices to nodes: vertices of the boundary and of interfaces between regions go to their
+/// positions on the Catmull-Clark limit of these sheets (`tagged_sheets`), other interior vertices stay.
 ///
-/// Square, num_vertices() rows; boundary rows sum to 1 and use boundary vertices only. Exact for smooth vertices,
+/// Square, num_vertices() rows; rows of a sheet sum to 1 and use vertices of the sheet only. Exact for smooth vertices,
 /// creases, corners, semi-sharp features and darts, next to quads and triangles.
 /// InputError: as `tagged_boundary` (a boundary that is not a manifold, bad tags). Cost: linear.
 SparseMap limit_map(const VolumeMesh& mesh);
@@ -27,9 +27,13 @@ struct BoundaryRefinement {
   /// Faces of the refined boundary, outward. All of them are quads, except at level 0 of a boundary with triangles,
   /// which have kNoIndex as their last corner.
   std::vector<std::array<Index, 4>> quads;
-  std::vector<Index> face_of_quad;  ///< boundary face of each quad: a place in MeshTopology::boundary_faces()
+  std::vector<Index> face_of_quad;  ///< surface face of each quad, ascending: a place in `faces`
+  /// The faces of the mesh that were refined, as MeshTopology numbers them: its boundary_faces(), and then those
+  /// of interfaces, if they were refined, too.
+  std::vector<Index> faces;
   std::vector<Index> vertices;      ///< volume vertex of each of the first vertices.size() refined vertices
-  /// Refined edges along the mesh's creases, in the order of its tags: 2^levels for each.
+  /// Refined edges along the mesh's creases, in the order of its tags: 2^levels for each. Those on interfaces are left
+  /// out if only the boundary is refined.
   std::vector<std::array<Index, 2>> crease_edges;
 
   /// Tangents of the limit surface, one row per *normal site*: one site per vertex on smooth parts, one per side where
@@ -46,6 +50,11 @@ struct BoundaryRefinement {
 /// Each refined vertex lies exactly on the limit surface (as `limit_map`), so the quads are a tessellation of it.
 /// Cost: about 1 microsecond per refined vertex.
 BoundaryRefinement refine_boundary(const VolumeMesh& mesh, int levels, bool with_tangents = false);
+
+/// Does the same with the boundary and the interfaces between regions. Each sheet has vertices of its own along the
+/// feature curves at which it ends, at the same places as those of its neighbors. `limit_normals` of interfaces point
+/// from the smaller to the larger reference.
+BoundaryRefinement refine_sheets(const VolumeMesh& mesh, int levels, bool with_tangents = false);
 
 /// Returns the outward unit normals of the limit surface at the sites of a refinement with tangents.
 ///

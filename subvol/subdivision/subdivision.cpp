@@ -2,10 +2,12 @@
 #include "subvol/subdivision/subdivision.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/features.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/crease_sheets.h"
 #include "subvol/subdivision/surface_refinement.h"
+#include "subvol/surface/sheets.h"
 
 #include <array>
 #include <cmath>
@@ -138,10 +140,11 @@ class Refiner {
       : mesh_(mesh),
         rule_(rule),
         topology_(mesh),
-        boundary_(tagged_boundary(mesh, topology_)),
-        surface_vertex_(inverse(boundary_.vertices, mesh.num_vertices())),
-        surface_edge_(inverse(boundary_.edges, topology_.num_edges())),
-        sheets_(mesh, topology_, boundary_),
+        sheets_(tagged_sheets(mesh, topology_)),
+        sheet_vertex_(inverse(sheets_.vertices, mesh.num_vertices())),
+        sheet_edge_(inverse(sheets_.edges, topology_.num_edges())),
+        sheet_face_(inverse(sheets_.faces, topology_.num_faces())),
+        crease_sheets_(mesh, topology_, sheets_),
         vertex_cells_(mesh.num_vertices(), mesh.num_cells(), [&](std::size_t c) { return mesh.cell(c); }),
         edge_cells_(topology_.num_edges(), mesh.num_cells(), [&](std::size_t c) { return topology_.cell_edges(c); }),
         face_cells_(topology_.num_faces(), mesh.num_cells(), [&](std::size_t c) { return topology_.cell_faces(c); }) {}
@@ -166,9 +169,10 @@ class Refiner {
   FeatureTags fine_tags() const;
 
  private:
+  /// Returns the first place of each number in a list.
   static std::vector<Index> inverse(std::span<const Index> list, std::size_t size) {
     std::vector<Index> numbers(size, kNoIndex);
-    for (std::size_t i = 0; i < list.size(); ++i) numbers[list[i]] = static_cast<Index>(i);
+    for (std::size_t i = list.size(); i-- > 0;) numbers[list[i]] = static_cast<Index>(i);
     return numbers;
   }
 
@@ -187,26 +191,26 @@ class Refiner {
   void vertex_row(Index v, RowBuilder& row) const {
     if (vertex_cells_[v].empty())
       row.add(v, 1);  // unused vertices stay
-    else if (surface_vertex_[v] != kNoIndex)
-      add_vertex_child(boundary_.topology, surface_vertex_[v], {rule_, boundary_.vertices, row});
+    else if (sheet_vertex_[v] != kNoIndex)
+      add_vertex_child(sheets_.topology, sheet_vertex_[v], {rule_, sheets_.vertices, row});
     else
       add_cell_mean(vertex_cells_[v], 1, [](const CellMasks& m, std::size_t i) -> auto& { return m.vertices[i]; }, row);
   }
 
   void edge_row(Index e, RowBuilder& row) const {
-    if (surface_edge_[e] != kNoIndex) {
-      add_edge_child(boundary_.topology, surface_edge_[e], {rule_, boundary_.vertices, row});
+    if (sheet_edge_[e] != kNoIndex) {
+      add_edge_child(sheets_.topology, sheet_edge_[e], {rule_, sheets_.vertices, row});
       return;
     }
-    const double sheet = sheets_.edge_share(e);
-    if (sheet > 0) sheets_.add_edge(e, sheet, row);
+    const double sheet = crease_sheets_.edge_share(e);
+    if (sheet > 0) crease_sheets_.add_edge(e, sheet, row);
     if (sheet < 1)
       add_cell_mean(edge_cells_[e], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.edges[i]; },
                     row);
   }
 
   void face_row(Index f, RowBuilder& row) const {
-    const double sheet = topology_.is_boundary_face(f) ? 1 : sheets_.face_share(f);
+    const double sheet = sheet_face_[f] != kNoIndex ? 1 : crease_sheets_.face_share(f);
     if (sheet > 0) add_mean(topology_.face(f), row, sheet);
     if (sheet < 1)
       add_cell_mean(face_cells_[f], 1 - sheet, [](const CellMasks& m, std::size_t i) -> auto& { return m.faces[i]; },
@@ -216,9 +220,9 @@ class Refiner {
   const VolumeMesh& mesh_;
   BoundaryRule rule_;
   MeshTopology topology_;
-  BoundarySurface boundary_;
-  std::vector<Index> surface_vertex_, surface_edge_;
-  CreaseSheets sheets_;
+  SheetSurface sheets_;
+  std::vector<Index> sheet_vertex_, sheet_edge_, sheet_face_;  // first place in sheets_; kNoIndex: inside
+  CreaseSheets crease_sheets_;
   Incidence vertex_cells_, edge_cells_, face_cells_;
 };
 
@@ -285,7 +289,13 @@ FeatureTags Refiner::fine_tags() const {
     const double sharpness = child_sharpness(static_cast<float>(corner.sharpness));
     if (sharpness > 0) tags.corners.push_back({corner.vertex, sharpness});
   }
-  return tags;
+  // Where a crease ends at a feature curve, the corner outlives it.
+  FeatureTags lasting;
+  const SheetFeatures features = sheet_features(mesh_, topology_);
+  for (const CreaseEdge& crease : mesh_.tags.creases)
+    for (const Index v : {crease.v0, crease.v1})
+      if (crease.sharpness < kInfiniteSharpness && features.is_corner(v)) lasting.corners.push_back({v});
+  return lasting.empty() ? tags : merge_tags(tags, lasting);
 }
 
 void require_usable(const VolumeMesh& mesh) {

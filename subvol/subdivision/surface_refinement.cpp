@@ -53,6 +53,11 @@ void add_face_child(const SurfaceTopology& surface, Index f, const RowTarget& ta
 
 void add_edge_child(const SurfaceTopology& surface, Index e, const RowTarget& target) {
   const Index h = surface.edge_corners[e], twin = surface.twins[h];
+  if (twin == kNoIndex) {
+    target.row.add(target.columns[surface.corner_vertices[h]], target.scale * 0.5);
+    target.row.add(target.columns[surface.corner_vertices[surface.next(h)]], target.scale * 0.5);
+    return;
+  }
   const std::array<Index, 2> faces = {surface.corner_faces[h], surface.corner_faces[twin]};
   const EdgeWeights weights =
       edge_weights(target.rule, surface.edge_sharpness[e], {surface.face_size(faces[0]), surface.face_size(faces[1])});
@@ -64,12 +69,7 @@ void add_edge_child(const SurfaceTopology& surface, Index e, const RowTarget& ta
 
 VertexWeights vertex_weights_at(const SurfaceTopology& surface, Index v, BoundaryRule rule) {
   std::vector<float> sharpness;
-  const Index start = surface.vertex_corners[v];
-  Index h = start;
-  do {
-    sharpness.push_back(surface.edge_sharpness[surface.corner_edges[h]]);
-    h = surface.rotate(h);
-  } while (h != start);
+  visit_ring(surface, v, [&](int, Index edge, Index, Index) { sharpness.push_back(surface.edge_sharpness[edge]); });
   return vertex_weights(rule, surface.vertex_sharpness[v], sharpness);
 }
 
@@ -77,17 +77,12 @@ void add_vertex_child(const SurfaceTopology& surface, Index v, const RowTarget& 
   const VertexWeights weights = vertex_weights_at(surface, v, target.rule);
   target.row.add(target.columns[v], target.scale * weights.self);
   if (weights.fixed()) return;
-  const Index start = surface.vertex_corners[v];
-  Index h = start;
-  int i = 0;
-  do {
+  visit_ring(surface, v, [&](int i, Index, Index neighbor, Index face) {
     const bool crease = weights.crease != 0 && (i == weights.crease_ends[0] || i == weights.crease_ends[1]);
     const double weight = weights.edge + (crease ? weights.crease : 0);
-    if (weight != 0) target.row.add(target.columns[surface.corner_vertices[surface.next(h)]], target.scale * weight);
-    if (weights.face != 0) add_centroid(surface, surface.corner_faces[h], weights.face, target);
-    h = surface.rotate(h);
-    ++i;
-  } while (h != start);
+    if (weight != 0) target.row.add(target.columns[neighbor], target.scale * weight);
+    if (weights.face != 0 && face != kNoIndex) add_centroid(surface, face, weights.face, target);
+  });
 }
 
 SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std::span<const Index> columns,
@@ -143,6 +138,8 @@ SurfaceTopology refined_topology(const SurfaceTopology& coarse) {
       if (fine.vertex_corners[vertices[k]] == kNoIndex) fine.vertex_corners[vertices[k]] = q + k;
     }
   }
+  for (std::size_t h = 0; h < fine.twins.size(); ++h)
+    if (fine.twins[h] == kNoIndex) fine.vertex_corners[fine.corner_vertices[h]] = static_cast<Index>(h);
   fine.face_offsets[num_corners] = static_cast<Index>(4 * num_corners);
   for (Index e = 0; e < ne; ++e)
     fine.edge_sharpness[2 * e] = fine.edge_sharpness[2 * e + 1] = child_sharpness(coarse.edge_sharpness[e]);

@@ -18,7 +18,27 @@ struct RowTarget {
   double scale = 1;
 };
 
-/// Add the row of the child of face f (its centroid), of edge e, or of vertex v.
+/// Visits the edges around vertex v, counter-clockwise: visit(i, edge, neighbor, face), where the face lies between edges
+/// i and i + 1. At an open fan, whose first corner must be `vertex_corners[v]`, the last face is kNoIndex.
+template <class Visit>
+void visit_ring(const SurfaceTopology& surface, Index v, const Visit& visit) {
+  const Index start = surface.vertex_corners[v];
+  int i = 0;
+  for (Index h = start;;) {
+    visit(i++, surface.corner_edges[h], surface.corner_vertices[surface.next(h)], surface.corner_faces[h]);
+    const Index after = surface.rotate(h);
+    if (after == start) return;
+    if (after == kNoIndex) {
+      const Index last = surface.prev(h);
+      visit(i, surface.corner_edges[last], surface.corner_vertices[last], kNoIndex);
+      return;
+    }
+    h = after;
+  }
+}
+
+/// Add the row of the child of face f (its centroid), of edge e, or of vertex v. Along the border of an open surface,
+/// edges must be infinitely sharp: border vertices and edges move as on a crease.
 void add_face_child(const SurfaceTopology& surface, Index f, const RowTarget& target);
 void add_edge_child(const SurfaceTopology& surface, Index e, const RowTarget& target);
 void add_vertex_child(const SurfaceTopology& surface, Index v, const RowTarget& target);
@@ -35,7 +55,8 @@ SparseMap refinement_rows(const SurfaceTopology& surface, BoundaryRule rule, std
 /// Returns the refined surface: one quad per corner, in order, with the corners (vertex, edge out, face, edge in) and
 /// the sharpnesses of `child_sharpness`.
 ///
-/// Works on open pieces, too (see `surface_piece`): sides on the border get no twin.
+/// Works on open surfaces and pieces (see `surface_piece`), too: sides on the border get no twin, and the corner of a
+/// border vertex is the first of its fan.
 SurfaceTopology refined_topology(const SurfaceTopology& surface);
 
 /// Returns the points of all children [vertices][edges][faces] by the Catmull-Clark rules, as `refinement_rows` would

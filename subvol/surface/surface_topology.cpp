@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/surface/crowded_edges.h"
+#include "subvol/surface/sheets.h"
 
 #include <string>
 
@@ -131,6 +132,10 @@ SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_
 }
 
 BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology) {
+  return tagged_boundary(mesh, topology, sheet_features(mesh, topology));
+}
+
+BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology, const SheetFeatures& features) {
   BoundarySurface boundary;
   std::vector<Index> number(mesh.num_vertices(), kNoIndex);
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v) {
@@ -156,19 +161,30 @@ BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topo
     boundary.edges.push_back(topology.find_edge(a, b));
     surface_edge[boundary.edges.back()] = static_cast<Index>(e);
   }
+  const InterfaceMarks& marks = features.marks;
   const auto in_range = [&](Index v) { return v >= 0 && static_cast<std::size_t>(v) < mesh.num_vertices(); };
   for (const CreaseEdge& crease : mesh.tags.creases) {
     const std::string what = "crease " + std::to_string(crease.v0) + "-" + std::to_string(crease.v1);
     const Index e = in_range(crease.v0) && in_range(crease.v1) ? topology.find_edge(crease.v0, crease.v1) : kNoIndex;
-    if (e == kNoIndex || surface_edge[e] == kNoIndex) throw InputError(what + " is not an edge of the boundary");
-    surface.edge_sharpness[surface_edge[e]] = checked_sharpness(crease.sharpness, what);
+    const bool on_interface = e != kNoIndex && marks.has_edge(e);
+    if (e == kNoIndex || (surface_edge[e] == kNoIndex && !on_interface))
+      throw InputError(what + " is not an edge of the boundary or of an interface");
+    const float sharpness = checked_sharpness(crease.sharpness, what);
+    if (surface_edge[e] != kNoIndex) surface.edge_sharpness[surface_edge[e]] = sharpness;
   }
   for (const CornerVertex& corner : mesh.tags.corners) {
     const std::string what = "corner " + std::to_string(corner.vertex);
-    if (!in_range(corner.vertex) || number[corner.vertex] == kNoIndex)
-      throw InputError(what + " is not a vertex of the boundary");
-    surface.vertex_sharpness[number[corner.vertex]] = checked_sharpness(corner.sharpness, what);
+    const bool known = in_range(corner.vertex);
+    if (!known || (number[corner.vertex] == kNoIndex && !marks.has_vertex(corner.vertex)))
+      throw InputError(what + " is not a vertex of the boundary or of an interface");
+    const float sharpness = checked_sharpness(corner.sharpness, what);
+    if (number[corner.vertex] != kNoIndex) surface.vertex_sharpness[number[corner.vertex]] = sharpness;
   }
+  constexpr auto kSharp = static_cast<float>(kInfiniteSharpness);
+  for (std::size_t e = 0; e < surface.num_edges(); ++e)
+    if (features.is_curve(boundary.edges[e])) surface.edge_sharpness[e] = kSharp;
+  for (std::size_t v = 0; v < surface.num_vertices(); ++v)
+    if (features.is_corner(boundary.vertices[v])) surface.vertex_sharpness[v] = kSharp;
   return boundary;
 }
 

@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 
@@ -39,11 +40,14 @@ void normalise_tags(FeatureTags& tags) {
 void drop_lost_tags(VolumeMesh& mesh) {
   if (mesh.tags.empty()) return;
   const MeshTopology topology(mesh);
+  const InterfaceMarks interfaces = mark_interfaces(topology, find_interfaces(mesh, topology));
   std::erase_if(mesh.tags.creases, [&](const CreaseEdge& c) {
     const Index e = topology.find_edge(c.v0, c.v1);
-    return e == kNoIndex || !topology.is_boundary_edge(e);
+    return e == kNoIndex || (!topology.is_boundary_edge(e) && !interfaces.has_edge(e));
   });
-  std::erase_if(mesh.tags.corners, [&](const CornerVertex& c) { return !topology.is_boundary_vertex(c.vertex); });
+  std::erase_if(mesh.tags.corners, [&](const CornerVertex& c) {
+    return !topology.is_boundary_vertex(c.vertex) && !interfaces.has_vertex(c.vertex);
+  });
 }
 
 VolumeMesh kept_cells(const VolumeMesh& mesh, std::span<const char> kept) {

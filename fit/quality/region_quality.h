@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/quality/quality.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace subvol {
+
+/// What is true of one region: the cells of one reference.
+struct RegionQuality {
+  int reference;
+  std::string name;  ///< of its group in `VolumeMesh::regions`; may be empty
+  std::size_t num_cells = 0, num_uncertified = 0;
+  double volume = 0;
+  double area = 0;   ///< of its faces on the boundary
+  double min_scaled_jacobian = 1;
+};
+
+/// What is true of the faces between two regions.
+struct InterfaceArea {
+  std::array<int, 2> references;
+  std::size_t num_faces = 0;
+  double area = 0;
+};
+
+struct RegionReport {
+  std::vector<RegionQuality> regions;     ///< ascending by reference
+  std::vector<InterfaceArea> interfaces;  ///< ascending by pair
+};
+
+/// Measures the regions of a mesh of linear cells. quality: of this mesh; null: only volumes and areas are set.
+///
+/// Volumes are those of the cells with bilinear quads. Areas are those of four triangles for each quad. Index-correct
+/// cells are expected. Cost: linear.
+RegionReport measure_regions(const VolumeMesh& mesh, const QualityReport* quality);
+
+/// Returns the volumes of the regions, ascending by reference. Cost: linear.
+std::vector<double> region_volumes(const VolumeMesh& mesh);
+
+}  // namespace subvol

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes of several regions, as their users run them through the verbs.
+
+#include "subvol/io/mesh_io.h"
+#include "tests/support/sample_meshes.h"
+#include "tests/support/workplace.h"
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+using subvol::test::content_of;
+using subvol::test::Run;
+using subvol::test::Workplace;
+
+namespace {
+
+/// Two layers of two cells each; the lower one has a name in formats that write names.
+subvol::VolumeMesh two_layers() {
+  subvol::VolumeMesh mesh = subvol::test::lattice(2, 2, 4);
+  for (int c = 0; c < 16; ++c) mesh.references.push_back(c < 8 ? 3 : 8);
+  mesh.regions = {{"skin", 3, 3}, {"core", 8, 3}};
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "layers.mesh", two_layers());
+  for (const char* command :
+       {"subdivide layers.mesh --crease-angle 40 -o out.mesh --report r.json --force",
+        "optimize layers.mesh -o out.mesh --report r.json --force",
+        "fit layers.mesh --template layers.mesh --levels 1 --crease-angle 40 -o out.mesh --report r.json --force"}) {
+    CAPTURE(command);
+    const Run run = place.run(command);
+    INFO(run.err);
+    REQUIRE(run.status == 0);
+    const auto report = nlohmann::json::parse(content_of(place / "r.json"));
+    const auto& regions = report.at("regions").at("cells");
+    REQUIRE(regions.size() == 2);
+    CHECK(regions[0].at("reference") == 3);
+    CHECK(regions[0].at("volume").get<double>() == Approx(8).epsilon(1e-3));
+    CHECK(regions[1].at("volume").get<double>() == Approx(8).epsilon(1e-3));
+    REQUIRE(report.at("regions").at("interfaces").size() == 1);
+    CHECK(report.at("regions").at("interfaces")[0].at("area").get<double>() == Approx(4).epsilon(1e-3));
+  }
+  const Run check = place.run("check layers.mesh");
+  CHECK(check.status == 0);
+  CHECK(check.out.find("interface           between 3 and 8: 4 faces, area 4") != std::string::npos);
+}
+
+TEST_CASE("convert writes one region, by name or number, and lists the regions if there is no such one",
+          "[cli][regions]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "layers.mesh", two_layers());
+  REQUIRE(place.run("convert layers.mesh --region 8 -o core.mesh").status == 0);
+  const subvol::VolumeMesh core = subvol::read_volume_mesh(place / "core.mesh");
+  CHECK(core.num_cells() == 8);
+  CHECK(core.references == std::vector<int>(8, 8));
+  const Run unknown = place.run("convert layers.mesh --region bone -o bone.mesh");
+  CHECK(unknown.status == 2);
+  CHECK(unknown.err.find("3 (") != std::string::npos);
+  CHECK(unknown.err.find("8 (") != std::string::npos);
+}
+
+TEST_CASE("the cage of a mesh with regions is sharp where interfaces reach its boundary", "[cli][regions]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "layers.mesh", two_layers());
+  REQUIRE(place.run("convert layers.mesh -o cage.usda").status == 0);
+  CHECK(content_of(place / "cage.usda").find("creaseIndices") != std::string::npos);
+}
