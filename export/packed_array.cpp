@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/packed_array.h"
+#include "subvol/export/packed_array.h"
 
 #include "subvol/base/base64.h"
 

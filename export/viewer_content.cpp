@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/viewer_content.h"
+#include "subvol/export/viewer_content.h"
 
-#include "export/export.h"
-#include "export/tessellate.h"
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
+#include "subvol/export/tessellate.h"
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>

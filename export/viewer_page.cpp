@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/viewer_page.h"
+#include "subvol/export/viewer_page.h"
 
-#include "export/packed_array.h"
-#include "export/viewer_script.h"
 #include "subvol/base/error.h"
+#include "subvol/export/packed_array.h"
+#include "subvol/export/viewer_script.h"
 
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/viewer_content.h"
+#include "subvol/export/viewer_content.h"
 
 #include <string>
 

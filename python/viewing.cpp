@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/runs/viewing.h"
 #include "cli/runs/report_plots.h"
-#include "export/viewer_page.h"
+#include "cli/runs/viewing.h"
 #include "python/keywords.h"
 #include "python/meshes.h"
 #include "python/module.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/export/viewer_page.h"
 #include "subvol/mesh/validate.h"
 
 #include <optional>

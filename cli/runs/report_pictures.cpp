@@ -2,14 +2,14 @@
 #include "cli/runs/report_pictures.h"
 
 #include "cli/runs/scene_chord.h"
-#include "export/cutaway.h"
-#include "export/export.h"
-#include "export/raster.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/closest_point.h"
-#include "fit/quality/high_order_quality.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/cutaway.h"
+#include "subvol/export/export.h"
+#include "subvol/export/raster.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/surface/boundary.h"
 
 #include <png.h>

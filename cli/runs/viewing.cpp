@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/viewing.h"
 
-#include "export/export.h"
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/mesh_check.h"
-#include "fit/quality/high_order_quality.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/io/cell_values.h"
 #include "subvol/surface/boundary.h"
 

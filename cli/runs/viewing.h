@@ -3,8 +3,8 @@
 
 #include "cli/runs/report_meshes.h"
 #include "cli/runs/scene_chord.h"
-#include "export/viewer_content.h"
 #include "subvol/base/work_progress.h"
+#include "subvol/export/viewer_content.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <filesystem>

@@ -7,10 +7,10 @@
 #include "cli/runs/report_pictures.h"
 #include "cli/runs/viewing.h"
 #include "cli/verbs/commands.h"
-#include "export/viewer_page.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/export/viewer_page.h"
 
 #include <iostream>
 #include <memory>

@@ -10,11 +10,11 @@
 #include "cli/runs/viewing.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/verb_options.h"
-#include "export/viewer_page.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/base/version.h"
+#include "subvol/export/viewer_page.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/surface/boundary.h"
 

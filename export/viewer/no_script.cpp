@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Stands for the bundled script in builds without node.
-#include "export/viewer_script.h"
+#include "subvol/export/viewer_script.h"
 
 namespace subvol {
 
