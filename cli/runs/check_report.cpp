@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
 
-#include "export/high_order_file.h"
-#include "fit/elements/polynomial_map.h"
-#include "fit/quality/high_order_quality.h"
 #include "subvol/base/format.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/fit/elements/polynomial_map.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>

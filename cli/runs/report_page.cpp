@@ -3,8 +3,8 @@
 
 #include "cli/runs/page_parts.h"
 #include "cli/runs/report_plots.h"
-#include "export/color_map.h"
 #include "subvol/base/error.h"
+#include "subvol/export/color_map.h"
 
 #include <algorithm>
 #include <cmath>

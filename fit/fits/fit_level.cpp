@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/fit_level.h"
+#include "subvol/fit/fits/fit_level.h"
 
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"

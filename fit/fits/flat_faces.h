@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/flat_facets.h"
-#include "fit/geometry/closest_point.h"
+#include "subvol/fit/features/flat_facets.h"
+#include "subvol/fit/geometry/closest_point.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/fit_target.h"
+#include "subvol/fit/target/fit_target.h"
 
-#include "fit/target/enclosed_volume.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/target/enclosed_volume.h"
 
 #include <Eigen/Geometry>
 
