@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Microseconds per cell for the proof that linear hexes are nowhere inverted.
 #include "bench/hex_grid.h"
-#include "fit/certificate/certificate.h"
+#include "subvol/fit/certificate/certificate.h"
 
 #include <omp.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Nanoseconds per quadrature point of the volume energy: value, value and gradient, value, gradient and Hessian; beside
 // the same energy evaluated one Jacobian at a time with a general eigenvalue solver. JSON to stdout.
-#include "fit/energies/volume_energy.h"
+#include "subvol/fit/energies/volume_energy.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>

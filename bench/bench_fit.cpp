@@ -2,11 +2,11 @@
 // Whole fits with and without each accelerator: Newton against L-BFGS, closest points against Voronoi cells, one
 // against all threads. JSON to stdout. Usage: bench_fit [TARGET TEMPLATE [LEVELS]]; without arguments the torus sample,
 // level 2.
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/subdivision_fit.h"
 #include "samples/shapes.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/subdivision_fit.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/mesh_topology.h"

@@ -3,10 +3,10 @@
 // Microseconds per cell, one thread, of an energy and gradient with the points of a fit, and by that the proof that no
 // cell is inverted: of the first pass, which makes the models that it needs, and of later ones.
 #include "bench/freed_memory.h"
-#include "export/high_order_file.h"
-#include "fit/certificate/high_order_certificate.h"
-#include "fit/energies/high_order_energy.h"
 #include "subvol/base/error.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
+#include "subvol/fit/energies/high_order_energy.h"
 
 #include <omp.h>
 

@@ -5,15 +5,15 @@
 // amplitudes before), and of later ones. Times for the proof and what stands beside it are those of the processor.
 #include "bench/freed_memory.h"
 #include "bench/hex_grid.h"
-#include "fit/certificate/high_order_certificate.h"
-#include "fit/energies/high_order_energy.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
+#include "subvol/fit/energies/high_order_energy.h"
 
 #include <omp.h>
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 #include <cstdio>
+#include <ctime>
 #include <random>
 
 using namespace subvol;

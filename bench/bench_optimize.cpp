@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "bench/hex_grid.h"
-#include "fit/optimize_mesh.h"
-#include "fit/quality/quality.h"
+#include "subvol/fit/optimize_mesh.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <omp.h>

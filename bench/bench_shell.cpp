@@ -2,7 +2,7 @@
 // Shells of finer and finer bowls: cells per second, and the share that checks take of the time.
 
 #include "samples/shapes.h"
-#include "shell/shell.h"
+#include "subvol/shell/shell.h"
 
 #include <omp.h>
 

@@ -2,7 +2,7 @@
 // Restricted Voronoi diagram: nanoseconds per pair (triangle, cell) with sites near the target and far from it, both
 // ways. The target is a bumpy sphere; times are those of the process's processors, so with one thread other jobs
 // disturb little.
-#include "fit/geometry/restricted_voronoi.h"
+#include "subvol/fit/geometry/restricted_voronoi.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <Eigen/Geometry>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/animation.h"
+#include "subvol/export/animation.h"
 
-#include "export/polygon_shading.h"
-#include "fit/elements/boundary_samples.h"
 #include "subvol/base/error.h"
+#include "subvol/export/polygon_shading.h"
+#include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/surface/boundary.h"

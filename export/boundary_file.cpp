@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/boundary_file.h"
+#include "subvol/export/boundary_file.h"
 
-#include "export/text_format.h"
-#include "export/vtu_arrays.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/export/text_format.h"
+#include "subvol/export/vtu_arrays.h"
 
 #include <algorithm>
 #include <cstdint>

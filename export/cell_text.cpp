@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/cell_text.h"
+#include "subvol/export/cell_text.h"
 
-#include "export/text_format.h"
-#include "export/vtu_arrays.h"
 #include "subvol/base/error.h"
+#include "subvol/export/text_format.h"
+#include "subvol/export/vtu_arrays.h"
 
 #include <algorithm>
 #include <cassert>

@@ -3,8 +3,8 @@
 
 // Text of .vtu and .msh files, for linear and for Lagrange cells alike.
 
-#include "export/grouped_faces.h"
-#include "export/volume_writer.h"
+#include "subvol/export/grouped_faces.h"
+#include "subvol/export/volume_writer.h"
 
 #include <cstdint>
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/chord_distance.h"
+#include "subvol/export/chord_distance.h"
 
 #include <Eigen/Geometry>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/color_map.h"
+#include "subvol/export/color_map.h"
 
 #include <algorithm>
 #include <cmath>

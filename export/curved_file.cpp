@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/curved_file.h"
+#include "subvol/export/curved_file.h"
 
-#include "export/lagrange_cells.h"
-#include "export/lagrange_mesh.h"
-#include "export/text_format.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/export/lagrange_cells.h"
+#include "subvol/export/lagrange_mesh.h"
+#include "subvol/export/text_format.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>

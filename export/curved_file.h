@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/high_order_file.h"
+#include "subvol/export/high_order_file.h"
 #include "subvol/io/nodal_mesh.h"
 
 #include <filesystem>

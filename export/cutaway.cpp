@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/cutaway.h"
+#include "subvol/export/cutaway.h"
 
-#include "export/color_map.h"
-#include "fit/elements/boundary_samples.h"
 #include "subvol/base/error.h"
+#include "subvol/export/color_map.h"
+#include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/export.h"
+#include "subvol/export/export.h"
 
 #include <span>
 

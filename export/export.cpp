@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/export.h"
+#include "subvol/export/export.h"
 
-#include "export/color_map.h"
-#include "export/polygon_shading.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/color_map.h"
+#include "subvol/export/polygon_shading.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/surface/boundary.h"

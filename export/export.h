@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/high_order_patches.h"
-#include "export/scene.h"
-#include "export/tessellate.h"
-#include "fit/geometry/curved_boundary.h"
+#include "subvol/export/high_order_patches.h"
+#include "subvol/export/scene.h"
+#include "subvol/export/tessellate.h"
+#include "subvol/fit/geometry/curved_boundary.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

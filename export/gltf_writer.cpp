@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/gltf_writer.h"
+#include "subvol/export/gltf_writer.h"
 
-#include "export/text_format.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/version.h"
+#include "subvol/export/text_format.h"
 
 #include <tiny_gltf.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/scene.h"
+#include "subvol/export/scene.h"
 
 #include <filesystem>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/group_data.h"
+#include "subvol/export/group_data.h"
 
-#include "export/vtu_arrays.h"
+#include "subvol/export/vtu_arrays.h"
 
 #include <algorithm>
 #include <cstdint>

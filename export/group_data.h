@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/vtu_reader.h"
+#include "subvol/export/vtu_reader.h"
 #include "subvol/mesh/face_groups.h"
 
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/grouped_faces.h"
+#include "subvol/export/grouped_faces.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/lagrange_mesh.h"
+#include "subvol/export/lagrange_mesh.h"
 #include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/volume_writer.h"
-#include "fit/elements/cell_reference.h"
-#include "fit/elements/high_order_mesh.h"
-#include "fit/elements/polynomial_map.h"
+#include "subvol/export/volume_writer.h"
+#include "subvol/fit/elements/cell_reference.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/elements/polynomial_map.h"
 #include "subvol/io/nodal_mesh.h"
 
 #include <filesystem>

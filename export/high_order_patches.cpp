@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/high_order_patches.h"
+#include "subvol/export/high_order_patches.h"
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/feature_tags.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/lagrange_cells.h"
+#include "subvol/export/lagrange_cells.h"
 
-#include "fit/elements/pattern_table.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/pattern_table.h"
 #include "subvol/io/node_points.h"
 
 #include <Eigen/LU>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/cell_text.h"
+#include "subvol/export/cell_text.h"
+#include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/io/cell_lattice.h"
 #include "subvol/io/nodal_mesh.h"
-#include "fit/elements/high_order_mesh.h"
 
 namespace subvol {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/io/cell_lattice.h"
-#include "fit/elements/high_order_mesh.h"
 
 #include <span>
 #include <vector>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/nodal_export.h"
+#include "subvol/export/nodal_export.h"
 
-#include "export/lagrange_mesh.h"
-#include "fit/elements/basis.h"
-#include "fit/elements/pattern_table.h"
 #include "subvol/base/error.h"
+#include "subvol/export/lagrange_mesh.h"
+#include "subvol/fit/elements/basis.h"
+#include "subvol/fit/elements/pattern_table.h"
 #include "subvol/io/mfem_numbering.h"
-#include "subvol/io/node_points.h"
 #include "subvol/io/nodal_writers.h"
+#include "subvol/io/node_points.h"
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/high_order_mesh.h"
-#include "fit/elements/polynomial_map.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/elements/polynomial_map.h"
 #include "subvol/io/nodal_mesh.h"
 
 #include <filesystem>

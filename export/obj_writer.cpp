@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/obj_writer.h"
+#include "subvol/export/obj_writer.h"
 
-#include "export/text_format.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/version.h"
+#include "subvol/export/text_format.h"
 
 #include <algorithm>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/polygon_shading.h"
+#include "subvol/export/polygon_shading.h"
 
-#include "export/text_format.h"
 #include "subvol/base/error.h"
+#include "subvol/export/text_format.h"
 
 #include <Eigen/Geometry>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/raster.h"
+#include "subvol/export/raster.h"
 
 #include "subvol/base/error.h"
 

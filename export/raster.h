@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "export/color_map.h"
+#include "subvol/export/color_map.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>

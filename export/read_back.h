@@ -7,8 +7,8 @@
 // All functions throw IoError, naming the file and the first difference, or why the file cannot be read. Files that are
 // not regular (a pipe, a device) are skipped, because they do not return what was written. Cost: about that of writing.
 
-#include "export/high_order_file.h"
-#include "export/scene.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/export/scene.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

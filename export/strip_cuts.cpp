@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/strip_cuts.h"
+#include "subvol/export/strip_cuts.h"
 
-#include "export/chord_distance.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/export/chord_distance.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/tessellate.h"
+#include "subvol/export/tessellate.h"
 
-#include "export/strip_cuts.h"
 #include "subvol/base/error.h"
+#include "subvol/export/strip_cuts.h"
 #include "subvol/mesh/feature_tags.h"
 #include "subvol/subdivision/limit_patches.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/text_format.h"
+#include "subvol/export/text_format.h"
 
 #include "subvol/base/error.h"
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/usd_writer.h"
+#include "subvol/export/usd_writer.h"
 
-#include "export/text_format.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/version.h"
+#include "subvol/export/text_format.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/volume_writer.h"
+#include "subvol/export/volume_writer.h"
 
-#include "export/cell_text.h"
-#include "export/group_data.h"
-#include "export/grouped_faces.h"
-#include "export/nodal_export.h"
-#include "export/text_format.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/export/cell_text.h"
+#include "subvol/export/group_data.h"
+#include "subvol/export/grouped_faces.h"
+#include "subvol/export/nodal_export.h"
+#include "subvol/export/text_format.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/validate.h"
 

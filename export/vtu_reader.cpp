@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/vtu_reader.h"
+#include "subvol/export/vtu_reader.h"
 
 #include <utility>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/feature_routing.h"
-#include "fit/features/followed_creases.h"
-#include "fit/stages/fit_report.h"
-#include "fit/stages/quality_stages.h"
-#include "fit/target/feature_size.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/followed_creases.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/quality_stages.h"
+#include "subvol/fit/target/feature_size.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/high_order_mesh.h"
-#include "fit/stages/fit_report.h"
-#include "fit/subdivision_fit.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/subdivision_fit.h"
 
 #include <functional>
 #include <optional>

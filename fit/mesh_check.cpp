@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/mesh_check.h"
+#include "subvol/fit/mesh_check.h"
 
-#include "fit/certificate/high_order_certificate.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/self_intersection.h"
-#include "fit/quality/high_order_quality.h"
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/high_order_mesh.h"
-#include "fit/geometry/curved_boundary.h"
-#include "fit/geometry/normal_deviation.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/quality/quality.h"
-#include "fit/quality/region_quality.h"
 #include "subvol/base/work_progress.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/geometry/curved_boundary.h"
+#include "subvol/fit/geometry/normal_deviation.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/audit.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_options.h"
-#include "fit/stages/fit_report.h"
+#include "subvol/fit/stages/fit_options.h"
+#include "subvol/fit/stages/fit_report.h"
 #include "subvol/mesh/fit_state.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/point_cloud.h"

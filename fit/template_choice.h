@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/basis.h"
-#include "fit/stages/fit_report.h"
+#include "subvol/fit/elements/basis.h"
+#include "subvol/fit/stages/fit_report.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/untangle_before_fit.h"
+#include "subvol/fit/untangle_before_fit.h"
 
-#include "fit/certificate/certificate.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
 
 #include <string>
 #include <utility>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/optimize_mesh.h"
+#include "subvol/fit/optimize_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <cstddef>

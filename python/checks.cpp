@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/check_report.h"
-#include "export/curved_file.h"
-#include "fit/geometry/self_intersection.h"
-#include "fit/mesh_check.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/report.h"
 #include "python/results.h"
+#include "subvol/export/curved_file.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/mesh_check.h"
 
 #include <utility>
 #include <variant>

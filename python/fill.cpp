@@ -3,13 +3,13 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
-#include "fit/automatic_fit.h"
-#include "fit/mesh_check.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/mesh_check.h"
 
 namespace subvol::python {
 namespace {

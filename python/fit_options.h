@@ -2,10 +2,10 @@
 #pragma once
 
 #include "cli/runs/writing.h"
-#include "fit/elements/basis.h"
-#include "fit/high_order_fit.h"
-#include "fit/untangle_before_fit.h"
 #include "python/keywords.h"
+#include "subvol/fit/elements/basis.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/untangle_before_fit.h"
 #include "subvol/subdivision/subdivision.h"
 
 namespace subvol::python {

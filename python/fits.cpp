@@ -5,16 +5,16 @@
 #include "cli/runs/report.h"
 #include "cli/runs/untangling.h"
 #include "cli/runs/writing.h"
-#include "fit/high_order_fit.h"
-#include "fit/mesh_check.h"
-#include "fit/template_choice.h"
-#include "fit/untangle_before_fit.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/template_choice.h"
+#include "subvol/fit/untangle_before_fit.h"
 
 #include <algorithm>
 

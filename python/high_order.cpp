@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/export.h"
-#include "export/lagrange_mesh.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/groups.h"
 #include "python/meshes.h"
 #include "python/module.h"
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
+#include "subvol/export/lagrange_mesh.h"
 #include "subvol/surface/boundary.h"
 
 namespace subvol::python {

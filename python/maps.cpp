@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/tessellate.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/meshes.h"
 #include "python/module.h"
 #include "python/work.h"
 #include "subvol/base/error.h"
+#include "subvol/export/tessellate.h"
 #include "subvol/mesh/features.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/repeated_subdivision.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cli/runs/loading.h"
-#include "export/high_order_file.h"
+#include "subvol/export/high_order_file.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/optimize_mesh.h"
+#include "subvol/fit/optimize_mesh.h"
 
 #include "cli/runs/check_report.h"
 #include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/mesh_check.h"
-#include "fit/untangle_before_fit.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
 #include "python/fit_options.h"
@@ -14,6 +11,9 @@
 #include "python/results.h"
 #include "subvol/base/error.h"
 #include "subvol/base/option_checks.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/untangle_before_fit.h"
 #include "subvol/surface/boundary.h"
 
 namespace subvol::python {

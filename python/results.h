@@ -3,8 +3,8 @@
 
 #include "python/meshes.h"
 #include "python/report.h"
-#include "shell/curved_shell.h"
 #include "subvol/mesh/fit_state.h"
+#include "subvol/shell/curved_shell.h"
 
 #include <memory>
 #include <optional>

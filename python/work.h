@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_report.h"
 #include "python/keywords.h"
 #include "subvol/base/work_progress.h"
+#include "subvol/fit/stages/fit_report.h"
 
 #include <pybind11/pybind11.h>
 

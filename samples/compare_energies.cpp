@@ -3,11 +3,11 @@
 // are left to themselves, with no surface to follow, under each distortion energy. A rigid one keeps the volume of
 // every cell; a conformal one shrinks or swells cells by the singularity to keep their shapes.
 
-#include "export/high_order_file.h"
-#include "fit/energies/high_order_energy.h"
-#include "fit/quality/high_order_quality.h"
-#include "fit/solver/newton.h"
 #include "subvol/base/atomic_file.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/solver/newton.h"
 
 #include <Eigen/LU>
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Makes a template by hand, step by step (grid, carve, pillow), fits it, and lets one be made automatically.
 
-#include "fit/quality/quality.h"
-#include "fit/subdivision_fit.h"
 #include "samples/shapes.h"
-#include "subvol/io/mesh_io.h"
-#include "subvol/templates/auto_template.h"
-#include "subvol/templates/carve.h"
-#include "subvol/templates/pillow.h"
-#include "subvol/templates/voxel_grid.h"
+#include <subvol/fit/quality/quality.h>
+#include <subvol/fit/subdivision_fit.h>
+#include <subvol/io/mesh_io.h>
+#include <subvol/templates/auto_template.h>
+#include <subvol/templates/carve.h>
+#include <subvol/templates/pillow.h>
+#include <subvol/templates/voxel_grid.h>
 
 #include <cstdio>
 #include <exception>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/mesh/volume_mesh.h"
-#include "subvol/surface/point_cloud.h"
-#include "subvol/surface/triangle_mesh.h"
+#include <subvol/mesh/volume_mesh.h>
+#include <subvol/surface/point_cloud.h>
+#include <subvol/surface/triangle_mesh.h>
 
 #include <string>
 #include <vector>

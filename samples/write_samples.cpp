@@ -2,10 +2,10 @@
 // Writes every sample as NAME_target.off and NAME_template.mesh, torus_points.xyz, bowl.obj to grow shells on, plate.obj
 // to compute on, and tangled.mesh to repair.
 
-#include "export/obj_writer.h"
 #include "samples/shapes.h"
 #include "subvol/base/atomic_file.h"
-#include "subvol/io/mesh_io.h"
+#include <subvol/export/obj_writer.h>
+#include <subvol/io/mesh_io.h>
 
 #include <cstdio>
 #include <exception>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/boundary_samples.h"
-#include "fit/elements/high_order_mesh.h"
-#include "fit/geometry/curved_boundary.h"
-#include "shell/shell.h"
-#include "shell/thickness.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/geometry/curved_boundary.h"
+#include "subvol/shell/shell.h"
+#include "subvol/shell/thickness.h"
 
 #include <array>
 #include <functional>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/extrude.h"
+#include "subvol/shell/extrude.h"
 
-#include "shell/shell_layers.h"
-#include "shell/visible_normals.h"
 #include "subvol/base/error.h"
+#include "subvol/shell/shell_layers.h"
+#include "subvol/shell/visible_normals.h"
 #include "subvol/templates/template_edit.h"
 
 #include <cmath>

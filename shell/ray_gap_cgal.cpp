@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/ray_gap.h"
+#include "subvol/shell/ray_gap.h"
 
 #include "subvol/base/error.h"
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/shell.h"
+#include "subvol/shell/shell.h"
 
-#include "fit/energies/closest_point_energy.h"
-#include "fit/energies/volume_energy.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/self_intersection.h"
-#include "fit/solver/free_nodes.h"
-#include "fit/solver/newton.h"
-#include "shell/thickness.h"
-#include "shell/visible_normals.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/energies/closest_point_energy.h"
+#include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/solver/free_nodes.h"
+#include "subvol/fit/solver/newton.h"
+#include "subvol/shell/thickness.h"
+#include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/quality/quality.h"
-#include "fit/stages/fit_report.h"
-#include "shell/shell_check.h"
-#include "shell/shell_layers.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/shell/shell_check.h"
+#include "subvol/shell/shell_layers.h"
 
 #include <functional>
 #include <vector>

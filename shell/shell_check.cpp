@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/shell_check.h"
+#include "subvol/shell/shell_check.h"
 
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/self_intersection.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/certificate.h"
-#include "shell/shell_layers.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/shell/shell_layers.h"
 
 #include <array>
 #include <cstddef>

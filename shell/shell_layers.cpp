@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/shell_layers.h"
+#include "subvol/shell/shell_layers.h"
 
-#include "shell/visible_normals.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
+#include "subvol/shell/visible_normals.h"
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/cell_reference.h"
+#include "subvol/fit/elements/cell_reference.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/surface_topology.h"
 #include "subvol/surface/triangle_mesh.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/thickness.h"
+#include "subvol/shell/thickness.h"
 
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/surface_distance.h"
-#include "shell/ray_gap.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/shell/ray_gap.h"
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>

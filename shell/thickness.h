@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "shell/shell_check.h"
-#include "shell/shell_layers.h"
+#include "subvol/shell/shell_check.h"
+#include "subvol/shell/shell_layers.h"
 
 #include <functional>
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/visible_normals.h"
+#include "subvol/shell/visible_normals.h"
 
 #include "subvol/base/error.h"
 

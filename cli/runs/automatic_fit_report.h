@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
-#include "fit/automatic_fit.h"
+#include "subvol/fit/automatic_fit.h"
 
 namespace subvol::cli {
 

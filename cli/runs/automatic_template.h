@@ -3,7 +3,7 @@
 
 #include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
-#include "fit/template_choice.h"
+#include "subvol/fit/template_choice.h"
 
 #include <optional>
 #include <string>

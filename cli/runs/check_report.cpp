@@ -3,10 +3,10 @@
 
 #include "cli/runs/run_options.h"
 
-#include "export/high_order_file.h"
-#include "fit/elements/polynomial_map.h"
-#include "fit/quality/high_order_quality.h"
 #include "subvol/base/format.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/fit/elements/polynomial_map.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
-#include "fit/elements/high_order_mesh.h"
-#include "fit/features/crease_distance.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/mesh_check.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/features/crease_distance.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/mesh_check.h"
 #include "subvol/subdivision/audit.h"
 
 #include <filesystem>

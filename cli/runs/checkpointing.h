@@ -3,7 +3,7 @@
 
 #include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
-#include "fit/stages/checkpoint.h"
+#include "subvol/fit/stages/checkpoint.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

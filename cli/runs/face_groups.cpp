@@ -2,7 +2,7 @@
 #include "cli/runs/face_groups.h"
 
 #include "cli/runs/writing.h"
-#include "export/export.h"
+#include "subvol/export/export.h"
 
 #include <utility>
 #include <variant>

@@ -3,8 +3,8 @@
 
 #include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
-#include "export/high_order_file.h"
-#include "fit/target/carried_groups.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/fit/target/carried_groups.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <string>

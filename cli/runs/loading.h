@@ -2,8 +2,8 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
-#include "export/high_order_file.h"
-#include "fit/elements/high_order_mesh.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/point_cloud.h"
 #include "subvol/surface/triangle_mesh.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_report.h"
 #include "subvol/base/work_progress.h"
+#include "subvol/fit/stages/fit_report.h"
 
 #include <chrono>
 #include <string>

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
-#include "fit/stages/fit_report.h"
 #include "subvol/base/process_memory.h"
+#include "subvol/fit/stages/fit_report.h"
 
 #include <filesystem>
 #include <string>

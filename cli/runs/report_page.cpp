@@ -2,9 +2,9 @@
 #include "cli/runs/report_page.h"
 
 #include "cli/runs/report_plots.h"
-#include "export/color_map.h"
-#include "export/vtu_arrays.h"
 #include "subvol/base/error.h"
+#include "subvol/export/color_map.h"
+#include "subvol/export/vtu_arrays.h"
 
 #include <algorithm>
 #include <cmath>

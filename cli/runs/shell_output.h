@@ -3,7 +3,7 @@
 
 #include "cli/runs/outputs.h"
 #include "cli/runs/writing.h"
-#include "shell/curved_shell.h"
+#include "subvol/shell/curved_shell.h"
 
 #include <optional>
 #include <string>

@@ -4,8 +4,8 @@
 #include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/progress.h"
-#include "fit/untangle_before_fit.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/untangle_before_fit.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>

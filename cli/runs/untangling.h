@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
-#include "fit/optimize_mesh.h"
+#include "subvol/fit/optimize_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <string>

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "cli/runs/outputs.h"
-#include "export/cutaway.h"
-#include "export/export.h"
-#include "export/high_order_file.h"
-#include "export/scene.h"
-#include "export/tessellate.h"
+#include "subvol/export/cutaway.h"
+#include "subvol/export/export.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/export/scene.h"
+#include "subvol/export/tessellate.h"
 #include "subvol/mesh/fit_state.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"

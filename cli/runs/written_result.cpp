@@ -4,9 +4,9 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/report.h"
-#include "export/high_order_file.h"
 #include "subvol/base/format.h"
 #include "subvol/base/version.h"
+#include "subvol/export/high_order_file.h"
 #include "subvol/io/mesh_io.h"
 
 #include <algorithm>

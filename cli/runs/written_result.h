@@ -5,9 +5,9 @@
 // reports refer to that.
 
 #include "cli/runs/outputs.h"
-#include "fit/elements/high_order_mesh.h"
-#include "fit/mesh_check.h"
-#include "fit/stages/fit_report.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/stages/fit_report.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <functional>

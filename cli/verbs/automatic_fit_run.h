@@ -3,7 +3,7 @@
 
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
-#include "fit/automatic_fit.h"
+#include "subvol/fit/automatic_fit.h"
 #include "subvol/templates/auto_template.h"
 
 #include <CLI/CLI.hpp>

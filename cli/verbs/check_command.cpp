@@ -11,8 +11,8 @@
 #include "cli/runs/writing.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/verb_options.h"
-#include "export/curved_file.h"
 #include "subvol/base/version.h"
+#include "subvol/export/curved_file.h"
 #include "subvol/io/surface_io.h"
 
 #include <iostream>

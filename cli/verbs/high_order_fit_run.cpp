@@ -14,10 +14,10 @@
 #include "cli/runs/untangling.h"
 #include "cli/runs/written_result.h"
 #include "cli/verbs/verb_options.h"
-#include "fit/mesh_check.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
 #include "subvol/base/version.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/templates/voxel_grid.h"
 
 #include <algorithm>

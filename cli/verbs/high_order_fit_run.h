@@ -4,7 +4,7 @@
 #include "cli/runs/automatic_template.h"
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
-#include "fit/high_order_fit.h"
+#include "subvol/fit/high_order_fit.h"
 
 #include <CLI/CLI.hpp>
 

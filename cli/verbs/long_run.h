@@ -5,7 +5,7 @@
 #include "cli/runs/outputs.h"
 #include "cli/runs/progress.h"
 #include "cli/runs/run_options.h"
-#include "fit/stages/fit_report.h"
+#include "subvol/fit/stages/fit_report.h"
 
 #include <CLI/CLI.hpp>
 

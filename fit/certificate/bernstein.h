@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/simd/cell_lanes.h"
+#include "subvol/fit/simd/cell_lanes.h"
 
 #include <array>
 #include <cmath>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/certificate.h"
+#include "subvol/fit/certificate/certificate.h"
 
-#include "fit/certificate/bernstein.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/certificate/bernstein.h"
 
 #include <algorithm>
 #include <string>

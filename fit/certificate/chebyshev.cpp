@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/chebyshev.h"
+#include "subvol/fit/certificate/chebyshev.h"
 
 #include <utility>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/control_matrices.h"
+#include "subvol/fit/certificate/control_matrices.h"
 
-#include "fit/certificate/hex_matrices.h"
-#include "fit/certificate/prism_matrices.h"
+#include "subvol/fit/certificate/hex_matrices.h"
+#include "subvol/fit/certificate/prism_matrices.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/simd/wide.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <array>
 #include <cstddef>

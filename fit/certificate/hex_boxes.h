@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/hex_contraction.h"
+#include "subvol/fit/certificate/hex_contraction.h"
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/hex_contraction.h"
+#include "subvol/fit/certificate/hex_contraction.h"
 
 #include <algorithm>
 #include <cassert>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/hex_matrices.h"
-#include "fit/certificate/line_models.h"
-#include "fit/elements/shape_functions.h"
+#include "subvol/fit/certificate/hex_matrices.h"
+#include "subvol/fit/certificate/line_models.h"
+#include "subvol/fit/elements/shape_functions.h"
 
 #include <array>
 #include <span>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/control_matrices.h"
+#include "subvol/fit/certificate/control_matrices.h"
 
 #include <array>
 #include <cstddef>

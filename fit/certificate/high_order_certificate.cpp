@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/high_order_certificate.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
 
-#include "fit/certificate/hex_boxes.h"
-#include "fit/certificate/simplex_boxes.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/certificate/hex_boxes.h"
+#include "subvol/fit/certificate/simplex_boxes.h"
 
 #include <Eigen/LU>
 

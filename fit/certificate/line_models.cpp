@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/line_models.h"
+#include "subvol/fit/certificate/line_models.h"
 
-#include "fit/certificate/chebyshev.h"
+#include "subvol/fit/certificate/chebyshev.h"
 
 #include <algorithm>
 #include <cassert>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/basis.h"
-#include "fit/simd/wide.h"
+#include "subvol/fit/elements/basis.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <algorithm>
 #include <array>

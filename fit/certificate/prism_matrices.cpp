@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/prism_matrices.h"
+#include "subvol/fit/certificate/prism_matrices.h"
 
-#include "fit/certificate/simplex_tables.h"
+#include "subvol/fit/certificate/simplex_tables.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/simplex_boxes.h"
+#include "subvol/fit/certificate/simplex_boxes.h"
 
-#include "fit/elements/element_rule.h"
+#include "subvol/fit/elements/element_rule.h"
 
 #include <Eigen/LU>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/control_matrices.h"
-#include "fit/certificate/line_models.h"
-#include "fit/certificate/prism_matrices.h"
-#include "fit/certificate/simplex_models.h"
+#include "subvol/fit/certificate/control_matrices.h"
+#include "subvol/fit/certificate/line_models.h"
+#include "subvol/fit/certificate/prism_matrices.h"
+#include "subvol/fit/certificate/simplex_models.h"
 
 #include <array>
 #include <cstdint>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/chebyshev.h"
-#include "fit/certificate/simplex_tables.h"
-#include "fit/elements/shape_functions.h"
-#include "fit/simd/wide.h"
+#include "subvol/fit/certificate/chebyshev.h"
+#include "subvol/fit/certificate/simplex_tables.h"
+#include "subvol/fit/elements/shape_functions.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <cstdint>
 #include <map>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/simplex_polynomials.h"
+#include "subvol/fit/certificate/simplex_polynomials.h"
 
-#include "fit/simd/wide.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <algorithm>
 #include <cassert>

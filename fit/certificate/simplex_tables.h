@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/simplex_polynomials.h"
+#include "subvol/fit/certificate/simplex_polynomials.h"
 
 #include <mutex>
 

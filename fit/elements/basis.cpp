@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/basis.h"
+#include "subvol/fit/elements/basis.h"
 
 #include <cassert>
 #include <cmath>

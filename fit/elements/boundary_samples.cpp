@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/boundary_samples.h"
+#include "subvol/fit/elements/boundary_samples.h"
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/interfaces.h"

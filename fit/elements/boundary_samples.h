@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/high_order_mesh.h"
+#include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/mesh/feature_tags.h"
 #include "subvol/mesh/volume_mesh.h"
 

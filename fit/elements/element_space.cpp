@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/element_space.h"
+#include "subvol/fit/elements/element_space.h"
 
 #include "subvol/base/error.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/shape_functions.h"
+#include "subvol/fit/elements/shape_functions.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
 

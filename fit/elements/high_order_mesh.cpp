@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/high_order_mesh.h"
+#include "subvol/fit/elements/high_order_mesh.h"
 
 #include "subvol/base/error.h"
 #include "subvol/subdivision/row_assembly.h"

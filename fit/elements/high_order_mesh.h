@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/element_space.h"
+#include "subvol/fit/elements/element_space.h"
 #include "subvol/subdivision/sparse_map.h"
 
 #include <span>

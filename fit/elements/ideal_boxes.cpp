@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/ideal_boxes.h"
+#include "subvol/fit/elements/ideal_boxes.h"
 
-#include "fit/elements/element_rule.h"
-#include "fit/elements/shape_functions.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/elements/shape_functions.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/map_projection.h"
+#include "subvol/fit/elements/map_projection.h"
 
-#include "fit/elements/quadrature.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/quadrature.h"
 
 #include <Eigen/QR>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/pattern_table.h"
+#include "subvol/fit/elements/pattern_table.h"
 
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/point_tables.h"
+#include "subvol/fit/elements/point_tables.h"
 
 #include "subvol/base/error.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/high_order_mesh.h"
-#include "fit/simd/wide.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <span>
 #include <vector>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/polynomial_map.h"
+#include "subvol/fit/elements/polynomial_map.h"
 
-#include "fit/elements/pattern_table.h"
-#include "fit/elements/quadrature.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/elements/pattern_table.h"
+#include "subvol/fit/elements/quadrature.h"
 
 #include <Eigen/Geometry>
 

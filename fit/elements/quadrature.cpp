@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/quadrature.h"
+#include "subvol/fit/elements/quadrature.h"
 
 #include "subvol/base/error.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/shape_functions.h"
+#include "subvol/fit/elements/shape_functions.h"
 
 #include <cassert>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/basis.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/elements/basis.h"
 #include "subvol/mesh/cell_topology.h"
 
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/block_sparse.h"
+#include "subvol/fit/energies/block_sparse.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <cstddef>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/element_space.h"
-#include "fit/elements/quadrature.h"
-#include "fit/energies/frozen_distortion.h"
+#include "subvol/fit/elements/element_space.h"
+#include "subvol/fit/elements/quadrature.h"
+#include "subvol/fit/energies/frozen_distortion.h"
 
 #include <algorithm>
 #include <array>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/element_rule.h"
-#include "fit/energies/distortion.h"
-#include "fit/energies/regularised_barrier.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/distortion.h"
+#include "subvol/fit/energies/regularised_barrier.h"
 #include "subvol/mesh/cell_topology.h"
 
 #include <span>

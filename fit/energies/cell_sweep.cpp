@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/cell_sweep.h"
+#include "subvol/fit/energies/cell_sweep.h"
 
 #include <algorithm>
 

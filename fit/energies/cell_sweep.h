@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/cell_group.h"
+#include "subvol/fit/energies/cell_group.h"
 
 #include <algorithm>
 #include <memory>

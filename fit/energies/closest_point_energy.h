@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/surface_term.h"
-#include "fit/geometry/grouped_closest_point.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/energies/surface_term.h"
+#include "subvol/fit/geometry/grouped_closest_point.h"
+#include "subvol/fit/target/target_surface.h"
 
 #include <optional>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/distortion.h"
+#include "subvol/fit/energies/distortion.h"
 
-#include "fit/energies/singular_values.h"
+#include "subvol/fit/energies/singular_values.h"
 
 #include <cmath>
 #include <cstdint>

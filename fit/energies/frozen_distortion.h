@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/distortion.h"
-#include "fit/simd/wide_matrix.h"
+#include "subvol/fit/energies/distortion.h"
+#include "subvol/fit/simd/wide_matrix.h"
 
 namespace subvol {
 

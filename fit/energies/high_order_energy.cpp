@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/high_order_energy.h"
+#include "subvol/fit/energies/high_order_energy.h"
 
-#include "fit/certificate/high_order_certificate.h"
-#include "fit/elements/element_rule.h"
-#include "fit/energies/cell_sweep.h"
-#include "fit/energies/step_limit.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/cell_sweep.h"
+#include "subvol/fit/energies/step_limit.h"
 
 #include <Eigen/LU>
 #include <omp.h>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/cell_reference.h"
-#include "fit/elements/element_space.h"
-#include "fit/elements/quadrature.h"
-#include "fit/energies/distortion.h"
-#include "fit/energies/volume_term.h"
-#include "fit/simd/wide.h"
+#include "subvol/fit/elements/cell_reference.h"
+#include "subvol/fit/elements/element_space.h"
+#include "subvol/fit/elements/quadrature.h"
+#include "subvol/fit/energies/distortion.h"
+#include "subvol/fit/energies/volume_term.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <array>
 #include <cstdint>

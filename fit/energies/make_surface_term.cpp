@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/make_surface_term.h"
+#include "subvol/fit/energies/make_surface_term.h"
 
-#include "fit/energies/surface_energy.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/energies/surface_energy.h"
 
 namespace subvol {
 

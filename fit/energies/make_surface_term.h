@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/closest_point_energy.h"
-#include "fit/energies/correspondence.h"
-#include "fit/energies/surface_term.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/energies/closest_point_energy.h"
+#include "subvol/fit/energies/correspondence.h"
+#include "subvol/fit/energies/surface_term.h"
+#include "subvol/fit/target/target_surface.h"
 
 #include <array>
 #include <cstddef>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/quality_energy.h"
+#include "subvol/fit/energies/quality_energy.h"
 
-#include "fit/certificate/certificate.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
 
 #include <Eigen/Geometry>
 

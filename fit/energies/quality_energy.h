@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/element_rule.h"
-#include "fit/energies/cell_blocks.h"
-#include "fit/energies/volume_term.h"
-#include "fit/features/quality_caps.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/cell_blocks.h"
+#include "subvol/fit/energies/volume_term.h"
+#include "subvol/fit/features/quality_caps.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>

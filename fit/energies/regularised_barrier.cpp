@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/regularised_barrier.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/distortion.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/energies/distortion.h"
 
 namespace subvol {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/simd/wide.h"
+#include "subvol/fit/simd/wide.h"
 
 namespace subvol {
 

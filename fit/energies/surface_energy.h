@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/surface_term.h"
-#include "fit/geometry/restricted_voronoi.h"
-#include "fit/target/target_surface.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/energies/surface_term.h"
+#include "subvol/fit/geometry/restricted_voronoi.h"
+#include "subvol/fit/target/target_surface.h"
 
 #include <array>
 #include <cstddef>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/block_sparse.h"
-#include "fit/features/crease_energy.h"
+#include "subvol/fit/energies/block_sparse.h"
+#include "subvol/fit/features/crease_energy.h"
 
 #include <omp.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/volume_energy.h"
+#include "subvol/fit/energies/volume_energy.h"
 
-#include "fit/certificate/certificate.h"
-#include "fit/energies/cell_kernels.h"
-#include "fit/energies/step_limit.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/energies/cell_kernels.h"
+#include "subvol/fit/energies/step_limit.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/cell_reference.h"
-#include "fit/elements/element_rule.h"
-#include "fit/energies/cell_blocks.h"
-#include "fit/energies/distortion.h"
-#include "fit/energies/volume_term.h"
+#include "subvol/fit/elements/cell_reference.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/cell_blocks.h"
+#include "subvol/fit/energies/distortion.h"
+#include "subvol/fit/energies/volume_term.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/boundary_patches.h"
+#include "subvol/fit/features/boundary_patches.h"
 
-#include "fit/geometry/closest_point.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <Eigen/Geometry>
 

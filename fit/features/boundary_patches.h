@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/crease_paths.h"
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/crease_paths.h"
+#include "subvol/fit/features/signed_features.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"

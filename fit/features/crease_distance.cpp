@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/crease_distance.h"
+#include "subvol/fit/features/crease_distance.h"
 
 #include "subvol/base/error.h"
 

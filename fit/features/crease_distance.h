@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/feature_curves.h"
+#include "subvol/fit/features/feature_curves.h"
 
 #include <algorithm>
 #include <span>

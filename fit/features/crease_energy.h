@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/feature_curves.h"
-#include "fit/geometry/closest_point.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/features/feature_curves.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include <array>
 #include <cstddef>

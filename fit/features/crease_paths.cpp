@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/crease_paths.h"
+#include "subvol/fit/features/crease_paths.h"
 
-#include "fit/features/polyline.h"
-#include "fit/geometry/site_tree.h"
+#include "subvol/fit/features/polyline.h"
+#include "subvol/fit/geometry/site_tree.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/feature_routing.h"
-#include "fit/features/pads.h"
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/pads.h"
+#include "subvol/fit/features/signed_features.h"
 
 #include <span>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/edge_layout.h"
+#include "subvol/fit/features/edge_layout.h"
 
 #include "subvol/mesh/mesh_topology.h"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/curve_choice.h"
-#include "fit/features/feature_routing.h"
-#include "fit/features/followed_creases.h"
-#include "fit/features/pads.h"
-#include "fit/features/quality_caps.h"
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/curve_choice.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/followed_creases.h"
+#include "subvol/fit/features/pads.h"
+#include "subvol/fit/features/quality_caps.h"
+#include "subvol/fit/features/signed_features.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

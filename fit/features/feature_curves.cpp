@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/feature_curves.h"
+#include "subvol/fit/features/feature_curves.h"
 
 #include "subvol/base/error.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/polyline.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/feature_routing.h"
+#include "subvol/fit/features/feature_routing.h"
 
-#include "fit/features/polyline.h"
-#include "fit/features/routing_graph.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/polyline.h"
+#include "subvol/fit/features/routing_graph.h"
 
 #include <algorithm>
 #include <array>

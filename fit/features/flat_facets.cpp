@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/flat_facets.h"
+#include "subvol/fit/features/flat_facets.h"
 
-#include "fit/geometry/surface_distance.h"
+#include "subvol/fit/geometry/surface_distance.h"
 
 #include <Eigen/Geometry>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/followed_creases.h"
+#include "subvol/fit/features/followed_creases.h"
 
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/interfaces.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/crease_distance.h"
-#include "fit/features/crease_energy.h"
-#include "fit/features/crease_paths.h"
+#include "subvol/fit/features/crease_distance.h"
+#include "subvol/fit/features/crease_energy.h"
+#include "subvol/fit/features/crease_paths.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/surface/triangle_mesh.h"

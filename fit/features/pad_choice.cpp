@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/pads.h"
-#include "fit/features/patch_fans.h"
+#include "subvol/fit/features/pads.h"
+#include "subvol/fit/features/patch_fans.h"
 
 #include "subvol/base/error.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/boundary_patches.h"
-#include "fit/features/feature_routing.h"
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/boundary_patches.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/signed_features.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/patch_fans.h"
+#include "subvol/fit/features/patch_fans.h"
 
 #include "subvol/base/error.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/pads.h"
+#include "subvol/fit/features/pads.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/surface_topology.h"
 

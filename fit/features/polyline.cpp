@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/polyline.h"
+#include "subvol/fit/features/polyline.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/quality_caps.h"
+#include "subvol/fit/features/quality_caps.h"
 
 #include "subvol/base/error.h"
 #include "subvol/mesh/mesh_topology.h"

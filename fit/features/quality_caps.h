@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/pads.h"
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/pads.h"
+#include "subvol/fit/features/signed_features.h"
 
 #include <array>
 #include <vector>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/routing_graph.h"
+#include "subvol/fit/features/routing_graph.h"
 
-#include "fit/features/feature_curves.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/feature_curves.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>

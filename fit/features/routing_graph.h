@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/site_tree.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/site_tree.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>

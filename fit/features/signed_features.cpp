@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/signed_features.h"
 
 #include "subvol/base/error.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/fit_level.h"
+#include "subvol/fit/fits/fit_level.h"
 
-#include "fit/target/fit_target.h"
+#include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_options.h"
+#include "subvol/fit/stages/fit_options.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/subdivision/sparse_map.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/fit_schedule.h"
+#include "subvol/fit/fits/fit_schedule.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_options.h"
-#include "fit/stages/stage.h"
+#include "subvol/fit/stages/fit_options.h"
+#include "subvol/fit/stages/stage.h"
 
 #include <vector>
 

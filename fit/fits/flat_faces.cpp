@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/flat_faces.h"
+#include "subvol/fit/fits/flat_faces.h"
 
-#include "fit/geometry/grouped_closest_point.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/quality/quality.h"
+#include "subvol/fit/geometry/grouped_closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 

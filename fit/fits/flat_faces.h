@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/flat_facets.h"
-#include "fit/geometry/closest_point.h"
-#include "fit/target/fit_target.h"
+#include "subvol/fit/features/flat_facets.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/target/fit_target.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 

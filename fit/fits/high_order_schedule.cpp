@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/high_order_schedule.h"
+#include "subvol/fit/fits/high_order_schedule.h"
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/fits/fit_schedule.h"
+#include "subvol/fit/fits/fit_schedule.h"
 
 #include <vector>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/order_indicator.h"
+#include "subvol/fit/fits/order_indicator.h"
 
-#include "fit/solver/vector_math.h"
+#include "subvol/fit/solver/vector_math.h"
 
 #include <Eigen/LU>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/element_space.h"
-#include "fit/solver/fit_problem.h"
+#include "subvol/fit/elements/element_space.h"
+#include "subvol/fit/solver/fit_problem.h"
 
 #include <span>
 #include <vector>

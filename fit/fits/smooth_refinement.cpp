@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/smooth_refinement.h"
+#include "subvol/fit/fits/smooth_refinement.h"
 
-#include "fit/quality/quality.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
 

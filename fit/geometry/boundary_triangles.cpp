@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/cell_envelope.h"
+#include "subvol/fit/geometry/cell_envelope.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/barycentric.h"
-#include "fit/simd/wide.h"
+#include "subvol/fit/geometry/barycentric.h"
+#include "subvol/fit/simd/wide.h"
 
 #include <cstdint>
 #include <vector>

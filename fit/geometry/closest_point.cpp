@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/closest_point.h"
 
 #include "subvol/base/error.h"
 

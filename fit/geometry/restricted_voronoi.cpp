@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/restricted_voronoi.h"
+#include "subvol/fit/geometry/restricted_voronoi.h"
 
-#include "fit/geometry/triangle_cutter.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/geometry/triangle_cutter.h"
 
 #include <omp.h>
 

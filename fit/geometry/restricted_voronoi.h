@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/site_tree.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/geometry/site_tree.h"
 
 #include <array>
 #include <span>

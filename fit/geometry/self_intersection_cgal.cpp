@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/self_intersection.h"
+#include "subvol/fit/geometry/self_intersection.h"
 
 #include "subvol/base/error.h"
 

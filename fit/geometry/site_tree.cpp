@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/site_tree.h"
+#include "subvol/fit/geometry/site_tree.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/surface_distance.h"
+#include "subvol/fit/geometry/surface_distance.h"
 
 #include "subvol/base/error.h"
 

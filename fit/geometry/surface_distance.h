@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/closest_point.h"
 #include "subvol/surface/point_cloud.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/thinnest_place.h"
+#include "subvol/fit/geometry/thinnest_place.h"
 
 #include <Eigen/Geometry>
 

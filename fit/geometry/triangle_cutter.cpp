@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/triangle_cutter.h"
+#include "subvol/fit/geometry/triangle_cutter.h"
 
 #include <Eigen/Geometry>
 

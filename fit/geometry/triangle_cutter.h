@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/barycentric.h"
-#include "fit/geometry/cell_envelope.h"
-#include "fit/geometry/restricted_voronoi.h"
+#include "subvol/fit/geometry/barycentric.h"
+#include "subvol/fit/geometry/cell_envelope.h"
+#include "subvol/fit/geometry/restricted_voronoi.h"
 
 namespace subvol {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/quality/high_order_quality.h"
+#include "subvol/fit/quality/high_order_quality.h"
 
-#include "fit/certificate/high_order_certificate.h"
-#include "fit/elements/element_rule.h"
-#include "fit/elements/pattern_table.h"
-#include "fit/elements/quadrature.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/elements/pattern_table.h"
+#include "subvol/fit/elements/quadrature.h"
 
 #include <Eigen/LU>
 

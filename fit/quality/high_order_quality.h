@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/cell_reference.h"
-#include "fit/elements/high_order_mesh.h"
-#include "fit/quality/quality.h"
+#include "subvol/fit/elements/cell_reference.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/quality/quality.h"
 
 namespace subvol {
 

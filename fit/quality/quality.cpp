@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/quality/quality.h"
+#include "subvol/fit/quality/quality.h"
 
-#include "fit/certificate/bernstein.h"
-#include "fit/elements/element_rule.h"
-#include "fit/elements/quadrature.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/bernstein.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/elements/quadrature.h"
 
 #include <Eigen/LU>
 

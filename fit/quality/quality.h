@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/certificate/certificate.h"
-#include "fit/elements/cell_reference.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/elements/cell_reference.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>

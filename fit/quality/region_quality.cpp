@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/quality/region_quality.h"
+#include "subvol/fit/quality/region_quality.h"
 
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"

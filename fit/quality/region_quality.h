@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/quality/quality.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>

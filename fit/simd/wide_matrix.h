@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/simd/lanes.h"
-#include "fit/simd/wide.h"
+#include "subvol/fit/simd/lanes.h"
+#include "subvol/fit/simd/wide.h"
 
 namespace subvol {
 

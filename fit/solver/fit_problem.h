@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/point_tables.h"
-#include "fit/energies/surface_term.h"
-#include "fit/energies/volume_term.h"
+#include "subvol/fit/elements/point_tables.h"
+#include "subvol/fit/energies/surface_term.h"
+#include "subvol/fit/energies/volume_term.h"
 #include "subvol/subdivision/sparse_map.h"
 
 #include <memory>

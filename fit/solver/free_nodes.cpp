@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/free_nodes.h"
+#include "subvol/fit/solver/free_nodes.h"
 
 namespace subvol {
 

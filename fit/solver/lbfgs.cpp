@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/lbfgs.h"
+#include "subvol/fit/solver/lbfgs.h"
 
-#include "fit/solver/vector_math.h"
+#include "subvol/fit/solver/vector_math.h"
 
 #include <cmath>
 #include <deque>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/solver/fit_problem.h"
-#include "fit/solver/minimizer.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/solver/minimizer.h"
 
 #include <vector>
 

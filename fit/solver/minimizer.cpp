@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/minimizer.h"
+#include "subvol/fit/solver/minimizer.h"
 
-#include "fit/solver/fit_problem.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/solver/fit_problem.h"
 
 #include <algorithm>
 #include <iterator>

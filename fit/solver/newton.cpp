@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/newton.h"
+#include "subvol/fit/solver/newton.h"
 
-#include "fit/solver/reduced_hessian.h"
-#include "fit/solver/vector_math.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/solver/reduced_hessian.h"
+#include "subvol/fit/solver/vector_math.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/checkpoint.h"
+#include "subvol/fit/stages/checkpoint.h"
 
 #include "subvol/base/error.h"
 #include "subvol/base/fingerprint.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/stage_log.h"
+#include "subvol/fit/stages/stage_log.h"
 
 #include <filesystem>
 #include <string>

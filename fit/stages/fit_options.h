@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/correspondence.h"
-#include "fit/energies/distortion.h"
-#include "fit/stages/fit_report.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/energies/correspondence.h"
+#include "subvol/fit/energies/distortion.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/target/target_surface.h"
 #include "subvol/subdivision/boundary_rules.h"
 
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/fit_report.h"
+#include "subvol/fit/stages/fit_report.h"
 
 namespace subvol {
 

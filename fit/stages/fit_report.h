@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/crease_distance.h"
-#include "fit/solver/minimizer.h"
-#include "fit/target/target_report.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/features/crease_distance.h"
+#include "subvol/fit/solver/minimizer.h"
+#include "subvol/fit/target/target_report.h"
 
 #include <algorithm>
 #include <cstddef>

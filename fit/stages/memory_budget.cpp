@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/memory_budget.h"
+#include "subvol/fit/stages/memory_budget.h"
 
 #include "subvol/base/format.h"
 #include "subvol/base/process_memory.h"

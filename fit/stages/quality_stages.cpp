@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/quality_stages.h"
+#include "subvol/fit/stages/quality_stages.h"
 
-#include "fit/solver/levenberg_marquardt.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/solver/levenberg_marquardt.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>

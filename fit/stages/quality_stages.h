@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/closest_point_energy.h"
-#include "fit/energies/quality_energy.h"
-#include "fit/features/crease_energy.h"
-#include "fit/solver/fit_problem.h"
-#include "fit/stages/stage_runner.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/energies/closest_point_energy.h"
+#include "subvol/fit/energies/quality_energy.h"
+#include "subvol/fit/features/crease_energy.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>

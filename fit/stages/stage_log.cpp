@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/stage_log.h"
+#include "subvol/fit/stages/stage_log.h"
 
 #include "subvol/base/error.h"
 

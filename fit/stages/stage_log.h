@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/solver/minimizer.h"
+#include "subvol/fit/solver/minimizer.h"
 
 #include <cstdint>
 #include <functional>

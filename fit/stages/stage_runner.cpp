@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/stage_runner.h"
+#include "subvol/fit/stages/stage_runner.h"
 
-#include "fit/geometry/self_intersection.h"
-#include "fit/solver/lbfgs.h"
-#include "fit/solver/levenberg_marquardt.h"
-#include "fit/solver/newton.h"
 #include "subvol/base/fingerprint.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/solver/lbfgs.h"
+#include "subvol/fit/solver/levenberg_marquardt.h"
+#include "subvol/fit/solver/newton.h"
 
 #include <algorithm>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/solver/fit_problem.h"
-#include "fit/solver/minimizer.h"
-#include "fit/stages/fit_options.h"
-#include "fit/stages/fit_report.h"
-#include "fit/stages/stage.h"
-#include "fit/stages/stage_log.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/solver/minimizer.h"
+#include "subvol/fit/stages/fit_options.h"
+#include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/stages/stage.h"
+#include "subvol/fit/stages/stage_log.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <chrono>

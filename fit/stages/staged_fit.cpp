@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/staged_fit.h"
+#include "subvol/fit/stages/staged_fit.h"
 
 #include <algorithm>
 #include <utility>

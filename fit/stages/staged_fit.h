@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/stages/fit_report.h"
 #include "subvol/base/types.h"
+#include "subvol/fit/stages/fit_report.h"
 #include "subvol/mesh/fit_state.h"
 
 #include <cstddef>

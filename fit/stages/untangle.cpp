@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/untangle.h"
+#include "subvol/fit/stages/untangle.h"
 
-#include "fit/certificate/certificate.h"
-#include "fit/energies/regularised_barrier.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/energies/regularised_barrier.h"
 
 #include <algorithm>
 #include <cmath>

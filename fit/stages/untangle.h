@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/energies/volume_energy.h"
-#include "fit/stages/stage_runner.h"
+#include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/stages/stage_runner.h"
 
 #include <vector>
 

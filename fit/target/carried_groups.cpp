@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/carried_groups.h"
+#include "subvol/fit/target/carried_groups.h"
 
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/geometry/closest_point.h"
-#include "fit/target/soup_topology.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/target/soup_topology.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/solid_topology.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/curved_boundary.h"
+#include "subvol/fit/geometry/curved_boundary.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 

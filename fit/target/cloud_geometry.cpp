@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/cloud_geometry.h"
+#include "subvol/fit/target/cloud_geometry.h"
 
-#include "fit/geometry/site_tree.h"
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
+#include "subvol/fit/geometry/site_tree.h"
 
 #include <Eigen/Eigenvalues>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/enclosed_volume.h"
+#include "subvol/fit/target/enclosed_volume.h"
 
 #include <Eigen/Geometry>
 

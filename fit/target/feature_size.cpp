@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/feature_size.h"
+#include "subvol/fit/target/feature_size.h"
 
 #include "subvol/base/error.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/target/target_surface.h"
 
 #include <optional>
 #include <vector>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/fit_target.h"
+#include "subvol/fit/target/fit_target.h"
 
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/target/enclosed_volume.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/target/enclosed_volume.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/sheets.h"
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/target/target_report.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/target/target_report.h"
+#include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/soup_topology.h"
+#include "subvol/fit/target/soup_topology.h"
 
 #include <algorithm>
 #include <compare>

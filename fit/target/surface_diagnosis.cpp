@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/surface_diagnosis.h"
+#include "subvol/fit/target/surface_diagnosis.h"
 
-#include "fit/geometry/closest_point.h"
-#include "fit/geometry/self_intersection.h"
-#include "fit/geometry/thinnest_place.h"
-#include "fit/geometry/triangle_meeting.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/geometry/thinnest_place.h"
+#include "subvol/fit/geometry/triangle_meeting.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
 

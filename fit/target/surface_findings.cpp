@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // This file names the findings of a diagnosis, for programs and for people.
 
-#include "fit/target/surface_diagnosis.h"
 #include "subvol/base/format.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/fit/target/surface_diagnosis.h"
 
 #include <cstdio>
 #include <utility>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/surface_repair.h"
+#include "subvol/fit/target/surface_repair.h"
 
-#include "fit/geometry/self_intersection.h"
-#include "fit/geometry/surface_union.h"
-#include "fit/geometry/triangle_meeting.h"
-#include "fit/target/carried_groups.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/geometry/surface_union.h"
+#include "subvol/fit/geometry/triangle_meeting.h"
+#include "subvol/fit/target/carried_groups.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/target/surface_diagnosis.h"
+#include "subvol/fit/target/surface_diagnosis.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 

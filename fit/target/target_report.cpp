@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/target_report.h"
+#include "subvol/fit/target/target_report.h"
 
 #include "subvol/base/error.h"
 

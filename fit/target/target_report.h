@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/target/soup_topology.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/target/soup_topology.h"
+#include "subvol/fit/target/target_surface.h"
 #include "subvol/surface/solid_topology.h"
 
 #include <cstddef>

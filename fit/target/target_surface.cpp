@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/target_surface.h"
+#include "subvol/fit/target/target_surface.h"
 
-#include "fit/target/cloud_geometry.h"
-#include "fit/target/enclosed_volume.h"
-#include "fit/target/soup_topology.h"
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
+#include "subvol/fit/target/cloud_geometry.h"
+#include "subvol/fit/target/enclosed_volume.h"
+#include "subvol/fit/target/soup_topology.h"
 #include "subvol/surface/solid_topology.h"
 
 #include <Eigen/Geometry>

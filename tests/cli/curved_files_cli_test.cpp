@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // `fit`, `convert` and `check` report on the polynomial cells in .vtu and .msh.
 
-#include "export/high_order_file.h"
+#include "subvol/export/high_order_file.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/workplace.h"
 

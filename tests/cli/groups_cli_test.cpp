@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Groups of faces, from the surface to the boundary of every result.
 
-#include "export/high_order_file.h"
 #include "samples/shapes.h"
+#include "subvol/export/high_order_file.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/mesh_topology.h"

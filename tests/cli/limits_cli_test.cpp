@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The program where something ends it: killed and resumed, without memory, without room on the disk.
 
-#include "export/high_order_file.h"
+#include "subvol/export/high_order_file.h"
 #include "tests/support/workplace.h"
 
 #include <catch2/catch.hpp>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The verbs beside fit as their users run them: shells, high-order files, optimisation, templates.
 
-#include "export/high_order_file.h"
+#include "subvol/export/high_order_file.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "tests/support/glb_reader.h"

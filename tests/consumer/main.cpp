@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/quality/quality.h"
-#include "fit/subdivision_fit.h"
-#include "subvol/base/version.h"
-#include "subvol/mesh/mesh_topology.h"
-#include "subvol/subdivision/subdivision.h"
-#include "subvol/surface/boundary.h"
+#include <subvol/base/version.h>
+#include <subvol/fit/quality/quality.h>
+#include <subvol/fit/subdivision_fit.h>
+#include <subvol/mesh/mesh_topology.h>
+#include <subvol/subdivision/subdivision.h>
+#include <subvol/surface/boundary.h>
 
 #include <array>
 #include <cstdio>

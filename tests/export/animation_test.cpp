@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/animation.h"
+#include "subvol/export/animation.h"
 
-#include "export/gltf_writer.h"
-#include "fit/high_order_fit.h"
-#include "fit/subdivision_fit.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
+#include "subvol/export/gltf_writer.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/subdivision_fit.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
 #include "tests/support/gltf_validator.h"

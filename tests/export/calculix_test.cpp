@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // CalculiX computes on what is written for it. Skipped without the program (calculix-ccx).
 
-#include "export/high_order_file.h"
-#include "export/volume_writer.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/export/volume_writer.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes of other programs: every node of a sheared, bent cell has one right place.
 
-#include "export/curved_file.h"
-#include "export/nodal_export.h"
-#include "export/volume_writer.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/export/curved_file.h"
+#include "subvol/export/nodal_export.h"
+#include "subvol/export/volume_writer.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/io/node_points.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/cutaway.h"
+#include "subvol/export/cutaway.h"
 
-#include "export/gltf_writer.h"
-#include "fit/quality/high_order_quality.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/gltf_writer.h"
+#include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/quality/quality.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/gltf_validator.h"
 #include "tests/support/sample_meshes.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/export.h"
+#include "subvol/export/export.h"
 
-#include "export/gltf_writer.h"
-#include "export/polygon_shading.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/gltf_writer.h"
+#include "subvol/export/polygon_shading.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/subdivision/subdivision.h"
 #include "tests/support/glb_reader.h"
 #include "tests/support/sample_meshes.h"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/gltf_writer.h"
+#include "subvol/export/gltf_writer.h"
 
-#include "export/color_map.h"
-#include "export/export.h"
 #include "subvol/base/error.h"
 #include "subvol/base/version.h"
+#include "subvol/export/color_map.h"
+#include "subvol/export/export.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/glb_reader.h"
 #include "tests/support/gltf_validator.h"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/export.h"
-#include "export/gltf_writer.h"
-#include "fit/elements/map_projection.h"
-#include "fit/elements/quadrature.h"
-#include "fit/mesh_check.h"
-#include "fit/quality/high_order_quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
+#include "subvol/export/gltf_writer.h"
+#include "subvol/fit/elements/map_projection.h"
+#include "subvol/fit/elements/quadrature.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/glb_reader.h"
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/high_order_file.h"
+#include "subvol/export/high_order_file.h"
 
-#include "export/cell_text.h"
-#include "export/lagrange_mesh.h"
-#include "fit/elements/quadrature.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/export/cell_text.h"
+#include "subvol/export/lagrange_mesh.h"
+#include "subvol/fit/elements/quadrature.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/validate.h"
 #include "tests/support/data.h"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/read_back.h"
+#include "subvol/export/read_back.h"
 
-#include "export/cutaway.h"
-#include "export/gltf_writer.h"
-#include "export/obj_writer.h"
-#include "export/usd_writer.h"
 #include "subvol/base/error.h"
+#include "subvol/export/cutaway.h"
+#include "subvol/export/gltf_writer.h"
+#include "subvol/export/obj_writer.h"
+#include "subvol/export/usd_writer.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/tessellate.h"
+#include "subvol/export/tessellate.h"
 
-#include "fit/geometry/closest_point.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/closest_point.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "tests/support/sample_meshes.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/obj_writer.h"
-#include "export/read_back.h"
-#include "export/usd_writer.h"
 #include "subvol/base/error.h"
+#include "subvol/export/obj_writer.h"
+#include "subvol/export/read_back.h"
+#include "subvol/export/usd_writer.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/usda_reader.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/volume_writer.h"
+#include "subvol/export/volume_writer.h"
 
 #include "subvol/base/error.h"
 #include "tests/support/sample_meshes.h"

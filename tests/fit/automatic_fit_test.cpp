@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/automatic_fit.h"
+#include "subvol/fit/automatic_fit.h"
 
-#include "fit/mesh_check.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/mesh_check.h"
 #include "tests/support/surface_fixtures.h"
 
 #include <catch2/catch.hpp>

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Targets as they come: torn, turned, doubled, holed, noisy. Paper: figure 9.
 
-#include "fit/certificate/certificate.h"
-#include "fit/elements/boundary_samples.h"
-#include "fit/energies/closest_point_energy.h"
-#include "fit/high_order_fit.h"
-#include "fit/mesh_check.h"
-#include "fit/quality/high_order_quality.h"
-#include "fit/subdivision_fit.h"
 #include "samples/shapes.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/energies/closest_point_energy.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/subdivision_fit.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/surface_fixtures.h"
 

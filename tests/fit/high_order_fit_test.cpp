@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/boundary_samples.h"
-#include "fit/energies/high_order_energy.h"
-#include "fit/geometry/surface_distance.h"
-#include "fit/high_order_fit.h"
-#include "fit/quality/high_order_quality.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/templates/auto_template.h"
-#include "tests/support/require_data.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>

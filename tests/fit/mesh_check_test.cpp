@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "export/export.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/mesh_check.h"
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/mesh_check.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"

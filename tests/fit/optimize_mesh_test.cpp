@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/certificate.h"
-#include "fit/geometry/boundary_triangles.h"
-#include "fit/mesh_check.h"
-#include "fit/optimize_mesh.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/optimize_mesh.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"

@@ -3,12 +3,12 @@
 // Whatever they are, a fit returns finite positions, with every cell certified where it says it converged from a
 // certified template, or throws InputError.
 
-#include "fit/certificate/certificate.h"
-#include "fit/certificate/high_order_certificate.h"
-#include "fit/high_order_fit.h"
-#include "fit/optimize_mesh.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/optimize_mesh.h"
 #include "subvol/mesh/validate.h"
 #include "tests/fuzz/bytes_as_file.h"
 

@@ -2,10 +2,10 @@
 // libFuzzer target of one of the library's readers: kExtension says of which files. Whatever the bytes, the reader
 // returns something sound or throws InputError.
 
-#include "export/curved_file.h"
-#include "fit/stages/checkpoint.h"
 #include "subvol/base/error.h"
 #include "subvol/base/fingerprint.h"
+#include "subvol/export/curved_file.h"
+#include "subvol/fit/stages/checkpoint.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Writes small files of every format for the fuzzers to start from: FOLDER/EXTENSION/NAME.
 
-#include "export/high_order_file.h"
-#include "export/obj_writer.h"
-#include "export/volume_writer.h"
-#include "fit/stages/checkpoint.h"
 #include "samples/shapes.h"
 #include "subvol/base/atomic_file.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/export/obj_writer.h"
+#include "subvol/export/volume_writer.h"
+#include "subvol/fit/stages/checkpoint.h"
 #include "subvol/io/mesh_io.h"
 
 #include <cstdio>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/curved_shell.h"
+#include "subvol/shell/curved_shell.h"
 
-#include "export/export.h"
-#include "fit/elements/quadrature.h"
-#include "fit/energies/high_order_energy.h"
-#include "fit/mesh_check.h"
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
+#include "subvol/fit/elements/quadrature.h"
+#include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/mesh_check.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/require_data.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/elements/shape_functions.h"
+#include "subvol/fit/elements/shape_functions.h"
 
 #include <cstdint>
 #include <random>

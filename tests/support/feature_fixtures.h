@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "fit/features/feature_curves.h"
-#include "fit/features/feature_routing.h"
-#include "fit/features/pads.h"
-#include "fit/features/signed_features.h"
+#include "subvol/fit/features/feature_curves.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/features/pads.h"
+#include "subvol/fit/features/signed_features.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/sample_meshes.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/certificate.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/certificate/certificate.h"
 
 #include <Eigen/LU>
 #include <Eigen/QR>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/hex_matrices.h"
+#include "subvol/fit/certificate/hex_matrices.h"
 
-#include "fit/certificate/hex_boxes.h"
-#include "fit/certificate/prism_matrices.h"
-#include "fit/certificate/simplex_tables.h"
+#include "subvol/fit/certificate/hex_boxes.h"
+#include "subvol/fit/certificate/prism_matrices.h"
+#include "subvol/fit/certificate/simplex_tables.h"
 #include "tests/support/bent_hex.h"
 
 #include <Eigen/LU>

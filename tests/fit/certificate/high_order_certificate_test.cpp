@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/high_order_certificate.h"
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
+#include "subvol/fit/certificate/high_order_certificate.h"
 #include "tests/support/element_fixtures.h"
 
 #include <Eigen/LU>

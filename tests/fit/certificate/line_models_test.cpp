@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/line_models.h"
+#include "subvol/fit/certificate/line_models.h"
 
 #include <catch2/catch.hpp>
 

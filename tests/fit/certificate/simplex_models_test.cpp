@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/certificate/simplex_models.h"
+#include "subvol/fit/certificate/simplex_models.h"
 #include "tests/support/element_fixtures.h"
 
 #include <Eigen/LU>

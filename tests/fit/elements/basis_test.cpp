@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/basis.h"
-#include "fit/elements/quadrature.h"
-#include "fit/elements/shape_functions.h"
+#include "subvol/fit/elements/basis.h"
+#include "subvol/fit/elements/quadrature.h"
+#include "subvol/fit/elements/shape_functions.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/boundary_samples.h"
-#include "fit/energies/closest_point_energy.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/surface/boundary.h"
-#include "tests/support/require_data.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/require_data.h"
 
 #include <catch2/catch.hpp>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/element_space.h"
-#include "fit/elements/high_order_mesh.h"
-#include "fit/elements/map_projection.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/element_space.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/elements/map_projection.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/boundary_samples.h"
-#include "fit/elements/point_tables.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/elements/point_tables.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>

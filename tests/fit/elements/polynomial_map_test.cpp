@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/polynomial_map.h"
+#include "subvol/fit/elements/polynomial_map.h"
 
-#include "export/lagrange_cells.h"
-#include "export/lagrange_mesh.h"
 #include "subvol/base/error.h"
+#include "subvol/export/lagrange_cells.h"
+#include "subvol/export/lagrange_mesh.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>

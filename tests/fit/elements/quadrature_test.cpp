@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/quadrature.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/quadrature.h"
 #include "tests/support/element_fixtures.h"
 
 #include <catch2/catch.hpp>

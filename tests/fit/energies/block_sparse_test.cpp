@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/block_sparse.h"
+#include "subvol/fit/energies/block_sparse.h"
 
 #include "subvol/base/error.h"
 

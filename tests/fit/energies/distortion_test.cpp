@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The distortions that can be chosen by name, at one Jacobian and over cells of all kinds and orders.
 
-#include "fit/elements/element_rule.h"
-#include "fit/energies/high_order_energy.h"
-#include "fit/energies/volume_energy.h"
-#include "fit/high_order_fit.h"
-#include "fit/mesh_check.h"
-#include "fit/quality/high_order_quality.h"
-#include "fit/subdivision_fit.h"
 #include "samples/shapes.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/subdivision_fit.h"
 #include "tests/support/element_fixtures.h"
 
 #include <Eigen/Eigenvalues>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/element_rule.h"
-#include "fit/energies/distortion.h"
-#include "fit/energies/volume_energy.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/distortion.h"
+#include "subvol/fit/energies/volume_energy.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/element_rule.h"
-#include "fit/energies/high_order_energy.h"
-#include "fit/energies/volume_energy.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/energies/volume_energy.h"
 #include "tests/support/element_fixtures.h"
 
 #include <Eigen/LU>

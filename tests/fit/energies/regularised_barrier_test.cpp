@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/energies/regularised_barrier.h"
-#include "fit/energies/volume_energy.h"
+#include "subvol/fit/energies/regularised_barrier.h"
+#include "subvol/fit/energies/volume_energy.h"
 #include "tests/support/sample_meshes.h"
 
 #include <Eigen/Geometry>

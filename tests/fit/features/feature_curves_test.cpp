@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/features/crease_paths.h"
-#include "fit/features/feature_curves.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/crease_paths.h"
+#include "subvol/fit/features/feature_curves.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/surface_fixtures.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/fits/flat_faces.h"
+#include "subvol/fit/fits/flat_faces.h"
 
-#include "fit/features/flat_facets.h"
-#include "fit/quality/quality.h"
+#include "subvol/fit/features/flat_facets.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "tests/support/feature_fixtures.h"
 #include "tests/support/mesh_checks.h"

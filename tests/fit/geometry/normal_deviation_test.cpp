@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/normal_deviation.h"
+#include "subvol/fit/geometry/normal_deviation.h"
 
 #include "subvol/base/error.h"
 #include "tests/support/surface_fixtures.h"

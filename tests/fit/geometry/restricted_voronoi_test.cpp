@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/restricted_voronoi.h"
+#include "subvol/fit/geometry/restricted_voronoi.h"
 
 #include "subvol/base/error.h"
 #include "tests/support/surface_fixtures.h"

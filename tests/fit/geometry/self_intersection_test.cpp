@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/self_intersection.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/self_intersection.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>

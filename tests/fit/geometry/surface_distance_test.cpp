@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/geometry/surface_distance.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/geometry/surface_distance.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>

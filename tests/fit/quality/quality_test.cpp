@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/elements/element_rule.h"
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/quality/quality.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>

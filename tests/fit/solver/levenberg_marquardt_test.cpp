@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/levenberg_marquardt.h"
+#include "subvol/fit/solver/levenberg_marquardt.h"
 
-#include "fit/energies/quality_energy.h"
-#include "fit/quality/quality.h"
+#include "subvol/fit/energies/quality_energy.h"
+#include "subvol/fit/quality/quality.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>

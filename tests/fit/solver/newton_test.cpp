@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/solver/newton.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/solver/newton.h"
 
 #include <catch2/catch.hpp>
 

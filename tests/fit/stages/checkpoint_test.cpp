@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Runs that go on from what an earlier one has solved; the files that hold it.
 
-#include "fit/high_order_fit.h"
-#include "fit/optimize_mesh.h"
-#include "fit/stages/checkpoint.h"
-#include "fit/stages/stage_runner.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
 #include "subvol/base/fingerprint.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/optimize_mesh.h"
+#include "subvol/fit/stages/checkpoint.h"
+#include "subvol/fit/stages/stage_runner.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/sample_meshes.h"
 

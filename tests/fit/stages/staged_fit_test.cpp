@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/stages/stage_runner.h"
-#include "fit/stages/staged_fit.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/stages/staged_fit.h"
 
 #include <catch2/catch.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/carried_groups.h"
+#include "subvol/fit/target/carried_groups.h"
 
 #include "subvol/surface/boundary.h"
 #include "tests/support/grouped_meshes.h"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/target/fit_target.h"
-#include "fit/target/target_surface.h"
+#include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/target_surface.h"
 
-#include "fit/target/enclosed_volume.h"
-#include "fit/target/soup_topology.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/target/enclosed_volume.h"
+#include "subvol/fit/target/soup_topology.h"
 #include "tests/support/surface_fixtures.h"
 
 #include <catch2/catch.hpp>

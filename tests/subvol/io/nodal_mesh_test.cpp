@@ -5,8 +5,8 @@
 #include "subvol/base/error.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/mfem_numbering.h"
-#include "subvol/io/node_points.h"
 #include "subvol/io/nodal_writers.h"
+#include "subvol/io/node_points.h"
 #include "tests/support/temporary_folder.h"
 
 #include <catch2/catch.hpp>

@@ -3,8 +3,8 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/subdivision/row_assembly.h"
 #include "subvol/subdivision/subdivision.h"
-#include "tests/support/require_data.h"
 #include "tests/support/opensubdiv_oracle.h"
+#include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>

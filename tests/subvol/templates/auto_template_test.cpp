@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fit/template_choice.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/template_choice.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"

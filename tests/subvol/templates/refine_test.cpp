@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/refine.h"
 
-#include "fit/quality/quality.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/features.h"
 #include "tests/support/mesh_checks.h"
 #include "tests/support/sample_meshes.h"

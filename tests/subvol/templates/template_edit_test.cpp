@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "shell/extrude.h"
 #include "subvol/base/error.h"
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
+#include "subvol/shell/extrude.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/winding_number.h"
 #include "subvol/templates/carve.h"
