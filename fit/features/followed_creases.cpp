@@ -17,6 +17,16 @@ namespace {
 constexpr int kMaxUnfoldings = 5;
 constexpr double kMost = 0.5;
 
+/// Adds tags that keep sheets from folding at corners. A crease added at one corner may leave a span of more than 180
+/// degrees at another.
+void unfold(VolumeMesh& mesh) {
+  for (int round = 0; round < kMaxUnfoldings; ++round) {
+    const SubdivisionAudit found = audit(mesh);
+    if (found.folding_edges.empty()) break;
+    mesh.tags = unfolding_tags(mesh, found);
+  }
+}
+
 }  // namespace
 
 FollowedCreases::FollowedCreases(const TriangleMesh& target, std::optional<double> angle_degrees,
@@ -74,6 +84,7 @@ void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, bo
     curves_.curves.push_back(curve);
   }
   mesh.tags = merge_tags(mesh.tags, tags);
+  unfold(mesh);
   curve_of_crease_.clear();
   find_curves_of_creases(mesh);
 }
@@ -91,12 +102,7 @@ void FollowedCreases::find_curves_of_creases(const VolumeMesh& mesh) {
 
 void FollowedCreases::tag(VolumeMesh& template_mesh) const {
   template_mesh.tags = merge_tags(template_mesh.tags, tags_of_paths(paths_, curves_));
-  // A crease added at one corner may leave a span of more than 180 degrees at another.
-  for (int round = 0; round < kMaxUnfoldings; ++round) {
-    const SubdivisionAudit found = audit(template_mesh);
-    if (found.folding_edges.empty()) break;
-    template_mesh.tags = unfolding_tags(template_mesh, found);
-  }
+  unfold(template_mesh);
 }
 
 bool FollowedCreases::hold_the_surface() const {

@@ -36,7 +36,8 @@ class FollowedCreases {
   FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh);
 
   /// Adds the sharp edges of the interfaces between a mesh's regions, which follow themselves as they are, and tags the
-  /// mesh with them: edges sharper than the angle, creases of its tags, and inner feature curves.
+  /// mesh with them: edges sharper than the angle, creases of its tags, and inner feature curves. Also adds tags that
+  /// keep interfaces from folding at their corners (`unfolding_tags`).
   /// with_rims  also the feature curves where interfaces end at the boundary, if these are to stay where they are.
   void keep_interfaces(VolumeMesh& mesh, double angle_degrees, bool with_rims);
 

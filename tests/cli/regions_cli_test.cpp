@@ -14,11 +14,10 @@ using subvol::test::Workplace;
 
 namespace {
 
-/// Two layers of two cells each; the lower one has a name in formats that write names.
+/// Two layers of eight cells each.
 subvol::VolumeMesh two_layers() {
   subvol::VolumeMesh mesh = subvol::test::lattice(2, 2, 4);
   for (int c = 0; c < 16; ++c) mesh.references.push_back(c < 8 ? 3 : 8);
-  mesh.regions = {{"skin", 3, 3}, {"core", 8, 3}};
   return mesh;
 }
 
@@ -49,7 +48,7 @@ TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions]") {
   CHECK(check.out.find("interface           between 3 and 8: 4 faces, area 4") != std::string::npos);
 }
 
-TEST_CASE("convert writes one region, by name or number, and lists the regions if there is no such one",
+TEST_CASE("convert writes one region, and lists the regions if there is no such one",
           "[cli][regions]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "layers.mesh", two_layers());

@@ -316,6 +316,21 @@ TEST_CASE("a crease of a material is a tag, one of neither boundary nor interfac
   CHECK_THROWS(subdivide(mesh));
 }
 
+TEST_CASE("the audit finds where an interface folds at a corner of more than 180 degrees", "[regions][audit]") {
+  VolumeMesh mesh = fan(3, 270, 4);
+  for (int c = 0; c < 12; ++c) mesh.references.push_back(c < 6 ? 1 : 2);
+  mesh.tags = features_by_angle(mesh, 40);
+  const Index corner = static_cast<Index>(std::ranges::find(mesh.positions, Vec3(0, 0, 2)) - mesh.positions.begin());
+  const auto folds = [&](const SubdivisionAudit& found) {
+    return std::ranges::count(found.folding_corners, corner) > 0;
+  };
+  const SubdivisionAudit found = audit(mesh);
+  CHECK(folds(found));
+  mesh.tags = unfolding_tags(mesh, found);
+  CHECK(validate(mesh).empty());
+  CHECK_FALSE(folds(audit(mesh)));
+}
+
 TEST_CASE("the audit counts smooth edges between regions with one cell on a side", "[regions][audit]") {
   VolumeMesh mesh = lattice_of_regions(3, 3, 3, [](int i, int j, int k) { return i == 1 && j == 1 && k == 1 ? 1 : 0; });
   const SubdivisionAudit found = audit(mesh);
