@@ -175,8 +175,11 @@ std::string picture_of(const fs::path& folder) {
     Json report = parse_report(read_file(file), file.string());
     for (Json& output : report["outputs"])  // not a file of the same name in the current folder
       output = (folder / output.get<std::string>()).string();
-    std::vector<ReportPicture> pictures = report_pictures(report, folder, notes);
-    return pictures.empty() || pictures.back().high.empty() ? std::string() : std::move(pictures.back().png);
+    const ReportMeshes meshes = load_report_meshes(report, folder, notes);
+    std::vector<ReportPicture> pictures = report_pictures(report, meshes, notes);
+    // The last one with a scale of colors: of the result, or of its cells inside.
+    const auto colored = std::find_if(pictures.rbegin(), pictures.rend(), [](const auto& p) { return !p.high.empty(); });
+    return colored == pictures.rend() ? std::string() : std::move(colored->png);
   } catch (const InputError&) {
   } catch (const Json::exception&) {
   }

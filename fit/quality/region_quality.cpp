@@ -44,8 +44,8 @@ double cell_volume(const VolumeMesh& mesh, std::size_t c) {
     std::array<Index, 4> face{};
     for (int i = 0; i < topology.face_sizes[f]; ++i) face[i] = cell[topology.faces[f][i]];
     volume += sum_over_fan(mesh, std::span(face).first(topology.face_sizes[f]),
-                           [&](const Vec3& a, const Vec3& b, const Vec3& c) {
-                             return (a - origin).dot((b - origin).cross(c - origin)) / 6;
+                           [&](const Vec3& p, const Vec3& q, const Vec3& r) {
+                             return (p - origin).dot((q - origin).cross(r - origin)) / 6;
                            });
   }
   return volume;
