@@ -76,6 +76,7 @@ class Loader {
   double said_cells() const { return report_.value("quality", Json::object()).value("cells", 0.0); }
 
   void load_outputs(ReportMeshes& meshes) {
+    const double said = said_cells();
     bool any = false;
     std::optional<VolumeMesh> other;
     for (const Json& output : report_.value("outputs", Json::array())) {
@@ -85,7 +86,7 @@ class Loader {
       if (meshes.result && meshes.cage) break;
       std::optional<ShownMesh> found = load(name);
       if (!found) continue;
-      if (!meshes.result && static_cast<double>(num_cells(*found)) == said_cells())
+      if (!meshes.result && static_cast<double>(num_cells(*found)) == said)
         meshes.result = std::move(found);
       else if (auto* cells = std::get_if<VolumeMesh>(&*found); cells && !other)
         other = std::move(*cells);
