@@ -79,8 +79,9 @@ class Scenes(InFolder):
         folder = os.getcwd()
         os.chdir(cls.samples)
         cls.fit = subvol.fit("torus_target.off", "torus_template.mesh", levels=1, keep_states=True)
-        subvol.write("torus.glb", cls.fit, unit=0.01)
-        subvol.write("small.glb", cls.fit, unit=0.01, quantize=True)
+        fine = 0.005  # the default of limit_surface, with which the sizes are compared
+        subvol.write("torus.glb", cls.fit, unit=0.01, chord=fine)
+        subvol.write("small.glb", cls.fit, unit=0.01, chord=fine, quantize=True)
         subvol.write("cutaway:inside.glb", cls.fit, unit=0.01)
         subvol.write("animation:steps.glb", cls.fit, unit=0.01)
         done = run_in_blender("scenes_in_blender.py", os.path.abspath("told.json"),
