@@ -27,7 +27,7 @@ struct BatchManifest {
   std::vector<BatchModel> models;
 };
 
-/// What a batch has to know about a verb.
+/// Properties of a verb that a batch needs.
 struct BatchVerb {
   std::vector<std::string> words;                 ///< {"template", "auto"}
   std::set<std::string, std::less<>> options;     ///< long names, with their hyphens

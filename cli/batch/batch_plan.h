@@ -24,7 +24,7 @@ struct PlanOptions {
   std::string program;               ///< as given; empty: subvol itself
 };
 
-/// What the last record of each model says, and what is left to do.
+/// Holds what the last record of each model says, and which models are left to do.
 ///
 /// Memory: about 150 bytes for each model.
 class BatchPlan {

@@ -261,7 +261,7 @@ class Batch {
     remains.was_timed_out = job.is_timed_out && end.exit_code != kDone;
     for (const std::string& output : model.outputs)
       if (std::string file = output_file(output); fs::exists(folder / file)) remains.outputs.push_back(std::move(file));
-    // What a wrapper leaves is its own business.
+    // A wrapper decides itself which files it leaves, so none of them is required.
     remains.has_outputs = !options_.plan.program.empty() || remains.outputs.size() == model.outputs.size();
     if (fs::is_regular_file(folder / kReportName))
       remains.report = Json::parse(read_file(folder / kReportName), nullptr, false);

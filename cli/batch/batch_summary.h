@@ -29,7 +29,7 @@ struct FigureKind {
 /// In the order of `Figure`.
 std::span<const FigureKind> figure_kinds();
 
-/// What a summary keeps of a record. Figures that the record lacks are NaN.
+/// The figures of a record that a summary keeps. Those that the record lacks are NaN.
 struct ModelFigures {
   std::string id, reason;
   Outcome outcome = Outcome::valid;
@@ -67,7 +67,7 @@ struct Compared {
   std::size_t before, now;
 };
 
-/// What differs between two batches, by id. Lists are ordered by id.
+/// The differences between two batches. Every list is ordered by id.
 struct Comparison {
   std::vector<Compared> failing;     ///< failures now, and none before
   std::vector<Compared> mended;      ///< failures before, and none now

@@ -43,8 +43,8 @@ class Environment {
   std::vector<char*> entries_;
 };
 
-/// What the new process needs until it runs its program, prepared by the old one: the two share their memory, so the
-/// new one must not allocate.
+/// The data that the new process needs until it runs its program. The old process prepares them: the two share their
+/// memory, so the new one must not allocate.
 struct Launch {
   const char *program, *folder, *messages;
   char* const* words;

@@ -50,9 +50,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
                      std::size_t num_samples, double tangential_weight, int points_per_triangle,
                      SurfacePull pull = SurfacePull::along_normals);
 
-  /// The part of an energy that some of its sample triangles have: as if all others were where they are at the last
-  /// `assign` of the whole, which must have been called. Points of the target belong to it if they correspond to one of
-  /// these triangles there.
+  /// Makes the part of an energy that belongs to some of its sample triangles; all others stay where they are. The whole
+  /// must be assigned: a point of the target belongs to the part if it corresponds to one of these triangles there.
   ///
   /// triangles    of the whole, ascending.
   /// numbers      number in the part of each sample of the whole; kNoIndex for those outside. Corners of `triangles` and
@@ -112,8 +111,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
     double tangential;  ///< tau; 0 over a boundary
   };
 
-  /// Number of points of the target that are used, and the place of each in its samples.
-  std::size_t num_target_points() const { return is_part_ ? used_.size() : target_->samples().size(); }
+  /// Returns the place of a used point of the target in its samples.
   std::size_t target_point(std::size_t j) const { return is_part_ ? static_cast<std::size_t>(used_[j]) : j; }
 
   void link_target(std::span<const Vec3> samples);

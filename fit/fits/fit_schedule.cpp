@@ -15,8 +15,8 @@ constexpr double kCoarseLambda = 0.05;
 /// Lambda if creases are drawn to the target from the start: stiffer cells swell beside the creases, and the folds that
 /// this makes do not disappear later.
 constexpr double kHeldLambda = 0.01;
-/// Stages that take many steps solve roughly and keep the cells' Hessian: bone87 ends 1.4 times as fast at the same
-/// distances. A continuation, whose few steps must free every cell, does neither.
+/// Stages that take many steps solve their systems roughly and keep the cells' Hessian, which makes a step cheaper. A
+/// continuation does neither: its few steps must free every cell.
 constexpr double kRoughTolerance = 0.3;
 constexpr int kHessianLife = 4;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;

@@ -192,7 +192,8 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
 
 /// Raises the emphasis of sample triangles that are too far from the target. Returns the largest distance.
 /// far_cells  receives the cells at triangles that are farther than what is aimed at.
-double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, std::vector<Index>& far_cells) {
+double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x,
+                                    std::vector<Index>& far_cells) {
   constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
   const double most_distance = schedule.most_distance;
   std::vector<Vec3> samples(problem_->samples.num_rows());

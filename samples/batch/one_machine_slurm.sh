@@ -3,7 +3,7 @@
 # one_machine_slurm.sh FOLDER COMMAND ...: starts Slurm on this machine alone, runs a command with it, and ends it again:
 # to try scripts out without a cluster. Needs slurm-wlm and munge, and to be root in a container or machine of your own.
 #
-#   samples/batch/one_machine_slurm.sh /tmp/slurm sbatch --wait --array=1-8 samples/batch/slurm_array.sh models.csv out
+#   samples/batch/one_machine_slurm.sh slurm_folder sbatch --wait --array=1-8 samples/batch/slurm_array.sh models.csv out
 set -eu
 folder="$(mkdir -p "$1" && cd "$1" && pwd)"
 shift
