@@ -504,7 +504,7 @@ bool MeshOptimizer::raise_quality(double goal) {
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
   QualitySchedule schedule = fine_quality_schedule(goal);
-  schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+  schedule.most_distance = std::max(kMaxMargin * options_.max_tolerance_percent, before.max_percent) / 100;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const std::size_t stages_before = report_.stages.size();
     const bool going = run_quality_stages(schedule);
@@ -513,8 +513,7 @@ bool MeshOptimizer::raise_quality(double goal) {
     report_.undo_stages(stages_before, report_.stages.size());
     if (!going) return false;
     if (options_.fixed_boundary) break;
-    for (QualityStage& stage : schedule.stages) stage.surface *= kMoreSurface;
-    schedule.lift.surface *= kMoreSurface;
+    schedule.give_surface_more_weight(kMoreSurface);
   }
   return true;
 }

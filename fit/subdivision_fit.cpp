@@ -453,8 +453,7 @@ bool SubdivisionFit::raise_quality() {
     QualitySchedule schedule =
         attempt.only_lift ? late_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
     schedule.most_distance = (attempt.only_lift ? 1 : kMaxMargin) * before->largest();
-    for (QualityStage& stage : schedule.stages) stage.surface *= attempt.more_surface;
-    schedule.lift.surface *= attempt.more_surface;
+    schedule.give_surface_more_weight(attempt.more_surface);
     FitSnapshot start = snapshot();
     const bool going = or_back(start, [&] { return run_quality_stages(schedule); });
     const std::optional<Measured> now = going ? measure() : std::nullopt;

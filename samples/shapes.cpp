@@ -111,12 +111,19 @@ std::vector<Lattice> box_of_cubes(int nx, int ny, int nz) {
   return cubes;
 }
 
-TriangleMesh bumpy_ball(int resolution) {
+/// The surface of the unit ball, moved by a map.
+template <typename Map>
+TriangleMesh mapped_sphere(int resolution, const Map& position) {
   const VolumeMesh cubes = lattice_mesh(box_of_cubes(resolution, resolution, resolution), [&](const Vec3& node) {
-    const Vec3 p = cube_to_ball(Vec3(node * (2.0 / resolution) - Vec3::Ones()));
-    return Vec3(p * (1 + 0.08 * std::sin(4 * p.x()) * std::cos(3 * p.y()) + 0.05 * std::sin(5 * p.z())));
+    return position(cube_to_ball(Vec3(node * (2.0 / resolution) - Vec3::Ones())));
   });
   return boundary_triangles(cubes);
+}
+
+TriangleMesh bumpy_ball(int resolution) {
+  return mapped_sphere(resolution, [](const Vec3& p) {
+    return Vec3(p * (1 + 0.08 * std::sin(4 * p.x()) * std::cos(3 * p.y()) + 0.05 * std::sin(5 * p.z())));
+  });
 }
 
 VolumeMesh seven_cells() {
@@ -173,40 +180,15 @@ Sample bracket_sample() {
   return {"bracket", boundary_triangles(fine), cells};
 }
 
-PolygonMesh bowl_surface(int n) {
-  // A cube's surface without its upper side, blown up to a ball.
-  PolygonMesh mesh;
-  std::map<Lattice, Index> numbers;
-  const auto vertex = [&](const Lattice& at) {
-    const auto [entry, added] = numbers.try_emplace(at, static_cast<Index>(mesh.positions.size()));
-    if (added) {
-      // Tangents space the quads of a side evenly over the ball.
-      const auto coordinate = [&](int i) { return std::tan((2.0 * i / n - 1) * kTau / 8); };
-      const Vec3 p = Vec3(coordinate(at[0]), coordinate(at[1]), coordinate(at[2])).normalized();
-      const double ripple = 1 + 0.06 * (1 + p.z()) * std::cos(8 * std::atan2(p.y(), p.x()));
-      mesh.positions.emplace_back(ripple * p.x(), ripple * p.y(), 0.8 * p.z());
-    }
-    return entry->second;
-  };
-  for (int side = 0; side < 6; ++side) {
-    const int axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
-    if (side == 5) continue;
-    for (int j = 0; j < n; ++j)
-      for (int i = 0; i < n; ++i) {
-        std::array<Index, 4> quad{};
-        for (int k = 0; k < 4; ++k) {
-          Lattice at{};
-          at[axis] = side % 2 * n;
-          at[u] = i + (k == 1 || k == 2);
-          at[v] = j + k / 2;
-          quad[k] = vertex(at);
-        }
-        if (side % 2 == 0) std::swap(quad[1], quad[3]);
-        mesh.face_vertices.insert(mesh.face_vertices.end(), quad.begin(), quad.end());
-        mesh.face_offsets.push_back(mesh.face_vertices.size());
-      }
-  }
-  return mesh;
+TriangleMesh starfish_surface() {
+  constexpr int kArms = 5, kResolution = 40;
+  return mapped_sphere(kResolution, [](const Vec3& p) {
+    const double equator = std::hypot(p.x(), p.y()), around = std::atan2(p.y(), p.x());
+    const double arm = std::pow(0.5 + 0.5 * std::cos(kArms * around), 2) * std::pow(equator, 4);
+    const double radius = 0.35 + 0.65 * arm, turned = around + 0.4 * radius * radius;
+    const double across = radius * equator;
+    return Vec3(across * std::cos(turned), across * std::sin(turned), 0.28 * (p.z() + 0.4 * (1 - arm) * p.z()));
+  });
 }
 
 std::vector<Sample> all_samples() { return {torus_sample(), ball_sample(), bracket_sample()}; }
@@ -244,53 +226,6 @@ PointCloud scattered_points(const TriangleMesh& surface, std::size_t count, doub
     cloud.points.push_back(point);
   }
   return cloud;
-}
-
-PolygonMesh plate_surface() {
-  constexpr double kLength = 2, kWidth = 1, kThickness = 0.02, kRadius = 0.25;
-  constexpr int kAcross = 16, kAlong = 32, kRings = 8, kSides = kAcross + kAlong;
-  const std::vector<Group> groups{{"symmetry_x", 1}, {"symmetry_y", 2}, {"symmetry_z", 3}, {"hole", 4},
-                                  {"loaded", 5},     {"side", 6},       {"top", 7}};
-  const auto group = [&](const char* name) {
-    const auto found = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.name == name; });
-    return static_cast<Index>(found - groups.begin());
-  };
-  PolygonMesh plate;
-  plate.face_groups.groups = groups;
-  // Points on rays from the hole to the outline, at the bottom and at the top.
-  for (const double z : {0.0, kThickness})
-    for (int ring = 0; ring <= kRings; ++ring)
-      for (int side = 0; side <= kSides; ++side) {
-        const Vec3 outline = side <= kAcross ? Vec3(kLength, kWidth * side / kAcross, 0)
-                                             : Vec3(kLength * (kSides - side) / kAlong, kWidth, 0);
-        const Vec3 rim = kRadius * outline.normalized();
-        const double share = static_cast<double>(ring) / kRings;
-        plate.positions.push_back((1 - share) * rim + share * outline + z * Vec3::UnitZ());
-      }
-  const auto vertex = [](int layer, int ring, int side) { return (layer * (kRings + 1) + ring) * (kSides + 1) + side; };
-  const auto add = [&](const char* name, std::array<Index, 4> corners) {
-    plate.face_vertices.insert(plate.face_vertices.end(), corners.begin(), corners.end());
-    plate.face_offsets.push_back(plate.face_vertices.size());
-    plate.face_groups.of_face.push_back(group(name));
-  };
-  for (int ring = 0; ring < kRings; ++ring) {
-    for (int side = 0; side < kSides; ++side)
-      for (const int layer : {0, 1}) {
-        std::array<Index, 4> corners{vertex(layer, ring, side), vertex(layer, ring + 1, side),
-                                     vertex(layer, ring + 1, side + 1), vertex(layer, ring, side + 1)};
-        if (layer == 0) std::reverse(corners.begin(), corners.end());
-        add(layer == 0 ? "symmetry_z" : "top", corners);
-      }
-    add("symmetry_y", {vertex(0, ring, 0), vertex(0, ring + 1, 0), vertex(1, ring + 1, 0), vertex(1, ring, 0)});
-    add("symmetry_x", {vertex(0, ring + 1, kSides), vertex(0, ring, kSides), vertex(1, ring, kSides),
-                       vertex(1, ring + 1, kSides)});
-  }
-  for (int side = 0; side < kSides; ++side) {
-    add(side < kAcross ? "loaded" : "side", {vertex(0, kRings, side), vertex(0, kRings, side + 1),
-                                             vertex(1, kRings, side + 1), vertex(1, kRings, side)});
-    add("hole", {vertex(0, 0, side + 1), vertex(0, 0, side), vertex(1, 0, side), vertex(1, 0, side + 1)});
-  }
-  return plate;
 }
 
 std::string xyz_text(const PointCloud& cloud) {

@@ -37,6 +37,13 @@ PolygonMesh bowl_surface(int n = 12);
 /// outward.
 PolygonMesh plate_surface();
 
+/// A connecting rod with two bores: 2.8 long, 0.3 thick. Quads with the groups small_bore, large_bore, side, bottom and
+/// top; all edges between them are sharp; outward.
+PolygonMesh rod_surface();
+
+/// A starfish of five arms, smooth; outward.
+TriangleMesh starfish_surface();
+
 /// A ball of 448 hexes, the vertices inside thrown about: four in five cells are inverted. The same one everywhere.
 VolumeMesh tangled_ball();
 

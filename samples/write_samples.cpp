@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Writes every sample as NAME_target.off and NAME_template.mesh, torus_points.xyz, bowl.obj to grow shells on, plate.obj
-// to compute on, and tangled.mesh to repair.
+// Writes every sample as NAME_target.off and NAME_template.mesh, torus_points.xyz, bowl.obj to grow shells on, rod.obj,
+// starfish.off and plate.obj to fill and to compute on, and tangled.mesh to repair.
 
 #include "samples/shapes.h"
 #include "subvol/base/atomic_file.h"
@@ -26,6 +26,9 @@ int main(int argc, char** argv) try {
   subvol::write_file_atomically(folder / "torus_points.xyz", subvol::samples::xyz_text(points));
   subvol::write_volume_mesh(folder / "tangled.mesh", subvol::samples::tangled_ball());
   subvol::write_obj(folder / "bowl.obj", subvol::samples::bowl_surface());
+  subvol::write_obj(folder / "rod.obj", subvol::samples::rod_surface());
+  subvol::write_file_atomically(folder / "starfish.off",
+                                subvol::samples::off_text(subvol::samples::starfish_surface()));
   subvol::write_obj(folder / "plate.obj", subvol::samples::plate_surface());
   return 0;
 } catch (const std::exception& error) {

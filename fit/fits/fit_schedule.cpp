@@ -19,12 +19,17 @@ constexpr double kHeldLambda = 0.01;
 /// continuation does neither: its few steps must free every cell.
 constexpr double kRoughTolerance = 0.3;
 constexpr int kHessianLife = 4;
+/// Accelerated steps decrease E by more, so these stages end at larger decreases than others: E is then what it is at
+/// the end of many more plain steps.
+constexpr double kAcceleratedDecrease = 5e-3;
 constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
 
 Stage rough_stage(double lambda, double tangential_weight) {
   Stage stage{lambda, tangential_weight};
   stage.linear_tolerance = kRoughTolerance;
   stage.hessian_life = kHessianLife;
+  stage.accelerates = true;
+  stage.relative_decrease = kAcceleratedDecrease;
   return stage;
 }
 

@@ -2,6 +2,7 @@
 #include "subvol/fit/solver/newton.h"
 
 #include "subvol/base/format.h"
+#include "subvol/fit/solver/anderson.h"
 #include "subvol/fit/solver/reduced_hessian.h"
 #include "subvol/fit/solver/vector_math.h"
 
@@ -16,6 +17,8 @@ namespace {
 
 /// Steps below this share of a whole one mean that the model of the energy is poor.
 constexpr double kShortStep = 0.5;
+/// Steps after which everything but x is forgotten, so that an interrupted minimization can be resumed from x.
+constexpr int kRestartPeriod = 8;
 
 /// One minimization by Newton's method.
 class NewtonRun {
@@ -40,6 +43,9 @@ class NewtonRun {
   Search search_line(bool may_stiffen, IterationRecord& record);
   /// Takes the step that was found.
   void take_step(IterationRecord& record);
+  /// Takes the step that follows from the last ones by Anderson acceleration instead, if no cell stands in its way and E,
+  /// with correspondences found anew, is not above that of the step that was found. Returns false if it does not.
+  bool take_accelerated_step(IterationRecord& record);
   /// Records the step. Returns true if E has stopped decreasing or the caller wants to stop.
   bool is_done(const IterationRecord& record);
   void stop(MinimizerStop why, std::string explanation) {
@@ -53,7 +59,9 @@ class NewtonRun {
   MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
   std::vector<Vec3> y_, z_;  // nodes and samples at x
   Linearization linearized_;
-  std::vector<Vec3> d_, dy_, dz_, y_trial_, z_trial_;
+  AndersonMemory memory_;
+  std::vector<Vec3> d_, dy_, dz_, y_trial_, z_trial_, step_;
+  bool is_assigned_ = false;  // true if the surface term's correspondences are those of z_
   std::vector<Mat3> inverse_diagonal_;
   std::vector<Index> uncertified_;  // at x, up to rounding
   double energy_ = 0, slope_ = 0, t_ = 0;
@@ -145,6 +153,43 @@ void NewtonRun::take_step(IterationRecord& record) {
   record.step_length = t_;
 }
 
+bool NewtonRun::take_accelerated_step(IterationRecord& record) {
+  if (!options_.accelerates || !problem_.surface) return false;
+  step_.assign(d_.size(), Vec3::Zero());
+  add_scaled(t_, d_, step_);
+  memory_.add(x_, step_, linearized_.gradient());
+  const auto accept = [&] {
+    problem_.nodes.apply(step_, dy_);
+    if (problem_.volume->max_step(y_, dy_) < 1) return false;
+    add_scaled(1, x_, step_);
+    problem_.apply_nodes(step_, y_trial_);
+    const double volume = problem_.volume->value(y_trial_);
+    if (!(problem_.lambda * volume <= trial_)) return false;
+    std::vector<Index> uncertified = problem_.volume->uncertified(y_trial_);
+    if (!newly_failed(uncertified_, uncertified).empty()) return false;
+    problem_.apply_samples(step_, z_trial_);
+    problem_.surface->assign(z_trial_);
+    const double surface = problem_.surface->value(z_trial_), energy = surface + problem_.lambda * volume;
+    if (!(energy <= trial_)) return false;
+    trial_ = energy;
+    record.surface_energy = surface;
+    record.volume_energy = volume;
+    uncertified_ = std::move(uncertified);
+    return true;
+  };
+  if (!memory_.find_step(step_)) return false;
+  ++record.evaluations;
+  if (!accept()) {
+    memory_.clear();
+    return false;
+  }
+  record.step_length = 1;
+  std::swap(x_, step_);
+  std::swap(y_, y_trial_);
+  std::swap(z_, z_trial_);
+  return is_assigned_ = true;
+}
+
 bool NewtonRun::is_done(const IterationRecord& record) {
   if (!record_step(record, options_, result_)) return true;
   const double decrease = (energy_ - trial_) / energy_;
@@ -155,7 +200,6 @@ bool NewtonRun::is_done(const IterationRecord& record) {
 }
 
 MinimizerResult NewtonRun::run() {
-  constexpr int kPreconditionerLife = 4;
   bool is_refined = false;  // the quadrature of cells, since the Hessian was computed
   const auto end = [&](MinimizerStop why, std::string explanation) {
     stop(why, std::move(explanation));
@@ -163,15 +207,19 @@ MinimizerResult NewtonRun::run() {
   };
   for (int iteration = static_cast<int>(result_.iterations.size()); iteration < options_.max_iterations; ++iteration) {
     // From here on nothing but x and the result is used, so that the minimization can be resumed from them.
-    if (iteration > 0 && iteration % kPreconditionerLife == 0) {
+    const bool restarts = iteration % kRestartPeriod == 0;
+    if (iteration > 0 && restarts) {
       if (problem_.surface) problem_.surface->forget();
+      is_assigned_ = false;
+      memory_.clear();
       inverse_diagonal_.clear();
       uncertified_ = problem_.volume->uncertified(y_);
       if (options_.keep) options_.keep(x_, result_);
     }
-    const bool is_old = iteration < 2 || iteration % options_.hessian_life == 0 || is_stiffened_ || is_refined ||
+    const bool is_old = iteration < 2 || restarts || iteration % options_.hessian_life == 0 || is_stiffened_ || is_refined ||
                         t_ < kShortStep;
-    energy_ = linearized_.linearize(problem_, y_, z_, !is_old);
+    energy_ = linearized_.linearize(problem_, y_, z_, !is_old, is_assigned_);
+    is_assigned_ = false;
     is_refined = false;
     if (!std::isfinite(energy_))
       return end(MinimizerStop::infeasible_start, "the start has a cell that is inverted at a quadrature point");
@@ -188,7 +236,7 @@ MinimizerResult NewtonRun::run() {
     }
     if (found == Search::no_step)
       return end(MinimizerStop::no_step, "no step along the search direction decreases the energy");
-    take_step(record);
+    if (!take_accelerated_step(record)) take_step(record);
     if (is_done(record)) return std::move(result_);
   }
   return end(MinimizerStop::iteration_limit, "iteration limit");

@@ -10,9 +10,9 @@
 namespace subvol {
 
 double Linearization::linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z,
-                                bool keeps_hessian) {
+                                bool keeps_hessian, bool is_assigned) {
   SurfaceTerm* surface = problem.surface.get();
-  if (surface) surface->assign(z);
+  if (surface && !is_assigned) surface->assign(z);
   node_gradient_.assign(y.size(), Vec3::Zero());
   gradient_.resize(problem.nodes.num_cols);
   const double distance = surface ? surface->value(z) : 0;

@@ -16,7 +16,9 @@ class Linearization {
   /// over nodes and samples (`ReducedHessian`). Returns E; if it is infinite, nothing else is valid.
   /// y, z           nodes and samples of the state.
   /// keeps_hessian  true: the Hessian over the nodes stays that of the call before, at a state nearby.
-  double linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z, bool keeps_hessian = false);
+  /// is_assigned    true: the correspondences are those of z already (`SurfaceTerm::assign`).
+  double linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z, bool keeps_hessian = false,
+                   bool is_assigned = false);
   std::span<const Vec3> gradient() const { return gradient_; }
 
  private:

@@ -38,6 +38,11 @@ double above(double goal, double margin = kMargin) { return std::min(0.95, goal 
 
 }  // namespace
 
+void QualitySchedule::give_surface_more_weight(double factor) {
+  for (QualityStage& stage : stages) stage.surface *= factor;
+  lift.surface *= factor;
+}
+
 QualitySchedule coarse_quality_schedule(double goal) {
   const auto weights = [](double hinge, double threshold) {
     return QualityWeights{.hinge = hinge, .threshold = threshold};

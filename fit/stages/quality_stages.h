@@ -38,6 +38,9 @@ struct QualitySchedule {
   double most_distance = 0;
   /// Share of `most_distance` from which on places are emphasized.
   double far_margin = 0.5;
+
+  /// Multiplies the weight of the surface in all stages.
+  void give_surface_more_weight(double factor);
 };
 
 /// `QualitySchedule::far_margin` of lifts that start from a mesh whose surface is where it should be.

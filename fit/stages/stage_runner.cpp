@@ -42,6 +42,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   minimizer.first_damping = stage.first_damping;
   minimizer.cg_tolerance = stage.linear_tolerance;
   minimizer.hessian_life = stage.hessian_life;
+  minimizer.accelerates = stage.accelerates;
   if (stage.longest_move > 0) minimizer.cg_tolerance = kLeastSquaresTolerance;
   int iteration = 0;
   minimizer.ended = [this] { return is_to_end(); };

@@ -165,7 +165,8 @@ class ObjParser {
       for (std::size_t i = 0; i < names_.size() && chosen == kObjNamings.size(); ++i)
         if (names_[i].num_used() >= std::max(least, kObjNamings[i].least_names)) chosen = i;
     for (std::size_t i = 0; i < names_.size(); ++i)
-      if (i != chosen) left_out_.add(kObjNamings[i].missed, names_[i].uses());
+      if (i != chosen && names_[i].uses() >= kObjNamings[i].least_names)
+        left_out_.add(kObjNamings[i].missed, names_[i].uses());
     if (chosen != kObjNamings.size()) mesh_.face_groups = used_groups(names_[chosen].take());
   }
 

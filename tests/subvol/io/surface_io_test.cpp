@@ -269,7 +269,7 @@ TEST_CASE("what a surface file holds beside its polygons is counted in one warni
              Contains("4 colours of vertices"));
   CHECK_THAT(told("a.obj", "mtllib m.mtl\no tet\nv 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nv 0 0 1\nvt 0 0\nvn 0 0 1\n"
                            "g a\nusemtl m\ns off\nf 1/1/1 3/1/1 2/1/1\nf 1 2 4\ng b\nf 2 3 4\nf 3 1 4\nl 1 2\n"),
-             Contains("1 colours of vertices, 1 texture coordinates, 1 lines, 1 uses of materials, 1 names of objects"));
+             Contains("1 colours of vertices, 1 texture coordinates, 1 lines, 1 uses of materials"));
   CHECK_THAT(told("a.stl", binary_stl("b")), Contains("4 facets' attributes"));
   CHECK_THAT(told("a.stl", binary_stl("b", 4, "more")), Contains("4 facets' attributes"));
   CHECK_THAT(told("a.ply", kTextPly), Contains("1 properties of vertex, 1 properties of face, 1 properties of element 'edge'"));
