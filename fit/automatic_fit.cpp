@@ -45,6 +45,10 @@ constexpr double kQualityWeight = 5;         // of the share of the quality in t
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
 constexpr double kMaxMargin = 0.8;
 
+/// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases; and
+/// the portions of what is left of an attempt that its template, the coarser of two levels and a smooth fit take.
+constexpr double kAttemptPortion = 0.7, kTemplatePortion = 0.1, kCoarsePortion = 0.2, kSmoothPortion = 0.25;
+
 /// Returns the options, with the least goal that the stages can use in place of none.
 AutomaticFitOptions checked(AutomaticFitOptions options) {
   constexpr double kLeastQuality = 0.1;
@@ -137,7 +141,11 @@ class AutomaticFit {
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
-  bool fit_level(int level, const QualitySchedule& schedule, const char* what);
+  /// Begins a part of the attempt that takes this portion of what is left of it.
+  void begin_part(double portion, double forecast) {
+    runner_.work().begin_portion(portion, share_at_end_, forecast);
+  }
+  bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
   bool judge(AutomaticFitTrial trial);
@@ -162,7 +170,7 @@ class AutomaticFit {
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
   std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
   AutomaticFitResult result_;
-  double fraction_ = 0;
+  double share_at_end_ = 0;           ///< of the attempt in progress
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
   double least_share_ = 1;            ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
@@ -192,8 +200,11 @@ void AutomaticFit::find_features() {
 
 /// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
 std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions options) {
+  begin_part(kTemplatePortion, 1);
   options.progress = [this](double fraction) {
-    return !runner_.is_to_end() && (!options_.progress || options_.progress({"template", 0, 0, fraction, fraction_}));
+    runner_.work().set(fraction);
+    return !runner_.is_to_end() &&
+           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
   };
   AutoTemplateResult made = auto_templates(original_, options, 1);
   result_.topology = made.wanted;
@@ -230,8 +241,9 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
   }
 }
 
-/// Fits the present mesh. Returns false if the fit must end.
-bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what) {
+/// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
+bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
+  begin_part(portion, schedule.expected_steps());
   constexpr int kIntervals = 2;
   constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
   const std::size_t faces = MeshTopology(mesh_).boundary_faces().size();
@@ -257,7 +269,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
   record.cells = mesh_.num_cells();
-  const bool going = stages.run(schedule, runner_, record, fraction_, mesh_.positions, result_.report);
+  const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
   least_share_ = stages.state().cells.least_share;
   return going;
 }
@@ -351,7 +363,7 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
                                : level == 0        ? coarse_quality_schedule(options_.quality)
                                                    : fine_quality_schedule(options_.quality);
     if (level == attempt.levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    going = fit_level(level, schedule, "");
+    going = fit_level(level, schedule, "", level < attempt.levels ? kCoarsePortion : 1);
   }
   if (going || result_.trials.empty()) going = judge(trial) && going;
   return going;
@@ -404,7 +416,7 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
     const VolumeMesh grid = std::move(made->mesh);
     layout_.reset();
     mesh_ = grid;
-    if (!fit_level(0, smooth_quality_schedule(), ", smooth")) {
+    if (!fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
       if (result_.trials.empty()) judge({.template_cells = grid.num_cells()});
       return false;
     }
@@ -469,7 +481,7 @@ AutomaticFitResult AutomaticFit::run() {
   const std::vector<Attempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
-    fraction_ = static_cast<double>(i) / static_cast<double>(attempts.size());
+    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
     if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
   }
   for (Attempt attempt : std::exchange(skipped_, {})) {

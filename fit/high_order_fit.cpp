@@ -132,6 +132,7 @@ class HighOrderFit : StagedFit {
   int try_ = 0;              ///< number of the current attempt, from 1
   Approach approach_ = Approach::direct;
   int order_ = 1;            ///< highest order of any entity
+  int order_in_progress_ = 0;  ///< the order whose part of the work has begun
   FitSnapshot start_{};      ///< state before the last stage of the schedule
   std::vector<int> points_;  ///< quadrature points of each cell per direction in the last stage
   bool stays_dense_ = false; ///< set after the first orders: cells keep at least points_
@@ -255,8 +256,14 @@ bool HighOrderFit::run_stage(const Stage& stage) {
   volume->emphasize_poor(mesh_.coefficients, emphasis_);
   const HighOrderEnergy& energy = *volume;
   FitProblem stage_problem = problem(mesh_.space, std::move(volume), samples_, stage);
-  const double fraction = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_) + 1);
-  const bool going = runner_.run(stage_problem, stage, std::move(record), fraction, mesh_.coefficients, report_);
+  if (order_ != order_in_progress_) {
+    constexpr double kExpectedSteps = 20;
+    order_in_progress_ = order_;
+    // An order takes about a quarter of the work of twice the order.
+    const double share = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_));
+    runner_.work().begin_part(share, kExpectedSteps);
+  }
+  const bool going = runner_.run(stage_problem, stage, std::move(record), mesh_.coefficients, report_);
   points_.assign(energy.points_per_direction().begin(), energy.points_per_direction().end());
   return going;
 }

@@ -53,6 +53,11 @@ constexpr double kMeanMargin = 0.9, kMaxMargin = 0.8;
 /// Least factor to which the weight of a cell is lowered for the sake of the distance.
 constexpr double kLeastRelief = 0.25;
 
+/// Estimates of the work: its share when untangling and the rounds end, the portion of the rest that the first quality
+/// stages take, and the steps of untangling.
+constexpr double kShareAfterUntangling = 0.25, kShareAfterRounds = 0.5, kFirstQualityPortion = 0.7;
+constexpr double kExpectedUntanglingSteps = 30;
+
 /// Largest relative change of a region's volume.
 constexpr double kMostVolumeChange = 1e-3;
 
@@ -141,7 +146,7 @@ class MeshOptimizer {
   bool untangle_all();
   bool untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options);
   bool improve();
-  bool run_stage(const std::string& name, double lambda, int steps, double fraction);
+  bool run_stage(const std::string& name, double lambda, int steps);
   struct Measured;
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
@@ -301,13 +306,14 @@ StageRecord MeshOptimizer::record(std::string name) const {
 bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const UntangleOptions& options) {
   std::vector<Vec3> x;
   FitProblem problem = make_problem(boundary, boundary == Boundary::fixed ? 1 : kUntangleLambda, true, x);
-  UntangleResult result = untangle(problem, mesh_, options, runner_, record(name), 0.1, x, report_);
+  UntangleResult result = untangle(problem, mesh_, options, runner_, record(name), x, report_);
   problem.apply_nodes(x, mesh_.positions);
   uncertified_ = std::move(result.uncertified);
   return result.going;
 }
 
 bool MeshOptimizer::untangle_all() {
+  runner_.work().begin_part(kShareAfterUntangling, kExpectedUntanglingSteps);
   const std::vector<Vec3> start = mesh_.positions;
   const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = 40,
                               .patience = options_.fixed_boundary ? 6 : 2};
@@ -324,12 +330,11 @@ bool MeshOptimizer::untangle_all() {
   return untangle_cells(Boundary::sliding, "untangle, sharp edges released", {.tangential_weight = kTangentialWeight});
 }
 
-bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps, double fraction) {
+bool MeshOptimizer::run_stage(const std::string& name, double lambda, int steps) {
   std::vector<Vec3> x;
   const Boundary boundary = options_.fixed_boundary ? Boundary::fixed : Boundary::sliding;
   FitProblem problem = make_problem(boundary, lambda, false, x);
-  const bool going =
-      runner_.run(problem, {lambda, kTangentialWeight, steps}, record(name), fraction, x, report_);
+  const bool going = runner_.run(problem, {lambda, kTangentialWeight, steps}, record(name), x, report_);
   problem.apply_nodes(x, mesh_.positions);
   if (!going) return false;
   if (auto* surface = dynamic_cast<ClosestPointEnergy*>(problem.surface.get())) {
@@ -378,7 +383,8 @@ bool MeshOptimizer::improve() {
   constexpr double kLeastLambdaShare = 1.0 / 64;
   double lambda = options_.lambda;
   Progress before;
-  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstSteps, 0.3)) return false;
+  runner_.work().begin_part(kShareAfterRounds, kFirstSteps + kSteps * kMaxRounds / 2);
+  if (!run_stage(formatted("improve, lambda %g", lambda), lambda, kFirstSteps)) return false;
   for (int round = 0; round < kMaxRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
@@ -398,8 +404,7 @@ bool MeshOptimizer::improve() {
       if (minima[c] < kPoorJacobian) poor.push_back(static_cast<Index>(c));
     release_corners(poor);
     weigh_cells(minima);
-    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kSteps, 0.4 + 0.6 * round / kMaxRounds))
-      return false;
+    if (!run_stage(formatted("round %d, lambda %g", round + 1, lambda), lambda, kSteps)) return false;
   }
   return true;
 }
@@ -468,7 +473,6 @@ bool MeshOptimizer::is_worth_keeping(const Measured& now, const Measured& start)
 
 /// Runs quality stages on the present mesh. Returns false if the work must end.
 bool MeshOptimizer::run_quality_stages(const QualitySchedule& schedule) {
-  constexpr double kFraction = 0.9;
   const bool slides = !options_.fixed_boundary;
   FreeNodes free = free_nodes(fixed_vertices(slides ? Boundary::sliding : Boundary::fixed), mesh_.positions);
   QualityBoundary boundary;
@@ -488,7 +492,7 @@ bool MeshOptimizer::run_quality_stages(const QualitySchedule& schedule) {
   }
   QualityStages stages(mesh_, ideal_boxes_, free.map, free.fixed, boundary, target_.surface, creases);
   std::vector<Vec3> x = std::move(free.unknowns);
-  const bool going = stages.run(schedule, runner_, record("quality"), kFraction, x, report_);
+  const bool going = stages.run(schedule, runner_, record("quality"), x, report_);
   mesh_.positions = std::move(free.fixed);
   const std::vector<Vec3> moved = free.map.apply(x);
   for (std::size_t v = 0; v < moved.size(); ++v) mesh_.positions[v] += moved[v];
@@ -504,6 +508,7 @@ bool MeshOptimizer::raise_quality(double goal) {
   if (before.least_jacobian >= goal) return true;
   const std::vector<Vec3> start = mesh_.positions;
   QualitySchedule schedule = fine_quality_schedule(goal);
+  runner_.work().begin_portion(kFirstQualityPortion, 1, schedule.expected_steps());
   schedule.most_distance = std::max(kMaxMargin * options_.max_tolerance_percent, before.max_percent) / 100;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const std::size_t stages_before = report_.stages.size();

@@ -234,8 +234,7 @@ bool SubdivisionFit::run_stage(const Stage& stage, const std::string& name) {
   volume->set_distortion(options_.distortion);
   FitProblem problem(level_.nodes, level_.samples, std::move(volume), surface_term(stage), stage.lambda);
   const double begin = runner_.seconds();
-  const bool going =
-      runner_.run(problem, stage, std::move(record), schedule_.fraction(number_), unknowns_, result_.report);
+  const bool going = runner_.run(problem, stage, std::move(record), unknowns_, result_.report);
   seconds_["solve"] += runner_.seconds() - begin;
   mean_.reset();
   return going;
@@ -428,7 +427,7 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
   record.name = formatted("level %d, quality", number_);
   record.level = number_;
   record.cells = level_.mesh.num_cells();
-  const bool going = stages.run(schedule, runner_, record, schedule_.fraction(number_), unknowns_, result_.report);
+  const bool going = stages.run(schedule, runner_, record, unknowns_, result_.report);
   mean_.reset();
   return going;
 }
@@ -449,6 +448,7 @@ bool SubdivisionFit::raise_quality() {
   const std::optional<Measured> before = measure();
   if (!before) return false;
   if (before->least_jacobian >= options_.quality) return true;
+  runner_.work().begin_part(1, late_quality_schedule(options_.quality).expected_steps());
   for (const Attempt& attempt : kAttempts) {
     QualitySchedule schedule =
         attempt.only_lift ? late_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
@@ -558,6 +558,7 @@ bool SubdivisionFit::has_room() {
 }
 
 bool SubdivisionFit::run_level() {
+  runner_.work().begin_part(schedule_.share_at_end(number_, options_.quality > 0), kExpectedLevelSteps);
   prepare_level();
   const bool going = start_level() && run_stages();
   store_result();

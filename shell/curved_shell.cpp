@@ -19,6 +19,8 @@ namespace {
 
 constexpr int kLeastIntervals = 4;
 constexpr int kDefaultIterations = 60;
+/// Share of the work that is done when the straight shell is there.
+constexpr double kStraightShare = 0.97;
 
 /// Calls visit(first node, number of nodes, vertices) for every vertex, edge, face and cell of a space.
 template <class Visit>
@@ -145,8 +147,9 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
   record.name = "order " + std::to_string(options.order);
   record.order = options.order;
   record.cells = mesh.space.num_cells();
-  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultIterations}, std::move(record), 0.97, unknowns,
-                 report)) {
+  runner.work() = WorkShare(kStraightShare);
+  runner.work().begin_part(1, kDefaultIterations);
+  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultIterations}, std::move(record), unknowns, report)) {
     report.stop_reason = stop_reason(report.stages.back().ended);
     report.explanation = report.stages.back().stop;
   }

@@ -17,6 +17,8 @@ using Kind = ProgressTeller::Kind;
 constexpr int kBarWidth = 30;
 constexpr std::chrono::seconds kPlainInterval{10}, kWorkInterval{1};
 constexpr double kTellingShare = 0.05;
+/// Share of a run that its fit takes; the rest is for measuring and writing the result.
+constexpr double kFitShare = 0.9;
 constexpr std::chrono::milliseconds kBarInterval{100};
 
 Kind kind_of(const std::string& name, bool quiet) {
@@ -27,7 +29,7 @@ Kind kind_of(const std::string& name, bool quiet) {
   return Kind::plain;
 }
 
-double share_done(const FitProgress& progress) { return std::clamp(progress.fraction, 0.0, 1.0); }
+double share_done(const FitProgress& progress) { return kFitShare * std::clamp(progress.fraction, 0.0, 1.0); }
 
 std::string level_text(const FitProgress& progress) {
   return progress.level > 0 ? "level " + std::to_string(progress.level) + "  " : "";
@@ -48,6 +50,7 @@ ProgressTeller::ProgressTeller(const std::string& name, bool quiet)
 ProgressTeller::~ProgressTeller() { finish(); }
 
 void ProgressTeller::tell(const FitProgress& progress) {
+  has_fit_ = true;
   switch (kind_) {
     case Kind::bar:
       return draw_bar(share_done(progress), level_text(progress) + formatted("%.40s", progress.stage) + "  step " +
@@ -58,10 +61,11 @@ void ProgressTeller::tell(const FitProgress& progress) {
   }
 }
 
-void ProgressTeller::tell_work(const char* part, double share) {
+void ProgressTeller::tell_work(const char* part, double share_of_work) {
+  const double share = has_fit_ ? kFitShare + (1 - kFitShare) * share_of_work : share_of_work;
   if (kind_ == Kind::bar) return draw_bar(share, part);
   if (kind_ == Kind::json)
-    print(Json{{"part", part}, {"share", share}, {"seconds", seconds()}}.dump() + '\n');
+    print(Json{{"part", part}, {"share", share_of_work}, {"seconds", seconds()}}.dump() + '\n');
   const auto now = Clock::now();
   if (kind_ != Kind::plain || now - last_ < kWorkInterval) return;
   last_ = now;

@@ -21,6 +21,7 @@ class ProgressTeller {
   ProgressTeller(const ProgressTeller&) = delete;
   ProgressTeller& operator=(const ProgressTeller&) = delete;
 
+  /// Reports a step of a fit, whose share of the run is nine tenths.
   void tell(const FitProgress& progress);
   /// Reports work after the solve: on the bar, as a line at most once a second, or to scripts as "part" and "share".
   void tell_work(const char* part, double share);
@@ -48,6 +49,7 @@ class ProgressTeller {
   Clock::time_point start_, last_;
   std::string last_stage_;
   int last_level_ = -1;
+  bool has_fit_ = false;  ///< true if work is what follows a fit
   double last_share_ = 0, total_seconds_ = 0;  ///< estimated total time when that share was reached
   bool bar_shown_ = false;
 };

@@ -44,7 +44,18 @@ std::vector<Stage> FitSchedule::stages(int number) const {
 
 Stage FitSchedule::final_stage(double lambda) const { return rough_stage(lambda, kCloseTangentialWeight); }
 
-double FitSchedule::fraction(int number) const { return std::pow(0.25, levels - number + 1); }
+double FitSchedule::share_at_end(int number, bool raises_quality) const {
+  // A step of a level costs about a quarter of one of the next: that has eight times the cells, but fewer quadrature
+  // points in each.
+  constexpr double kNextLevel = 4, kQuality = 1;
+  double before = 0, all = 0;
+  for (int level = 1; level <= levels; ++level) {
+    all += std::pow(kNextLevel, level);
+    if (level == number) before = all;
+  }
+  if (raises_quality) all += kQuality * std::pow(kNextLevel, levels);
+  return before / all;
+}
 
 std::vector<double> own_box_shares(double distance) {
   return distance < kCloseDistance ? std::vector{1.0, 0.5, 0.0} : std::vector{0.0, 0.5, 1.0};

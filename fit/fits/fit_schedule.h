@@ -40,9 +40,13 @@ struct FitSchedule {
   /// Returns the number of quadrature points per direction. Points are nested from level to level, so that no child
   /// starts inverted at one of its points.
   int quadrature_points(int number) const { return number == 1 ? 5 : number == 2 ? 3 : 2; }
-  /// Returns a rough estimate of the share of the work that is done when a level begins.
-  double fraction(int number) const;
+  /// Returns an estimate of the share of the work that is done when the stages of a level end.
+  /// raises_quality  true if quality stages follow on the finest level.
+  double share_at_end(int number, bool raises_quality) const;
 };
+
+/// Number of steps that the stages of a level are expected to take together.
+inline constexpr double kExpectedLevelSteps = 12;
 
 /// Returns the `own_share` values (`ideal_boxes`) to be tried on level 1, first choice first.
 ///

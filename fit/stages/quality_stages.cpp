@@ -38,6 +38,13 @@ double above(double goal, double margin = kMargin) { return std::min(0.95, goal 
 
 }  // namespace
 
+double QualitySchedule::expected_steps() const {
+  constexpr double kLift = 10;  // most of the lift is done on patches
+  double steps = lift.steps > 0 ? kLift : 0;
+  for (const QualityStage& stage : stages) steps += stage.steps;
+  return steps;
+}
+
 void QualitySchedule::give_surface_more_weight(double factor) {
   for (QualityStage& stage : stages) stage.surface *= factor;
   lift.surface *= factor;
@@ -134,7 +141,8 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
     : patch_mesh_(std::make_unique<VolumeMesh>(subvol::patch_mesh(*whole.mesh_, patch))),
       mesh_(patch_mesh_.get()),
       mean_length_(whole.mean_length_),
-      lambda_one_(whole.lambda_one_) {
+      lambda_one_(whole.lambda_one_),
+      step_work_(static_cast<double>(patch.cells.size()) / static_cast<double>(whole.mesh_->num_cells())) {
   const FitProblem& problem = *whole.problem_;
   auto volume = std::make_unique<QualityEnergy>(*whole.energy_, *mesh_, patch.cells);
   energy_ = volume.get();
@@ -190,7 +198,7 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   StageRecord record = record_;
   record.name = name;
   const Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_, damping_};
-  const bool going = runner_->run(*problem_, settings, std::move(record), fraction_, x, *report_);
+  const bool going = runner_->run(*problem_, settings, std::move(record), x, *report_, step_work_);
   damping_ = damping_after(damping_, report_->stages.back().iterations);
   return going;
 }
@@ -271,7 +279,7 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
     FitReport report;
     StageRecord record = record_;
     record.name += formatted(", patch of %zu cells", patch.cells.size());
-    going = part.run(of_patch, quiet, record, fraction_, own, report);
+    going = part.run(of_patch, quiet, record, own, report);
     for (std::size_t i = 0; i < own.size(); ++i) x[patch.unknowns[i]] = own[i];
     reached += part.state().merit >= 1;
     unknowns += patch.unknowns.size();
@@ -334,11 +342,10 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
 }
 
 bool QualityStages::run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record,
-                        double fraction, std::vector<Vec3>& x, FitReport& report) {
+                        std::vector<Vec3>& x, FitReport& report) {
   constexpr double kLeastDecrease = 1e-3;
   runner_ = &runner;
   record_ = record;
-  fraction_ = fraction;
   report_ = &report;
   damping_ = kFirstDamping;
   energy_->reset_emphasis();

@@ -39,6 +39,8 @@ struct QualitySchedule {
   /// Share of `most_distance` from which on places are emphasized.
   double far_margin = 0.5;
 
+  /// Number of steps of the whole mesh that the schedule is expected to take, for forecasts of work.
+  double expected_steps() const;
   /// Multiplies the weight of the surface in all stages.
   void give_surface_more_weight(double factor);
 };
@@ -103,8 +105,8 @@ class QualityStages {
   /// name  of the level, for reports.  record  level and number of cells are set.
   /// x  the degrees of freedom; after the lift, those of the state with the highest merit, on each patch.
   /// returns  false if the fit must end, with its reason in the report.
-  bool run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record, double fraction,
-           std::vector<Vec3>& x, FitReport& report);
+  bool run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x,
+           FitReport& report);
 
   /// Called before each minimization; x then holds the state that it starts from. Empty: nothing is called.
   std::function<void()> before_stage;
@@ -127,6 +129,7 @@ class QualityStages {
   double damping_ = kFirstDamping;  ///< for the next stage
   double mean_length_ = 0;  ///< wanted, of the cells at the boundary
   double lambda_one_ = 1;   ///< lambda for w_s = 1
+  double step_work_ = 1;    ///< of a step, as a share of one of the whole level
   std::unique_ptr<FitProblem> problem_;
   QualityEnergy* energy_ = nullptr;  ///< owned by the problem, as is the next
   ClosestPointEnergy* surface_ = nullptr;
@@ -136,7 +139,6 @@ class QualityStages {
   // These belong to the call of `run` that is in progress.
   const StageRunner* runner_ = nullptr;
   StageRecord record_;
-  double fraction_ = 0;
   FitReport* report_ = nullptr;
 };
 

@@ -26,8 +26,8 @@ std::uint64_t start_of(const FitProblem& problem, const MinimizerOptions& minimi
 
 }  // namespace
 
-bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction,
-                      std::vector<Vec3>& x, FitReport& report) const {
+bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord record, std::vector<Vec3>& x,
+                      FitReport& report, double step_work) const {
   record.lambda = stage.lambda;
   record.tangential_weight = stage.tangential_weight;
   record.unknowns = x.size();
@@ -48,8 +48,9 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   minimizer.ended = [this] { return is_to_end(); };
   minimizer.progress = [&](const IterationRecord& step) {
     const double energy = step.surface_energy + stage.lambda * step.volume_energy;
+    work_->add(step_work);
     const bool wanted = !options_.progress ||
-                        options_.progress({record.name.c_str(), record.level, ++iteration, energy, fraction});
+                        options_.progress({record.name.c_str(), record.level, ++iteration, energy, work_->share()});
     return wanted && !is_over();
   };
   // A stage recalled from a log leaves no correspondences behind, so those left by a solved stage must not matter

@@ -7,11 +7,13 @@
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/stages/stage.h"
 #include "subvol/fit/stages/stage_log.h"
+#include "subvol/fit/stages/work_share.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <chrono>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -34,7 +36,7 @@ class StageRunner {
 
   explicit StageRunner(Options options) : options_(std::move(options)) {}
 
-  /// Returns a runner with the same options and clock, but without the log.
+  /// Returns a runner with the same options, clock and share of work, but without the log.
   StageRunner without_log() const {
     StageRunner result = *this;
     result.options_.log = nullptr;
@@ -42,14 +44,17 @@ class StageRunner {
   }
 
   /// Minimizes over x and appends the record to the report. The record's name, level or order, and number of cells must
-  /// be set. `fraction` is passed on to the progress callback. If the fit must end, sets the report's stop reason and
-  /// returns false.
+  /// be set. Each step is counted as `step_work` in `work()`, whose share is passed on to the progress callback. If the
+  /// fit must end, sets the report's stop reason and returns false.
   ///
   /// If the log holds the result, nothing is minimized, and only the recorded quadrature refinements are repeated. To
   /// make both cases alike, correspondences are reset at the start; call `SurfaceTerm::forget` before inspecting them
   /// afterwards.
-  bool run(FitProblem& problem, const Stage& stage, StageRecord record, double fraction, std::vector<Vec3>& x,
-           FitReport& report) const;
+  bool run(FitProblem& problem, const Stage& stage, StageRecord record, std::vector<Vec3>& x, FitReport& report,
+           double step_work = 1) const;
+
+  /// The share of the whole work that is done. Its parts are begun by the fit, with their expected numbers of steps.
+  WorkShare& work() const { return *work_; }
 
   /// Checks the time limit before long work. If the time is over, sets the report's stop reason and returns false.
   bool in_time(const std::string& work, FitReport& report) const;
@@ -77,6 +82,7 @@ class StageRunner {
 
   Options options_;
   Clock::time_point start_ = Clock::now();
+  std::shared_ptr<WorkShare> work_ = std::make_shared<WorkShare>();  ///< never null; the same one in all copies
 };
 
 }  // namespace subvol

@@ -84,8 +84,7 @@ class TangledCells {
 }  // namespace
 
 UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
-                        const StageRunner& runner, const StageRecord& record, double fraction, std::vector<Vec3>& x,
-                        FitReport& report) {
+                        const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x, FitReport& report) {
   TangledCells cells(problem, mesh);
   if (cells.look(x)) return {};
   double epsilon = std::max(kShareOfWorst * std::abs(cells.determinant()), kLeastEpsilon);
@@ -98,7 +97,7 @@ UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const Untan
     stage.name = record.name + formatted(", epsilon %.3g", epsilon);
     const double before = cells.energy(x);
     const Stage weights{problem.lambda, options.tangential_weight, kSteps, kRelativeDecrease};
-    const bool going = runner.run(problem, weights, std::move(stage), fraction, x, report);
+    const bool going = runner.run(problem, weights, std::move(stage), x, report);
     const double decrease = 1 - cells.energy(x) / before;
     if (cells.look(x) || !going) return {going, cells.uncertified()};
     const bool gained = cells.uncertified().size() < fewest || cells.determinant() > best + kLeastRise * std::abs(best);

@@ -29,7 +29,6 @@ struct UntangleResult {
 /// x         any finite start; receives the result, certified or not.
 /// A round counts as a gain if fewer cells fail than in any round before or the worst determinant rises.
 UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
-                        const StageRunner& runner, const StageRecord& record, double fraction, std::vector<Vec3>& x,
-                        FitReport& report);
+                        const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x, FitReport& report);
 
 }  // namespace subvol

@@ -223,7 +223,7 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
   StageRecord record;
   record.name = "stage";
   StageLog first;
-  REQUIRE(StageRunner({.log = &first}).run(problem, {0.5, 0, 2}, record, 0, x, report));
+  REQUIRE(StageRunner({.log = &first}).run(problem, {0.5, 0, 2}, record, x, report));
   REQUIRE(first.stages().size() == 1);
   CHECK(forgotten > 0);
   CHECK(densified.empty());
@@ -233,7 +233,7 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
   StageLog log(solved, "memory");
   forgotten = 0;
   x.assign(3, Vec3::Zero());
-  CHECK(StageRunner({.log = &log}).run(problem, {0.5, 0, 2}, record, 0, x, report));
+  CHECK(StageRunner({.log = &log}).run(problem, {0.5, 0, 2}, record, x, report));
   CHECK(log.num_recalled() == 1);
   CHECK(densified == solved[0].result.densified);
   CHECK(densified_at == solved[0].result.densified_at);
@@ -241,7 +241,7 @@ TEST_CASE("A stage that comes from a log leaves its problem as one that was solv
   solved[0].result.densified_at.pop_back();
   StageLog wrong(solved, "memory");
   x.assign(3, Vec3::Zero());
-  CHECK_THROWS_WITH(StageRunner({.log = &wrong}).run(problem, {0.5, 0, 2}, record, 0, x, report),
+  CHECK_THROWS_WITH(StageRunner({.log = &wrong}).run(problem, {0.5, 0, 2}, record, x, report),
                     Catch::Contains("2 unknowns, expected 3"));
 }
 

@@ -81,7 +81,7 @@ TEST_CASE("A lift moves only the patch around a poor cell", "[quality]") {
   StageRecord record;
   record.name = "bar";
   FitReport report;
-  REQUIRE(stages.run(schedule, runner, record, 0, x, report));
+  REQUIRE(stages.run(schedule, runner, record, x, report));
   CHECK(stages.state().cells.least >= kGoal);
   CHECK(stages.state().merit >= 1);
   REQUIRE(report.stages.size() == 1);

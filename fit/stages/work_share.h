@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace subvol {
+
+/// Share of a long work that is done, from work that is counted against a forecast. It never falls, grows with all that
+/// is counted, and stays below 1 however much more than the forecast that is.
+class WorkShare {
+ public:
+  WorkShare() = default;
+  /// A work of which this share is done.
+  explicit WorkShare(double done) : begin_(done), end_(done) {}
+
+  /// Begins a part, at whose end the share will be `end`; if that much is done already, a third of what is left.
+  /// forecast  work that the part is expected to take, > 0, in any unit.
+  void begin_part(double end, double forecast) {
+    constexpr double kLeastPart = 1.0 / 3;
+    begin_ = share();
+    end_ = end > begin_ ? std::min(end, 1.0) : begin_ + kLeastPart * (1 - begin_);
+    forecast_ = forecast;
+    done_ = 0;
+  }
+  /// Begins a part that ends at this portion, in (0, 1], of what is left up to `last`.
+  void begin_portion(double portion, double last, double forecast) {
+    const double now = share();
+    begin_part(now + portion * (last - now), forecast);
+  }
+  /// Counts work >= 0, in the unit of the forecast.
+  void add(double work) { done_ += work; }
+  /// Sets the share of the part that is done, >= 0, in place of counted work.
+  void set(double share_of_part) { done_ = std::max(done_, share_of_part * forecast_); }
+
+  double share() const {
+    constexpr double kTrusted = 0.8;  // from here on, the part's end is approached and never reached
+    const double done = done_ / forecast_, rest = 1 - kTrusted;
+    const double eased = done < kTrusted ? done : 1 - rest * std::exp(-(done - kTrusted) / rest);
+    return begin_ + eased * (end_ - begin_);
+  }
+
+ private:
+  double begin_ = 0, end_ = 0, forecast_ = 1, done_ = 0;
+};
+
+}  // namespace subvol
