@@ -114,9 +114,15 @@ int check_surface(const CheckArguments& arguments, const CLI::App& verb) {
             {"options", options_in_force(verb)},
             {"input", {{"surface", describe(arguments.mesh, surface.mesh)}}}};
   json.update(diagnosis_json(diagnosis));
+  std::string text = to_text(diagnosis);
+  if (!diagnosis.is_cancelled && diagnosis.parts.size() > 1)
+    if (const std::optional<RegionSurface> regions = find_regions(surface.mesh)) {
+      json["regions"] = regions_json(*regions);
+      text = to_text(*regions) + text;
+    }
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = peak_memory_bytes();
-  tell_check(arguments, warnings, json, to_text(diagnosis));
+  tell_check(arguments, warnings, json, text);
   if (diagnosis.is_cancelled) return kInterrupted;
   return diagnosis.is_fillable() ? kDone : kFailed;
 }
