@@ -7,6 +7,7 @@
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/sheet_layout.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/region_volumes.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/closest_point.h"
@@ -227,8 +228,10 @@ double RegionFit::volume_percent() const {
 /// Makes flat sheets of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the fit
 /// must end.
 bool RegionFit::judge(AutomaticFitTrial trial) {
-  constexpr double kLeastAfterFlattening = 0.3;
+  constexpr double kLeastAfterFlattening = 0.3;  // a cell may become as poor, for what is exact
+
   if (follows_edges_) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
+  restore_volumes(mesh_, unit_.volumes, kLeastAfterFlattening);
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance outer =
       target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
@@ -270,19 +273,26 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
 
 /// Fits a pillowed grid that is refined once, unless the regions need too many cells for that.
 bool RegionFit::run_smooth(std::size_t cells) {
-  constexpr double kRoom = 0.85, kMostExcess = 1.4;
+  constexpr double kRoom = 0.85, kLess = 0.95, kMostExcess = 1.4;
+  constexpr int kTries = 3;
+  /// Makes the present mesh a pillowed template of at most so many cells, if there is one; false: none at all.
+  const auto make_template = [&](std::size_t most) {
+    double asked = kRoom * static_cast<double>(most);
+    for (int round = 1;; ++round) {
+      const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
+      if (!grid) return false;
+      mesh_ = pillowed(*grid);
+      const std::size_t got = mesh_.num_cells();
+      if (got <= most || round == kTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
+      asked *= kLess * static_cast<double>(most) / static_cast<double>(got);
+    }
+  };
   const std::size_t coarse = std::max(kLeastTemplateCells, cells / kChildren);
-  std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(kRoom * static_cast<double>(coarse)));
-  if (!grid) return !no_template_.empty();
-  mesh_ = pillowed(*grid);
+  if (!make_template(coarse)) return !no_template_.empty();
   int levels = 1;
   if (static_cast<double>(mesh_.num_cells()) > kMostExcess * static_cast<double>(coarse)) {
     levels = 0;
-    if (mesh_.num_cells() < cells / 2) {
-      grid = make_grid(static_cast<std::size_t>(kRoom * static_cast<double>(cells)));
-      if (!grid) return !no_template_.empty();
-      mesh_ = pillowed(*grid);
-    }
+    if (mesh_.num_cells() < cells / 2 && !make_template(cells)) return !no_template_.empty();
   }
   AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
   bool going = true;
