@@ -59,7 +59,8 @@ CLI::Option* add_references_option(CLI::App& verb, RunOptions& options) {
   return verb
       .add_option("--references", options.references,
                   "Cell data of a .vtk that become the cells' references (default: those with a name of materials or\n"
-                  "regions, or else the first of whole numbers that are no ghosts or cell numbers)")
+                  "regions, or else the first of whole numbers that are no ghosts or cell numbers); none: references\n"
+                  "of any file are left out, and all cells are one region")
       ->type_name("NAME");
 }
 

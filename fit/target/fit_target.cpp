@@ -74,7 +74,7 @@ FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
     : normalisation(target), surface(normalised(target, normalisation), weights) {}
 
 void FitTarget::keep_interfaces(const VolumeMesh& start) {
-  if (surface.is_cloud()) return;
+  if (surface.is_cloud() || has_interfaces()) return;
   const MeshTopology topology(start);
   const Interfaces found = find_interfaces(start, topology);
   if (found.empty()) return;
