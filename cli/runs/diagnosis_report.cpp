@@ -7,6 +7,7 @@
 #include "subvol/base/format.h"
 #include "subvol/io/label_grid_io.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/label_surface.h"
 
@@ -86,6 +87,13 @@ FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std
 }
 
 SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings) {
+  if (rule != RegionRule::merge && is_volume_file(path))
+    if (const VolumeMesh mesh = load_volume(path, warnings); region_references(mesh).size() > 1) {
+      SurfaceRepair loaded;
+      loaded.regions = surface_of_regions(mesh);
+      loaded.surface = loaded.regions->mesh;
+      return loaded;
+    }
   if (!is_label_grid_file(path)) return repair_surface(load_surface(path, warnings), interrupted, rule);
   LabelGrid grid = read_label_grid(path);
   if (rule == RegionRule::merge)

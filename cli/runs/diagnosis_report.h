@@ -20,7 +20,7 @@ struct FileSurface {
 /// Reads a surface file. InputError: as `read_polygon_mesh`.
 FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
-/// Loads a surface, or the sheets of a segmentation (`surface_of_labels`), ready to be filled. With RegionRule::merge, all
+/// Loads a surface, the sheets of a mesh with several regions, or those of a segmentation (`surface_of_labels`), ready to be filled. With RegionRule::merge, all
 /// labels are one region. The cancel callback is `interrupted`.
 SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings);
 

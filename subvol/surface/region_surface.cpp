@@ -2,6 +2,8 @@
 #include "subvol/surface/region_surface.h"
 
 #include "subvol/base/format.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/welded_surface.h"
 #include "subvol/surface/winding_number.h"
 
@@ -393,6 +395,46 @@ void orient_sheets(RegionSurface& surface) {
       if (surface.regions[r].number == front) surface.volumes[r] -= below;
     }
   }
+}
+
+RegionSurface surface_of_regions(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  const std::vector<int> references = region_references(mesh);
+  const bool keeps = references.front() > kOutside;
+  const auto number_of = [&](int reference) {
+    return keeps ? reference : 1 + static_cast<int>(std::ranges::lower_bound(references, reference) - references.begin());
+  };
+  RegionSurface surface;
+  for (const int reference : references) {
+    Group region{"", number_of(reference), 3};
+    for (const Group& named : mesh.regions)
+      if (named.number == reference) region.name = named.name;
+    surface.regions.push_back(std::move(region));
+  }
+  surface.mesh.positions = mesh.positions;
+  const auto region_of = [&](Index cell) {
+    if (cell == kNoIndex) return kOutside;
+    return number_of(mesh.references.empty() ? 0 : mesh.references[cell]);
+  };
+  const auto add = [&](Index f) {
+    const auto face = topology.face(f);
+    const auto [first, second] = topology.face_cells(f);
+    const auto center = static_cast<Index>(surface.mesh.positions.size());
+    if (face.size() > 3) {
+      Vec3 sum = Vec3::Zero();
+      for (const Index v : face) sum += mesh.positions[v];
+      surface.mesh.positions.push_back(sum / static_cast<double>(face.size()));
+    }
+    for (std::size_t i = 0; i < (face.size() > 3 ? face.size() : 1); ++i) {
+      if (face.size() > 3) surface.mesh.triangles.push_back({center, face[i], face[(i + 1) % face.size()]});
+      else surface.mesh.triangles.push_back({face[0], face[1], face[2]});
+      surface.sides.push_back({region_of(first), region_of(second)});
+    }
+  };
+  for (const Index f : topology.boundary_faces()) add(f);
+  for (const Index f : find_interfaces(mesh, topology).faces) add(f);
+  orient_sheets(surface);
+  return surface;
 }
 
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region) {

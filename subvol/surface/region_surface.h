@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -61,6 +62,10 @@ const char* to_string(RegionRule rule);
 /// InputError: a vertex number out of range, a position that is not finite.
 /// Cost: sorts of vertices and edges; of parts inside others, that of winding numbers.
 std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRule rule = RegionRule::automatic);
+
+/// Returns the sheets of a mesh of several regions, each quad as four triangles around its center. Regions have their
+/// references as numbers, and their names; if a reference is not positive, they are numbered from 1 on instead.
+RegionSurface surface_of_regions(const VolumeMesh& mesh);
 
 /// Returns the closed boundary of a region, oriented outward, without groups; vertices are numbered as in the surface.
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region);

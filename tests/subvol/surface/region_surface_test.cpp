@@ -3,6 +3,7 @@
 
 #include "subvol/surface/solid_topology.h"
 #include "tests/support/region_fixtures.h"
+#include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
 
@@ -109,6 +110,22 @@ TEST_CASE("Layers of a cylinder and a membrane inside one of them", "[regions]")
   CHECK(volumes[2] == Approx((1 - 0.49) * unit));
   layered.triangles.pop_back();  // an open surface divides nothing
   CHECK(!find_regions(layered));
+}
+
+TEST_CASE("The sheets of a mesh with references are a surface with its regions", "[regions]") {
+  VolumeMesh mesh = test::lattice(4, 2, 2);
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    Vec3 center = Vec3::Zero();
+    for (const Index v : mesh.cell(c)) center += mesh.positions[v] / 8;
+    mesh.references.push_back(center.x() < 1 ? 9 : 4);
+  }
+  mesh.regions = {{"left", 9, 3}};
+  RegionSurface surface = surface_of_regions(mesh);
+  CHECK(surface.regions == std::vector<Group>{{"", 4, 3}, {"left", 9, 3}});
+  CHECK(are(surface.volumes, {12, 4}));
+  CHECK(find_regions(surface.mesh)->volumes.size() == 2);
+  for (int& reference : mesh.references) reference -= 4;
+  CHECK(surface_of_regions(mesh).regions.front().number == 1);
 }
 
 TEST_CASE("Regions get the names of groups that bound them alone", "[regions]") {
