@@ -3,7 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
-#include "subvol/base/option_checks.h"
+#include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/features/crisp_edges.h"
@@ -37,35 +37,6 @@ namespace {
 
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
-constexpr double kGoodMerit = 0.1;           // no other template is tried below it ...
-/// ... nor if the quality is what keeps the merit above it, and reaches this share of the goal: larger templates have
-/// the same angles at sharp edges and irregular vertices.
-constexpr double kEnoughQuality = 0.85;
-constexpr double kQualityWeight = 5;         // of the share of the quality in the merit
-/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
-constexpr double kMaxMargin = 0.8;
-
-/// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases; and
-/// the portions of what is left of an attempt that its template, the coarser of two levels and a smooth fit take.
-constexpr double kAttemptPortion = 0.7, kTemplatePortion = 0.1, kCoarsePortion = 0.2, kSmoothPortion = 0.25;
-
-/// Returns the options, with the least goal that the stages can use in place of none.
-AutomaticFitOptions checked(AutomaticFitOptions options) {
-  constexpr double kLeastQuality = 0.1;
-  const auto in_range = [](const char* name, double value, double low, double high) {
-    require_in_range("AutomaticFitOptions", name, value, low, high);
-  };
-  in_range("quality", options.quality, 0, kMostQuality);
-  if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
-  in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
-  in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
-  in_range("max_iterations", options.max_iterations, 0, 1e9);
-  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
-  if (options.cells)
-    in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
-  options.quality = std::max(options.quality, kLeastQuality);
-  return options;
-}
 
 /// The state of the sharp edges of a target.
 struct Edges {
@@ -123,7 +94,7 @@ bool has_edges_to_follow(const TriangleMesh& target, const AutomaticFitOptions& 
 class AutomaticFit {
  public:
   AutomaticFit(const TriangleMesh& target, const AutomaticFitOptions& options)
-      : options_(checked(options)),
+      : options_(checked_options(options)),
         follows_edges_(has_edges_to_follow(target, options_)),
         original_(follows_edges_ ? solid_boundary(target).surface : target),
         target_(original_),
@@ -178,10 +149,7 @@ class AutomaticFit {
 
 /// Returns true if no other template needs to be tried.
 bool AutomaticFit::is_good() const {
-  if (result_.trials.empty()) return false;
-  const AutomaticFitTrial& best = result_.trials[result_.chosen];
-  const double excused = best.least_share >= kEnoughQuality ? kQualityWeight * (1 - best.least_share) : 0;
-  return best.merit - excused < kGoodMerit;
+  return !result_.trials.empty() && is_good_enough(result_.trials[result_.chosen]);
 }
 
 void AutomaticFit::find_edges() {
@@ -272,18 +240,6 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
   least_share_ = stages.state().cells.least_share;
   return going;
-}
-
-/// Returns how far a trial is from its aims: the formula in the header.
-double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
-  constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
-  const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
-  const bool counts_misses = trial.feature_miss && trial.curves > 0;
-  const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
-  return excess(trial.max_percent, options.max_tolerance_percent) +
-         excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
-         kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
-         (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
 }
 
 /// Returns the largest miss of the target's small features by a surface, in the target's unit and coordinates.
@@ -498,6 +454,8 @@ AutomaticFitResult AutomaticFit::run() {
 }  // namespace
 
 AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options) {
+  if (const std::optional<RegionSurface> regions = find_regions(target, options.regions))
+    return fit_regions(*regions, options);
   return AutomaticFit(target, options).run();
 }
 

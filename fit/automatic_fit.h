@@ -7,6 +7,7 @@
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/target/feature_size.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/region_surface.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -24,6 +25,8 @@ class StageLog;
 inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
 /// Largest distance from a small feature (`FeatureSizes`) that an automatic fit aims at, as a share of its radius.
 inline constexpr double kAutomaticFeatureShare = 0.1;
+/// Largest difference of a region's volume that an automatic fit aims at, in percent of that volume.
+inline constexpr double kAutomaticVolumePercent = 0.1;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp edges,
 /// and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
@@ -38,6 +41,7 @@ struct AutomaticFitOptions {
   std::optional<double> crease_angle_degrees = kUsualCreaseAngle;
   /// False: edges are followed only on surfaces of designed parts (`EdgeCrispness::is_designed`), not on scans.
   bool follows_all_edges = false;
+  RegionRule regions = RegionRule::automatic;  ///< how targets with several regions are taken (`find_regions`)
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
   int max_iterations = 0;          ///< per stage; 0: as the schedule says
   double time_limit_seconds = 0;   ///< 0: no limit
@@ -67,6 +71,7 @@ struct AutomaticFitTrial {
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
   double least_share = 0;          ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t uncertified = 0;
+  double volume_percent = 0;       ///< largest difference of a region's volume from the target's, if it has regions
   std::optional<std::size_t> self_intersections;  ///< pairs of triangles; empty: the search was interrupted
   double merit = 0;                ///< 0: all aims are reached; lower is better
 };
@@ -105,8 +110,28 @@ struct AutomaticFitResult {
 ///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
 ///         + 1 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
+/// A target with several regions (`find_regions`) is filled as `fit_regions` says.
+///
 /// InputError: options out of range, a surface that `auto_templates` refuses or whose topology no grid reproduces.
 /// Same bits for any number of threads, except under a time limit.
 AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options = {});
+
+/// Fills several regions with hexes whose interfaces conform: the references of cells are the regions' numbers, and faces
+/// between regions are in groups (`add_interface_groups`).
+///
+/// The template is a grid labelled by region (`region_template`), with layers of cells on both sides of all sheets but
+/// those that lie exactly on the grid (`pillow_regions`). Sheets of regions (a, b) and the target's triangles between a
+/// and b correspond to each other and to nothing else. If the target is a designed part, sharp edges and the curves where
+/// sheets meet are routed on the sheets (`sheet_layout`), so that parts of sheets correspond to parts between curves, and
+/// faces on flat parts become exactly flat. Else the template has about an eighth of the cells and is refined once, unless
+/// the regions need more.
+///
+/// Larger templates are tried as by `fit_automatically`; distances are the largest of the outer surface's and of all
+/// interfaces', and the merit also counts
+///
+///   min(3, max(0, largest difference of a region's volume / 0.1 % - 1))
+///
+/// InputError: options out of range; as `topology_of`; regions whose topology no grid reproduces.
+AutomaticFitResult fit_regions(const RegionSurface& target, const AutomaticFitOptions& options = {});
 
 }  // namespace subvol

@@ -17,6 +17,7 @@
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/staged_fit.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/region_matching.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
@@ -573,6 +574,8 @@ HighOrderFitResult HighOrderFit::run() {
 
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options) {
+  if (const std::optional<RegionSurface> regions = regions_as_in(target, template_mesh))
+    return HighOrderFit(FitTarget(*regions), template_mesh, options).run();
   return HighOrderFit(FitTarget(target), template_mesh, options).run();
 }
 

@@ -22,6 +22,8 @@ class Filling {
     keywords_.take("cells", options_.cells);
     keywords_.take("quality", options_.quality);
     take_crease_angle();
+    keywords_.take("regions", options_.regions,
+                   {{"auto", RegionRule::automatic}, {"keep", RegionRule::keep}, {"merge", RegionRule::merge}});
     keywords_.take("tolerance", options_.mean_tolerance_percent);
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
     keywords_.take("max_iterations", options_.max_iterations);
@@ -40,12 +42,18 @@ class Filling {
       return fit_automatically(target_, options_);
     });
     if (found.mesh.num_cells() == 0) throw InputError("fill: ended before there was a mesh");
-    const cli::GroupsFound groups = work_.run("groups", [&] { return cli::carry_groups(target_, found.mesh); });
-    const MeshCheck checked = work_.run("check", [&] { return check_mesh(found.mesh, &target_); });
+    const std::optional<RegionSurface> regions = find_regions(target_, options_.regions);
+    const TriangleMesh outer = regions ? outer_surface(*regions) : target_;
+    const cli::GroupsFound groups = work_.run("groups", [&] { return cli::carry_groups(outer, found.mesh); });
+    const MeshCheck checked = work_.run("check", [&] { return check_mesh(found.mesh, &outer); });
     Json json{{"input", {{"target", cli::describe("", target_)}}}};
     json.update(cli::automatic_fit_json(found));
     json.update(cli::fit_json(found.report));
     json.update(cli::check_json(checked));
+    if (regions && checked.regions) {
+      const RegionReport wanted = measure_regions(*regions);
+      json["regions"] = cli::regions_json(*checked.regions, &wanted, "target");
+    }
     if (!groups.groups.empty()) json["groups"] = cli::groups_json(groups.groups);
     checkpoints_.describe(json);
     warnings.insert(warnings.end(), found.report.warnings.begin(), found.report.warnings.end());

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/meshes.h"
 
+#include "cli/runs/check_report.h"
 #include "python/arrays.h"
 #include "python/groups.h"
 #include "python/module.h"
+#include "python/report.h"
 #include "python/work.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/io/sound_points.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/features.h"
@@ -204,6 +207,9 @@ Takes the arrays named above.)");
   add_groups(type);
   type.def_property_readonly("region_names", [](const VolumeMesh& mesh) { return region_names(mesh.regions); },
                              "Names of references: dict of number and name.");
+  type.def_property_readonly("regions", [](const VolumeMesh& mesh) {
+    return to_python(cli::regions_json(measure_regions(mesh, nullptr)));
+  }, "Cells, volume and boundary area of each region, and the area of each interface, as in the report of a check.");
   type.def("boundary", &cli::tagged_polygons,
            "boundary($self)\n--\n\nThe boundary as it stands: a SurfaceMesh with the mesh's tags.");
   type.def("copy", [](const VolumeMesh& mesh) { return std::make_shared<VolumeMesh>(mesh); },

@@ -4,10 +4,19 @@
 #include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/progress.h"
+#include "subvol/fit/automatic_fit.h"
+#include "subvol/surface/region_surface.h"
 
 #include <sstream>
 
 namespace subvol::cli {
+
+namespace {
+
+/// Number of cells of a template for several regions, if none is given: those of curved cells are large.
+constexpr std::size_t kRegionTemplateCells = 1500;
+
+}  // namespace
 
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings) {
@@ -24,6 +33,17 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
   };
   options.cancelled = interrupted;
   catch_interrupt();
+  if (const std::optional<RegionSurface> regions = find_regions(std::get<TriangleMesh>(target))) {
+    AutomaticFitOptions fit{.cells = source.cells.value_or(kRegionTemplateCells)};
+    fit.crease_angle_degrees = options.crease_angle_degrees.value_or(kUsualCreaseAngle);
+    fit.time_limit_seconds = options.time_limit_seconds;
+    fit.progress = options.progress;
+    fit.cancelled = options.cancelled;
+    AutomaticFitResult made = fit_regions(*regions, fit);
+    teller.finish();
+    warnings.insert(warnings.end(), made.report.warnings.begin(), made.report.warnings.end());
+    return {std::move(made.mesh), std::nullopt};
+  }
   TemplateChoice choice = choose_template(std::get<TriangleMesh>(target), options);
   teller.finish();
   warnings.insert(warnings.end(), choice.warnings.begin(), choice.warnings.end());

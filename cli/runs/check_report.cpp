@@ -139,7 +139,8 @@ Json check_json(const MeshCheck& check) {
   return json;
 }
 
-Json regions_json(const RegionReport& report, const RegionReport* start) {
+Json regions_json(const RegionReport& report, const RegionReport* start, const char* prefix) {
+  const std::string volume = std::string(prefix) + "_volume", area = std::string(prefix) + "_area";
   Json regions = Json::array(), interfaces = Json::array();
   for (const RegionQuality& region : report.regions) {
     Json one{{"reference", region.reference},
@@ -151,14 +152,14 @@ Json regions_json(const RegionReport& report, const RegionReport* start) {
     if (!region.name.empty()) one["name"] = as_utf8(region.name);
     if (start)
       for (const RegionQuality& before : start->regions)
-        if (before.reference == region.reference) one["start_volume"] = before.volume;
+        if (before.reference == region.reference) one[volume] = before.volume;
     regions.push_back(std::move(one));
   }
   for (const InterfaceArea& interface : report.interfaces) {
     Json one{{"references", interface.references}, {"faces", interface.num_faces}, {"area", interface.area}};
     if (start)
       for (const InterfaceArea& before : start->interfaces)
-        if (before.references == interface.references) one["start_area"] = before.area;
+        if (before.references == interface.references) one[area] = before.area;
     interfaces.push_back(std::move(one));
   }
   return {{"cells", std::move(regions)}, {"interfaces", std::move(interfaces)}};

@@ -17,9 +17,10 @@ namespace subvol::cli {
 /// The report's entries about a check: defects, topology, quality, certificate, self-intersections, distance.
 Json check_json(const MeshCheck& check);
 
-/// Returns the regions and interfaces of a mesh. start: those of the mesh that it was made from, by reference, for
-/// `start_volume` and `start_area`; null: without these.
-Json regions_json(const RegionReport& report, const RegionReport* start = nullptr);
+/// Returns the regions and interfaces of a mesh. start: those of the mesh that it was made from, or of its target, by
+/// reference, for `start_volume` and `start_area`; null: without these.
+/// prefix: of these names, "start" or "target".
+Json regions_json(const RegionReport& report, const RegionReport* start = nullptr, const char* prefix = "start");
 
 /// Check of the Lagrange cells of a .vtu, which VTK and other programs read, against the curved cells in its field
 /// data.

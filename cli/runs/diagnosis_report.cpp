@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/diagnosis_report.h"
 
+#include "cli/runs/interrupt.h"
+#include "cli/runs/loading.h"
+#include "cli/runs/writing.h"
 #include "subvol/base/format.h"
+#include "subvol/io/label_grid_io.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/templates/label_surface.h"
 
+#include <algorithm>
 #include <sstream>
 
 namespace subvol::cli {
@@ -77,6 +84,50 @@ FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std
   FileSurface surface;
   surface.mesh = triangulate(read_polygon_mesh(path, &warnings), &surface.face_of_triangle);
   return surface;
+}
+
+SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings) {
+  if (rule != RegionRule::merge && is_volume_file(path))
+    if (const VolumeMesh mesh = load_volume(path, warnings); region_references(mesh).size() > 1) {
+      SurfaceRepair loaded;
+      loaded.regions = surface_of_regions(mesh);
+      loaded.surface = loaded.regions->mesh;
+      return loaded;
+    }
+  if (!is_label_grid_file(path)) return repair_surface(load_surface(path, warnings), interrupted, rule);
+  LabelGrid grid = read_label_grid(path);
+  if (rule == RegionRule::merge)
+    for (int& label : grid.labels) label = std::min(label, 1);
+  RegionSurface surface = surface_of_labels(grid);
+  SurfaceRepair loaded;
+  for (const std::string& note : surface.notes) loaded.notes.push_back("target: " + note);
+  if (surface.regions.size() > 1) {
+    loaded.surface = surface.mesh;
+    loaded.regions = std::move(surface);
+  } else {
+    loaded.surface = outer_surface(surface);
+  }
+  return loaded;
+}
+
+std::string to_text(const RegionSurface& regions) {
+  std::string text = formatted("%-20s%zu", "regions", regions.regions.size());
+  for (std::size_t r = 0; r < regions.regions.size(); ++r) {
+    const Group& region = regions.regions[r];
+    text += (r == 0 ? ": " : ", ") + (region.name.empty() ? "region " + std::to_string(region.number) : region.name) +
+            formatted(" of volume %.6g", regions.volumes[r]);
+  }
+  return text + '\n';
+}
+
+Json regions_json(const RegionSurface& regions) {
+  Json json = Json::array();
+  for (std::size_t r = 0; r < regions.regions.size(); ++r) {
+    Json one{{"reference", regions.regions[r].number}, {"volume", regions.volumes[r]}};
+    if (!regions.regions[r].name.empty()) one["name"] = as_utf8(regions.regions[r].name);
+    json.push_back(std::move(one));
+  }
+  return json;
 }
 
 void number_by_faces(SurfaceDiagnosis& diagnosis, const FileSurface& surface) {

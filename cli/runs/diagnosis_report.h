@@ -20,6 +20,14 @@ struct FileSurface {
 /// Reads a surface file. InputError: as `read_polygon_mesh`.
 FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
+/// Loads a surface, the sheets of a mesh with several regions, or those of a segmentation (`surface_of_labels`), ready to be filled. With RegionRule::merge, all
+/// labels are one region. The cancel callback is `interrupted`.
+SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings);
+
+/// The regions of a surface as text and as an entry of a report: numbers, names and volumes.
+std::string to_text(const RegionSurface& regions);
+Json regions_json(const RegionSurface& regions);
+
 /// Names the triangles of a diagnosis by the faces of the file.
 void number_by_faces(SurfaceDiagnosis& diagnosis, const FileSurface& surface);
 

@@ -113,7 +113,14 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
   require_cell_file(path);
-  return read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = references});
+  const bool ignores = references == kNoReferences;
+  VolumeMesh mesh =
+      read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = ignores ? "" : references});
+  if (ignores) {
+    mesh.references.clear();
+    mesh.regions.clear();
+  }
+  return mesh;
 }
 
 VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
@@ -135,7 +142,12 @@ VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
 
 HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings,
                               const std::string& references) {
-  HighOrderFile file = read_curved(path, warnings, references);
+  const bool ignores = references == kNoReferences;
+  HighOrderFile file = read_curved(path, warnings, ignores ? "" : references);
+  if (ignores) {
+    file.references.clear();
+    file.regions.clear();
+  }
   const auto& x = file.mesh.coefficients;  // positions of vertices, then displacements
   const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
   if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
@@ -145,7 +157,7 @@ HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std
 }
 
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references) {
-  if (references.empty() || (has_cells(path) && !(is_high_order_file(path) && holds_exact_map(path)))) return;
+  if (references.empty() || references == kNoReferences || (has_cells(path) && !(is_high_order_file(path) && holds_exact_map(path)))) return;
   throw UsageError("--references: " + path.string() + " has no cell data to choose from");
 }
 

@@ -51,8 +51,11 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
 /// `load_polygons` with the tags of a volume mesh; a surface file has none.
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
+/// What --references says if cells are to have none: all are one region.
+inline constexpr const char* kNoReferences = "none";
+
 /// Loads a volume mesh that is valid except for inverted cells and unused vertices (or, unchecked, is just readable).
-/// references: name of the cell data that become the references; empty: the usual ones.
+/// references: name of the cell data that become the references; empty: the usual ones; `kNoReferences`: none.
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
 

@@ -105,6 +105,25 @@ std::string place(const Json& point) {
   return text;
 }
 
+std::string regions(const Json& report) {
+  const Json& all = part(report, "regions");
+  std::string cells, interfaces;
+  const auto entry = [](const Json& one, const char* target, const char* start) {
+    return one.contains(target) ? words(one[target]) : one.contains(start) ? words(one[start]) : "";
+  };
+  for (const Json& region : all.value("cells", Json::array()))
+    cells += row({region.contains("name") ? words(region["name"]) : "region " + words(region.at("reference")),
+                  words(region.at("cells")), words(region.at("volume")), entry(region, "target_volume", "start_volume"),
+                  words(region.at("min_scaled_jacobian"))});
+  for (const Json& one : all.value("interfaces", Json::array()))
+    interfaces += row({place(one.at("references")), words(one.at("faces")), words(one.at("area")),
+                       entry(one, "target_area", "start_area")});
+  if (cells.empty()) return "";
+  std::string text = table({"", "cells", "volume", "wanted", "least scaled Jacobian"}, cells);
+  if (!interfaces.empty()) text += table({"interface", "faces", "area", "wanted"}, interfaces);
+  return text;
+}
+
 std::string trials(const Json& report) {
   const Json& made = part(report, "template");
   std::string rows;
@@ -258,6 +277,7 @@ std::string report_page(const Json& report, std::string_view viewer, std::span<c
   page += section("Distance", distances(report));
   page += section("Thickness", thicknesses(report));
   page += section("Quality", quality(report) + histogram(report));
+  page += section("Regions", regions(report));
   page += section("Worst cells", worst_cells(report));
   page += section("Sharp edges that are not followed", missed_edges(report));
   page += section("Templates that were tried", trials(report));

@@ -130,18 +130,34 @@ RasterSurface drawn(const Scene& scene) {
   return surface;
 }
 
-/// The cells up to a plane, from the side from which the section is seen.
-RasterSurface cut_open(const ShownMesh& mesh, const RasterView& view) {
+/// A number between 0 and 1 for each cell that tells regions apart; empty if there are not several.
+std::vector<double> region_shades(const ShownMesh& mesh) {
+  std::vector<int> of_cell;
+  if (const auto* cells = std::get_if<VolumeMesh>(&mesh)) of_cell = cells->references;
+  if (const auto* file = std::get_if<HighOrderFile>(&mesh)) of_cell = file->references;
+  std::vector<int> all = of_cell;
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  std::vector<double> shades;
+  if (all.size() < 2) return shades;
+  for (const int reference : of_cell)
+    shades.push_back((static_cast<double>(std::ranges::lower_bound(all, reference) - all.begin()) + 0.5) /
+                     static_cast<double>(all.size()));
+  return shades;
+}
+
+/// The cells up to a plane, from the side from which the section is seen, in colors of the viridis map.
+/// shades: of each cell, in [0, 1].
+RasterSurface cut_open(const ShownMesh& mesh, const RasterView& view, const std::vector<double>& shades) {
   CutPlane plane;
   Eigen::Index axis = 0;
   view.towards_viewer.cwiseAbs().maxCoeff(&axis);  // across the line of sight, as far as an axis is
   plane.axis = static_cast<int>(axis);
-  const std::vector<double> minima = cell_minima(mesh);
   SurfaceSceneOptions options;
-  options.wireframe = minima.size() <= kMostWiredFaces;
+  options.wireframe = shades.size() <= kMostWiredFaces;
   if (const auto* file = std::get_if<HighOrderFile>(&mesh))
-    return drawn(cutaway_scene(file->mesh, minima, plane, options));
-  return drawn(cutaway_scene(std::get<VolumeMesh>(mesh), minima, plane, options));
+    return drawn(cutaway_scene(file->mesh, shades, plane, options));
+  return drawn(cutaway_scene(std::get<VolumeMesh>(mesh), shades, plane, options));
 }
 
 /// Draws the pictures of one report.
@@ -166,8 +182,13 @@ class Painter {
       if (meshes_.cage) attempt([&] { add_limit(*meshes_.cage); });
       else add_quality(*result);
       attempt([&] {
-        add("Result, cut open: scaled Jacobian of the cells", cut_open(*meshes_.result, view_), "0", "1");
+        add("Result, cut open: scaled Jacobian of the cells",
+            cut_open(*meshes_.result, view_, cell_minima(*meshes_.result)), "0", "1");
       });
+      if (const std::vector<double> shades = region_shades(*meshes_.result); !shades.empty())
+        attempt([&] {
+          add("Result, cut open: regions", cut_open(*meshes_.result, view_, shades), "first region", "last region");
+        });
     }
     return std::move(pictures_);
   }

@@ -15,6 +15,8 @@
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/format.h"
 #include "subvol/base/version.h"
+#include "subvol/io/label_grid_io.h"
+#include "subvol/io/surface_io.h"
 #include "subvol/surface/solid_topology.h"
 
 #include <algorithm>
@@ -22,7 +24,6 @@
 #include <iostream>
 #include <optional>
 #include <utility>
-#include <variant>
 
 namespace subvol::cli {
 namespace {
@@ -36,6 +37,7 @@ class AutomaticFitRun : public LongRun {
 
  private:
   void load();
+  const TriangleMesh& surface() const { return regions_ ? outer_ : target_; }
   void fit();
   void write();
   void check();
@@ -44,6 +46,8 @@ class AutomaticFitRun : public LongRun {
 
   const AutomaticFitArguments& arguments_;
   TriangleMesh target_;                ///< repaired
+  std::optional<RegionSurface> regions_;  ///< of the target, if there are several
+  TriangleMesh outer_;                 ///< the target's surface without its interfaces, if there are regions
   std::vector<std::string> repairs_;   ///< made to the target
   std::optional<Checkpointing> checkpointing_;
   AutomaticFitResult result_;
@@ -52,20 +56,26 @@ class AutomaticFitRun : public LongRun {
 };
 
 void AutomaticFitRun::load() {
-  Target target = load_target(arguments_.target, warnings_);
-  require_fitting_options(verb_, is_cloud(target));
-  if (is_cloud(target))
+  bool has_only_points = false;
+  if (!is_label_grid_file(arguments_.target)) {
+    require_surface_file(arguments_.target);
+    has_only_points = is_point_cloud_file(arguments_.target);
+  }
+  require_fitting_options(verb_, has_only_points);
+  if (has_only_points)
     throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
-  SurfaceRepair repair = repair_surface(std::get<TriangleMesh>(target), interrupted);
+  SurfaceRepair repair = load_to_fill(arguments_.target, arguments_.fit.regions, warnings_);
   target_ = std::move(repair.surface);
+  regions_ = std::move(repair.regions);
+  if (regions_) outer_ = outer_surface(*regions_);
   add_remarks(repair, warnings_);
   repairs_ = std::move(repair.done);
   tell_warnings();
 }
 
-/// Returns the number of cubes of an edge length that fill a solid. UsageError: there are too many.
-std::size_t cells_of_size(const TriangleMesh& target, double size) {
-  const double cells = solid_boundary(target).volume / std::pow(size, 3);
+/// Returns the number of cubes of an edge length that fill a volume. UsageError: there are too many.
+std::size_t cells_of_size(double volume, double size) {
+  const double cells = volume / std::pow(size, 3);
   if (!(cells <= static_cast<double>(kMostCells)))
     throw UsageError(formatted("--size %g: the target would need %.3g cells, expected at most %zu", size, cells,
                                kMostCells));
@@ -74,17 +84,18 @@ std::size_t cells_of_size(const TriangleMesh& target, double size) {
 
 void AutomaticFitRun::fit() {
   AutomaticFitOptions options = arguments_.fit;
-  if (arguments_.size) options.cells = cells_of_size(target_, *arguments_.size);
+  if (arguments_.size) options.cells = cells_of_size(solid_boundary(surface()).volume, *arguments_.size);
   checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
   options.log = checkpointing_->log();
   result_ = followed([&](auto progress) {
     options.progress = progress;
     options.cancelled = interrupted;
-    return fit_automatically(target_, options);
+    options.regions = RegionRule::merge;  // they were found when the target was read
+    return regions_ ? fit_regions(*regions_, options) : fit_automatically(target_, options);
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
-  groups_ = carry_groups(target_, result_.mesh);
+  groups_ = carry_groups(surface(), result_.mesh);
   add_warnings(groups_.warnings);
 }
 
@@ -98,7 +109,7 @@ void AutomaticFitRun::write() {
 void AutomaticFitRun::check() {
   const std::optional<VolumeMesh> written = written_cells(outputs_);
   const VolumeMesh& mesh = written ? *written : result_.mesh;
-  mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target_, {.progress = progress}); });
+  mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &surface(), {.progress = progress}); });
   hold_to({arguments_.mean_tolerance_percent, arguments_.max_tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.least_quality, mesh_check_, result_.report);
 }
@@ -112,6 +123,10 @@ Json AutomaticFitRun::report() const {
   json.update(automatic_fit_json(result_));
   json.update(fit_json(result_.report));
   json.update(check_json(mesh_check_));
+  if (mesh_check_.regions && regions_) {
+    const RegionReport wanted = measure_regions(*regions_);
+    json["regions"] = regions_json(*mesh_check_.regions, &wanted, "target");
+  }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   checkpointing_->describe(json);
   return json;

@@ -24,7 +24,7 @@ namespace {
 
 struct CheckArguments {
   RunOptions run;
-  std::string mesh, target;
+  std::string mesh, target, region;
   double chord_percent = WritingOptions{}.chord_percent;
   bool json = false;
 };
@@ -48,7 +48,8 @@ MeshCheck against(const std::optional<Target>& target, const Check& check) {
 
 Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, const WorkProgress& progress,
                      std::vector<std::string>& warnings) {
-  const VolumeMesh mesh = load_volume(arguments.mesh, warnings, false, arguments.run.references);
+  VolumeMesh mesh = load_volume(arguments.mesh, warnings, false, arguments.run.references);
+  if (!arguments.region.empty()) mesh = cells_of_region(mesh, arguments.region);
   Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
@@ -114,9 +115,15 @@ int check_surface(const CheckArguments& arguments, const CLI::App& verb) {
             {"options", options_in_force(verb)},
             {"input", {{"surface", describe(arguments.mesh, surface.mesh)}}}};
   json.update(diagnosis_json(diagnosis));
+  std::string text = to_text(diagnosis);
+  if (!diagnosis.is_cancelled && diagnosis.parts.size() > 1)
+    if (const std::optional<RegionSurface> regions = find_regions(surface.mesh)) {
+      json["regions"] = regions_json(*regions);
+      text = to_text(*regions) + text;
+    }
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = peak_memory_bytes();
-  tell_check(arguments, warnings, json, to_text(diagnosis));
+  tell_check(arguments, warnings, json, text);
   if (diagnosis.is_cancelled) return kInterrupted;
   return diagnosis.is_fillable() ? kDone : kFailed;
 }
@@ -127,6 +134,8 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   require_known_file(arguments.mesh);
   require_choice_of_references(arguments.mesh, arguments.run.references);
   if (is_surface_file(arguments.mesh)) return check_surface(arguments, verb);
+  if (!arguments.region.empty() && is_high_order_file(arguments.mesh))
+    throw UsageError("--region: " + arguments.mesh + " holds no linear cells to choose from");
   std::vector<std::string> warnings;
   std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
@@ -155,6 +164,8 @@ void add_check_command(CLI::App& app, Action& action) {
       ->type_name("PERCENT")
       ->capture_default_str();
   add_references_option(*verb, arguments->run);
+  verb->add_option("--region", arguments->region, "Check the linear cells of this region only: its name or reference")
+      ->type_name("NAME");
   verb->add_flag("--json", arguments->json, "Print JSON instead of text");
   verb->add_option("--report", arguments->run.report, "Write the JSON to a file as well")->type_name("FILE.json");
   verb->add_flag("--force", arguments->run.force, "Replace a report that exists");

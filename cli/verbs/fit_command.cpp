@@ -18,6 +18,7 @@
 #include "subvol/base/version.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/subdivision_fit.h"
+#include "subvol/io/label_grid_io.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/templates/auto_template.h"
@@ -45,7 +46,7 @@ struct FitArguments {
   std::string target;
   TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
-  std::string point_weights = "equal", energy = "hencky", crease_angle = kAutomaticAngle;
+  std::string regions, point_weights = "equal", energy = "hencky", crease_angle = kAutomaticAngle;
   std::optional<std::size_t> cells;              ///< of the result, if the template is made
   double quality = kUsualQuality;
   std::optional<double> quality_floor, max_tolerance_percent, size;
@@ -335,7 +336,7 @@ bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
 
 /// UsageError: an option was given that has a meaning only for automatic fits.
 void refuse_automatic_options(const CLI::App& verb) {
-  for (const std::string option : {"--max-tolerance", "--size"})
+  for (const std::string option : {"--max-tolerance", "--size", "--regions"})
     if (verb.count(option) > 0)
       throw UsageError(option + ": only fits without a template, --order, a cage or --levels aim at it");
 }
@@ -345,6 +346,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
                                arguments.max_tolerance_percent, arguments.quality_floor, arguments.target, arguments.size};
   AutomaticFitOptions& fit = result.fit;
   fit.cells = arguments.cells;
+  fit.regions = region_rule(arguments.regions);
   fit.quality = arguments.quality;
   fit.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
   fit.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
@@ -444,8 +446,8 @@ void add_fit_command(CLI::App& app, Action& action) {
       app.add_subcommand("fit", "Fill a surface with cells, or deform a template until its boundary reproduces it");
   const auto arguments = std::make_shared<FitArguments>();
   verb->add_option("TARGET", arguments->target,
-                   "Surface to reproduce: " + surface_formats() + "; a volume mesh, for its boundary; or points: " +
-                       point_cloud_formats())
+                   "Surface to reproduce: " + surface_formats() + "; a volume mesh, for its boundary; points: " +
+                       point_cloud_formats() + "; or, without a template, a segmentation: " + label_grid_formats())
       ->required()
       ->type_name("FILE");
   CLI::Option* file = verb->add_option("--template", arguments->template_mesh.path,
@@ -465,6 +467,7 @@ void add_fit_command(CLI::App& app, Action& action) {
       ->excludes(file)
       ->excludes(verb->get_option("--cells"));
   add_references_option(*verb, arguments->run)->needs(file);
+  add_regions_option(*verb, arguments->regions);
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
   add_high_order_options(*verb, *arguments);

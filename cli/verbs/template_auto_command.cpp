@@ -7,8 +7,12 @@
 #include "cli/runs/progress.h"
 #include "cli/verbs/template_command.h"
 #include "cli/verbs/verb_options.h"
+#include "subvol/io/label_grid_io.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/templates/auto_template.h"
+#include "subvol/templates/pillow.h"
+#include "subvol/templates/region_template.h"
 
 #include <chrono>
 #include <iostream>
@@ -20,22 +24,23 @@ namespace {
 struct AutoArguments : TemplateRun {
   std::string target;
   AutoTemplateOptions options;
+  std::string regions;
   double time_limit_seconds = 0;  ///< 0: none
 };
 
-AutoTemplateResult make(const AutoArguments& arguments, const TriangleMesh& target) {
+/// Calls search(progress), progress(fraction) being false if the search must end.
+template <class Search>
+auto make(const AutoArguments& arguments, const Search& search) {
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet);
-  AutoTemplateOptions options = arguments.options;
   const auto start = std::chrono::steady_clock::now();
   const auto in_time = [&] {
     const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
     return arguments.time_limit_seconds == 0 || passed.count() < arguments.time_limit_seconds;
   };
-  options.progress = [&](double fraction) {
+  auto result = search([&](double fraction) {
     teller.tell({.stage = "template", .level = 0, .iteration = 0, .energy = 0, .fraction = fraction});
     return !interrupted() && in_time();
-  };
-  AutoTemplateResult result = auto_templates(target, options);
+  });
   teller.finish();
   return result;
 }
@@ -47,14 +52,55 @@ Json topology_json(const BettiNumbers& topology) {
           {"euler_number", topology.euler_number()}};
 }
 
+int run_with_regions(AutoArguments arguments, const CLI::App& verb, const std::vector<Output>& outputs,
+                     const SurfaceRepair& repair) {
+  const RegionSurface& target = *repair.regions;
+  const RegionTemplateResult result = make(arguments, [&](auto progress) {
+    return region_template(target, {arguments.options.cells, arguments.options.pillow, progress});
+  });
+  if (result.cancelled && interrupted()) return kInterrupted;
+  if (!result.made) {
+    std::cerr << (result.cancelled ? "subvol: the time limit was reached before a template was made\n"
+                                   : "subvol: no grid that was tried has the topology of the target's regions; ask for "
+                                     "more --cells\n");
+    return result.cancelled ? kNotConverged : kFailed;
+  }
+  const RegionTemplate& made = *result.made;
+  VolumeMesh mesh = arguments.options.pillow ? pillow_regions(made.mesh) : made.mesh;
+  add_interface_groups(mesh);
+  const bool as_asked = made.cells_asked == arguments.options.cells && made.wrong_sheets == 0;
+  if (made.cells_asked != arguments.options.cells)
+    arguments.warnings.push_back(std::to_string(arguments.options.cells) +
+                                 " cells cannot carry the topology of the target's regions; --cells " +
+                                 std::to_string(made.cells_asked) + " does");
+  if (made.wrong_sheets > 0)
+    arguments.warnings.push_back(std::to_string(made.wrong_sheets) +
+                                 " interfaces or parts of the boundary have another topology than in the target");
+  const int status = write_template(arguments, verb, outputs, mesh,
+                                    {{"input", {{"target", describe(arguments.target, repair.surface)}}},
+                                     {"repairs", repair.done},
+                                     {"template",
+                                      {{"cells", mesh.num_cells()},
+                                       {"cells_that_work", made.cells_asked},
+                                       {"pillowed", arguments.options.pillow},
+                                       {"regions", target.regions.size()},
+                                       {"wrong_sheets", made.wrong_sheets}}}});
+  return status == kDone && !as_asked ? kNotConverged : status;
+}
+
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
   catch_interrupt();
-  const SurfaceRepair repair = repair_surface(load_surface(arguments.target, arguments.warnings), interrupted);
+  const SurfaceRepair repair = load_to_fill(arguments.target, region_rule(arguments.regions), arguments.warnings);
   const TriangleMesh& target = repair.surface;
   add_remarks(repair, arguments.warnings);
   arguments.writing.source = arguments.target;
-  const AutoTemplateResult result = make(arguments, target);
+  if (repair.regions) return run_with_regions(arguments, verb, outputs, repair);
+  const AutoTemplateResult result = make(arguments, [&](auto progress) {
+    AutoTemplateOptions options = arguments.options;
+    options.progress = progress;
+    return auto_templates(target, options);
+  });
   if (result.cancelled && interrupted()) return kInterrupted;
   if (result.cancelled) {
     std::cerr << "subvol: the time limit was reached before a template was made; "
@@ -94,7 +140,8 @@ void add_template_auto(CLI::App& group, Action& action) {
   CLI::App* verb = group.add_subcommand("auto", "Make a template from a surface: a carved grid with its topology");
   const auto arguments = std::make_shared<AutoArguments>();
   verb->add_option("TARGET", arguments->target,
-                   "Surface that bounds a solid: " + surface_formats() + "; or a volume mesh, for its boundary")
+                   "Surface that bounds a solid: " + surface_formats() + "; a volume mesh, for its boundary; or a segmentation: " +
+                       label_grid_formats())
       ->required()
       ->type_name("FILE");
   verb->add_option("--cells", arguments->options.cells, "About how many cells; more where the topology needs them")
@@ -102,6 +149,7 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->type_name("N")
       ->capture_default_str();
   verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");
+  add_regions_option(*verb, arguments->regions);
   verb->add_option("--time-limit", arguments->time_limit_seconds, "End after this time, without a template")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");

@@ -59,8 +59,24 @@ CLI::Option* add_references_option(CLI::App& verb, RunOptions& options) {
   return verb
       .add_option("--references", options.references,
                   "Cell data of a .vtk that become the cells' references (default: those with a name of materials or\n"
-                  "regions, or else the first of whole numbers that are no ghosts or cell numbers)")
+                  "regions, or else the first of whole numbers that are no ghosts or cell numbers); none: references\n"
+                  "of any file are left out, and all cells are one region")
       ->type_name("NAME");
+}
+
+void add_regions_option(CLI::App& verb, std::string& rule) {
+  verb.add_option("--regions", rule,
+                  "What becomes of closed parts inside others and of sheets inside a solid. auto (default): sheets make\n"
+                  "regions, and so do parts inside others, unless they face inward as walls of voids do; keep: whatever\n"
+                  "is enclosed is a region; merge: one region, parts inside others are the walls of voids")
+      ->check(CLI::IsMember({"auto", "keep", "merge"}))
+      ->type_name("auto|keep|merge");
+}
+
+RegionRule region_rule(const std::string& rule) {
+  for (const RegionRule one : {RegionRule::keep, RegionRule::merge})
+    if (rule == to_string(one)) return one;
+  return RegionRule::automatic;
 }
 
 CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options) {

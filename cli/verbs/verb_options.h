@@ -4,6 +4,7 @@
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/run_options.h"
 #include "cli/runs/writing.h"
+#include "subvol/surface/region_surface.h"
 
 #include <CLI/CLI.hpp>
 
@@ -30,6 +31,11 @@ void add_long_run_options(CLI::App& verb, RunOptions& options);
 void add_checkpoint_options(CLI::App& verb, RunOptions& options);
 /// --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
+
+/// --regions. Its value is empty unless it is given, so that it is not among the options that files record.
+void add_regions_option(CLI::App& verb, std::string& rule);
+/// Returns the rule that --regions names; automatic if it is empty.
+RegionRule region_rule(const std::string& rule);
 
 /// --map-tolerance.
 CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);

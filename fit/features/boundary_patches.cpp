@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/geometry/grouped_closest_point.h"
 
 #include <Eigen/Geometry>
 
@@ -100,51 +101,62 @@ struct Votes {
   std::vector<double> cast, received;             ///< by patch, by region
 };
 
-Votes count_votes(const MeshTopology& topology, const BoundaryPatches& patches, std::span<const Vec3> positions,
-                  const ClosestPoint& tree, const SignedFeatures& features) {
-  std::vector<Vec3> points;
-  std::vector<Index> patch_of_point;
-  const auto faces = topology.boundary_faces();
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const Vec3 center = center_of(topology.face(faces[i]), positions);
-    for (Index v : topology.face(faces[i])) {
-      points.push_back(center + kVoteOffset * (positions[v] - center));
-      patch_of_point.push_back(patches.of_face[i]);
+/// The faces of a mesh that vote, and the patch of each.
+struct Voters {
+  std::span<const Index> faces, patch_of_face;
+  std::size_t num_patches;
+};
+
+/// Returns the points that vote, and the voter of each.
+std::pair<std::vector<Vec3>, std::vector<std::size_t>> voting_points(const MeshTopology& topology, const Voters& voters,
+                                                                     std::span<const Vec3> positions) {
+  std::pair<std::vector<Vec3>, std::vector<std::size_t>> result;
+  for (std::size_t i = 0; i < voters.faces.size(); ++i) {
+    const Vec3 center = center_of(topology.face(voters.faces[i]), positions);
+    for (Index v : topology.face(voters.faces[i])) {
+      result.first.push_back(center + kVoteOffset * (positions[v] - center));
+      result.second.push_back(i);
     }
   }
-  std::vector<ClosestPoint::Hit> hits(points.size());
-  tree.closest(points, hits);
-  Votes votes{std::vector<std::map<Index, double>>(patches.count), std::vector<double>(patches.count, 0.0),
-              std::vector<double>(features.num_regions, 0.0)};
+  return result;
+}
+
+/// hits: closest triangles of the target to the voting points.
+Votes count_votes(const Voters& voters, std::span<const std::size_t> voter_of_point,
+                  std::span<const ClosestPoint::Hit> hits, std::span<const Index> regions, std::size_t num_regions) {
+  Votes votes{std::vector<std::map<Index, double>>(voters.num_patches), std::vector<double>(voters.num_patches, 0.0),
+              std::vector<double>(num_regions, 0.0)};
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (hits[i].triangle == kNoIndex) continue;
-    const Index region = features.regions[hits[i].triangle];
-    votes.of_patch[patch_of_point[i]][region] += 1;
-    votes.cast[patch_of_point[i]] += 1;
+    const Index region = regions[hits[i].triangle];
+    const Index patch = voters.patch_of_face[voter_of_point[i]];
+    votes.of_patch[patch][region] += 1;
+    votes.cast[patch] += 1;
     votes.received[region] += 1;
   }
   return votes;
 }
 
-std::vector<Vec3> region_centers(const TriangleMesh& target, const SignedFeatures& features) {
-  std::vector<Vec3> centers(features.num_regions, Vec3::Zero());
-  std::vector<double> counts(features.num_regions, 0.0);
+std::vector<Vec3> region_centers(const TriangleMesh& target, std::span<const Index> regions, std::size_t num_regions) {
+  std::vector<Vec3> centers(num_regions, Vec3::Zero());
+  std::vector<double> counts(num_regions, 0.0);
   for (std::size_t t = 0; t < target.triangles.size(); ++t) {
-    for (Index v : target.triangles[t]) centers[features.regions[t]] += target.positions[v] / 3;
-    counts[features.regions[t]] += 1;
+    for (Index v : target.triangles[t]) centers[regions[t]] += target.positions[v] / 3;
+    counts[regions[t]] += 1;
   }
   for (std::size_t r = 0; r < centers.size(); ++r) centers[r] /= counts[r];
   return centers;
 }
 
-Index patch_nearest_to(const Vec3& point, const MeshTopology& topology, const BoundaryPatches& patches,
-                       std::span<const Vec3> positions) {
+/// key, key_of_face: if not empty, only faces with this key count; kNoIndex if there are none.
+Index patch_nearest_to(const Vec3& point, const MeshTopology& topology, const Voters& voters,
+                       std::span<const Vec3> positions, Index key = 0, std::span<const Index> key_of_face = {}) {
   double distance = std::numeric_limits<double>::infinity();
-  Index nearest = 0;
-  const auto faces = topology.boundary_faces();
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    const double d = (center_of(topology.face(faces[i]), positions) - point).squaredNorm();
-    if (d < distance) distance = d, nearest = patches.of_face[i];
+  Index nearest = kNoIndex;
+  for (std::size_t i = 0; i < voters.faces.size(); ++i) {
+    if (!key_of_face.empty() && key_of_face[i] != key) continue;
+    const double d = (center_of(topology.face(voters.faces[i]), positions) - point).squaredNorm();
+    if (d < distance) distance = d, nearest = voters.patch_of_face[i];
   }
   return nearest;
 }
@@ -242,13 +254,44 @@ PatchGroups patch_groups(const MeshTopology& topology, const BoundaryPatches& pa
     if (r < 0 || static_cast<std::size_t>(r) >= features.num_regions)
       throw InputError("patch_groups: there is no region " + std::to_string(r));
   Matching matching(patches.count, features.num_regions);
-  const Votes votes = count_votes(topology, patches, positions, ClosestPoint(target), features);
+  const Voters voters{topology.boundary_faces(), patches.of_face, patches.count};
+  const auto [points, voter_of_point] = voting_points(topology, voters, positions);
+  std::vector<ClosestPoint::Hit> hits(points.size());
+  ClosestPoint(target).closest(points, hits);
+  const Votes votes = count_votes(voters, voter_of_point, hits, features.regions, features.num_regions);
   match_by_shares(votes, matching);
   match_lone_patches(votes, matching);
-  const std::vector<Vec3> centers = region_centers(target, features);
+  const std::vector<Vec3> centers = region_centers(target, features.regions, features.num_regions);
   for (std::size_t r = 0; r < centers.size() && patches.count > 0; ++r)
     if (!matching.has_region(static_cast<Index>(r)))
-      matching.match(patch_nearest_to(centers[r], topology, patches, positions), static_cast<Index>(r));
+      matching.match(patch_nearest_to(centers[r], topology, voters, positions), static_cast<Index>(r));
+  return matching.groups();
+}
+
+PatchGroups sheet_patch_groups(const MeshTopology& topology, std::span<const Index> faces,
+                               std::span<const Index> patch_of_face, std::size_t num_patches,
+                               std::span<const Index> key_of_face, std::span<const Vec3> positions,
+                               const TriangleMesh& target, std::span<const Index> regions, std::size_t num_regions,
+                               std::span<const Index> keys) {
+  require_positions(topology, positions);
+  const Voters voters{faces, patch_of_face, num_patches};
+  const auto [points, voter_of_point] = voting_points(topology, voters, positions);
+  std::vector<Index> key_of_point;
+  for (const std::size_t voter : voter_of_point) key_of_point.push_back(key_of_face[voter]);
+  std::vector<ClosestPoint::Hit> hits(points.size());
+  GroupedClosestPoint(target, keys).closest(points, key_of_point, hits);
+  const Votes votes = count_votes(voters, voter_of_point, hits, regions, num_regions);
+  Matching matching(num_patches, num_regions);
+  match_by_shares(votes, matching);
+  match_lone_patches(votes, matching);
+  const std::vector<Vec3> centers = region_centers(target, regions, num_regions);
+  std::vector<Index> key_of_region(num_regions, 0);
+  for (std::size_t t = 0; t < regions.size(); ++t) key_of_region[regions[t]] = keys[t];
+  for (std::size_t r = 0; r < centers.size(); ++r) {
+    if (matching.has_region(static_cast<Index>(r))) continue;
+    const Index patch = patch_nearest_to(centers[r], topology, voters, positions, key_of_region[r], key_of_face);
+    if (patch != kNoIndex) matching.match(patch, static_cast<Index>(r));
+  }
   return matching.groups();
 }
 

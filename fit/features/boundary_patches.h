@@ -49,6 +49,17 @@ struct PatchGroups {
 PatchGroups patch_groups(const MeshTopology& topology, const BoundaryPatches& patches, std::span<const Vec3> positions,
                          const TriangleMesh& target, const SignedFeatures& features);
 
+/// Does the same for any faces of a mesh and any triangles of the target, of which only those with the same key belong to
+/// each other: keys are those of the pairs of regions that a sheet lies between. Patches and regions have one key each.
+///
+/// faces       of the mesh, by `MeshTopology`.  patch_of_face, key_of_face  one entry for each of them.
+/// regions     region of each triangle, in [0, num_regions).  keys  of each triangle.  All keys are numbered from 0 on.
+PatchGroups sheet_patch_groups(const MeshTopology& topology, std::span<const Index> faces,
+                               std::span<const Index> patch_of_face, std::size_t num_patches,
+                               std::span<const Index> key_of_face, std::span<const Vec3> positions,
+                               const TriangleMesh& target, std::span<const Index> regions, std::size_t num_regions,
+                               std::span<const Index> keys);
+
 /// Interior angle of the target at a boundary edge of a mesh, in degrees, at the scale of the mesh.
 struct EdgeAngle {
   std::array<Index, 2> ends;  ///< the smaller number first

@@ -55,6 +55,11 @@ std::array<double, 3> edge_factors(double angle) {
   return {3, 1.5, 1};
 }
 
+/// Factors of edges on feature curves of sheets, and of others: a path uses one kind of them.
+std::array<double, 3> sheet_factors(bool along_curves) {
+  return along_curves ? std::array{1.0, kInfinity, kInfinity} : std::array{kInfinity, 1.0, 1.0};
+}
+
 /// A place that a path passes through, at a vertex that is chosen anew for each search.
 struct Anchor {
   Vec3 point;
@@ -80,7 +85,7 @@ class Router {
   Router(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options)
       : features_(features),
         curves_(features.curves.curves),
-        graph_(mesh),
+        graph_(mesh, options.on_sheets),
         h_(graph_.edge_length()),
         reasons_(curves_.size()),
         joinable_(curves_.size(), 1),
@@ -128,6 +133,9 @@ class Router {
         reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }
+    on_sheets_ = options.on_sheets;
+    along_curves_ = options.along_sheet_curves;
+    along_curves_.resize(curves_.size(), 0);
   }
 
   bool is_eligible(Index c) const { return !reasons_[c]; }
@@ -204,7 +212,8 @@ class Router {
   }
 
   FollowingCost cost_along(Index c, std::span<const Vec3> points) const {
-    return {points, edge_factors(features_.angles[c]), kSoftness * h_, kSearchReach * h_};
+    return {points, on_sheets_ ? sheet_factors(along_curves_[c]) : edge_factors(features_.angles[c]), kSoftness * h_,
+            kSearchReach * h_};
   }
 
   Course straight_course(Index c) const {
@@ -494,6 +503,8 @@ class Router {
   double h_;
   std::vector<std::optional<NotFollowed>> reasons_;  ///< why a curve is not even tried
   std::vector<std::uint8_t> joinable_;
+  bool on_sheets_ = false;
+  std::vector<std::uint8_t> along_curves_;
   std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed
   Occupied base_;                             ///< the vertices of corners
   Paths best_;

@@ -31,6 +31,12 @@ struct PlacedCorner {
 struct RoutingOptions {
   std::vector<std::uint8_t> excluded;    ///< one entry per curve, not zero for curves to leave alone; empty: none
   std::vector<std::uint8_t> not_joined;  ///< likewise for curves that may not join the path of another one
+  /// True: paths run along all sheets of the mesh, its boundary and the interfaces between regions. Numbers of cells do
+  /// not matter then.
+  bool on_sheets = false;
+  /// One entry per curve, not zero for those whose paths run along feature curves of the sheets, which no other path
+  /// uses; empty: none. Only with `on_sheets`.
+  std::vector<std::uint8_t> along_sheet_curves;
 };
 
 struct FeatureRouting {

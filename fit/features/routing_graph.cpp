@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/features/feature_routing.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 
 #include <algorithm>
@@ -21,11 +22,14 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-RoutingGraph::RoutingGraph(const VolumeMesh& mesh) : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0) {
+RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets)
+    : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0) {
   const MeshTopology topology(mesh);
+  InterfaceMarks marks;
+  if (on_sheets) marks = mark_interfaces(topology, find_interfaces(mesh, topology));
   for (std::size_t e = 0; e < topology.num_edges(); ++e)
-    if (const auto edge = static_cast<Index>(e); topology.is_boundary_edge(edge))
-      edges_.push_back({topology.edge(edge), topology.num_edge_cells(edge)});
+    if (const auto edge = static_cast<Index>(e); topology.is_boundary_edge(edge) || marks.has_edge(edge))
+      edges_.push_back({topology.edge(edge), on_sheets ? (marks.is_curve(edge) ? 1 : 2) : topology.num_edge_cells(edge)});
   for (const Edge& edge : edges_)
     for (Index v : edge.ends) ++offsets_[v + 1];
   for (std::size_t v = 0; v + 1 < offsets_.size(); ++v) {

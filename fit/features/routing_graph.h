@@ -13,16 +13,17 @@
 
 namespace subvol {
 
-/// The boundary edges of a mesh as a graph in space.
+/// The edges of a mesh's boundary, or of all its sheets, as a graph in space.
 class RoutingGraph {
  public:
   struct Edge {
     std::array<Index, 2> ends;
-    int cells;  ///< number of cells around it
+    int cells;  ///< number of cells around it; of sheets 1 on their feature curves, 2 elsewhere
   };
 
   /// mesh  must outlive the graph; finite positions of its boundary vertices, else InputError.
-  explicit RoutingGraph(const VolumeMesh& mesh);
+  /// on_sheets  also the edges of interfaces between regions.
+  explicit RoutingGraph(const VolumeMesh& mesh, bool on_sheets = false);
 
   std::span<const Edge> edges() const { return edges_; }
   std::span<const Index> edges_at(Index vertex) const {

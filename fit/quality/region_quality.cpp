@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <map>
 
 namespace subvol {
 
@@ -94,6 +95,30 @@ RegionReport measure_regions(const VolumeMesh& mesh, const QualityReport* qualit
     InterfaceArea& interface = report.interfaces[interfaces.pair_of_face[i]];
     ++interface.num_faces;
     interface.area += face_area(mesh, topology.face(interfaces.faces[i]));
+  }
+  return report;
+}
+
+RegionReport measure_regions(const RegionSurface& surface) {
+  RegionReport report;
+  std::map<std::array<int, 2>, InterfaceArea> areas;
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+    const auto& [a, b, c] = surface.mesh.triangles[t];
+    const std::vector<Vec3>& x = surface.mesh.positions;
+    InterfaceArea& one = areas[surface.pair(t)];
+    ++one.num_faces;
+    one.area += 0.5 * (x[b] - x[a]).cross(x[c] - x[a]).norm();
+  }
+  for (std::size_t r = 0; r < surface.regions.size(); ++r) {
+    RegionQuality region{surface.regions[r].number, surface.regions[r].name};
+    region.volume = surface.volumes[r];
+    if (const auto at = areas.find({kOutside, region.reference}); at != areas.end()) region.area = at->second.area;
+    report.regions.push_back(std::move(region));
+  }
+  for (auto& [pair, area] : areas) {
+    if (pair[0] == kOutside) continue;
+    area.references = pair;
+    report.interfaces.push_back(area);
   }
   return report;
 }

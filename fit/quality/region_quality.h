@@ -3,6 +3,7 @@
 
 #include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/region_surface.h"
 
 #include <array>
 #include <cstddef>
@@ -38,6 +39,9 @@ struct RegionReport {
 /// Volumes are those of the cells with bilinear quads. Areas are those of four triangles for each quad. Index-correct
 /// cells are expected. Cost: linear.
 RegionReport measure_regions(const VolumeMesh& mesh, const QualityReport* quality);
+
+/// Measures the regions of a surface: names, volumes and areas; the numbers of faces are those of triangles.
+RegionReport measure_regions(const RegionSurface& surface);
 
 /// Returns the volumes of the regions, ascending by reference. Cost: linear.
 std::vector<double> region_volumes(const VolumeMesh& mesh);

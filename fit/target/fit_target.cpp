@@ -74,14 +74,40 @@ FitTarget::FitTarget(const PointCloud& target, PointWeights weights)
     : normalisation(target), surface(normalised(target, normalisation), weights) {}
 
 void FitTarget::keep_interfaces(const VolumeMesh& start) {
-  if (surface.is_cloud()) return;
+  if (surface.is_cloud() || has_interfaces()) return;
   const MeshTopology topology(start);
   const Interfaces found = find_interfaces(start, topology);
   if (found.empty()) return;
   std::vector<Index> face_of_triangle;
   interfaces = fan_triangles(interface_surface(start, topology, found), &face_of_triangle);
   for (const Index f : face_of_triangle) group_of_interface_triangle.push_back(1 + found.pair_of_face[f]);
+  add_interfaces();
+}
 
+FitTarget::FitTarget(const RegionSurface& target) : FitTarget(outer_surface(target)) {
+  std::vector<Index> numbers;
+  interfaces = normalised(inner_surface(target, numbers), normalisation);
+  std::vector<std::array<int, 2>> pairs;
+  for (const Index t : numbers) pairs.push_back(target.pair(static_cast<std::size_t>(t)));
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  for (const Index t : numbers) {
+    const auto at = std::ranges::lower_bound(pairs, target.pair(static_cast<std::size_t>(t)));
+    group_of_interface_triangle.push_back(1 + static_cast<Index>(at - pairs.begin()));
+  }
+  const auto has_area = [&](std::size_t t) {
+    std::array<Vec3, 3> x;
+    for (std::size_t i = 0; i < 3; ++i)
+      x[i] = (target.mesh.positions[target.mesh.triangles[t][i]] - normalisation.centre) / normalisation.diagonal;
+    return (x[1] - x[0]).cross(x[2] - x[0]).norm() > 0;
+  };
+  for (const bool inner : {false, true})
+    for (std::size_t t = 0; t < target.sides.size(); ++t)
+      if (target.is_inner(t) == inner && has_area(t)) region_triangle.push_back(static_cast<Index>(t));
+  add_interfaces();
+}
+
+void FitTarget::add_interfaces() {
   TriangleMesh all{surface.positions(), surface.triangles()};  // without triangles that have no area
   group_of_triangle.assign(all.triangles.size(), 0);
   const auto first = static_cast<Index>(all.positions.size());

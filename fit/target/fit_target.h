@@ -7,6 +7,7 @@
 #include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/region_surface.h"
 
 #include <cstddef>
 #include <limits>
@@ -47,10 +48,15 @@ struct FitTarget {
   /// Group of each triangle of `surface`, which consists of the target's triangles and those of the interfaces: 0 for the
   /// target, 1 + the place of its pair of regions in `Interfaces::pairs` for an interface. Empty without interfaces.
   std::vector<Index> group_of_triangle;
+  /// Of a target with regions: the number of each triangle of `surface` in the `RegionSurface`; else empty.
+  std::vector<Index> region_triangle;
 
   /// InputError: as for `Normalisation`.
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);
+  /// The outer surface of regions, and their interfaces. A mesh that is to reproduce it must have interfaces between the
+  /// same pairs of regions.
+  explicit FitTarget(const RegionSurface& target);
 
   /// Makes the interfaces of a mesh, in normalized coordinates, part of the target; does nothing if there are none, or
   /// if the target is a cloud. `mesh`, `tree` and distances remain those of the target alone.
@@ -76,6 +82,7 @@ struct FitTarget {
   StartComparison compare_start(const TriangleMesh& boundary);
 
  private:
+  void add_interfaces();
   SurfaceDistance measure(const TriangleMesh& fitted, bool extremes) const;
 };
 

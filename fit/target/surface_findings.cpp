@@ -30,7 +30,7 @@ constexpr Words kWords[kNumSurfaceFaults] = {
     {"pinhole", "pinhole", "pinholes", true},
     {"fin", "edge of a fin has three triangles or more", "edges of fins have three triangles or more", true},
     {"interface", "edge of three triangles or more divides the inside into regions",
-     "edges of three triangles or more divide the inside into regions", true},
+     "edges of three triangles or more divide the inside into regions", false},
     {"disagreement", "edge whose two triangles disagree about the outside",
      "edges whose two triangles disagree about the outside", true},
     {"wall_outward", "part inside another faces the same way: the wall of a void that points outward",

@@ -142,17 +142,35 @@ FaceGroups groups_of_pieces(const TriangleMesh& surface, const TriangleMesh& pie
 
 }  // namespace
 
-SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled) {
-  const SurfaceDiagnosis diagnosis = diagnose(surface, cancelled);
-  SurfaceRepair repair{surface, {}, {}};
+SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+  const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
+  TriangleMesh surface = given;
+  SurfaceRepair repair{surface, {}, {}, {}};
   if (diagnosis.is_cancelled) return repair;
   const auto words = [&](SurfaceFault fault) {
     const SurfaceFinding* found = diagnosis.find(fault);
     return found ? "target: " + to_text(*found, diagnosis.diagonal) : std::string();
   };
-  if (const std::string regions = words(SurfaceFault::interface); !regions.empty())
-    throw InputError(regions + "; several regions are not supported yet: give the outer surface alone");
   const bool crosses = diagnosis.find(SurfaceFault::crossing) || diagnosis.find(SurfaceFault::face_contact);
+  if (!crosses) {
+    repair.regions = find_regions(surface, rule);
+    if (repair.regions) {
+      for (const std::string& note : repair.regions->notes) repair.notes.push_back("target: " + note);
+      return repair;
+    }
+  }
+  if (const std::string sheets = words(SurfaceFault::interface); !sheets.empty()) {
+    const std::optional<RegionSurface> regions = find_regions(surface, RegionRule::keep);
+    if (crosses)
+      throw InputError(sheets + ", and " + words(diagnosis.find(SurfaceFault::crossing) ? SurfaceFault::crossing
+                                                                                         : SurfaceFault::face_contact)
+                                               .substr(std::string("target: ").size()) +
+                       ": sheets must meet along edges that they share");
+    if (!regions) throw InputError(sheets + ", but an edge of one triangle leaves them open");
+    surface = outer_surface(*regions);
+    repair.surface = surface;
+    repair.done.push_back(sheets + "; they are left out, and the regions are one");
+  }
   const std::string turned = words(SurfaceFault::wall_outward);
   if (diagnosis.parts.size() > 1 && !diagnosis.find(SurfaceFault::fin) && (crosses || !turned.empty())) {
     Union parts(surface_parts(surface), cancelled);

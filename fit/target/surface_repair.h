@@ -2,11 +2,13 @@
 #pragma once
 
 #include "subvol/fit/target/surface_diagnosis.h"
+#include "subvol/surface/region_surface.h"
 #include "subvol/surface/solid_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,7 @@ namespace subvol {
 /// A surface made ready to be filled, and what was done to it.
 struct SurfaceRepair {
   TriangleMesh surface;
+  std::optional<RegionSurface> regions;  ///< of the surface, if there are several; it is as it was given then
   std::vector<std::string> done;   ///< a sentence for each repair; empty: the surface is as it was given
   std::vector<std::string> notes;  ///< a sentence for each fault that was left: contacts, pinholes, crossings
 };
@@ -25,12 +28,16 @@ struct SurfaceRepair {
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
 /// points inward beside others that do not. A solid part in a void stays a part of its own.
 ///
+/// Where there are several regions by the rule (`find_regions`) and nothing crosses, there is nothing to repair. With
+/// RegionRule::merge, sheets inside a solid are left out.
+///
 /// surface    in any state; a surface that needs no repair is returned bit by bit.
 /// cancelled  asked now and then, from the calling thread; if it returns true, the surface is returned as it was given.
-/// InputError: as `diagnose`; sheets that divide the inside into several regions; parts that cross and cannot be united,
-/// with the place.
+/// InputError: as `diagnose`; sheets that divide the inside into several regions, if something crosses or an edge has only
+/// one triangle; parts that cross and cannot be united, with the place.
 /// Cost: that of `diagnose`, and again if parts are united.
-SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {});
+SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {},
+                             RegionRule rule = RegionRule::automatic);
 
 /// Returns why grids with up to 20 times a number of cells do not have the topology of a surface's solid: that they have
 /// not, and each cause that a diagnosis finds, with its place.

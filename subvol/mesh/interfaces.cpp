@@ -72,6 +72,18 @@ std::vector<int> region_references(const VolumeMesh& mesh) {
   return references;
 }
 
+void add_interface_groups(VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  const Interfaces interfaces = find_interfaces(mesh, topology);
+  const auto first = static_cast<Index>(mesh.face_groups.groups.size());
+  for (const auto& [a, b] : interfaces.pairs)
+    mesh.face_groups.groups.push_back(
+        {region_label(mesh, a) + "|" + region_label(mesh, b), free_number(mesh.face_groups.groups), 2});
+  for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
+    mesh.face_groups.faces.push_back({face_key(topology.face(interfaces.faces[i])), first + interfaces.pair_of_face[i]});
+  normalise(mesh.face_groups);
+}
+
 std::string region_label(const VolumeMesh& mesh, int reference) {
   for (const Group& group : mesh.regions)
     if (group.number == reference && !group.name.empty()) return group.name;

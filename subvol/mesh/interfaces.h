@@ -42,6 +42,10 @@ InterfaceMarks mark_interfaces(const MeshTopology& topology, const Interfaces& i
 /// Returns the references that occur, ascending; {0} for a mesh without references.
 std::vector<int> region_references(const VolumeMesh& mesh);
 
+/// Puts the faces of each interface into a group of their own, named by its two regions: "core|shell", "region 1|region 3".
+/// Groups that the mesh has are kept. Cost: linear but for a sort of the faces.
+void add_interface_groups(VolumeMesh& mesh);
+
 /// Returns the name of a region for people: that of its group in `VolumeMesh::regions`, or "region 3".
 std::string region_label(const VolumeMesh& mesh, int reference);
 

@@ -2,6 +2,7 @@
 #include "subvol/templates/pillow.h"
 
 #include "subvol/base/error.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/surface/surface_topology.h"
 #include "subvol/templates/template_edit.h"
 
@@ -10,6 +11,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -144,12 +147,34 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
                        std::to_string(old[mesh.cell(c)[0]] == kNoIndex ? mesh.cell(c)[0] : old[mesh.cell(c)[0]]));
 }
 
-}  // namespace
+/// Returns the faces of those connected parts of a boundary that are wanted.
+std::vector<Face> chosen_parts(std::span<const Face> faces, std::size_t num_vertices, int reference,
+                               const PillowChoice& takes) {
+  std::vector<Index> part(num_vertices);
+  std::iota(part.begin(), part.end(), 0);
+  const auto root = [&](Index v) {
+    while (part[v] != v) v = part[v] = part[part[v]];
+    return v;
+  };
+  for (const Face& face : faces)
+    for (const Index v : face.vertices()) part[root(v)] = root(face.corners[0]);
+  std::map<Index, std::vector<std::array<Index, 4>>> parts;
+  const auto corners = [](const Face& face) {
+    std::array<Index, 4> all = face.corners;
+    for (std::size_t i = face.size; i < all.size(); ++i) all[i] = kNoIndex;
+    return all;
+  };
+  for (const Face& face : faces) parts[root(face.corners[0])].push_back(corners(face));
+  std::map<Index, bool> is_wanted;
+  for (const auto& [first, members] : parts) is_wanted[first] = takes(reference, members);
+  std::vector<Face> chosen;
+  for (const Face& face : faces)
+    if (is_wanted[root(face.corners[0])]) chosen.push_back(face);
+  return chosen;
+}
 
-VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
-  require_sound(mesh, "pillow");
-  const std::vector<char> in_set = marked(mesh, cells);
-  const std::vector<Face> faces = boundary_of_set(mesh, MeshTopology(mesh), in_set);
+/// Puts a layer inside some faces of the boundary of a set.
+VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const Face> faces, std::span<const char> in_set) {
   const std::vector<Index> number = new_numbers(mesh.num_vertices(), faces);
   require_manifold(faces, number, mesh.num_vertices());
   const std::vector<Vec3> steps = steps_inward(mesh, faces, in_set);
@@ -169,6 +194,28 @@ VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
     if (!mesh.references.empty()) result.references.push_back(mesh.references[face.cell]);
   }
   shorten_steps(result, number, steps);
+  return result;
+}
+
+}  // namespace
+
+VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells) {
+  require_sound(mesh, "pillow");
+  const std::vector<char> in_set = marked(mesh, cells);
+  return pillowed(mesh, boundary_of_set(mesh, MeshTopology(mesh), in_set), in_set);
+}
+
+VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
+  require_sound(mesh, "pillow");
+  VolumeMesh result = mesh;
+  for (const int reference : region_references(mesh)) {
+    std::vector<char> in_set;
+    for (std::size_t c = 0; c < result.num_cells(); ++c)
+      in_set.push_back(mesh.references.empty() || result.references[c] == reference);
+    std::vector<Face> faces = boundary_of_set(result, MeshTopology(result), in_set);
+    if (takes) faces = chosen_parts(faces, result.num_vertices(), reference, takes);
+    if (!faces.empty()) result = pillowed(result, faces, in_set);
+  }
   return result;
 }
 

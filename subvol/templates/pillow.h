@@ -3,6 +3,8 @@
 
 #include "subvol/mesh/volume_mesh.h"
 
+#include <array>
+#include <functional>
 #include <span>
 
 namespace subvol {
@@ -29,5 +31,14 @@ namespace subvol {
 /// InputError: an invalid mesh; a cell number out of range or given twice; a set whose boundary is not a manifold (it
 /// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid.
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells = {});
+
+/// Puts a layer of cells inside the boundary of each region: inside the mesh's boundary there, and on both sides of each
+/// interface. Interfaces keep their vertices.
+///
+/// takes  asked for each connected part of a region's boundary, by the corners of its faces, four for each and
+///        kNoIndex for those that a triangle lacks; returns false for parts that get no layer. Empty: all get one.
+/// InputError: as `pillow`; regions whose boundaries are not manifolds.
+using PillowChoice = std::function<bool(int reference, std::span<const std::array<Index, 4>> part)>;
+VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes = {});
 
 }  // namespace subvol

@@ -193,10 +193,17 @@ bool VoxelSolid::good_after_flip(Index cell) const {
 }
 
 VoxelSolid::Contact VoxelSolid::contact(Index cell) const {
+  std::uint32_t neighbors = 0;
+  for (std::size_t n = 0; n < all_offsets_.size(); ++n)
+    if (filled_[cell + all_offsets_[n]]) neighbors |= 1u << n;
+  return contact_of(neighbors);
+}
+
+VoxelSolid::Contact VoxelSolid::contact_of(std::uint32_t neighbors) {
   Contact k;
   for (int e = 0, n = 0; e < kElements; ++e) {
     if (e == 13) continue;
-    if (filled_[cell + all_offsets_[n++]]) k.shared |= kCube.closure[e];
+    if (neighbors >> n++ & 1) k.shared |= kCube.closure[e];
   }
   k.open = kCube.all & ~k.shared;
   k.euler_number = std::popcount(k.shared & kCube.vertices) - std::popcount(k.shared & kCube.edges) +

@@ -60,6 +60,8 @@ class VoxelSolid {
                                          ///< and outside it
   };
   Contact contact(Index cell) const;
+  /// The same for any set of neighbors: bit n for the one at `all_offsets()[n]`.
+  static Contact contact_of(std::uint32_t neighbors);
   /// True if a flip leaves all points of the cell good and the solid and its outside unchanged up to deformation: K is
   /// a disc.
   bool is_simple(Index cell) const;

@@ -125,7 +125,9 @@ TEST_CASE("Nested parts are told apart by how deep they lie", "[diagnosis]") {
   REQUIRE(count(found, SurfaceFault::wall_outward) == 1);
   CHECK(found.find(SurfaceFault::wall_outward)->places.front().parts == std::array<Index, 2>{1, 0});
   CHECK(solid_boundary(wrong).topology == BettiNumbers{1, 0, 1});
-  const SurfaceRepair repair = repair_surface(wrong);
+  CHECK(repair_surface(wrong).regions);  // it does not face inward
+  const SurfaceRepair repair = repair_surface(wrong, {}, RegionRule::merge);
+  CHECK(!repair.regions);
   CHECK(repair.done.size() == 1);
   CHECK(diagnose(repair.surface).is_fillable());
   const TriangleMesh floating = together(hollow, inner);
@@ -168,7 +170,16 @@ TEST_CASE("A flap is a fin, and a sheet through the inside divides it into regio
                        {{0, 2, 1}, {0, 3, 2}, {0, 1, 3}, {1, 2, 3}, {0, 2, 4}, {0, 4, 1}, {1, 4, 2}}};
   found = diagnose(divided);
   CHECK(count(found, SurfaceFault::interface) == 3);
-  CHECK_THROWS_WITH(repair_surface(divided), Catch::Contains("several regions are not supported yet"));
+  CHECK(found.is_fillable());
+  const SurfaceRepair kept = repair_surface(divided);
+  REQUIRE(kept.regions);
+  CHECK(kept.regions->volumes.size() == 2);
+  CHECK(kept.done.empty());
+  const SurfaceRepair merged = repair_surface(divided, {}, RegionRule::merge);
+  CHECK(merged.surface.triangles.size() == 6);
+  CHECK(merged.done.size() == 1);
+  TriangleMesh crossed = together(divided, box({0.1, 0.1, -0.2}, {0.4, 0.4, 0.2}));
+  CHECK_THROWS_WITH(repair_surface(crossed), Catch::Contains("edges that they share"));
 }
 
 TEST_CASE("Gaps, sharp angles, turned and repeated triangles are told", "[diagnosis]") {

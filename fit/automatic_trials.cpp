@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/automatic_trials.h"
+
+#include "subvol/base/option_checks.h"
+#include "subvol/templates/auto_template.h"
+
+#include <algorithm>
+
+namespace subvol {
+
+namespace {
+
+constexpr double kGoodMerit = 0.1;           // no other template is tried below it ...
+/// ... nor if the quality is what keeps the merit above it, and reaches this share of the goal: larger templates have
+/// the same angles at sharp edges and irregular vertices.
+constexpr double kEnoughQuality = 0.85;
+constexpr double kQualityWeight = 5;         // of the share of the quality in the merit
+
+}  // namespace
+
+AutomaticFitOptions checked_options(AutomaticFitOptions options) {
+  constexpr double kLeastQuality = 0.1;
+  const auto in_range = [](const char* name, double value, double low, double high) {
+    require_in_range("AutomaticFitOptions", name, value, low, high);
+  };
+  in_range("quality", options.quality, 0, kMostQuality);
+  if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
+  in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
+  in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
+  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  if (options.cells)
+    in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
+  options.quality = std::max(options.quality, kLeastQuality);
+  return options;
+}
+
+double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
+  constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
+  const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
+  const bool counts_misses = trial.feature_miss && trial.curves > 0;
+  const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
+  return excess(trial.max_percent, options.max_tolerance_percent) +
+         excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
+         std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
+         kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
+         (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
+}
+
+bool is_good_enough(const AutomaticFitTrial& trial) {
+  const double excused = trial.least_share >= kEnoughQuality ? kQualityWeight * (1 - trial.least_share) : 0;
+  return trial.merit - excused < kGoodMerit;
+}
+
+}  // namespace subvol

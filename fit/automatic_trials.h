@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/automatic_fit.h"
+
+namespace subvol {
+
+/// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
+inline constexpr double kMaxMargin = 0.8;
+
+/// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases; and
+/// the portions of what is left of an attempt that its template, the coarser of two levels and a smooth fit take.
+inline constexpr double kAttemptPortion = 0.7, kTemplatePortion = 0.1, kCoarsePortion = 0.2, kSmoothPortion = 0.25;
+
+/// Returns the options, with the least goal that the stages can use in place of none. InputError: one out of range.
+AutomaticFitOptions checked_options(AutomaticFitOptions options);
+
+/// Returns how far a trial is from its aims: the formula in `fit_automatically`.
+double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options);
+
+/// Returns true if no other template needs to be tried.
+bool is_good_enough(const AutomaticFitTrial& trial);
+
+}  // namespace subvol

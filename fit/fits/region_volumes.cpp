@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/fits/region_volumes.h"
+
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/quality/region_quality.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+/// A face of a sheet; the normal points out of the first region.
+struct SheetFace {
+  std::array<Index, 4> corners;
+  std::size_t size;
+  Index behind, front;  ///< places of the regions; kNoIndex: outside
+};
+
+std::vector<SheetFace> sheet_faces(const VolumeMesh& mesh, const MeshTopology& topology) {
+  const std::vector<int> references = region_references(mesh);
+  const auto place = [&](Index cell) {
+    const int reference = mesh.references.empty() ? 0 : mesh.references[cell];
+    return static_cast<Index>(std::ranges::lower_bound(references, reference) - references.begin());
+  };
+  std::vector<SheetFace> faces;
+  const auto add = [&](Index f) {
+    const auto corners = topology.face(f);
+    const auto [first, second] = topology.face_cells(f);
+    SheetFace face{{}, corners.size(), place(first), second == kNoIndex ? kNoIndex : place(second)};
+    std::ranges::copy(corners, face.corners.begin());
+    faces.push_back(face);
+  };
+  for (const Index f : topology.boundary_faces()) add(f);
+  for (const Index f : find_interfaces(mesh, topology).faces) add(f);
+  return faces;
+}
+
+/// The area vector of a face, and of each of its corners the gradient of the volume behind the face.
+struct FaceGradients {
+  Vec3 area = Vec3::Zero();
+  std::array<Vec3, 4> of_corner;
+  bool is_flat;
+};
+
+FaceGradients gradients_of(const SheetFace& face, std::span<const Vec3> x) {
+  constexpr double kRounding = 1e-9;
+  // The volume below a fan around the mean of the corners, as `region_volumes` measures it.
+  FaceGradients result;
+  result.of_corner.fill(Vec3::Zero());
+  Vec3 center = Vec3::Zero(), of_center = Vec3::Zero();
+  const auto count = static_cast<double>(face.size);
+  for (std::size_t i = 0; i < face.size; ++i) center += x[face.corners[i]] / count;
+  double out_of_plane = 0, largest = 0;
+  for (std::size_t i = 0; i < face.size; ++i) {
+    const std::size_t next = (i + 1) % face.size;
+    const Vec3 &a = x[face.corners[i]], &b = x[face.corners[next]];
+    result.area += 0.5 * (a - center).cross(b - center);
+    of_center += a.cross(b) / 6;
+    result.of_corner[i] += b.cross(center) / 6;
+    result.of_corner[next] += center.cross(a) / 6;
+    largest = std::max(largest, (a - center).norm());
+  }
+  for (std::size_t i = 0; i < face.size; ++i) {
+    result.of_corner[i] += of_center / count;
+    out_of_plane = std::max(out_of_plane, std::abs((x[face.corners[i]] - center).dot(result.area.normalized())));
+  }
+  result.is_flat = out_of_plane <= kRounding * largest;
+  return result;
+}
+
+/// Takes a direction out of those in which a vertex may move.
+void forbid(Mat3& projector, const Vec3& normal) {
+  constexpr double kIndependent = 0.05;
+  const Vec3 left = projector * normal;
+  if (left.norm() < kIndependent) return;
+  projector -= left * left.transpose() / left.squaredNorm();
+}
+
+}  // namespace
+
+bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian) {
+  constexpr int kRounds = 6;
+  constexpr double kEnough = 1e-6, kMostMove = 0.2;  // relative; of the root of the area around a vertex
+  const MeshTopology topology(mesh);
+  const std::vector<SheetFace> faces = sheet_faces(mesh, topology);
+  const auto num_regions = static_cast<Eigen::Index>(wanted.size());
+  const std::vector<Vec3> before = mesh.positions;
+  const QualityReport quality = measure_quality(mesh);
+  // Sides of a face count for the regions on either side.
+  const auto regions_of = [](const SheetFace& face) {
+    return std::array<std::pair<Index, double>, 2>{{{face.behind, 1.0}, {face.front, -1.0}}};
+  };
+  std::vector<Mat3> projectors(mesh.num_vertices(), Mat3::Identity());
+  for (const SheetFace& face : faces)
+    if (const FaceGradients gradients = gradients_of(face, mesh.positions); gradients.is_flat)
+      for (std::size_t i = 0; i < face.size; ++i) forbid(projectors[face.corners[i]], gradients.area.normalized());
+
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<double> now = region_volumes(mesh);
+    Eigen::VectorXd missing(num_regions);
+    double worst = 0;
+    for (Eigen::Index r = 0; r < num_regions; ++r) {
+      missing[r] = wanted[static_cast<std::size_t>(r)] - now[static_cast<std::size_t>(r)];
+      worst = std::max(worst, std::abs(missing[r]) / wanted[static_cast<std::size_t>(r)]);
+    }
+    if (worst < kEnough) break;
+    std::vector<FaceGradients> gradients;
+    std::vector<double> area(mesh.num_vertices(), 0.0);
+    for (const SheetFace& face : faces) {
+      gradients.push_back(gradients_of(face, mesh.positions));
+      for (std::size_t i = 0; i < face.size; ++i)
+        area[face.corners[i]] += gradients.back().area.norm() / static_cast<double>(face.size);
+    }
+    // Gradients by vertex and region, few regions at each vertex.
+    std::vector<std::vector<std::pair<Index, Vec3>>> by_vertex(mesh.num_vertices());
+    for (std::size_t f = 0; f < faces.size(); ++f)
+      for (const auto& [region, sign] : regions_of(faces[f])) {
+        if (region == kNoIndex) continue;
+        for (std::size_t i = 0; i < faces[f].size; ++i) {
+          auto& list = by_vertex[faces[f].corners[i]];
+          const auto at = std::ranges::find(list, region, &std::pair<Index, Vec3>::first);
+          if (at == list.end()) list.push_back({region, sign * gradients[f].of_corner[i]});
+          else at->second += sign * gradients[f].of_corner[i];
+        }
+      }
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(num_regions, num_regions);
+    for (std::size_t v = 0; v < by_vertex.size(); ++v)
+      for (const auto& [r, g] : by_vertex[v])
+        for (const auto& [s, h] : by_vertex[v]) matrix(r, s) += g.dot(projectors[v] * h) / area[v];
+    const Eigen::VectorXd factors = matrix.completeOrthogonalDecomposition().solve(missing);
+    if (!factors.allFinite()) break;
+    for (std::size_t v = 0; v < by_vertex.size(); ++v) {
+      if (by_vertex[v].empty()) continue;
+      Vec3 move = Vec3::Zero();
+      for (const auto& [r, g] : by_vertex[v]) move += factors[r] * g / area[v];
+      move = projectors[v] * move;
+      const double most = kMostMove * std::sqrt(area[v]);
+      mesh.positions[v] += move.norm() > most ? Vec3(most / move.norm() * move) : move;
+    }
+  }
+  const QualityReport after = measure_quality(mesh);
+  bool good = after.certificate.not_certified.size() <= quality.certificate.not_certified.size();
+  for (std::size_t c = 0; c < after.cell_minima.size() && good; ++c)
+    good = after.cell_minima[c] >= std::min(least_jacobian, quality.cell_minima[c] - 1e-3);
+  if (!good) mesh.positions = before;
+  return good;
+}
+
+}  // namespace subvol

@@ -1,0 +1,414 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/error.h"
+#include "subvol/base/format.h"
+#include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/automatic_trials.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/features/crisp_edges.h"
+#include "subvol/fit/features/sheet_layout.h"
+#include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/region_volumes.h"
+#include "subvol/fit/fits/smooth_refinement.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/closest_point.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/fit/quality/region_quality.h"
+#include "subvol/fit/stages/quality_stages.h"
+#include "subvol/fit/target/fit_target.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+#include "subvol/templates/auto_template.h"
+#include "subvol/templates/pillow.h"
+#include "subvol/templates/region_template.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace subvol {
+
+namespace {
+
+constexpr std::size_t kChildren = 8;  // hexes of a hex that is subdivided
+
+/// The faces of all sheets of a mesh as one surface, on its vertices.
+TriangleMesh sheet_triangles(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  PolygonMesh polygons{.positions = mesh.positions};
+  const auto add = [&](std::span<const Index> face) {
+    polygons.face_vertices.insert(polygons.face_vertices.end(), face.begin(), face.end());
+    polygons.face_offsets.push_back(polygons.face_vertices.size());
+  };
+  for (const Index f : topology.boundary_faces()) add(topology.face(f));
+  for (const Index f : find_interfaces(mesh, topology).faces) add(topology.face(f));
+  return fan_triangles(polygons);
+}
+
+RegionSurface normalised(RegionSurface surface, const Normalisation& normalisation) {
+  surface.mesh.positions = normalisation.to_unit(std::move(surface.mesh.positions));
+  for (double& volume : surface.volumes) volume /= std::pow(normalisation.diagonal, 3);
+  return surface;
+}
+
+/// An automatic fit of several regions, in normalized coordinates.
+class RegionFit {
+ public:
+  RegionFit(const RegionSurface& target, const AutomaticFitOptions& options)
+      : options_(checked_options(options)),
+        original_(target),
+        target_(target),
+        unit_(normalised(target, target_.normalisation)),
+        tree_(unit_.mesh),
+        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
+                 options.cancelled, options.log}) {}
+  AutomaticFitResult run();
+
+ private:
+  void find_curves();
+  bool run_count(std::size_t cells);
+  bool run_smooth(std::size_t cells);
+  bool run_curves(std::size_t cells);
+  std::optional<VolumeMesh> make_grid(std::size_t cells);
+  VolumeMesh pillowed(const VolumeMesh& grid) const;
+  bool lies_on_target(std::span<const std::array<Index, 4>> faces, const VolumeMesh& grid) const;
+  /// Begins a part of the attempt that takes this portion of what is left of it.
+  void begin_part(double portion, double forecast) {
+    runner_.work().begin_portion(portion, share_at_end_, forecast);
+  }
+  bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
+  void group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const;
+  double volume_percent() const;
+  bool judge(AutomaticFitTrial trial);
+  void conclude();
+
+  AutomaticFitOptions options_;
+  const RegionSurface& original_;
+  FitTarget target_;
+  RegionSurface unit_;                 ///< the target in normalized coordinates
+  ClosestPoint tree_;                  ///< over all its triangles
+  bool follows_edges_ = false;
+  SheetCurves curves_;                 ///< to follow, if edges are followed
+  VolumeMesh mesh_;
+  std::optional<SheetLayout> layout_;  ///< of mesh_; none: sheets correspond as wholes
+  std::string no_template_;            ///< why the last template that was asked for does not exist; empty: it does
+  RegionTemplate template_;            ///< the last one, without its mesh
+  AutomaticFitResult result_;
+  double share_at_end_ = 0;            ///< of the attempt in progress
+  double least_share_ = 1;
+  StageRunner runner_;
+};
+
+void RegionFit::find_curves() {
+  if (options_.crease_angle_degrees) {
+    const FeatureCurves curves = feature_curves(unit_.mesh, *options_.crease_angle_degrees);
+    follows_edges_ = options_.follows_all_edges ? !curves.empty() : edge_crispness(unit_.mesh, curves).is_designed();
+  }
+  if (follows_edges_) curves_ = sheet_curves(unit_, options_.crease_angle_degrees);
+}
+
+/// Returns a labelled grid that has about so many cells once it is pillowed; nothing if there is none, or if the fit must
+/// end.
+std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
+  RegionTemplateOptions options;
+  options.cells = std::clamp(cells, kLeastTemplateCells, kMostTemplateCells);
+  options.for_pillow = true;
+  begin_part(kTemplatePortion, 1);
+  options.progress = [this](double fraction) {
+    runner_.work().set(fraction);
+    return !runner_.is_to_end() &&
+           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
+  };
+  RegionTemplateResult made = region_template(original_, options);
+  if (made.cancelled) {
+    if (runner_.in_time("the template", result_.report)) {
+      result_.report.stop_reason = StopReason::cancelled;
+      result_.report.explanation = "cancelled in the template";
+    }
+    return std::nullopt;
+  }
+  if (!made.made) {
+    std::string names;
+    for (const Index r : made.missed) {
+      const Group& region = original_.regions[static_cast<std::size_t>(r)];
+      names += (names.empty() ? "" : ", ") +
+               (region.name.empty() ? "region " + std::to_string(region.number) : region.name);
+    }
+    no_template_ = "target: no grid that was tried, of up to 9 times " + std::to_string(options.cells) +
+                   " cells, has the topology of its regions" + (names.empty() ? "" : "; missed: " + names) +
+                   "; ask for more --cells, or give a --template";
+    return std::nullopt;
+  }
+  VolumeMesh mesh = std::move(made.made->mesh);
+  template_ = std::move(*made.made);
+  target_.normalisation.take_in(mesh);
+  if (result_.report.stages.empty())  // the target without its interfaces, which are no part of what is described
+    result_.report.note_start(FitTarget(outer_surface(original_))
+                                  .compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
+  return mesh;
+}
+
+/// Returns true if faces of a grid lie on the target, up to rounding.
+bool RegionFit::lies_on_target(std::span<const std::array<Index, 4>> faces, const VolumeMesh& grid) const {
+  constexpr double kRounding = 1e-7;  // of the diagonal
+  for (const auto& face : faces) {
+    Vec3 center = Vec3::Zero();
+    for (const Index v : face) center += grid.positions[v] / 4;
+    if (tree_.closest(center).distance > kRounding) return false;
+    for (const Index v : face)
+      for (const Vec3& p : {grid.positions[v], Vec3(0.5 * (center + grid.positions[v]))})
+        if (tree_.closest(p).distance > kRounding) return false;
+  }
+  return true;
+}
+
+VolumeMesh RegionFit::pillowed(const VolumeMesh& grid) const {
+  return pillow_regions(grid, [&](int, std::span<const std::array<Index, 4>> part) {
+    // Layers that were added before leave the sheets on the grid's own vertices.
+    return !lies_on_target(part, grid);
+  });
+}
+
+void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const {
+  const std::vector<std::array<int, 2>> pairs = region_pairs(unit_);
+  const auto key_of = [&](const std::array<int, 2>& pair) {
+    return static_cast<Index>(std::ranges::lower_bound(pairs, pair) - pairs.begin());
+  };
+  boundary.group_of_face.assign(topology.num_faces(), 0);
+  for (const Index f : topology.boundary_faces())
+    boundary.group_of_face[f] = key_of({kOutside, mesh_.references[topology.face_cells(f)[0]]});
+  const Interfaces interfaces = find_interfaces(mesh_, topology);
+  for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
+    boundary.group_of_face[interfaces.faces[i]] = key_of(interfaces.pairs[interfaces.pair_of_face[i]]);
+  for (const Index t : target_.region_triangle)
+    boundary.group_of_triangle.push_back(key_of(unit_.pair(static_cast<std::size_t>(t))));
+}
+
+/// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
+bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
+  begin_part(portion, schedule.expected_steps());
+  constexpr int kIntervals = 2;
+  constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
+  const MeshTopology topology(mesh_);
+  QualityBoundary boundary;
+  boundary.interfaces = find_interfaces(mesh_, topology).faces;
+  const std::size_t faces = topology.boundary_faces().size() + boundary.interfaces.size();
+  const double h = std::sqrt(target_.surface.area() / static_cast<double>(faces));
+  const std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
+  BoundarySamples samples =
+      make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
+  target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
+  boundary.samples = std::move(samples.positions);
+  boundary.triangles = samples.triangles;
+  boundary.triangle_faces = samples.triangle_faces;
+  std::function<CreaseEnergy(double)> creases;
+  if (layout_) {
+    boundary.group_of_face = groups_of_faces(*layout_, mesh_);
+    for (const Index t : target_.region_triangle) boundary.group_of_triangle.push_back(layout_->group_of_triangle[t]);
+    if (!mesh_.tags.creases.empty())
+      creases = [&](double width) {
+        return layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
+      };
+  } else {
+    group_by_pairs(boundary, topology);
+  }
+  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
+  StageRecord record;
+  record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
+  record.level = level;
+  record.cells = mesh_.num_cells();
+  const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
+  least_share_ = stages.state().cells.least_share;
+  return going;
+}
+
+/// Returns the largest difference of a region's volume from the target's, in percent.
+double RegionFit::volume_percent() const {
+  const std::vector<double> volumes = region_volumes(mesh_);
+  double largest = 0;
+  for (std::size_t r = 0; r < volumes.size(); ++r)
+    largest = std::max(largest, 100 * std::abs(volumes[r] / unit_.volumes[r] - 1));
+  return largest;
+}
+
+/// Makes flat sheets of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the fit
+/// must end.
+bool RegionFit::judge(AutomaticFitTrial trial) {
+  constexpr double kLeastAfterFlattening = 0.3;  // a cell may become as poor, for what is exact
+
+  if (follows_edges_) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
+  restore_volumes(mesh_, unit_.volumes, kLeastAfterFlattening);
+  const QualityReport quality = measure_quality(mesh_);
+  const SurfaceDistance outer =
+      target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
+  const SurfaceDistance inner = target_.interface_distance(mesh_);
+  trial.cells = mesh_.num_cells();
+  trial.through_planes = template_.through_planes;
+  trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
+  trial.max_percent = 100 * std::max(outer.max(), inner.max());
+  trial.volume_percent = volume_percent();
+  trial.least_scaled_jacobian = quality.min_scaled_jacobian;
+  trial.mean_scaled_jacobian = quality.mean_scaled_jacobian;
+  trial.least_share = least_share_;
+  trial.uncertified = quality.certificate.not_certified.size();
+  trial.self_intersections = runner_.intersecting_pairs(sheet_triangles(mesh_), result_.report);
+  std::optional<CreaseDistance> edges;
+  if (layout_ && !curves_.features.curves.empty()) {
+    edges = crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
+    edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
+    trial.curves = edges->num_curves;
+    trial.followed_curves = edges->num_followed;
+    trial.within_share = edges->within_share();
+  }
+  trial.merit = merit_of(trial, options_);
+  result_.trials.push_back(trial);
+  const bool going = trial.self_intersections.has_value();
+  if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return going;
+  result_.chosen = result_.trials.size() - 1;
+  result_.mesh = mesh_;
+  result_.report.creases = edges;
+  result_.missed_edges.clear();
+  if (layout_)
+    for (const UnfollowedCurve& curve : layout_->routing.unfollowed)
+      result_.missed_edges.push_back({curve.reason, target_.normalisation.from_unit({curve.place})[0],
+                                      100 * curves_.features.curves.curves[curve.curve].length()});
+  std::stable_sort(result_.missed_edges.begin(), result_.missed_edges.end(),
+                   [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
+  return going;
+}
+
+/// Fits a pillowed grid that is refined once, unless the regions need too many cells for that.
+bool RegionFit::run_smooth(std::size_t cells) {
+  constexpr double kRoom = 0.85, kLess = 0.95, kMostExcess = 1.4;
+  constexpr int kTries = 3;
+  /// Makes the present mesh a pillowed template of at most so many cells, if there is one; false: none at all.
+  const auto make_template = [&](std::size_t most) {
+    double asked = kRoom * static_cast<double>(most);
+    for (int round = 1;; ++round) {
+      const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
+      if (!grid) return false;
+      mesh_ = pillowed(*grid);
+      const std::size_t got = mesh_.num_cells();
+      if (got <= most || round == kTries || template_.cells_asked > static_cast<std::size_t>(asked) + 1) return true;
+      asked *= kLess * static_cast<double>(most) / static_cast<double>(got);
+    }
+  };
+  const std::size_t coarse = std::max(kLeastTemplateCells, cells / kChildren);
+  if (!make_template(coarse)) return !no_template_.empty();
+  int levels = 1;
+  if (static_cast<double>(mesh_.num_cells()) > kMostExcess * static_cast<double>(coarse)) {
+    levels = 0;
+    if (mesh_.num_cells() < cells / 2 && !make_template(cells)) return !no_template_.empty();
+  }
+  AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
+  bool going = true;
+  for (int level = 0; going && level <= levels; ++level) {
+    if (level > 0) mesh_ = smooth_refinement(mesh_);
+    trial.level = level;
+    QualitySchedule schedule = levels == 0  ? single_quality_schedule(options_.quality)
+                               : level == 0 ? coarse_quality_schedule(options_.quality)
+                                            : fine_quality_schedule(options_.quality);
+    if (level == levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+    going = fit_level(level, schedule, "", level < levels ? kCoarsePortion : 1);
+  }
+  if (going || result_.trials.empty()) going = judge(trial) && going;
+  return going;
+}
+
+/// Fits a grid whose sheets are routed and pillowed.
+bool RegionFit::run_curves(std::size_t cells) {
+  constexpr double kRoom = 0.85, kLess = 0.95;
+  constexpr int kTries = 3;
+  double asked = kRoom * static_cast<double>(cells);
+  for (int round = 1;; ++round) {
+    const std::optional<VolumeMesh> grid = make_grid(static_cast<std::size_t>(asked));
+    if (!grid) return !no_template_.empty();
+    VolumeMesh padded = pillowed(*grid);
+    if (padded.num_cells() > cells && options_.cells && round < kTries) {
+      asked *= kLess * static_cast<double>(cells) / static_cast<double>(padded.num_cells());
+      continue;
+    }
+    const bool is_exact = padded.num_cells() == grid->num_cells();
+    mesh_ = *grid;
+    layout_.reset();
+    if (!is_exact && !fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
+      if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});
+      return false;
+    }
+    layout_ = sheet_layout(mesh_, unit_, curves_, {});
+    mesh_ = std::move(padded);
+    mesh_.tags = layout_->tagged_mesh.tags;
+    QualitySchedule schedule = single_quality_schedule(options_.quality);
+    schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+    bool going = fit_level(0, schedule, ", edges");
+    if (going || result_.trials.empty()) going = judge({.template_cells = grid->num_cells()}) && going;
+    return going;
+  }
+}
+
+/// Returns false if the fit must end. InputError: there is no template, and there was none before.
+bool RegionFit::run_count(std::size_t cells) {
+  layout_.reset();
+  no_template_.clear();
+  const bool going = follows_edges_ ? run_curves(cells) : run_smooth(cells);
+  return going;
+}
+
+void RegionFit::conclude() {
+  FitReport& report = result_.report;
+  const AutomaticFitTrial& best = result_.trials[result_.chosen];
+  report.explanation = formatted("%zu regions, least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%, "
+                                 "volumes within %.3g %%",
+                                 original_.regions.size(), best.least_scaled_jacobian, best.mean_percent,
+                                 best.max_percent, best.volume_percent);
+  if (best.max_percent > options_.max_tolerance_percent || best.mean_percent > options_.mean_tolerance_percent ||
+      best.volume_percent > kAutomaticVolumePercent || best.least_share < 1)
+    report.warnings.push_back(formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%, volumes "
+                                        "%.3g %%): ",
+                                        options_.quality, options_.mean_tolerance_percent,
+                                        options_.max_tolerance_percent, kAutomaticVolumePercent) +
+                              report.explanation);
+  if (template_.wrong_sheets > 0)
+    report.warnings.push_back(formatted("%zu interfaces or parts of the boundary have another topology than in the "
+                                        "target; more --cells may mend that",
+                                        template_.wrong_sheets));
+  if (!result_.missed_edges.empty()) {
+    const MissedEdge& longest = result_.missed_edges.front();
+    report.warnings.push_back(formatted("%zu of %zu curves are not followed; the longest, %.3g %% of the diagonal, at "
+                                        "(%.6g, %.6g, %.6g): %s",
+                                        result_.missed_edges.size(), best.curves, longest.length_percent,
+                                        longest.place.x(), longest.place.y(), longest.place.z(),
+                                        to_string(longest.reason).c_str()));
+  }
+}
+
+AutomaticFitResult RegionFit::run() {
+  find_curves();
+  result_.topology = solid_boundary(outer_surface(original_)).topology;
+  std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+  if (follows_edges_) counts.assign(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
+  if (options_.cells) counts = {*options_.cells};
+  bool going = true;
+  for (std::size_t i = 0; i < counts.size() && going; ++i) {
+    if (!result_.trials.empty() && is_good_enough(result_.trials[result_.chosen])) break;
+    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+    going = run_count(counts[i]);
+  }
+  if (result_.trials.empty() && !no_template_.empty()) throw InputError(no_template_);
+  if (going) conclude();
+  result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
+  if (result_.mesh.num_cells() > 0) add_interface_groups(result_.mesh);
+  result_.report.seconds = {{"total", runner_.seconds()}};
+  return std::move(result_);
+}
+
+}  // namespace
+
+AutomaticFitResult fit_regions(const RegionSurface& target, const AutomaticFitOptions& options) {
+  return RegionFit(target, options).run();
+}
+
+}  // namespace subvol

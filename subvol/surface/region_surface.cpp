@@ -1,0 +1,484 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/surface/region_surface.h"
+
+#include "subvol/base/format.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/welded_surface.h"
+#include "subvol/surface/winding_number.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+/// Sets of numbers that are joined one by one; each is known by its least member.
+class JoinedSets {
+ public:
+  explicit JoinedSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  Index of(Index i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(Index a, Index b) {
+    const Index x = of(a), y = of(b);
+    parent_[std::max(x, y)] = std::min(x, y);
+  }
+
+ private:
+  std::vector<Index> parent_;
+};
+
+/// Returns six times the signed volume between a triangle and the origin.
+double volume_below(const TriangleMesh& mesh, const std::array<Index, 3>& t, const Vec3& origin) {
+  return (mesh.positions[t[0]] - origin).dot((mesh.positions[t[1]] - origin).cross(mesh.positions[t[2]] - origin));
+}
+
+double area_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
+  const Vec3& a = mesh.positions[t[0]];
+  return 0.5 * (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm();
+}
+
+/// Drops all but the first of triangles with the same corners.
+void drop_copies(TriangleMesh& mesh) {
+  std::vector<std::pair<std::array<Index, 3>, Index>> keys;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    auto key = mesh.triangles[t];
+    std::sort(key.begin(), key.end());
+    keys.push_back({key, static_cast<Index>(t)});
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<char> is_copy(mesh.triangles.size(), 0);
+  for (std::size_t i = 1; i < keys.size(); ++i) is_copy[keys[i].second] = keys[i].first == keys[i - 1].first;
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < is_copy.size(); ++t) {
+    if (is_copy[t]) continue;
+    mesh.triangles[kept] = mesh.triangles[t];
+    if (!mesh.face_groups.empty()) mesh.face_groups.of_face[kept] = mesh.face_groups.of_face[t];
+    ++kept;
+  }
+  mesh.triangles.resize(kept);
+  if (!mesh.face_groups.empty()) mesh.face_groups.of_face.resize(kept);
+}
+
+/// The triangles at an edge in the order of their angles around it, and for each whether its front faces the next.
+struct EdgeFan {
+  std::vector<Index> triangles;
+  std::vector<char> faces_next;
+};
+
+EdgeFan sorted_around(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge> sides) {
+  const Vec3& from = mesh.positions[sides[0].low];
+  const Vec3 along = (mesh.positions[sides[0].high] - from).normalized();
+  const Vec3 x = along.unitOrthogonal(), y = along.cross(x);
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const auto& t = mesh.triangles[sides[i].triangle];
+    const Vec3 across = mesh.positions[t[0] + t[1] + t[2] - sides[i].low - sides[i].high] - from;
+    order.emplace_back(std::atan2(across.dot(y), across.dot(x)), i);
+  }
+  std::sort(order.begin(), order.end());
+  EdgeFan fan;
+  for (const auto& [angle, i] : order) {
+    fan.triangles.push_back(sides[i].triangle);
+    fan.faces_next.push_back(sides[i].forward);  // its normal is on the side of larger angles
+  }
+  return fan;
+}
+
+/// Finds the components of space and decides which are regions. A triangle t has two sides: 2t is behind it, 2t + 1 in
+/// front.
+class RegionFinder {
+ public:
+  RegionFinder(TriangleMesh mesh, RegionRule rule)
+      : mesh_(std::move(mesh)), rule_(rule), cells_(2 * mesh_.triangles.size()), parts_(mesh_.triangles.size()) {}
+
+  std::optional<RegionSurface> run() {
+    if (mesh_.triangles.empty() || !join_around_edges()) return std::nullopt;
+    list_cells();
+    if (parts_with_cells_.size() == 1 && is_manifold(0)) return std::nullopt;
+    place_parts();
+    number_regions();
+    return result();
+  }
+
+ private:
+  /// A component of space as far as one part of the surface tells.
+  struct Cell {
+    Index side;             ///< the least of its sides
+    double volume = 0;      ///< signed: negative for the one around the part
+    std::vector<Index> sides;
+  };
+  struct Part {
+    std::vector<std::size_t> cells;  ///< places in cells_of_parts_
+    std::size_t outer = 0;           ///< of these, the one around the part
+    std::vector<Index> triangles;
+    bool has_curves = false;         ///< edges of more than two triangles
+    double own_volume = 0;           ///< sum over its triangles as they are oriented
+    std::optional<std::size_t> inside;  ///< the cell of another part that it lies in
+    Eigen::AlignedBox3d box;
+  };
+
+  bool is_manifold(std::size_t part) const { return !parts_with_cells_[part].has_curves; }
+
+  /// Returns false if an edge has only one triangle.
+  bool join_around_edges() {
+    const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh_.triangles, mesh_.positions.size());
+    bool closed = true;
+    for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
+      if (edge.size() < 2) closed = false;
+      if (edge.size() > 2) curve_triangles_.push_back(edge[0].triangle);
+      if (!closed) return;
+      const EdgeFan fan = sorted_around(mesh_, edge);
+      for (std::size_t i = 0; i < fan.triangles.size(); ++i) {
+        const std::size_t next = (i + 1) % fan.triangles.size();
+        cells_.join(2 * fan.triangles[i] + (fan.faces_next[i] ? 1 : 0),
+                    2 * fan.triangles[next] + (fan.faces_next[next] ? 0 : 1));
+        parts_.join(fan.triangles[i], fan.triangles[next]);
+      }
+    });
+    return closed;
+  }
+
+  void list_cells() {
+    const std::size_t n = mesh_.triangles.size();
+    std::vector<std::size_t> part_of(n), cell_of(2 * n);
+    for (std::size_t t = 0; t < n; ++t) {
+      const auto root = static_cast<std::size_t>(parts_.of(static_cast<Index>(t)));
+      if (root == t) {
+        part_of[t] = parts_with_cells_.size();
+        parts_with_cells_.emplace_back();
+      }
+      Part& part = parts_with_cells_[part_of[t] = part_of[root]];
+      part.triangles.push_back(static_cast<Index>(t));
+      for (const Index v : mesh_.triangles[t]) part.box.extend(mesh_.positions[v]);
+      const Vec3& origin = mesh_.positions[mesh_.triangles[static_cast<std::size_t>(part.triangles[0])][0]];
+      const double below = volume_below(mesh_, mesh_.triangles[t], origin) / 6;
+      part.own_volume += below;
+      for (const std::size_t side : {2 * t, 2 * t + 1}) {
+        const auto first = static_cast<std::size_t>(cells_.of(static_cast<Index>(side)));
+        if (first == side) {
+          cell_of[side] = cells_of_parts_.size();
+          part.cells.push_back(cells_of_parts_.size());
+          cells_of_parts_.push_back({static_cast<Index>(side), 0, {}});
+        }
+        Cell& cell = cells_of_parts_[cell_of[first]];
+        cell.volume += side == 2 * t ? below : -below;  // what is behind a triangle has it as its outer side
+        cell.sides.push_back(static_cast<Index>(side));
+      }
+    }
+    for (const Index t : curve_triangles_) parts_with_cells_[part_of[t]].has_curves = true;
+    for (Part& part : parts_with_cells_)
+      part.outer = *std::min_element(part.cells.begin(), part.cells.end(), [&](std::size_t a, std::size_t b) {
+        return cells_of_parts_[a].volume < cells_of_parts_[b].volume;
+      });
+  }
+
+  /// Returns the triangles around a cell, turned outward.
+  TriangleMesh boundary_of(const Cell& cell) const {
+    TriangleMesh boundary{mesh_.positions, {}};
+    for (const Index side : cell.sides) {
+      std::array<Index, 3> t = mesh_.triangles[static_cast<std::size_t>(side / 2)];
+      if (side % 2 != 0) std::swap(t[1], t[2]);
+      boundary.triangles.push_back(t);
+    }
+    return boundary;
+  }
+
+  /// Finds the cell that each part lies in: the smallest that contains all of some of its points.
+  void place_parts() {
+    constexpr std::size_t kMostPoints = 16;
+    for (std::size_t around = 0; around < parts_with_cells_.size(); ++around) {
+      std::vector<std::size_t> candidates;
+      for (std::size_t k = 0; k < parts_with_cells_.size(); ++k)
+        if (k != around && parts_with_cells_[around].box.contains(parts_with_cells_[k].box)) candidates.push_back(k);
+      if (candidates.empty()) continue;
+      for (const std::size_t c : parts_with_cells_[around].cells) {
+        const Cell& cell = cells_of_parts_[c];
+        if (c == parts_with_cells_[around].outer || !(cell.volume > 0)) continue;
+        const WindingNumber winding(boundary_of(cell));
+        for (const std::size_t k : candidates) {
+          Part& part = parts_with_cells_[k];
+          if (part.inside && cells_of_parts_[*part.inside].volume <= cell.volume) continue;
+          bool contained = true;
+          const std::size_t step = std::max<std::size_t>(1, part.triangles.size() / kMostPoints);
+          for (std::size_t i = 0; i < part.triangles.size() && contained; i += step) {
+            const auto& [a, b, d] = mesh_.triangles[part.triangles[i]];
+            contained = winding.at((mesh_.positions[a] + mesh_.positions[b] + mesh_.positions[d]) / 3) > 0.5;
+          }
+          if (contained) part.inside = c;
+        }
+      }
+    }
+  }
+
+  /// Returns how a part faces: 1 if all of it faces outward, -1 inward.
+  double facing(const Part& part) const {
+    const double whole = -cells_of_parts_[part.outer].volume;
+    return whole > 0 ? part.own_volume / whole : 1;
+  }
+
+  std::size_t part_of_cell(std::size_t cell) const {
+    for (std::size_t p = 0;; ++p)
+      if (std::ranges::find(parts_with_cells_[p].cells, cell) != parts_with_cells_[p].cells.end()) return p;
+  }
+
+  void number_regions() {
+    constexpr double kMostly = 0.5;
+    // Parts that contain others come first.
+    std::vector<std::size_t> order(parts_with_cells_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return cells_of_parts_[parts_with_cells_[a].outer].volume < cells_of_parts_[parts_with_cells_[b].outer].volume;
+    });
+    std::vector<char> is_region(cells_of_parts_.size(), 0);
+    std::vector<std::size_t> joined(cells_of_parts_.size());
+    std::iota(joined.begin(), joined.end(), std::size_t{0});
+    std::vector<double> root_facing(parts_with_cells_.size(), 1);
+    for (const std::size_t p : order) {
+      const Part& part = parts_with_cells_[p];
+      bool is_void = false;
+      if (part.inside) {
+        const std::size_t parent = part_of_cell(*part.inside);
+        root_facing[p] = root_facing[parent];
+        joined[part.outer] = joined[*part.inside];
+        const bool in_region = is_region[joined[*part.inside]] != 0;
+        is_void = rule_ == RegionRule::automatic && in_region && is_manifold(p) &&
+                  facing(part) * root_facing[p] < -kMostly;
+        if (in_region && !is_void && is_manifold(p) && rule_ == RegionRule::automatic) ++nested_;
+      } else {
+        root_facing[p] = is_manifold(p) && facing(part) < -kMostly ? -1 : 1;
+      }
+      for (const std::size_t c : part.cells)
+        if (c != part.outer) is_region[c] = !is_void && cells_of_parts_[c].volume > 0;
+    }
+    region_of_side_.assign(2 * mesh_.triangles.size(), kOutside);
+    std::vector<std::size_t> cell_of(2 * mesh_.triangles.size());
+    for (std::size_t c = 0; c < cells_of_parts_.size(); ++c)
+      for (const Index side : cells_of_parts_[c].sides) cell_of[side] = joined[c];
+    std::vector<int> number(cells_of_parts_.size(), kOutside);
+    for (std::size_t side = 0; side < cell_of.size(); ++side) {
+      const std::size_t c = cell_of[side];
+      if (!is_region[c]) continue;
+      if (number[c] == kOutside) number[c] = ++num_regions_;
+      region_of_side_[side] = number[c];
+    }
+  }
+
+  std::optional<RegionSurface> result() {
+    RegionSurface surface;
+    surface.mesh.positions = mesh_.positions;
+    surface.mesh.face_groups.groups = mesh_.face_groups.groups;
+    std::size_t loose = 0;
+    bool has_interface = false;
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const std::array<int, 2> sides{region_of_side_[2 * t], region_of_side_[2 * t + 1]};
+      if (sides[0] == sides[1]) {  // a membrane in one region, or outside
+        ++loose;
+        continue;
+      }
+      has_interface = has_interface || (sides[0] != kOutside && sides[1] != kOutside);
+      surface.mesh.triangles.push_back(mesh_.triangles[t]);
+      surface.sides.push_back(sides);
+      if (!mesh_.face_groups.empty()) surface.mesh.face_groups.of_face.push_back(mesh_.face_groups.of_face[t]);
+    }
+    if (!has_interface) return std::nullopt;
+    for (int r = 1; r <= num_regions_; ++r) surface.regions.push_back({"", r, 3});
+    orient_sheets(surface);
+    name_regions(surface);
+    if (nested_ > 0)
+      surface.notes.push_back(formatted("%zu closed part%s inside another do%s not face inward and became region%s; "
+                                        "--regions merge makes voids of %s",
+                                        nested_, nested_ == 1 ? "" : "s", nested_ == 1 ? "es" : "",
+                                        nested_ == 1 ? "" : "s", nested_ == 1 ? "it" : "them"));
+    if (loose > 0)
+      surface.notes.push_back(formatted("%zu triangles divide nothing and were left out", loose));
+    return surface;
+  }
+
+  /// Gives regions the names of groups that bound them.
+  static void name_regions(RegionSurface& surface) {
+    constexpr double kMost = 0.5;
+    const auto& groups = surface.mesh.face_groups;
+    for (std::size_t g = 0; g < groups.groups.size(); ++g) {
+      double area = 0;
+      std::vector<double> shared(surface.regions.size(), 0.0);
+      for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+        if (groups.of_face[t] != static_cast<Index>(g)) continue;
+        const double one = area_of(surface.mesh, surface.mesh.triangles[t]);
+        area += one;
+        for (const int side : surface.sides[t])
+          if (side != kOutside) shared[static_cast<std::size_t>(side - 1)] += one;
+      }
+      for (std::size_t r = 0; r < shared.size(); ++r) {
+        double whole = 0;
+        for (std::size_t t = 0; t < surface.sides.size(); ++t)
+          for (const int side : surface.sides[t])
+            if (side == surface.regions[r].number) whole += area_of(surface.mesh, surface.mesh.triangles[t]);
+        constexpr double kAll = 1 - 1e-9;
+        if (surface.regions[r].name.empty() && area > 0 && shared[r] >= kAll * area && area >= kMost * whole) {
+          surface.regions[r].name = groups.groups[g].name;
+          break;
+        }
+      }
+    }
+  }
+
+  TriangleMesh mesh_;
+  RegionRule rule_;
+  JoinedSets cells_, parts_;
+  std::vector<Index> curve_triangles_;
+  std::vector<Cell> cells_of_parts_;
+  std::vector<Part> parts_with_cells_;
+  std::vector<int> region_of_side_;
+  int num_regions_ = 0;
+  std::size_t nested_ = 0;  ///< parts that are regions though they might be voids
+};
+
+/// Returns some triangles of a surface with their groups, and the vertices that they name.
+TriangleMesh selected(const TriangleMesh& mesh, std::span<const Index> triangles) {
+  TriangleMesh result;
+  result.face_groups.groups = mesh.face_groups.groups;
+  std::vector<Index> number(mesh.positions.size(), kNoIndex);
+  for (const Index t : triangles) {
+    std::array<Index, 3> corners = mesh.triangles[t];
+    for (Index& v : corners) {
+      if (number[v] == kNoIndex) {
+        number[v] = static_cast<Index>(result.positions.size());
+        result.positions.push_back(mesh.positions[v]);
+      }
+      v = number[v];
+    }
+    result.triangles.push_back(corners);
+    if (!mesh.face_groups.empty()) result.face_groups.of_face.push_back(mesh.face_groups.of_face[t]);
+  }
+  return result;
+}
+
+}  // namespace
+
+const char* to_string(RegionRule rule) {
+  switch (rule) {
+    case RegionRule::automatic: return "auto";
+    case RegionRule::keep: return "keep";
+    case RegionRule::merge: return "merge";
+  }
+  return "unknown";
+}
+
+std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRule rule) {
+  if (rule == RegionRule::merge) return std::nullopt;
+  TriangleMesh mesh = welded(surface).mesh;
+  drop_copies(mesh);
+  return RegionFinder(std::move(mesh), rule).run();
+}
+
+void orient_sheets(RegionSurface& surface) {
+  surface.volumes.assign(surface.regions.size(), 0.0);
+  if (surface.mesh.triangles.empty()) return;
+  const Vec3 origin = surface.mesh.positions[surface.mesh.triangles[0][0]];
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+    auto& [behind, front] = surface.sides[t];
+    if (behind == kOutside || (front != kOutside && front < behind)) {
+      std::swap(behind, front);
+      std::swap(surface.mesh.triangles[t][1], surface.mesh.triangles[t][2]);
+    }
+    const double below = volume_below(surface.mesh, surface.mesh.triangles[t], origin) / 6;
+    for (std::size_t r = 0; r < surface.regions.size(); ++r) {
+      if (surface.regions[r].number == behind) surface.volumes[r] += below;
+      if (surface.regions[r].number == front) surface.volumes[r] -= below;
+    }
+  }
+}
+
+RegionSurface surface_of_regions(const VolumeMesh& mesh) {
+  const MeshTopology topology(mesh);
+  const std::vector<int> references = region_references(mesh);
+  const bool keeps = references.front() > kOutside;
+  const auto number_of = [&](int reference) {
+    return keeps ? reference : 1 + static_cast<int>(std::ranges::lower_bound(references, reference) - references.begin());
+  };
+  RegionSurface surface;
+  for (const int reference : references) {
+    Group region{"", number_of(reference), 3};
+    for (const Group& named : mesh.regions)
+      if (named.number == reference) region.name = named.name;
+    surface.regions.push_back(std::move(region));
+  }
+  surface.mesh.positions = mesh.positions;
+  const auto region_of = [&](Index cell) {
+    if (cell == kNoIndex) return kOutside;
+    return number_of(mesh.references.empty() ? 0 : mesh.references[cell]);
+  };
+  const auto add = [&](Index f) {
+    const auto face = topology.face(f);
+    const auto [first, second] = topology.face_cells(f);
+    const auto center = static_cast<Index>(surface.mesh.positions.size());
+    if (face.size() > 3) {
+      Vec3 sum = Vec3::Zero();
+      for (const Index v : face) sum += mesh.positions[v];
+      surface.mesh.positions.push_back(sum / static_cast<double>(face.size()));
+    }
+    for (std::size_t i = 0; i < (face.size() > 3 ? face.size() : 1); ++i) {
+      if (face.size() > 3) surface.mesh.triangles.push_back({center, face[i], face[(i + 1) % face.size()]});
+      else surface.mesh.triangles.push_back({face[0], face[1], face[2]});
+      surface.sides.push_back({region_of(first), region_of(second)});
+    }
+  };
+  for (const Index f : topology.boundary_faces()) add(f);
+  for (const Index f : find_interfaces(mesh, topology).faces) add(f);
+  orient_sheets(surface);
+  return surface;
+}
+
+TriangleMesh boundary_of_region(const RegionSurface& surface, int region) {
+  TriangleMesh boundary{surface.mesh.positions, {}};
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+    const auto& [behind, front] = surface.sides[t];
+    if (behind != region && front != region) continue;
+    std::array<Index, 3> corners = surface.mesh.triangles[t];
+    if (front == region) std::swap(corners[1], corners[2]);
+    boundary.triangles.push_back(corners);
+  }
+  return boundary;
+}
+
+TriangleMesh outer_surface(const RegionSurface& surface) {
+  std::vector<Index> outer;
+  for (std::size_t t = 0; t < surface.sides.size(); ++t)
+    if (!surface.is_inner(t)) outer.push_back(static_cast<Index>(t));
+  return selected(surface.mesh, outer);
+}
+
+TriangleMesh inner_surface(const RegionSurface& surface, std::vector<Index>& triangles) {
+  triangles.clear();
+  for (std::size_t t = 0; t < surface.sides.size(); ++t)
+    if (surface.is_inner(t)) triangles.push_back(static_cast<Index>(t));
+  return selected(surface.mesh, triangles);
+}
+
+std::vector<std::array<int, 2>> region_pairs(const RegionSurface& surface) {
+  std::vector<std::array<int, 2>> pairs;
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) pairs.push_back(surface.pair(t));
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  return pairs;
+}
+
+std::vector<std::array<Index, 2>> curve_edges(const RegionSurface& surface) {
+  std::vector<std::array<Index, 2>> edges;
+  const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(surface.mesh.triangles, surface.mesh.positions.size());
+  for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
+    const auto pair = surface.pair(edge[0].triangle);
+    if (edge.size() != 2 || surface.pair(edge[1].triangle) != pair) edges.push_back({edge[0].low, edge[0].high});
+  });
+  return edges;
+}
+
+}  // namespace subvol

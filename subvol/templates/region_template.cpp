@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/region_template.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/parallel_errors.h"
+#include "subvol/surface/solid_topology.h"
+#include "subvol/templates/auto_template.h"
+#include "subvol/templates/plane_grid.h"
+#include "subvol/templates/search_stop.h"
+#include "subvol/templates/solid_fraction.h"
+#include "subvol/templates/template_frames.h"
+#include "subvol/templates/voxel_grid.h"
+#include "subvol/templates/voxel_labels.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace subvol {
+
+namespace {
+
+constexpr int kSpare = 2;          ///< layers of empty cells on each side of a grid
+constexpr double kNoPlanes = 0.03; ///< share of the area on planes below which these are no help
+constexpr double kAllPlanes = 0.999;  ///< share from which on the grid is taken to be exact, and needs no pillows
+
+double area_of(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    area += 0.5 * (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).norm();
+  return area;
+}
+
+/// A labelled grid.
+struct Candidate {
+  VoxelGrid grid;
+  std::vector<int> labels;
+  std::size_t wrong_sheets = 0;
+  double score = 0;     ///< share of the solid's volume in cells of wrong labels
+  double share = 0;     ///< number of cells, as a multiple of the requested one
+  double aligned = 0;
+};
+
+bool is_better(const Candidate& a, const Candidate& b) {
+  return a.wrong_sheets != b.wrong_sheets ? a.wrong_sheets < b.wrong_sheets : a.score < b.score;
+}
+
+class RegionSearch {
+ public:
+  RegionSearch(const RegionSurface& surface, const RegionTemplateOptions& options)
+      : surface_(surface),
+        options_(options),
+        wanted_(topology_of(surface)),
+        stop_([this] { return !options_.progress || options_.progress(fraction_); }) {
+    for (const Group& region : surface.regions) {
+      boundaries_.push_back(boundary_of_region(surface, region.number));
+      areas_.push_back(area_of(boundaries_.back()));
+      area_ += areas_.back();
+    }
+    for (const double volume : surface.volumes) volume_ += volume;
+    voids_ = solid_boundary(outer_surface(surface)).topology.cavities + 1;
+    misses_.assign(surface.regions.size(), 0);
+  }
+
+  RegionTemplateResult run();
+
+ private:
+  std::optional<Candidate> best_through(const AxisPlanes& planes, double cells, double most_cells);
+  std::optional<Candidate> best_of_cubes(double cells, double most_cells);
+  std::optional<Candidate> labelled(VoxelGrid grid, double cells, bool is_exact);
+  VoxelGrid cubes(const Mat3& frame, double size, double offset) const;
+  double size_for(double cells, bool counts_pillow) const;
+  double count_of(const VoxelLabels& labels, bool counts_pillow) const;
+  RegionTemplate finished(const Candidate& candidate, std::size_t cells) const;
+
+  const RegionSurface& surface_;
+  const RegionTemplateOptions& options_;
+  RegionTopology wanted_;
+  int voids_ = 1;
+  std::vector<TriangleMesh> boundaries_;
+  std::vector<double> areas_;     ///< of the boundaries of regions
+  double area_ = 0, volume_ = 0;  ///< sums
+  std::vector<std::size_t> misses_;  ///< by region
+  double fraction_ = 0;
+  SearchStop stop_;
+};
+
+/// Returns the edge length for which volume / size^3 cells, and a layer of cells on the sheets' sides, are as many as
+/// requested.
+double RegionSearch::size_for(double cells, bool counts_pillow) const {
+  constexpr double kStairs = 1.4;  // area of a staircase, as a multiple of the smooth surface's
+  double low = std::cbrt(volume_ / cells), high = 8 * low;
+  if (!counts_pillow) return low;
+  for (int i = 0; i < 40; ++i) {
+    const double size = std::sqrt(low * high);
+    (volume_ / std::pow(size, 3) + kStairs * area_ / (size * size) > cells ? low : high) = size;
+  }
+  return high;
+}
+
+double RegionSearch::count_of(const VoxelLabels& labels, bool counts_pillow) const {
+  std::size_t count = 0;
+  for (std::size_t c = 0; c < labels.num_cells(); ++c) {
+    const int label = labels.label(static_cast<Index>(c));
+    if (label == kOutside) continue;
+    ++count;
+    for (const Index offset : labels.face_offsets())
+      count += counts_pillow && labels.label(static_cast<Index>(c) + offset) != label;
+  }
+  return static_cast<double>(count);
+}
+
+VoxelGrid RegionSearch::cubes(const Mat3& frame, double size, double offset) const {
+  Eigen::AlignedBox3d box;
+  for (const auto& t : surface_.mesh.triangles)
+    for (const Index v : t) box.extend(Vec3(frame.transpose() * surface_.mesh.positions[v]));
+  const Eigen::Array3d counts = (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
+  VoxelGrid grid;
+  Vec3 low = box.center();
+  for (int a = 0; a < 3; ++a) {
+    grid.cells[static_cast<std::size_t>(a)] = static_cast<int>(counts[a]);
+    low[a] -= size * (counts[a] / 2.0 + offset);
+  }
+  grid.edges = size * frame;
+  grid.origin = frame * low;
+  return grid;
+}
+
+/// Labels a grid. Returns nothing if its regions cannot be made right.
+std::optional<Candidate> RegionSearch::labelled(VoxelGrid grid, double cells, bool is_exact) {
+  constexpr int kWeightRounds = 5;
+  constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
+  const auto num_regions = static_cast<int>(surface_.regions.size());
+  LabelFractions fractions(static_cast<std::size_t>(num_regions) + 1);
+  ParallelErrors errors;
+#pragma omp parallel for schedule(dynamic)
+  for (int r = 0; r < num_regions; ++r)
+    errors.guard([&] { fractions[r + 1] = solid_fractions(boundaries_[r], grid); });
+  errors.rethrow();
+  fractions[0].assign(grid.num_cells(), 1.0);
+  for (int r = 1; r <= num_regions; ++r)
+    for (std::size_t c = 0; c < grid.num_cells(); ++c) fractions[0][c] = std::max(0.0, fractions[0][c] - fractions[r][c]);
+  const std::vector<double> volumes = cell_volumes(grid);
+  const double unit = std::abs(grid.edges.determinant());
+  const double cell_length = std::cbrt(volume_ / cells);
+
+  std::vector<double> weights(fractions.size(), 1.0);
+  for (int round = 0; round < kWeightRounds; ++round) {
+    if (stop_.is_stopped()) return std::nullopt;
+    VoxelLabels labels(grid.cells, num_regions, is_exact ? VertexRule::manifold : VertexRule::pillowable);
+    std::vector<char> is_wrong(surface_.regions.size(), 0);
+    const bool assigned = assign_labels(labels, fractions, weights, wanted_, voids_, &stop_);
+    if (stop_.is_stopped()) return std::nullopt;
+    RegionTopology found;
+    if (assigned) {
+      evolve(labels, fractions, &stop_);
+      found = labels.topology();
+    }
+    bool all_right = assigned;
+    for (std::size_t r = 0; r < is_wrong.size(); ++r) {
+      std::vector<int> component;
+      is_wrong[r] = assigned ? found.regions[r] != wanted_.regions[r]
+                             : labels.components(static_cast<int>(r) + 1, component) != wanted_.regions[r].components;
+      all_right = all_right && !is_wrong[r];
+    }
+    bool same_pairs = assigned && found.sheets.size() == wanted_.sheets.size();
+    std::size_t wrong_sheets = 0;
+    for (const auto& [pair, sheet] : wanted_.sheets) {
+      const auto at = found.sheets.find(pair);
+      if (at == found.sheets.end()) {
+        same_pairs = false;
+        for (const int side : pair)
+          if (side != kOutside && assigned) is_wrong[static_cast<std::size_t>(side - 1)] = 1;
+      } else {
+        wrong_sheets += at->second != sheet;
+      }
+    }
+    // What separates two regions that must not touch is too thin.
+    for (const auto& [pair, sheet] : found.sheets)
+      if (!wanted_.sheets.contains(pair))
+        for (std::size_t r = 0; r < is_wrong.size(); ++r) {
+          const auto touches = [&](int other) {
+            const auto [low, high] = std::minmax(static_cast<int>(r) + 1, other);
+            return wanted_.sheets.contains({low, high});
+          };
+          if (touches(pair[0]) && touches(pair[1])) is_wrong[r] = 1;
+        }
+    if (all_right && same_pairs) {
+      Candidate candidate{std::move(grid), {labels.labels().begin(), labels.labels().end()}, wrong_sheets, 0, 0, 0};
+      for (std::size_t c = 0; c < labels.num_cells(); ++c)
+        candidate.score += (1 - fractions[labels.label(static_cast<Index>(c))][c]) * unit *
+                           (volumes.empty() ? 1 : volumes[c]) / volume_;
+      candidate.share = count_of(labels, options_.for_pillow && !is_exact) / cells;
+      return candidate;
+    }
+    bool raised = false;
+    for (std::size_t r = 0; r < is_wrong.size(); ++r) {
+      misses_[r] += is_wrong[r] != 0;
+      if (!is_wrong[r] || 2 * surface_.volumes[r] / areas_[r] > kThin * cell_length) continue;
+      weights[r + 1] *= kRaise;
+      raised = true;
+    }
+    if (!raised) break;
+  }
+  return std::nullopt;
+}
+
+std::optional<Candidate> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
+  constexpr int kGrids = 5;
+  constexpr double kLeast = 0.6, kMost = 1.25, kFiner = 0.85, kCoarser = 1.25, kBelieved = 8;
+  std::optional<Candidate> best;
+  double size = size_for(cells, options_.for_pillow), finer = 0, coarser = 0;
+  const auto step = [&](bool too_fine, double factor) {
+    (too_fine ? finer : coarser) = size;
+    size = finer > 0 && coarser > 0 ? std::sqrt(finer * coarser) : factor * size;
+  };
+  for (int attempt = 0; attempt < kGrids && !stop_.is_stopped(); ++attempt) {
+    auto lines = lines_through_planes(surface_.mesh, planes, size, kSpare, most_cells);
+    if (lines[0].empty()) {
+      step(true, kCoarser);
+      continue;
+    }
+    const double aligned = share_on_lines(planes, lines);
+    if (aligned < kNoPlanes) break;
+    for (std::vector<double>& at : lines)
+      for (int layer = 0; layer < kSpare; ++layer) {
+        at.insert(at.begin(), at.front() - size);
+        at.push_back(at.back() + size);
+      }
+    std::optional<Candidate> found = labelled(grid_through(planes.frame, std::move(lines)), cells, aligned > kAllPlanes);
+    if (!found) {
+      step(false, kFiner);
+      continue;
+    }
+    found->aligned = aligned;
+    const double share = found->share;
+    const bool is_near = share >= kLeast && share <= kMost;
+    if (!best || is_better(*found, *best) || (is_near && !(best->share <= kMost))) best = std::move(found);
+    if (is_near && best->wrong_sheets == 0) break;
+    step(share > 1, std::cbrt(std::clamp(share, 1 / kBelieved, kBelieved)));
+  }
+  return best;
+}
+
+std::optional<Candidate> RegionSearch::best_of_cubes(double cells, double most_cells) {
+  constexpr double kMost = 1.25;
+  constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
+  constexpr std::array<double, 2> kOffsets{0, 0.5};
+  const std::vector<Mat3> frames = template_frames(surface_.mesh);
+  double size = size_for(cells, options_.for_pillow);
+  std::optional<Candidate> best;
+  for (const double factor : kSizes)
+    for (const Mat3& frame : frames)
+      for (const double offset : kOffsets) {
+        if (stop_.is_stopped()) return std::nullopt;
+        VoxelGrid grid = cubes(frame, factor * size, offset);
+        if (static_cast<double>(grid.num_cells()) > most_cells) continue;
+        std::optional<Candidate> found = labelled(std::move(grid), cells, false);
+        if (!found) continue;
+        if (found->share > kMost || found->share < 1 / kMost) {  // the estimate was wrong: for all grids alike
+          const double corrected = size * std::cbrt(found->share);
+          found = labelled(cubes(frame, factor * corrected, offset), cells, false);
+          if (found) size = corrected;
+        }
+        if (found && (!best || is_better(*found, *best))) best = std::move(found);
+        if (best && best->wrong_sheets == 0 && factor != kSizes.front()) return best;
+      }
+  return best;
+}
+
+RegionTemplate RegionSearch::finished(const Candidate& candidate, std::size_t cells) const {
+  RegionTemplate result;
+  std::vector<char> kept;
+  for (const int label : candidate.labels) kept.push_back(label != kOutside);
+  result.mesh = voxel_mesh(candidate.grid, kept);
+  for (const int label : candidate.labels)
+    if (label != kOutside) result.mesh.references.push_back(surface_.regions[static_cast<std::size_t>(label - 1)].number);
+  result.mesh.regions = surface_.regions;
+  std::erase_if(result.mesh.regions, [](const Group& region) { return region.name.empty(); });
+  result.cells_asked = cells;
+  result.through_planes = candidate.aligned > 0;
+  result.aligned_share = candidate.aligned;
+  result.wrong_sheets = candidate.wrong_sheets;
+  return result;
+}
+
+RegionTemplateResult RegionSearch::run() {
+  constexpr std::array<double, 8> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9};
+  constexpr double kRoom = 64, kLeastRoom = 1e6;  // cells of a grid, empty ones counted, for each one requested
+  const AxisPlanes planes = axis_planes(surface_.mesh, frame_along_planes(surface_.mesh));
+  RegionTemplateResult result;
+  std::optional<Candidate> best;
+  std::size_t asked = 0;
+  for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
+    fraction_ = rung == 0 ? 0 : static_cast<double>(rung) / kLadder.size();
+    if (options_.progress && !options_.progress(fraction_)) result.cancelled = true;
+    if (result.cancelled) return result;
+    const double cells = kLadder[rung] * static_cast<double>(options_.cells);
+    const double most_cells = kLeastRoom + kRoom * cells;
+    std::optional<Candidate> found = best_through(planes, cells, most_cells);
+    if (!found && !stop_.is_stopped()) found = best_of_cubes(cells, most_cells);
+    if (stop_.is_stopped()) {
+      result.cancelled = true;
+      return result;
+    }
+    if (found && (!best || is_better(*found, *best))) {
+      best = std::move(found);
+      asked = static_cast<std::size_t>(std::lround(cells));
+    }
+    constexpr std::size_t kTriesForSheets = 4;  // rungs; then an interface may have holes or bridges
+    if (best && (best->wrong_sheets == 0 || rung + 1 >= kTriesForSheets)) {
+      result.made = finished(*best, asked);
+      return result;
+    }
+  }
+  const std::size_t most = *std::max_element(misses_.begin(), misses_.end());
+  for (std::size_t r = 0; r < misses_.size(); ++r)
+    if (misses_[r] > 0 && 2 * misses_[r] >= most) result.missed.push_back(static_cast<Index>(r));
+  return result;
+}
+
+}  // namespace
+
+RegionTemplateResult region_template(const RegionSurface& surface, const RegionTemplateOptions& options) {
+  if (options.cells < kLeastTemplateCells || options.cells > kMostTemplateCells)
+    throw InputError("the number of cells must be in [" + std::to_string(kLeastTemplateCells) + ", " +
+                     std::to_string(kMostTemplateCells) + "], got " + std::to_string(options.cells));
+  return RegionSearch(surface, options).run();
+}
+
+}  // namespace subvol

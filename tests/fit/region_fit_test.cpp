@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/region_quality.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/templates/label_surface.h"
+#include "tests/support/region_fixtures.h"
+
+#include <catch2/catch.hpp>
+
+using namespace subvol;
+using test::ball_surface;
+using test::box_surface;
+using test::together;
+
+namespace {
+
+/// Fits regions and checks what must be true of every result.
+AutomaticFitResult fitted(const RegionSurface& surface, const AutomaticFitOptions& options, double least_jacobian,
+                          double volume_percent) {
+  AutomaticFitResult result = fit_regions(surface, options);
+  const TriangleMesh outer = outer_surface(surface);
+  const MeshCheck check = check_mesh(result.mesh, &outer);
+  CHECK(check.valid());
+  REQUIRE(check.regions);
+  const AutomaticFitTrial& best = result.trials[result.chosen];
+  UNSCOPED_INFO(result.report.explanation);
+  CHECK(best.least_scaled_jacobian >= least_jacobian);
+  CHECK(best.volume_percent <= volume_percent);
+  CHECK(best.self_intersections == std::size_t{0});
+  const RegionReport wanted = measure_regions(surface), found = *check.regions;
+  REQUIRE(found.regions.size() == wanted.regions.size());
+  for (std::size_t r = 0; r < found.regions.size(); ++r)
+    CHECK(std::abs(found.regions[r].volume / wanted.regions[r].volume - 1) <= volume_percent / 100);
+  REQUIRE(found.interfaces.size() == wanted.interfaces.size());
+  for (std::size_t i = 0; i < found.interfaces.size(); ++i) {
+    CHECK(found.interfaces[i].references == wanted.interfaces[i].references);
+    CHECK(found.interfaces[i].area == Approx(wanted.interfaces[i].area).epsilon(0.01));
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("Slabs and a box in a box are filled exactly, with their interfaces in groups", "[regions]") {
+  for (const TriangleMesh& target :
+       {test::slabs_surface(5), together(box_surface({0, 0, 0}, {1, 1, 1}), box_surface({0.25, 0.25, 0.25}, {0.75, 0.75, 0.75}))}) {
+    const auto surface = find_regions(target);
+    REQUIRE(surface);
+    AutomaticFitOptions options;
+    options.cells = 600;
+    const AutomaticFitResult result = fitted(*surface, options, 0.999, 1e-6);
+    CHECK(result.trials[result.chosen].max_percent < 1e-6);
+    CHECK(result.trials[result.chosen].within_share == Approx(1));
+    CHECK(result.mesh.face_groups.groups.size() == surface->regions.size() - 1);
+    CHECK(result.mesh.face_groups.groups[0].name == "region 1|region 2");
+  }
+}
+
+TEST_CASE("A ball in a box keeps the box's edges, and both volumes", "[regions][slow]") {
+  const auto surface = find_regions(together(box_surface({-1, -1, -1}, {1, 1, 1}), ball_surface({0, 0, 0}, 0.6, 24)));
+  REQUIRE(surface);
+  AutomaticFitOptions options;
+  options.cells = 6000;
+  const AutomaticFitResult result = fitted(*surface, options, 0.5, 0.1);
+  CHECK(result.trials[result.chosen].followed_curves == 12);
+}
+
+TEST_CASE("A layered cylinder keeps its layers", "[regions][slow]") {
+  const auto surface = find_regions(test::layered_cylinder({0.5, 1}, 2, 96));
+  REQUIRE(surface);
+  AutomaticFitOptions options;
+  options.cells = 8000;
+  fitted(*surface, options, 0.35, 0.1);
+}
+
+TEST_CASE("Nested balls with a thin skin keep their volumes", "[regions][slow]") {
+  const auto surface =
+      find_regions(together(together(ball_surface({0, 0, 0}, 1, 40), ball_surface({0, 0, 0}, 0.9, 40)),
+                            ball_surface({0.1, 0, 0}, 0.5, 24)));
+  REQUIRE(surface);
+  AutomaticFitOptions options;
+  options.cells = 30000;
+  fitted(*surface, options, 0.4, 0.1);
+}
+
+TEST_CASE("A segmented phantom is filled with all of its regions, half a voxel or less from the truth", "[regions][slow]") {
+  const test::Phantom phantom{64};
+  const LabelGrid grid = phantom.grid();
+  std::vector<double> voxels(5, 0.0);
+  for (const int label : grid.labels) voxels[static_cast<std::size_t>(label)] += 1;
+  const RegionSurface surface = surface_of_labels(grid);
+  AutomaticFitOptions options;
+  options.cells = 20000;
+  const AutomaticFitResult result = fitted(surface, options, 0.3, 0.1);
+  const std::vector<double> volumes = region_volumes(result.mesh);
+  REQUIRE(volumes.size() == 4);
+  for (std::size_t r = 0; r < 4; ++r) CHECK(volumes[r] == Approx(voxels[r + 1]).epsilon(0.005));
+  const MeshTopology topology(result.mesh);
+  std::array<double, 4> sum{}, count{};
+  const auto add = [&](std::span<const Index> face, int shape) {
+    for (const Index v : face) {
+      sum[static_cast<std::size_t>(shape)] += phantom.distance(result.mesh.positions[v], shape);
+      count[static_cast<std::size_t>(shape)] += 1;
+    }
+  };
+  for (const Index f : topology.boundary_faces()) add(topology.face(f), 0);
+  const Interfaces interfaces = find_interfaces(result.mesh, topology);
+  for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
+    add(topology.face(interfaces.faces[i]), interfaces.pairs[interfaces.pair_of_face[i]][1] - 1);
+  for (std::size_t s = 0; s < 4; ++s) CHECK(sum[s] / count[s] < 0.5);
+}

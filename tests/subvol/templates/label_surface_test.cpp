@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/label_surface.h"
+
+#include "subvol/base/error.h"
+#include "subvol/surface/solid_topology.h"
+#include "tests/support/region_fixtures.h"
+
+#include <catch2/catch.hpp>
+
+using namespace subvol;
+
+TEST_CASE("The sheets of a phantom are smooth, near the truth, and keep the volumes of all regions", "[regions]") {
+  const test::Phantom phantom{32};
+  LabelGrid grid = phantom.grid();
+  std::vector<double> voxels(5, 0.0);
+  for (const int label : grid.labels) voxels[static_cast<std::size_t>(label)] += 1;
+  grid.labels[0] = 3;  // a speck
+  const RegionSurface surface = surface_of_labels(grid);
+  REQUIRE(surface.regions.size() == 4);
+  CHECK(surface.notes.size() == 1);
+  for (int r = 0; r < 4; ++r) {
+    CHECK(surface.regions[static_cast<std::size_t>(r)].number == r + 1);
+    CHECK(surface.volumes[static_cast<std::size_t>(r)] == Approx(voxels[static_cast<std::size_t>(r + 1)]).epsilon(2e-3));
+    const SolidBoundary solid = solid_boundary(boundary_of_region(surface, r + 1));
+    CHECK(solid.flipped_triangles == 0);
+    CHECK(solid.topology == BettiNumbers{1, 0, r == 0 ? 1 : r == 1 ? 2 : 0});
+  }
+  CHECK(region_pairs(surface) == std::vector<std::array<int, 2>>{{0, 1}, {1, 2}, {2, 3}, {2, 4}});
+  std::array<double, 4> sum{}, count{};
+  for (std::size_t t = 0; t < surface.sides.size(); ++t) {
+    const auto pair = surface.pair(t);
+    const int shape = pair[0] == 0 ? 0 : pair[1] - 1;
+    for (const Index v : surface.mesh.triangles[t]) {
+      sum[static_cast<std::size_t>(shape)] += phantom.distance(surface.mesh.positions[v], shape);
+      count[static_cast<std::size_t>(shape)] += 1;
+    }
+  }
+  for (std::size_t s = 0; s < 4; ++s) CHECK(sum[s] / count[s] < 0.2);
+}
+
+TEST_CASE("Voxels of any shape and hand keep their place, and flat sheets stay where they are", "[regions]") {
+  LabelGrid grid;
+  grid.counts = {4, 6, 5};
+  grid.edges = Vec3(2, 0.5, -1).asDiagonal();
+  grid.origin = {10, 20, 30};
+  for (int k = 0; k < 5; ++k)
+    for (int j = 0; j < 6; ++j)
+      for (int i = 0; i < 4; ++i) grid.labels.push_back(j < 3 ? 7 : 2);
+  const RegionSurface surface = surface_of_labels(grid, {0, 1});
+  REQUIRE(surface.regions.size() == 2);
+  CHECK(surface.regions[0].number == 2);
+  CHECK(surface.volumes[0] == Approx(60));
+  CHECK(surface.volumes[1] == Approx(60));
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : surface.mesh.positions) box.extend(p);
+  CHECK((box.min() - Vec3(9, 19.75, 25.5)).norm() < 1e-12);
+  CHECK((box.max() - Vec3(17, 22.75, 30.5)).norm() < 1e-12);
+}
+
+TEST_CASE("Regions that touch along an edge alone are mended, and empty segmentations refused", "[regions]") {
+  LabelGrid grid;
+  grid.counts = {8, 8, 8};
+  for (int k = 0; k < 8; ++k)
+    for (int j = 0; j < 8; ++j)
+      for (int i = 0; i < 8; ++i) grid.labels.push_back((i < 4) == (j < 4) ? 1 : 0);
+  const RegionSurface surface = surface_of_labels(grid);
+  REQUIRE(surface.regions.size() == 1);
+  CHECK(surface.volumes[0] == Approx(256).epsilon(0.1));
+  CHECK_NOTHROW(solid_boundary(boundary_of_region(surface, 1)));
+  std::fill(grid.labels.begin(), grid.labels.end(), 0);
+  CHECK_THROWS_AS(surface_of_labels(grid), InputError);
+  grid.labels[100] = 5;
+  CHECK_THROWS_WITH(surface_of_labels(grid), Catch::Contains("label 5 has only specks"));
+}
