@@ -178,7 +178,9 @@ StartComparison FitTarget::compare_start(const TriangleMesh& boundary) {
   if (surface.volume_source() == VolumeSource::isoperimetric)
     if (const double volume = signed_volume(boundary.positions, boundary.triangles); volume > 0)
       surface.set_volume(volume);
-  StartComparison result{start.mean(), start.max(), describe_target(surface, boundary)};
+  std::optional<TargetSurface> outer;  // interfaces are no part of what the boundary is compared with
+  if (!region_triangle.empty()) outer.emplace(mesh);
+  StartComparison result{start.mean(), start.max(), describe_target(outer ? *outer : surface, boundary)};
   const double unit = std::pow(normalisation.diagonal, 2);
   result.target.area *= unit;
   result.target.volume *= unit * normalisation.diagonal;
