@@ -115,6 +115,7 @@ class HighOrderFit : StagedFit {
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
   TriangleMesh boundary(int intervals) const;
   TriangleMesh measured_boundary() const;
+  std::optional<SurfaceDistance> measured_interfaces() const;
   double keep_mean(double distance);
   double measured_mean();
   std::optional<std::size_t> intersecting_pairs() override;
@@ -301,7 +302,19 @@ double HighOrderFit::keep_mean(double distance) {
 }
 
 double HighOrderFit::measured_mean() {
-  return mean_ ? *mean_ : keep_mean(target_.mean_distance(measured_boundary()));
+  if (mean_) return *mean_;
+  double mean = target_.mean_distance(measured_boundary());
+  if (const auto inner = measured_interfaces()) mean = std::max(mean, inner->mean());
+  return keep_mean(mean);
+}
+
+/// Measures the interfaces if the target has them, too; those that keep their shape do not count.
+std::optional<SurfaceDistance> HighOrderFit::measured_interfaces() const {
+  if (target_.region_triangle.empty()) return std::nullopt;
+  const std::vector<Index> faces = find_interfaces(template_, mesh_.space.topology()).faces;
+  const BoundarySamples fine = make_face_samples(mesh_.space, faces, 2 * sample_intervals(order_) + 1);
+  return target_.interface_distance({fine.positions.apply(mesh_.coefficients), fine.triangles},
+                                    groups_of_triangles(fine.triangle_faces, group_of_face_));
 }
 
 bool HighOrderFit::meets_tolerance() {
@@ -467,10 +480,12 @@ bool HighOrderFit::finish() {
 std::optional<HighOrderFit::Outcome> HighOrderFit::measured_outcome() {
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance distance = target_.distance(measured_boundary());
-  const double mean = keep_mean(distance.mean());
+  const std::optional<SurfaceDistance> inner = measured_interfaces();
+  const double mean = keep_mean(inner ? std::max(distance.mean(), inner->mean()) : distance.mean());
+  const double largest = inner ? std::max(distance.max(), inner->max()) : distance.max();
   const std::optional<std::size_t> pairs = intersecting_pairs();
   if (!pairs) return {};
-  return Outcome{quality.min_scaled_jacobian, mean, 100 * distance.max(), *pairs};
+  return Outcome{quality.min_scaled_jacobian, mean, 100 * largest, *pairs};
 }
 
 /// Repeats the last stage to improve a few places that hardly count in the energies, since these are means.

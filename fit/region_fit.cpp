@@ -145,9 +145,8 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   VolumeMesh mesh = std::move(made.made->mesh);
   template_ = std::move(*made.made);
   target_.normalisation.take_in(mesh);
-  if (result_.report.stages.empty())  // the target without its interfaces, which are no part of what is described
-    result_.report.note_start(FitTarget(outer_surface(original_))
-                                  .compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
+  if (result_.report.stages.empty())
+    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
   return mesh;
 }
 

@@ -127,13 +127,20 @@ SurfaceDistance FitTarget::interface_distance(const VolumeMesh& fitted) const {
   const Interfaces found = find_interfaces(fitted, topology);
   std::vector<Index> face_of_triangle;
   const TriangleMesh now = fan_triangles(interface_surface(fitted, topology, found), &face_of_triangle);
+  std::vector<Index> groups;
+  for (const Index f : face_of_triangle) groups.push_back(1 + found.pair_of_face[f]);
+  return interface_distance(now, groups);
+}
+
+SurfaceDistance FitTarget::interface_distance(const TriangleMesh& fitted, std::span<const Index> groups) const {
+  const Index num_groups = groups.empty() ? 0 : *std::ranges::max_element(groups);
   SurfaceDistance largest;
-  for (std::size_t pair = 0; pair < found.pairs.size(); ++pair) {
-    TriangleMesh a{now.positions, {}}, b{interfaces.positions, {}};
-    for (std::size_t t = 0; t < now.triangles.size(); ++t)
-      if (found.pair_of_face[face_of_triangle[t]] == static_cast<Index>(pair)) a.triangles.push_back(now.triangles[t]);
+  for (Index group = 1; group <= num_groups; ++group) {
+    TriangleMesh a{fitted.positions, {}}, b{interfaces.positions, {}};
+    for (std::size_t t = 0; t < groups.size(); ++t)
+      if (groups[t] == group) a.triangles.push_back(fitted.triangles[t]);
     for (std::size_t t = 0; t < interfaces.triangles.size(); ++t)
-      if (group_of_interface_triangle[t] == 1 + static_cast<Index>(pair)) b.triangles.push_back(interfaces.triangles[t]);
+      if (group_of_interface_triangle[t] == group) b.triangles.push_back(interfaces.triangles[t]);
     if (a.triangles.empty() || b.triangles.empty()) continue;
     const SurfaceDistance distance = surface_distance(a, b);
     largest.mean_a_to_b = std::max(largest.mean_a_to_b, distance.mean_a_to_b);
@@ -178,7 +185,9 @@ StartComparison FitTarget::compare_start(const TriangleMesh& boundary) {
   if (surface.volume_source() == VolumeSource::isoperimetric)
     if (const double volume = signed_volume(boundary.positions, boundary.triangles); volume > 0)
       surface.set_volume(volume);
-  StartComparison result{start.mean(), start.max(), describe_target(surface, boundary)};
+  std::optional<TargetSurface> outer;  // interfaces are no part of what the boundary is compared with
+  if (!region_triangle.empty()) outer.emplace(mesh);
+  StartComparison result{start.mean(), start.max(), describe_target(outer ? *outer : surface, boundary)};
   const double unit = std::pow(normalisation.diagonal, 2);
   result.target.area *= unit;
   result.target.volume *= unit * normalisation.diagonal;

@@ -76,6 +76,8 @@ struct FitTarget {
   /// Returns the symmetric distances between the interfaces and those of a mesh with the same pairs of regions: the
   /// largest of all pairs.
   SurfaceDistance interface_distance(const VolumeMesh& fitted) const;
+  /// The same for triangles on the interfaces of a mesh, with groups as in `group_of_triangle`.
+  SurfaceDistance interface_distance(const TriangleMesh& fitted, std::span<const Index> groups) const;
 
   /// Measures the distance of a template's boundary to the target and describes the state of the target, with area and
   /// volume in the target's unit. If the target encloses nothing, the volume in the template is used as its volume.

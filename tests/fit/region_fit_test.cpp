@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/mesh_check.h"
+#include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/region_quality.h"
+#include "subvol/fit/target/region_matching.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/templates/label_surface.h"
@@ -110,4 +114,26 @@ TEST_CASE("A segmented phantom is filled with all of its regions, half a voxel o
   for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
     add(topology.face(interfaces.faces[i]), interfaces.pairs[interfaces.pair_of_face[i]][1] - 1);
   for (std::size_t s = 0; s < 4; ++s) CHECK(sum[s] / count[s] < 0.5);
+}
+
+TEST_CASE("Curved cells follow the interfaces of a target with regions, whatever the template's references are",
+          "[regions][slow]") {
+  const TriangleMesh target = together(box_surface({-1, -1, -1}, {1, 1, 1}), ball_surface({0, 0, 0}, 0.6, 24));
+  const auto surface = find_regions(target);
+  REQUIRE(surface);
+  AutomaticFitOptions options;
+  options.cells = 400;
+  VolumeMesh start = fit_regions(*surface, options).mesh;
+  for (int& reference : start.references) reference = 10 - reference;
+  const auto matched = regions_as_in(target, start);
+  REQUIRE(matched);
+  CHECK(matched->regions.front().number == 8);
+  CHECK(matched->volumes.front() == Approx(surface->volumes[1]));
+  const HighOrderFitResult fit = fit_high_order(target, start, {.order = 2, .basis = Basis::legendre});
+  CHECK(measure_quality(fit.mesh).certificate.not_certified.empty());
+  const Interfaces interfaces = find_interfaces(start, MeshTopology(start));
+  const BoundarySamples samples = make_face_samples(fit.mesh.space, interfaces.faces, 4);
+  for (const Vec3& p : samples.positions.apply(fit.mesh.coefficients)) CHECK(p.norm() == Approx(0.6).epsilon(0.03));
+  for (int& reference : start.references) reference = 8;
+  CHECK(!regions_as_in(target, start));
 }
