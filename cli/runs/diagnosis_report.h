@@ -17,8 +17,7 @@ struct FileSurface {
   std::vector<Index> face_of_triangle;  ///< the face of the file that each triangle is cut from, from 0
 };
 
-/// Reads a surface file. InputError: as `read_polygon_mesh`.
-FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
+FileSurface file_surface(const PolygonMesh& polygons);
 
 /// Names the triangles of a diagnosis by the faces of the file.
 void number_by_faces(SurfaceDiagnosis& diagnosis, const FileSurface& surface);
