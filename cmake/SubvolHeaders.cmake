@@ -10,6 +10,7 @@ set(entry_points
   subvol/base/types.h
   subvol/base/version.h
   subvol/io/color_groups.h
+  subvol/io/file_formats.h
   subvol/io/mesh_io.h
   subvol/io/nodal_mesh.h
   subvol/io/surface_io.h
@@ -72,6 +73,7 @@ set(entry_points
   export/raster.h
   export/read_back.h
   export/scene.h
+  export/surface_writer.h
   export/tessellate.h
   export/usd_writer.h
   export/volume_writer.h)

@@ -3,9 +3,11 @@
 
 #include "subvol/surface/triangle_mesh.h"
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace subvol {
 
@@ -14,6 +16,12 @@ struct BoundaryOrigin {
   std::span<const Index> vertices;  ///< of the volume mesh, one per vertex of the boundary
   std::span<const Index> cells;     ///< of the volume mesh, one per face
 };
+
+/// Returns the number of each face's group, 0 for none; a number below 1 of a group is replaced by the lowest free one.
+std::vector<std::int32_t> group_numbers_of_faces(const PolygonMesh& mesh);
+/// Appends the `<FieldData>` `group_numbers` and `group_names` of the groups, with the same numbers; nothing if there are
+/// none.
+void append_group_fields(std::string& text, const FaceGroups& groups);
 
 /// Returns the faces of a boundary as a VTK XML unstructured grid of triangles, quads and polygons (5, 9, 7).
 ///

@@ -223,23 +223,71 @@ void append_elements(std::string& text, const CellView& mesh, const Blocks& bloc
   text += "$EndElements\n";
 }
 
-/// Appends the values of all elements; a face has that of its cell. Readers such as meshio expect one for each element.
-void append_element_data(std::string& text, const CellView& mesh, const Blocks& blocks, const FaceBlocks& face_blocks,
-                         std::span<const double> cell_minima) {
-  text += "$ElementData\n1\n\"scaled_jacobian\"\n1\n0\n3\n0\n1\n";
-  append_line(text, {cell_minima.size() + (mesh.faces ? mesh.faces->num_faces() : 0)});
-  std::size_t number = 0;
-  const auto append = [&](double value) {
-    append_number(text, ++number);
+// --- Version 2.2 ----------------------------------------------------------------------------------------------------
+
+void append_old_nodes(std::string& text, const CellView& mesh) {
+  text += "$Nodes\n" + std::to_string(mesh.positions.size()) + "\n";
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    append_number(text, v + 1);
     text += ' ';
-    append_number(text, value);
+    append_vector(text, mesh.positions[v], " ");
     text += '\n';
+  }
+  text += "$EndNodes\n";
+}
+
+/// Appends the elements with their types, physical groups and volumes or surfaces. of_element receives the cell of each.
+void append_old_elements(std::string& text, const CellView& mesh, const Blocks& blocks,
+                         const std::map<Volume, int>& volumes, const std::map<int, int>& groups,
+                         const FaceBlocks& face_blocks, const std::map<Surface, int>& surfaces,
+                         std::vector<std::size_t>& of_element) {
+  std::string lines;
+  const auto append = [&](std::size_t cell, int type, int group, int entity, std::span<const Index> nodes) {
+    of_element.push_back(cell);
+    append_number(lines, of_element.size());
+    for (const int number : {type, 2, group, entity}) (lines += ' ') += std::to_string(number);
+    for (const Index v : nodes) {
+      lines += ' ';
+      append_number(lines, v + std::int64_t{1});
+    }
+    lines += '\n';
   };
   for (const auto& [key, cells] : blocks)
-    for (const std::size_t c : cells) append(cell_minima[c]);
+    for (const std::size_t c : cells)
+      append(c, gmsh_type(key.second, key.first.order), groups.at(key.first.reference), volumes.at(key.first),
+             mesh.cell(c));
+  const std::vector<int> numbers = mesh.faces ? physical_surfaces(mesh.faces->groups) : std::vector<int>{};
   for (const auto& [key, faces] : face_blocks)
-    for (const std::size_t f : faces) append(cell_minima[static_cast<std::size_t>(mesh.faces->cells[f])]);
+    for (const std::size_t f : faces)
+      for (const Index group : key.first.groups)
+        append(static_cast<std::size_t>(mesh.faces->cells[f]), gmsh_face_type(key.second, key.first.order),
+               numbers[static_cast<std::size_t>(group)], surfaces.at(key.first), mesh.faces->face(f));
+  text += "$Elements\n" + std::to_string(of_element.size()) + "\n" + lines + "$EndElements\n";
+}
+
+// --- Data -----------------------------------------------------------------------------------------------------------
+
+/// Appends the values of all elements; a face has that of its cell. Readers such as meshio expect one for each element.
+void append_element_data(std::string& text, std::span<const std::size_t> of_element,
+                         std::span<const double> cell_minima) {
+  text += "$ElementData\n1\n\"scaled_jacobian\"\n1\n0\n3\n0\n1\n";
+  append_line(text, {of_element.size()});
+  for (std::size_t e = 0; e < of_element.size(); ++e) {
+    append_number(text, e + 1);
+    text += ' ';
+    append_number(text, cell_minima[of_element[e]]);
+    text += '\n';
+  }
   text += "$EndElementData\n";
+}
+
+/// The cell of each element of version 4.1.
+std::vector<std::size_t> cells_of_elements(const CellView& mesh, const Blocks& blocks, const FaceBlocks& face_blocks) {
+  std::vector<std::size_t> of_element;
+  for (const auto& [key, cells] : blocks) of_element.insert(of_element.end(), cells.begin(), cells.end());
+  for (const auto& [key, faces] : face_blocks)
+    for (const std::size_t f : faces) of_element.push_back(static_cast<std::size_t>(mesh.faces->cells[f]));
+  return of_element;
 }
 
 void append_node_data(std::string& text, const VertexField& field) {
@@ -329,18 +377,26 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
 }
 
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
-                         std::span<const VertexField> fields) {
+                         std::span<const VertexField> fields, MshVersion version) {
   const Blocks blocks = blocks_of(mesh);
   const std::map<Volume, int> volumes = volume_numbers(blocks);
   const FaceBlocks face_blocks = face_blocks_of(mesh);
   const std::map<Surface, int> surfaces = surface_numbers(face_blocks);
-  std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
+  const bool is_old = version == MshVersion::v2_2;
+  std::string text = is_old ? "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n" : "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
   const std::map<int, int> groups = physical_groups(blocks);
   append_physical_names(text, mesh, groups);
-  append_entities(text, mesh, surfaces, volumes, groups);
-  append_nodes(text, mesh);
-  append_elements(text, mesh, blocks, volumes, face_blocks, surfaces);
-  if (!cell_minima.empty()) append_element_data(text, mesh, blocks, face_blocks, cell_minima);
+  std::vector<std::size_t> of_element;
+  if (is_old) {
+    append_old_nodes(text, mesh);
+    append_old_elements(text, mesh, blocks, volumes, groups, face_blocks, surfaces, of_element);
+  } else {
+    append_entities(text, mesh, surfaces, volumes, groups);
+    append_nodes(text, mesh);
+    append_elements(text, mesh, blocks, volumes, face_blocks, surfaces);
+    of_element = cells_of_elements(mesh, blocks, face_blocks);
+  }
+  if (!cell_minima.empty()) append_element_data(text, of_element, cell_minima);
   for (const VertexField& field : fields) append_node_data(text, field);
   return text;
 }

@@ -49,7 +49,7 @@ std::uint8_t vtk_linear_type(CellKind kind);
 void turn_wedge(std::int64_t* corners);
 /// Text of a .msh. Orders: 1 .. max_gmsh_order (asserted). Grouped faces are elements of surfaces, behind the cells.
 std::string msh_document(const CellView& mesh, std::span<const double> cell_minima,
-                         std::span<const VertexField> fields);
+                         std::span<const VertexField> fields, MshVersion version = MshVersion::v4_1);
 
 /// Throws InputError unless there is one finite number per cell, or none at all.
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells);

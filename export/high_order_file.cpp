@@ -92,13 +92,13 @@ std::string field_data(const HighOrderMesh& mesh, double cells_distance) {
   return text;
 }
 
-/// Text of a .inp, .bdf or .mfem.
+/// Bytes of a .inp, .bdf, .mfem, .e, .exo or .xdmf.
 std::string nodal_text_of(const HighOrderMesh& mesh, const std::string& extension,
                           const HighOrderFileOptions& options) {
   require_writable(mesh, options);
   if (extension != ".mfem" && mesh.space.max_order() > 2)
     throw InputError("cells of order " + std::to_string(mesh.space.max_order()) +
-                     ", but elements of these formats have order 2 at most (C3D20); fit with --order 2, or write a .msh, "
+                     ", but elements of this format have order 2 at most (C3D20, HEX27); fit with --order 2, or write a .msh, "
                      ".mfem or .vtu");
   return nodal_text(extension, written_nodes(mesh, extension, options));
 }
@@ -264,8 +264,10 @@ PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension
     return polynomial_map(
         mesh, {max_gmsh_order(CellKind::tet), max_gmsh_order(CellKind::prism), max_gmsh_order(CellKind::hex)}, wanted);
   if (extension == ".mfem") return polynomial_map(mesh, {}, wanted);
-  if (is_nodal_output(extension)) return edge_cells(polynomial_map(mesh, {2, 2, 2}, wanted));
-  throw InputError("file_cells: expected the extension .vtu, .msh, .inp, .bdf or .mfem, found " + extension);
+  if (extension == ".inp" || extension == ".bdf") return edge_cells(polynomial_map(mesh, {2, 2, 2}, wanted));
+  if (is_nodal_output(extension)) return polynomial_map(mesh, {2, 2, 2}, wanted);
+  throw InputError("file_cells: expected the extension .vtu, .msh, .inp, .bdf, .mfem, .e, .exo or .xdmf, found " +
+                   extension);
 }
 
 NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension, const HighOrderFileOptions& options) {
@@ -300,7 +302,7 @@ std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
   view.faces = &faces;
   view.regions = options.regions;
   return msh_document(view, minima_of(written, options),
-                      fields_at_points(mesh, orders, NodeOrdering::gmsh, options.fields));
+                      fields_at_points(mesh, orders, NodeOrdering::gmsh, options.fields), options.msh_version);
 }
 
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options) {
@@ -310,7 +312,7 @@ void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh, 
     return write_volume_mesh(path, small_cells(mesh, options));
   }
   if (extension != ".vtu" && extension != ".msh" && !is_nodal_output(extension))
-    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .mesh or .vtk");
+    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .e, .exo, .xdmf, .mesh or .vtk");
   try {
     if (is_nodal_output(extension)) return write_file_atomically(path, nodal_text_of(mesh, extension, options));
     write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, options) : msh_text(mesh, options));

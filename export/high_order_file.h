@@ -24,6 +24,7 @@ struct HighOrderFileOptions {
   std::span<const int> references{};      ///< one per cell, or empty: all 0
   const VolumeFaceGroups* face_groups = nullptr;  ///< named faces of the cells; may be null
   std::span<const Group> regions{};       ///< names of references
+  MshVersion msh_version = MshVersion::v4_1;  ///< of a .msh
   /// Fields with one number per vertex of the mesh: point data of .vtu and .msh, interpolated linearly (order 1 of the
   /// cell's kind).
   std::span<const VertexField> fields{};
@@ -44,11 +45,12 @@ inline constexpr int kMaxVtkOrder = 12;
 /// those of `polynomial_map` with the lowest orders that keep to the tolerance, or the format's largest orders if none
 /// do.
 /// extension  ".vtu" (orders up to 12), ".msh" (up to 10 for tets, 2 for prisms, 9 for hexes), ".mfem" (up to 16), or
-///            ".inp" and ".bdf" (up to 2, without the modes of faces and hexes: `edge_cells`); else InputError.
+///            ".e", ".exo" and ".xdmf" (up to 2), or ".inp" and ".bdf" (up to 2, without the modes of faces and hexes:
+///            `edge_cells`); else InputError.
 PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension,
                          double map_tolerance_percent = kMapTolerancePercent);
 
-/// Returns what a .inp, .bdf or .mfem holds of a mesh: the cells of `file_cells` at the nodes of the format, with
+/// Returns what a .inp, .bdf, .mfem, .e, .exo or .xdmf holds of a mesh: the cells of `file_cells` at the nodes of the format, with
 /// references and groups.
 NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension,
                         const HighOrderFileOptions& options = {});
@@ -70,15 +72,15 @@ NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension,
 /// InputError: no cells, coefficients or minima that are not finite, arrays of wrong length.
 std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// Returns the cells of `file_cells` as Gmsh 4.1 ASCII, each with its largest order and its nodes in Gmsh's order;
+/// Returns the cells of `file_cells` as Gmsh ASCII, each with its largest order and its nodes in Gmsh's order;
 /// there is one volume per reference and order, otherwise the text is as for linear cells.
 ///
 /// InputError: as above, and for meshes of orders beyond what Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// Writes .vtu or .msh as above, .inp, .bdf or .mfem as the cells of `file_cells` (subvol/io/nodal_writers.h), or .mesh
+/// Writes .vtu or .msh as above, .inp, .bdf, .mfem, .e, .exo or .xdmf as the cells of `file_cells` (subvol/io/nodal_writers.h), or .mesh
 /// or .vtk as `linear_cells` (whose references are those of the curved cells); the whole file or nothing.
-/// InputError: another extension, orders above 2 in .inp and .bdf, and as above. IoError: the file cannot be written.
+/// InputError: another extension, orders above 2 in these but .mfem, and as above. IoError: the file cannot be written.
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh,
                   const HighOrderFileOptions& options = {});
 

@@ -66,17 +66,22 @@ double largest_edge_mode() {
   return std::abs(values[2]);
 }
 
+bool is_exodus(const std::string& extension) { return extension == ".e" || extension == ".exo"; }
+
 }  // namespace
 
 bool is_nodal_output(const std::string& extension) {
-  return extension == ".inp" || extension == ".bdf" || extension == ".mfem";
+  return extension == ".inp" || extension == ".bdf" || extension == ".mfem" || is_exodus(extension) ||
+         extension == ".xdmf";
 }
 
 std::string nodal_text(const std::string& extension, const NodalMesh& mesh) {
   if (extension == ".inp") return inp_text(mesh);
   if (extension == ".bdf") return nastran_text(mesh);
   if (extension == ".mfem") return mfem_text(mesh);
-  throw InputError("nodal_text: expected the extension .inp, .bdf or .mfem, found " + extension);
+  if (extension == ".xdmf") return xdmf_text(mesh);
+  if (is_exodus(extension)) return exodus_bytes(mesh);
+  throw InputError("nodal_text: expected the extension .inp, .bdf, .mfem, .e, .exo or .xdmf, found " + extension);
 }
 
 PolynomialMap edge_cells(PolynomialMap map) {

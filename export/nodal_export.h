@@ -10,10 +10,10 @@
 
 namespace subvol {
 
-/// True for the extensions whose files are made from a NodalMesh: .inp, .bdf and .mfem.
+/// True for the extensions whose files are made from a NodalMesh: .inp, .bdf, .mfem, .e, .exo and .xdmf.
 bool is_nodal_output(const std::string& extension);
 
-/// Returns the text of a .inp, .bdf or .mfem. InputError: another extension, and as the writers of these formats.
+/// Returns the bytes of such a file. InputError: another extension, and as the writers of these formats.
 std::string nodal_text(const std::string& extension, const NodalMesh& mesh);
 
 /// Drops the modes of faces and cells of a mesh of order 1 or 2: what remains are cells with nodes at corners and in
@@ -23,7 +23,7 @@ std::string nodal_text(const std::string& extension, const NodalMesh& mesh);
 ///          itself, of the lengths of the dropped coefficients times the largest values of their modes.
 PolynomialMap edge_cells(PolynomialMap map);
 
-/// Samples polynomial cells at the nodes of a format: at equal distances in order 1 or 2 (.inp, .bdf), at Gauss-Lobatto
+/// Samples polynomial cells at the nodes of a format: at equal distances in order 1 or 2, at Gauss-Lobatto
 /// points in the mesh's largest order (.mfem). Vertices come first, with their numbers.
 NodalMesh nodal_cells(const HighOrderMesh& mesh, const std::string& extension);
 

@@ -7,6 +7,7 @@
 #include "subvol/export/grouped_faces.h"
 #include "subvol/export/lagrange_mesh.h"
 #include "subvol/export/nodal_export.h"
+#include "subvol/export/surface_writer.h"
 #include "subvol/export/text_format.h"
 #include "subvol/export/vtu_reader.h"
 #include "subvol/io/mesh_io.h"
@@ -163,6 +164,13 @@ void skip_to(TextScanner& scan, std::string_view section) {
   while (scan.word(std::string(section).c_str()) != section) continue;
 }
 
+/// The order of cells in a .msh.
+std::vector<std::size_t> msh_order(const CellView& mesh) {
+  return sorted_cells(mesh.num_cells(), [&](std::size_t c) {
+    return std::tuple(reference(mesh.references, c), mesh.order(c), mesh.kinds[c]);
+  });
+}
+
 void compare_msh(const WrittenFile& file, const CellView& wanted) {
   const std::string bytes = read_file(file.path());
   TextScanner scan(file.path().string(), bytes, TextScanner::Comments::none);
@@ -184,9 +192,7 @@ void compare_msh(const WrittenFile& file, const CellView& wanted) {
   const std::size_t num_faces = wanted.faces ? wanted.faces->num_faces() : 0;
   file.same_count("elements", whole("the number of elements"), num_cells + num_faces);
   skip(2);
-  const std::vector<std::size_t> order = sorted_cells(num_cells, [&](std::size_t c) {
-    return std::tuple(reference(wanted.references, c), wanted.order(c), wanted.kinds[c]);
-  });
+  const std::vector<std::size_t> order = msh_order(wanted);
   std::size_t element = 0, num_grouped = 0;
   for (std::size_t block = 0; block < num_blocks; ++block) {
     const std::size_t dimension = whole("a dimension");
@@ -211,8 +217,33 @@ void compare_msh(const WrittenFile& file, const CellView& wanted) {
   file.same_count("faces in groups", num_grouped, num_faces);
 }
 
-void compare_cells(const WrittenFile& file, const std::string& extension, const CellView& wanted) {
-  extension == ".vtu" ? compare_vtu(file, wanted) : compare_msh(file, wanted);
+/// Compares version 2.2 as the reader sees it.
+void compare_old_msh(const WrittenFile& file, const CellView& wanted) {
+  const NodalMesh found = read_nodal_mesh(file.path());
+  file.same_count("nodes", found.positions.size(), wanted.positions.size());
+  file.same_count("elements", found.num_cells(), wanted.num_cells());
+  for (std::size_t v = 0; v < wanted.positions.size(); ++v)
+    file.same(found.positions[v] == wanted.positions[v], "node", v + 1);
+  const auto sorted = [](std::span<const Index> nodes) {
+    std::vector<Index> result(nodes.begin(), nodes.end());
+    std::sort(result.begin(), result.end());
+    return result;
+  };
+  const std::vector<std::size_t> order = msh_order(wanted);
+  for (std::size_t e = 0; e < order.size(); ++e) {
+    const std::size_t c = order[e];
+    file.same(found.kinds[e] == wanted.kinds[c] && found.orders[e] == wanted.order(c), "the type of element", e + 1);
+    file.same(sorted(found.cell(e)) == sorted(wanted.cell(c)), "the nodes of element", e + 1);
+  }
+  std::size_t num_faces = 0;
+  for (std::size_t f = 0; wanted.faces && f < wanted.faces->num_faces(); ++f)
+    num_faces += wanted.faces->of_face[f].size();
+  file.same_count("faces in groups", found.face_groups.faces.size(), num_faces);
+}
+
+void compare_cells(const WrittenFile& file, const std::string& extension, const CellView& wanted, MshVersion version) {
+  if (extension == ".vtu") return compare_vtu(file, wanted);
+  version == MshVersion::v2_2 ? compare_old_msh(file, wanted) : compare_msh(file, wanted);
 }
 
 void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, const HighOrderFileOptions& options) {
@@ -239,13 +270,18 @@ void compare_map(const WrittenFile& file, const HighOrderMesh& wanted, const Hig
 void compare_nodal(const WrittenFile& file, const std::string& extension, const NodalMesh& wanted) {
   const std::string text = read_file(file.path());
   if (text != nodal_text(extension, wanted)) file.differs("its text is not what was written");
+  if (!is_nodal_extension(file.path())) return;
   const NodalMesh found = read_nodal_mesh(file.path());
   file.same_count("cells", found.num_cells(), wanted.num_cells());
-  for (std::size_t c = 0; c < wanted.num_cells(); ++c) {
-    file.same(found.kinds[c] == wanted.kinds[c] && found.orders[c] == wanted.orders[c], "the kind of cell", c);
+  const bool is_by_block = extension == ".e" || extension == ".exo";
+  const std::vector<std::size_t> order =
+      is_by_block ? exodus_order(wanted) : sorted_cells(wanted.num_cells(), [](std::size_t) { return 0; });
+  for (std::size_t n = 0; n < wanted.num_cells(); ++n) {
+    const std::size_t c = order[n];
+    file.same(found.kinds[n] == wanted.kinds[c] && found.orders[n] == wanted.orders[c], "the kind of cell", c);
     for (int i = 0; i < cell_topology(wanted.kinds[c]).num_vertices; ++i) {
       const auto corner = [&](const NodalMesh& mesh) -> const Vec3& {
-        return mesh.positions[static_cast<std::size_t>(mesh.cell(c)[static_cast<std::size_t>(i)])];
+        return mesh.positions[static_cast<std::size_t>(mesh.cell(&mesh == &found ? n : c)[static_cast<std::size_t>(i)])];
       };
       const double size = corner(wanted).cwiseAbs().maxCoeff();
       // Sixteen characters hold eight digits at least, twenty characters twelve.
@@ -422,14 +458,15 @@ void compare_scene(const WrittenFile& file, const Scene& wanted) {
 
 }  // namespace
 
-void require_written(const fs::path& path, const VolumeMesh& mesh) {
+void require_written(const fs::path& path, const VolumeMesh& mesh, MshVersion msh_version) {
   const std::string extension = lower_case_extension(path);
   read_back(path, [&](const WrittenFile& file) {
     if (extension == ".mesh" || extension == ".vtk") return compare_linear(file, mesh, extension == ".mesh");
     if (is_nodal_output(extension)) return compare_nodal(file, extension, nodal_mesh(mesh));
     const GroupedFaces faces = grouped_faces(mesh);
     compare_cells(file, extension,
-                  {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references, &faces});
+                  {mesh.positions, mesh.kinds, {}, mesh.cell_offsets, mesh.cell_vertices, mesh.references, &faces},
+                  msh_version);
   });
 }
 
@@ -450,7 +487,8 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
                                    : GroupedFaces{};
     compare_cells(
         file, extension,
-        {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references, &faces});
+        {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references, &faces},
+        options.msh_version);
     if (is_vtu) compare_map(file, mesh, options);
   });
 }
@@ -461,8 +499,13 @@ void require_written(const fs::path& path, const PolygonMesh& surface) {
   double reach = 0;
   for (const Vec3& p : surface.positions) reach = std::max(reach, p.cwiseAbs().maxCoeff());
   read_back(path, [&](const WrittenFile& file) {
+    const std::string extension = lower_case_extension(path);
+    if (is_surface_output(extension)) {
+      if (read_file(path.string()) != surface_bytes(extension, surface)) file.differs("its bytes are not what was written");
+      return;
+    }
     Vec3 origin = Vec3::Zero();
-    const bool is_obj = lower_case_extension(path) == ".obj";
+    const bool is_obj = extension == ".obj";
     const PolygonMesh found = is_obj ? obj_polygons(file) : usda_polygons(file, origin);
     compare_polygons(file, found, surface, origin.isZero(0) ? 0 : kRounding * reach);
   });

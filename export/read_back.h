@@ -16,11 +16,12 @@
 
 namespace subvol {
 
-/// Checks a .mesh (with tags), .vtk, .vtu, .msh, .inp, .bdf or .mfem.
-void require_written(const std::filesystem::path& path, const VolumeMesh& mesh);
-/// Checks a .vtu (with the map), a .msh, .inp, .bdf or .mfem, or a .mesh or .vtk of linear cells.
+/// Checks a .mesh (with tags), .vtk, .vtu, .msh, .inp, .bdf, .mfem, .e, .exo or .xdmf (the last only as text).
+void require_written(const std::filesystem::path& path, const VolumeMesh& mesh,
+                     MshVersion msh_version = MshVersion::v4_1);
+/// Checks a .vtu (with the map), a .msh, .inp, .bdf, .mfem, .e, .exo or .xdmf, or a .mesh or .vtk of linear cells.
 void require_written(const std::filesystem::path& path, const HighOrderMesh& mesh, const HighOrderFileOptions& options);
-/// Checks an .obj or .usda.
+/// Checks an .obj or .usda; the bytes of a .stl, .ply, .vtp or .3mf.
 void require_written(const std::filesystem::path& path, const PolygonMesh& surface);
 /// Checks a .glb or .gltf.
 void require_written(const std::filesystem::path& path, const Scene& scene);

@@ -52,23 +52,24 @@ std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima
   return vtu_document(view_of(mesh), cell_minima, fields, {}, group_data(mesh.face_groups, mesh.regions));
 }
 
-std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {
+std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
+                     MshVersion version) {
   require_cells(mesh, cell_minima, fields);
   const GroupedFaces faces = grouped_faces(mesh);
-  return msh_document(view_of(mesh, &faces), cell_minima, fields);
+  return msh_document(view_of(mesh, &faces), cell_minima, fields, version);
 }
 
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima,
-                  std::span<const VertexField> fields) {
+                  std::span<const VertexField> fields, MshVersion version) {
   const std::string extension = lower_case_extension(path);
   if (is_nodal_output(extension)) {
     require_cells(mesh, cell_minima, fields);
     return write_file_atomically(path, nodal_text(extension, nodal_mesh(mesh)));
   }
   if (extension != ".vtu" && extension != ".msh")
-    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf or .mfem");
+    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .e, .exo or .xdmf");
   write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, cell_minima, fields)
-                                                  : msh_text(mesh, cell_minima, fields));
+                                                  : msh_text(mesh, cell_minima, fields, version));
 }
 
 }  // namespace subvol

@@ -28,17 +28,24 @@ struct VertexField {
 std::string vtu_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                      std::span<const VertexField> fields = {});
 
-/// Returns linear cells as Gmsh 4.1 ASCII: tets (4), hexes (5), prisms (6). There is one volume per reference, which is
+/// Version of Gmsh's file format.
+enum class MshVersion {
+  v2_2,  ///< older, and read by more programs: each element has its physical group
+  v4_1   ///< elements belong to volumes and surfaces, and these to physical groups
+};
+
+/// Returns linear cells as Gmsh ASCII: tets (4), hexes (5), prisms (6). There is one volume per reference, which is
 /// a physical group named `reference R` with the number R or, if that is not positive, the first free number.
 /// `scaled_jacobian` is written as element data, the fields as node data. Element numbers start at 1, volume by volume,
-/// then kind by kind. Reading gives the same doubles. Tags are not written. Errors as above.
+/// then kind by kind. In version 2.2, a face in several groups is an element of each. Reading gives the same doubles.
+/// Tags are not written. Errors as above.
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
-                     std::span<const VertexField> fields = {});
+                     std::span<const VertexField> fields = {}, MshVersion version = MshVersion::v4_1);
 
-/// Writes `vtu_text`, `msh_text`, or the cells as .inp, .bdf or .mfem (subvol/io/nodal_writers.h), which hold neither
-/// minima nor fields, depending on the extension; the whole text or nothing. InputError: another extension. IoError:
-/// the file cannot be written.
+/// Writes `vtu_text`, `msh_text`, or the cells as .inp, .bdf, .mfem, .e, .exo or .xdmf (subvol/io/nodal_writers.h), which
+/// hold neither minima nor fields, depending on the extension; the whole text or nothing. InputError: another
+/// extension. IoError: the file cannot be written.
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima = {},
-                  std::span<const VertexField> fields = {});
+                  std::span<const VertexField> fields = {}, MshVersion version = MshVersion::v4_1);
 
 }  // namespace subvol

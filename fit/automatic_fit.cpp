@@ -95,7 +95,8 @@ class AutomaticFit {
  public:
   AutomaticFit(const TriangleMesh& target, const AutomaticFitOptions& options)
       : options_(checked_options(options)),
-        follows_edges_(has_edges_to_follow(target, options_)),
+        follows_sharp_edges_(has_edges_to_follow(target, options_)),
+        follows_edges_(follows_sharp_edges_ || (options_.keeps_groups && !group_borders(target, target).empty())),
         original_(follows_edges_ ? solid_boundary(target).surface : target),
         target_(original_),
         runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
@@ -130,7 +131,8 @@ class AutomaticFit {
   bool is_good() const;
 
   AutomaticFitOptions options_;
-  bool follows_edges_;
+  bool follows_sharp_edges_;
+  bool follows_edges_;                ///< sharp ones, or borders of groups
   TriangleMesh original_;             ///< the target; if edges are followed, its triangles agree about what is inside
   FitTarget target_;
   Edges edges_;
@@ -155,7 +157,11 @@ bool AutomaticFit::is_good() const {
 void AutomaticFit::find_edges() {
   if (!follows_edges_) return;
   edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
-  edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, *options_.crease_angle_degrees));
+  constexpr double kNone = 180;  // no edge is sharper
+  std::vector<std::array<Index, 2>> borders;
+  if (options_.keeps_groups) borders = group_borders(edges_.mesh, original_);
+  const double angle = follows_sharp_edges_ ? *options_.crease_angle_degrees : kNone;
+  edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, angle, borders));
   facets_ = flat_facets(target_.mesh);
 }
 

@@ -42,6 +42,8 @@ struct AutomaticFitOptions {
   /// False: edges are followed only on surfaces of designed parts (`EdgeCrispness::is_designed`), not on scans.
   bool follows_all_edges = false;
   RegionRule regions = RegionRule::automatic;  ///< how targets with several regions are taken (`find_regions`)
+  /// Borders between groups of the target's faces are followed like sharp edges, also where the surface is smooth.
+  bool keeps_groups = false;
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
   int max_iterations = 0;          ///< per stage; 0: as the schedule says
   double time_limit_seconds = 0;   ///< 0: no limit

@@ -138,9 +138,14 @@ SubdivisionFit::SubdivisionFit(FitTarget target, const VolumeMesh& template_mesh
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   target_.normalisation.take_in(template_);
-  const bool wants_creases = options.crease_angle_degrees || !template_.tags.creases.empty();
+  std::vector<std::array<Index, 2>> borders;
+  if (options.keeps_groups) borders = group_borders(target_.mesh, target_.mesh);
+  constexpr double kNone = 180;  // no edge is sharper
+  const std::optional<double> angle =
+      !borders.empty() && !options.crease_angle_degrees ? kNone : options.crease_angle_degrees;
+  const bool wants_creases = angle || !template_.tags.creases.empty();
   if (wants_creases && !target_.surface.is_cloud())
-    template_creases_ = FollowedCreases(target_.mesh, options.crease_angle_degrees, template_);
+    template_creases_ = FollowedCreases(target_.mesh, angle, template_, borders);
 }
 
 /// Records the template's audit and its initial distance in the report and makes the schedule.

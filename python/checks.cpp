@@ -5,6 +5,7 @@
 #include "python/module.h"
 #include "python/report.h"
 #include "python/results.h"
+#include "subvol/base/error.h"
 #include "subvol/export/curved_file.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/mesh_check.h"
@@ -20,11 +21,18 @@ struct CheckedMesh {
   explicit CheckedMesh(const py::object& object) {
     if (py::isinstance<CurvedMesh>(object)) {
       curved = object.cast<std::shared_ptr<CurvedMesh>>();
-    } else if (is_path(object) && cli::is_high_order_file(path_from(object))) {
+    } else if (is_path(object)) {
       const std::string path = path_from(object);
-      const py::gil_scoped_release unlocked;
-      curved = std::make_shared<const CurvedMesh>(read_curved(path));
-      if (holds_exact_map(path)) lagrange = cli::check_lagrange_cells(path, curved->mesh);
+      cli::LoadedMesh mesh = mesh_from_file(path, false);
+      if (auto* cells = std::get_if<VolumeMesh>(&mesh)) {
+        linear = std::make_shared<const VolumeMesh>(std::move(*cells));
+      } else if (auto* file = std::get_if<HighOrderFile>(&mesh)) {
+        const py::gil_scoped_release unlocked;
+        curved = std::make_shared<const CurvedMesh>(std::move(*file));
+        if (holds_exact_map(path)) lagrange = cli::check_lagrange_cells(path, curved->mesh);
+      } else {
+        throw InputError(path + ": a surface, but cells are wanted");
+      }
     } else {
       linear = volume_from(object, "mesh", false);
     }

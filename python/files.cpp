@@ -23,16 +23,11 @@ py::object read(const py::object& path, const py::kwargs& given) {
   keywords.take("check", check);
   keywords.finish();
   const std::string file = path_from(path);
-  if (cli::is_high_order_file(file)) {
-    std::shared_ptr<CurvedMesh> curved;
-    {
-      const py::gil_scoped_release unlocked;
-      curved = std::make_shared<CurvedMesh>(read_curved(file));
-    }
-    return py::cast(curved);
-  }
-  if (cli::is_volume_file(file)) return py::cast(std::const_pointer_cast<VolumeMesh>(volume_from(path, "path", check)));
-  return py::cast(surface_from(path, "path"));
+  cli::LoadedMesh mesh = mesh_from_file(file, check);
+  if (auto* curved = std::get_if<HighOrderFile>(&mesh))
+    return py::cast(std::make_shared<CurvedMesh>(std::move(*curved)));
+  if (auto* cells = std::get_if<VolumeMesh>(&mesh)) return py::cast(std::make_shared<VolumeMesh>(std::move(*cells)));
+  return py::cast(SurfaceMesh{std::get<PolygonMesh>(std::move(mesh)), {}});
 }
 
 /// Options of `write`, and the file.
@@ -50,6 +45,7 @@ struct Writing {
     keywords.take("quantize", options.quantize);
     keywords.take("limit", limit);
     keywords.take("intervals", options.linear_intervals);
+    keywords.take("msh_version", options.msh_version, {{"2.2", MshVersion::v2_2}, {"4.1", MshVersion::v4_1}});
     keywords.take("map_tolerance", options.map_tolerance_percent);
     if (!(options.map_tolerance_percent >= 0)) throw InputError("map_tolerance: expected 0 or more");
     keywords.finish();
@@ -161,22 +157,22 @@ void add_files(py::module_& module) {
              R"(read(path, *, check=True)
 --
 
-Reads a file; its extension chooses the format: VolumeMesh (.mesh, .vtk), HighOrderMesh (.vtu as written here) or
-SurfaceMesh (.off, .obj, .stl, .ply).
+Reads a file; its extension chooses the format (`subvol formats` lists them): VolumeMesh of linear cells, HighOrderMesh
+of curved ones, or SurfaceMesh.
 
 check  refuse volume meshes that are not sound, but for inverted cells and unused points)");
   module.def("write", &write, py::arg("path"), py::arg("what"),
              R"(write(path, what, *, chord=0.05, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True,
-    quantize=False, map_tolerance=0.001)
+    quantize=False, map_tolerance=0.001, msh_version='4.1')
 --
 
-Writes a mesh or a result; the extension chooses the format: .mesh .vtk .vtu .msh .glb .gltf .obj .usda. A file of that
-name is replaced, once the new one is whole.
+Writes a mesh or a result; the extension chooses the format (`subvol formats` lists them). A file of that name is
+replaced, once the new one is whole.
 
 what       VolumeMesh, HighOrderMesh, SurfaceMesh, FitResult (its finest mesh; in a scene the limit surface, coloured by
            the quality of the cells; 'cage:FILE' is the cage, 'animation:FILE.glb' the fit as it went where its states
            were kept), OptimizeResult, ShellResult (in a scene its sheets); 'cutaway:FILE.glb' shows the cells inside,
-           'boundary:FILE.vtu' or .vtk holds the faces of the boundary with their groups
+           'boundary:FILE.vtu', .vtk or .xdmf holds the faces of the boundary with their groups
 chord      how close triangles are to a curved surface, per cent of its bounding box's diagonal
 unit, up   metres a unit has, and the mesh's upward axis, 'y' or 'z': for .glb, .gltf and .usda
 cut        where a cutaway is cut: the axis 'x', 'y' or 'z' that the plane stands across, also with a place between 0
@@ -186,7 +182,8 @@ quantize   scenes in 16 and 8 bits (KHR_mesh_quantization)
 limit      a VolumeMesh is a control mesh: scenes show its limit surface
 intervals  of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order
 map_tolerance  largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, per cent
-           of the diagonal; a warning tells if it is larger, or if these cells are not valid)");
+           of the diagonal; a warning tells if it is larger, or if these cells are not valid
+msh_version  of a .msh: '4.1', or '2.2', which more programs read)");
 }
 
 }  // namespace subvol::python

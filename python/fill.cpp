@@ -24,6 +24,7 @@ class Filling {
     take_crease_angle();
     keywords_.take("regions", options_.regions,
                    {{"auto", RegionRule::automatic}, {"keep", RegionRule::keep}, {"merge", RegionRule::merge}});
+    keywords_.take("keep_groups", options_.keeps_groups);
     keywords_.take("tolerance", options_.mean_tolerance_percent);
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
     keywords_.take("max_iterations", options_.max_iterations);
@@ -82,8 +83,8 @@ class Filling {
 };
 
 constexpr const char* kHelp =
-    R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, tolerance=0.02, max_tolerance=0.5, max_iterations=0,
-    time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
+    R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, keep_groups=False, tolerance=0.02, max_tolerance=0.5,
+    max_iterations=0, time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
 --
 
 Fills a surface with hexes that one can compute on, without a template: FillResult.
@@ -93,6 +94,7 @@ cells          number of cells that the result may have; None: as few as make it
 quality        least scaled Jacobian to aim at, at most 0.8
 crease_angle   degrees: edges of the target sharper than this stay sharp; negative: none; None: 40, if the target is a
                designed part and no scan
+keep_groups    follow borders between groups of the target's faces like sharp edges
 tolerance      mean distance to aim at, per cent of the diagonal of the target's bounding box
 max_tolerance  the same for the largest distance
 

@@ -42,6 +42,7 @@ FitOptions subdivision_options(Keywords& keywords) {
   keywords.take("boundary", options.boundary, boundary_rules());
   keywords.take("cage_only", options.cage_only);
   keywords.take("crease_angle", options.crease_angle_degrees);
+  keywords.take("keep_groups", options.keeps_groups);
   keywords.take("lambda_far", options.lambda_far);
   keywords.take("quality", options.quality);
   take_solver_options(keywords, options);
@@ -82,7 +83,7 @@ class Fit {
     else
       keywords_.take("cells", choice_options_.cells);
     if (curved_) {
-      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "lambda_far", "quality"},
+      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far", "quality"},
                        "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
@@ -216,8 +217,8 @@ class Fit {
 
 constexpr const char* kFitHelp =
     R"(fit(target, template=None, *, cells=None, levels=3, tolerance=None, surface='limit',
-    boundary='catmull-clark', cage_only=False, crease_angle=None, lambda_far=1.0, quality=0.65, lambda_close=None,
-    correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
+    boundary='catmull-clark', cage_only=False, crease_angle=None, keep_groups=False, lambda_far=1.0, quality=0.65,
+    lambda_close=None, correspondence='closest', solver='newton', energy='hencky', point_weights='equal', max_iterations=0,
     time_limit=0.0, order=None, basis='legendre', adaptive=False, keep_states=False, checkpoint=None, every=60.0,
     resume=None, chord=0.005, progress=None, threads=None)
 --
@@ -233,6 +234,7 @@ surface       what is to agree with the target: the cage's 'limit' surface, or t
 boundary      'catmull-clark' or 'averaging'
 cage_only     only the points of the template move
 crease_angle  degrees: keep edges of the target sharper than this sharp
+keep_groups   keep borders between groups of the target's faces in the same way
 lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
 quality       least scaled Jacobian to aim at, as far as distances allow; 0: none
 

@@ -349,6 +349,10 @@ std::string path_from(const py::object& object) {
   return bytes.cast<std::string>();
 }
 
+cli::LoadedMesh mesh_from_file(const std::string& path, bool check) {
+  return read_with_warnings([&](std::vector<std::string>& warnings) { return cli::load_mesh(path, warnings, check); });
+}
+
 std::shared_ptr<const VolumeMesh> volume_from(const py::object& object, const char* name, bool check) {
   if (py::isinstance<VolumeMesh>(object)) return object.cast<std::shared_ptr<VolumeMesh>>();
   if (!is_path(object)) refuse(object, name, "a VolumeMesh");

@@ -24,6 +24,9 @@ bool is_path(const py::object& object);
 /// Returns the path. TypeError if `is_path` is false.
 std::string path_from(const py::object& object);
 
+/// Reads a file as the program does; warnings go to Python. InputError: a file that the readers refuse.
+cli::LoadedMesh mesh_from_file(const std::string& path, bool check);
+
 /// Converts an argument that is a mesh, or the path of a file, which is read as the program reads it; `name` is for
 /// messages. TypeError: something else. InputError: a file that the readers refuse. Warnings go to Python.
 std::shared_ptr<const VolumeMesh> volume_from(const py::object& object, const char* name, bool check = true);

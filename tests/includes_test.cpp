@@ -72,10 +72,11 @@ struct Library {
 const std::vector<Library> kLibraries{
     {"CGAL/", {"fit/geometry", "shell"}, "_cgal.cpp"},
     {"opensubdiv/", {"subvol/subdivision", "bench", "tests"}, ".cpp"},
-    {"tiny_gltf", {"export"}, ".cpp"},
+    {"tiny_gltf", {"export", "subvol/io"}, ".cpp"},
     {"pugixml", {"subvol/io"}, "_pugixml.cpp"},
     {"zlib", {"subvol/io", "export", "tests"}, ".cpp"},
     {"lz4", {"subvol/io"}, ".cpp"},
+    {"netcdf", {"subvol/io"}, "_netcdf.cpp"},
     {"CLI/", {"cli/verbs"}, ""},
     {"pybind11/", {"python"}, ""},
 };

@@ -5,6 +5,7 @@ with subvol, and finds the same points and cells in each.
 
 Exit status 0 if all agree, 1 if not, 77 if there is no meshio.
 """
+import importlib.util
 import os
 import subprocess
 import sys
@@ -12,7 +13,8 @@ import tempfile
 from pathlib import Path
 
 SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's packages are for
-FORMATS = ("mesh", "vtk", "vtu", "msh", "inp", "bdf")
+FORMATS = ("mesh", "vtk", "vtu", "msh", "inp", "bdf", "xdmf", "e")
+OLD_MSH = "old.msh"  # of version 2.2
 
 try:
     import meshio
@@ -39,8 +41,12 @@ def main():
         run(samples, ".")
         outputs = [word for name in FORMATS for word in ("-o", f"plate.{name}")]
         run(program, "fit", "plate.obj", "--cells", 500, *outputs, "--quiet")
+        run(program, "convert", "plate.mesh", "--msh-version", "2.2", "-o", f"plate.{OLD_MSH}", "--quiet")
         wanted = hexes_of(Path(folder) / "plate.mesh")
-        for name in FORMATS:
+        for name in (*FORMATS, OLD_MSH):
+            if name == "e" and not importlib.util.find_spec("netCDF4"):
+                print("plate.e: SKIPPED: no netCDF4; apt-get install python3-netcdf4")
+                continue
             try:
                 found = hexes_of(Path(folder) / f"plate.{name}")
                 agrees = found.shape == wanted.shape and np.abs(found - wanted).max() < 1e-7

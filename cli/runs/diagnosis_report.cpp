@@ -80,9 +80,9 @@ std::string place_line(const SurfacePlace& place) {
 
 }  // namespace
 
-FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+FileSurface file_surface(const PolygonMesh& polygons) {
   FileSurface surface;
-  surface.mesh = triangulate(read_polygon_mesh(path, &warnings), &surface.face_of_triangle);
+  surface.mesh = triangulate(polygons, &surface.face_of_triangle);
   return surface;
 }
 

@@ -17,8 +17,7 @@ struct FileSurface {
   std::vector<Index> face_of_triangle;  ///< the face of the file that each triangle is cut from, from 0
 };
 
-/// Reads a surface file. InputError: as `read_polygon_mesh`.
-FileSurface load_file_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
+FileSurface file_surface(const PolygonMesh& polygons);
 
 /// Loads a surface, the sheets of a mesh with several regions, or those of a segmentation (`surface_of_labels`), ready to be filled. With RegionRule::merge, all
 /// labels are one region. The cancel callback is `interrupted`.

@@ -23,61 +23,93 @@ namespace subvol::cli {
 
 namespace {
 
-bool has_cells(const std::filesystem::path& path) { return is_nodal_extension(path); }
+/// A .vtu with an exact map beside its cells, which has not been read yet.
+struct ExactMap {};
+
+using Content = std::variant<VolumeMesh, NodalMesh, ExactMap, PolygonMesh>;
 
 bool is_surface_or_points(const std::filesystem::path& path) {
   const std::string extension = lower_case(path.extension().string());
   return is_surface_extension(extension) || extension == ".xyz";
 }
 
-}  // namespace
-
-bool is_volume_file(const std::filesystem::path& path) { return has_cells(path) && !is_high_order_file(path); }
-
-bool is_high_order_file(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (!has_cells(path) || !std::filesystem::is_regular_file(path, ignored)) return false;
-  return holds_exact_map(path) || holds_curved_cells(path);
+/// Reads a file of cells or of a surface, once.
+Content content_of(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+                   const std::string& references) {
+  require_known_file(path);
+  if (is_surface_or_points(path)) {
+    if (is_point_cloud_file(path))
+      throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; expected a " +
+                       "surface");
+    return read_polygon_mesh(path, &warnings);
+  }
+  if (holds_exact_map(path)) return ExactMap{};
+  FileCells cells = read_cells(path, {.check = check, .warnings = &warnings, .references = references});
+  return std::visit([](auto& mesh) -> Content { return std::move(mesh); }, cells);
 }
+
+[[noreturn]] void refuse_curved(const std::filesystem::path& path, const std::string& wanted) {
+  throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but " + wanted);
+}
+
+/// InputError: all of the mesh is in one place.
+HighOrderFile extended(const std::filesystem::path& path, HighOrderFile file) {
+  const auto& x = file.mesh.coefficients;  // positions of vertices, then displacements
+  const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
+  if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
+      std::all_of(vertices_end, x.end(), [](const Vec3& d) { return d.isZero(0); }))
+    throw InputError(path.string() + ": all of the mesh is in one place");
+  return file;
+}
+
+/// Returns the name of the array that an option --references asks for; empty: the usual ones.
+std::string array_of(const std::string& references) { return references == kNoReferences ? "" : references; }
+
+/// Returns cells as they were read or, if none are wanted, without their references.
+template <class Cells>
+Cells as_chosen(Cells cells, const std::string& references) {
+  if (references != kNoReferences) return cells;
+  cells.references.clear();
+  cells.regions.clear();
+  return cells;
+}
+
+}  // namespace
 
 bool is_surface_file(const std::filesystem::path& path) {
   return is_surface_extension(lower_case(path.extension().string())) && !is_point_cloud_file(path);
 }
 
 void require_known_file(const std::filesystem::path& path) {
-  if (has_cells(path) || is_surface_or_points(path)) return;
+  if (is_nodal_extension(path) || is_surface_or_points(path)) return;
   throw InputError(path.string() + ": unknown extension " + in_quotes(path.extension().string()) +
                    "; of cells there are " + cell_formats() + "; of surfaces " + surface_formats() + "; of points " +
                    point_cloud_formats());
 }
 
-void require_surface_file(const std::filesystem::path& path) {
-  require_known_file(path);
-  if (is_high_order_file(path))
-    throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but a surface is wanted");
-}
-
-void require_cell_file(const std::filesystem::path& path) {
-  require_known_file(path);
-  if (!has_cells(path))
-    throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
-  if (is_high_order_file(path))
-    throw InputError(path.string() + ": curved cells, which `check` and `convert` read, but linear cells are wanted: " +
-                     volume_mesh_formats());
+LoadedMesh load_mesh(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
+                     const std::string& references) {
+  Content content = content_of(path, warnings, check, array_of(references));
+  if (auto* mesh = std::get_if<VolumeMesh>(&content)) return as_chosen(std::move(*mesh), references);
+  if (auto* surface = std::get_if<PolygonMesh>(&content)) return std::move(*surface);
+  HighOrderFile file = std::holds_alternative<ExactMap>(content)
+                           ? read_high_order(path)
+                           : curved_mesh(path.string(), std::get<NodalMesh>(std::move(content)), &warnings);
+  return as_chosen(extended(path, std::move(file)), references);
 }
 
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings) {
-  require_surface_file(path);
-  if (is_point_cloud_file(path)) return read_point_cloud(path, &warnings);
+  require_known_file(path);
+  if (is_surface_or_points(path) && is_point_cloud_file(path)) return read_point_cloud(path, &warnings);
   return load_surface(path, warnings);
 }
 
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
-  require_surface_file(path);
-  if (is_point_cloud_file(path))
-    throw InputError(path.string() + ": it holds points without faces, which only fit and check can use; expected a " +
-                     "surface");
-  return is_volume_file(path) ? triangulate(load_polygons(path, warnings)) : read_triangle_mesh(path, &warnings);
+  Content content = content_of(path, warnings, true, {});
+  if (auto* mesh = std::get_if<VolumeMesh>(&content)) return triangulate(tagged_polygons(*mesh).polygons);
+  if (auto* surface = std::get_if<PolygonMesh>(&content))
+    return sound_triangles(std::move(*surface), path.string(), &warnings);
+  refuse_curved(path, "a surface is wanted");
 }
 
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
@@ -85,9 +117,10 @@ PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::st
 }
 
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {
-  require_surface_file(path);
-  if (!is_volume_file(path)) return {read_polygon_mesh(path, &warnings), {}};
-  return tagged_polygons(load_volume(path, warnings));
+  Content content = content_of(path, warnings, true, {});
+  if (auto* mesh = std::get_if<VolumeMesh>(&content)) return tagged_polygons(*mesh);
+  if (auto* surface = std::get_if<PolygonMesh>(&content)) return {std::move(*surface), {}};
+  refuse_curved(path, "a surface is wanted");
 }
 
 TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
@@ -112,15 +145,16 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh) {
 
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check,
                        const std::string& references) {
-  require_cell_file(path);
-  const bool ignores = references == kNoReferences;
-  VolumeMesh mesh =
-      read_volume_mesh(path, {.check = check, .warnings = &warnings, .references = ignores ? "" : references});
-  if (ignores) {
-    mesh.references.clear();
-    mesh.regions.clear();
-  }
-  return mesh;
+  const auto refuse_surface = [&] {
+    throw InputError(path.string() + ": a surface or points, but cells are wanted: " + volume_mesh_formats());
+  };
+  require_known_file(path);
+  if (is_surface_or_points(path)) refuse_surface();
+  Content content = content_of(path, warnings, check, array_of(references));
+  if (std::holds_alternative<PolygonMesh>(content)) refuse_surface();
+  if (!std::holds_alternative<VolumeMesh>(content))
+    refuse_curved(path, "linear cells are wanted: " + volume_mesh_formats());
+  return as_chosen(std::get<VolumeMesh>(std::move(content)), references);
 }
 
 VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
@@ -142,22 +176,11 @@ VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
 
 HighOrderFile load_high_order(const std::filesystem::path& path, std::vector<std::string>* warnings,
                               const std::string& references) {
-  const bool ignores = references == kNoReferences;
-  HighOrderFile file = read_curved(path, warnings, ignores ? "" : references);
-  if (ignores) {
-    file.references.clear();
-    file.regions.clear();
-  }
-  const auto& x = file.mesh.coefficients;  // positions of vertices, then displacements
-  const auto vertices_end = x.begin() + static_cast<std::ptrdiff_t>(file.mesh.space.num_vertices());
-  if (std::all_of(x.begin(), vertices_end, [&](const Vec3& p) { return p == x.front(); }) &&
-      std::all_of(vertices_end, x.end(), [](const Vec3& d) { return d.isZero(0); }))
-    throw InputError(path.string() + ": all of the mesh is in one place");
-  return file;
+  return as_chosen(extended(path, read_curved(path, warnings, array_of(references))), references);
 }
 
 void require_choice_of_references(const std::filesystem::path& path, const std::string& references) {
-  if (references.empty() || references == kNoReferences || (has_cells(path) && !(is_high_order_file(path) && holds_exact_map(path)))) return;
+  if (references.empty() || references == kNoReferences || (is_nodal_extension(path) && !holds_exact_map(path))) return;
   throw UsageError("--references: " + path.string() + " has no cell data to choose from");
 }
 

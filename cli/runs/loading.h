@@ -15,21 +15,22 @@
 
 namespace subvol::cli {
 
-/// Throws InputError if the extension is none of a file with geometry, and lists the known ones. The second also
-/// refuses files that hold no surface (a volume mesh has one, its boundary), the third those that hold no linear cells;
-/// the message says what the file holds.
+/// Throws InputError if the extension is none of a file with geometry, and lists the known ones.
 void require_known_file(const std::filesystem::path& path);
-void require_surface_file(const std::filesystem::path& path);
-void require_cell_file(const std::filesystem::path& path);
-
-/// True if a path has the extension of a file of cells, and does not hold curved ones; whether it exists does not matter.
-bool is_volume_file(const std::filesystem::path& path);
-
-/// True if a file holds curved cells, for `load_high_order`; false also if it cannot be read. Cost: that of reading it.
-bool is_high_order_file(const std::filesystem::path& path);
 
 /// True if a path has the extension of a surface and the file has faces. InputError: as `is_point_cloud_file`.
 bool is_surface_file(const std::filesystem::path& path);
+
+/// What a file holds: linear cells, curved cells, or a surface.
+using LoadedMesh = std::variant<VolumeMesh, HighOrderFile, PolygonMesh>;
+
+/// Reads a file of cells or of a surface, once.
+///
+/// check       linear cells must be valid, as for `load_volume`.
+/// references  name of the cell data that become the references; empty: the usual ones.
+/// InputError: as the readers; points without faces.
+LoadedMesh load_mesh(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
+                     const std::string& references = {});
 
 /// A target to fit or to compare with: a surface, or points on one.
 using Target = std::variant<TriangleMesh, PointCloud>;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/losses.h"
 
+#include "subvol/io/file_formats.h"
 #include "subvol/io/left_out.h"
 
 #include <algorithm>
@@ -9,11 +10,14 @@ namespace subvol::cli {
 
 namespace {
 
-bool holds_references(const Output& output) { return output.is_volume(); }
-bool holds_groups(const Output& output) {
-  return output.part == Part::boundary || (output.extension != ".vtk" && output.part != Part::cutaway);
+bool holds_references(const Output& output) {
+  return output.part != Part::boundary && format_of_extension(output.extension)->regions_written != Held::none;
 }
-bool holds_tags(const Output& output) { return output.extension == ".mesh" || output.extension == ".usda"; }
+bool holds_groups(const Output& output) {
+  return output.part == Part::boundary ||
+         (output.part != Part::cutaway && format_of_extension(output.extension)->groups_written != Held::none);
+}
+bool holds_tags(const Output& output) { return format_of_extension(output.extension)->holds_features; }
 
 }  // namespace
 

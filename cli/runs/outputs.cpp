@@ -4,6 +4,7 @@
 #include "cli/runs/exit_status.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
+#include "subvol/io/file_formats.h"
 
 #include <algorithm>
 #include <array>
@@ -27,15 +28,6 @@ namespace fs = std::filesystem;
 
 /// Prefix of each Part; in -o it stands before the file, separated by a colon.
 constexpr std::array<std::string_view, 5> kPartNames{"", "cage", "cutaway", "animation", "boundary"};
-constexpr std::array<std::string_view, 7> kVolumeExtensions{".mesh", ".vtk", ".vtu", ".msh", ".inp", ".bdf", ".mfem"};
-constexpr std::array<std::string_view, 4> kSurfaceExtensions{".glb", ".gltf", ".obj", ".usda"};
-constexpr std::array<std::string_view, 2> kSceneExtensions{".glb", ".gltf"};
-
-template <std::size_t N>
-bool contains(const std::array<std::string_view, N>& list, std::string_view item) {
-  return std::find(list.begin(), list.end(), item) != list.end();
-}
-
 /// Splits a text into the part that it starts with and the file. UsageError: a word and a colon that name no part.
 std::pair<Part, std::string> part_and_file(const std::string& text) {
   const std::size_t colon = text.find(':');
@@ -54,13 +46,15 @@ Output parse_output(const std::string& text) {
   output.extension = output.path.extension().string();
   std::transform(output.extension.begin(), output.extension.end(), output.extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (!contains(kVolumeExtensions, output.extension) && !contains(kSurfaceExtensions, output.extension)) {
+  const FileFormat* format = format_of_extension(output.extension);
+  if (!format || format->written.empty()) {
     throw UsageError("-o " + text + ": the extension must be one of " + output_formats());
   }
   if ((output.part == Part::cutaway || output.part == Part::animation) && !output.is_scene())
     throw UsageError("-o " + text + ": this part is a scene; the extension must be .glb or .gltf");
-  if (output.part == Part::boundary && output.extension != ".vtu" && output.extension != ".vtk")
-    throw UsageError("-o " + text + ": faces as cells; the extension must be .vtu or .vtk");
+  if (output.part == Part::boundary && output.extension != ".vtu" && output.extension != ".vtk" &&
+      output.extension != ".xdmf")
+    throw UsageError("-o " + text + ": faces as cells; the extension must be .vtu, .vtk or .xdmf");
   return output;
 }
 
@@ -95,8 +89,14 @@ void require_free(const fs::path& file, bool force) {
   if (!is_open && (!exists || fs::is_regular_file(file, ignored))) require_writable_folder(target);
 }
 
-bool Output::is_volume() const { return contains(kVolumeExtensions, extension); }
-bool Output::is_scene() const { return contains(kSceneExtensions, extension); }
+bool Output::is_volume() const {
+  const FileFormat* format = format_of_extension(extension);
+  return format && format->holds_cells;
+}
+bool Output::is_scene() const {
+  const FileFormat* format = format_of_extension(extension);
+  return format && format->is_scene;
+}
 
 bool holds_polynomial_cells(const Output& output) {
   return output.is_volume() && output.extension != ".mesh" && output.extension != ".vtk";
@@ -104,8 +104,8 @@ bool holds_polynomial_cells(const Output& output) {
 
 std::string output_formats() {
   std::string list;
-  for (std::string_view extension : kVolumeExtensions) list.append(list.empty() ? "" : " ").append(extension);
-  for (std::string_view extension : kSurfaceExtensions) list.append(" ").append(extension);
+  for (const FileFormat& format : file_formats())
+    if (!format.written.empty()) list.append(list.empty() ? "" : " ").append(format.extension);
   return list;
 }
 

@@ -29,7 +29,7 @@ struct Output {
   bool is_scene() const;        ///< true for a format that holds scenes
 };
 
-/// True if curved cells are written to it as polynomials (.vtu, .msh, .inp, .bdf, .mfem).
+/// True if curved cells are written to it as polynomials (.vtu, .msh, .inp, .bdf, .e, .mfem, .xdmf).
 bool holds_polynomial_cells(const Output& output);
 
 /// Formats that can be written, for help and messages.

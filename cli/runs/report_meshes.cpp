@@ -81,7 +81,7 @@ class Loader {
     std::optional<VolumeMesh> other;
     for (const Json& output : report_.value("outputs", Json::array())) {
       const std::string name = output.is_string() ? output.get<std::string>() : std::string();
-      if (!is_volume_file(name) && !is_high_order_file(name)) continue;
+      if (!is_nodal_extension(name)) continue;
       any = true;
       if (meshes.result && meshes.cage) break;
       std::optional<ShownMesh> found = load(name);
@@ -115,10 +115,7 @@ class Loader {
 }  // namespace
 
 ShownMesh load_shown_mesh(const fs::path& path, std::vector<std::string>& warnings, const std::string& references) {
-  require_known_file(path);
-  if (is_high_order_file(path)) return load_high_order(path, &warnings, references);
-  if (is_volume_file(path)) return load_volume(path, warnings, false, references);
-  return load_polygons(path, warnings);
+  return load_mesh(path, warnings, false, references);
 }
 
 void require_boundary(const VolumeMesh& mesh) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
 #include "subvol/export/high_order_file.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -15,7 +16,7 @@
 namespace subvol::cli {
 
 /// What a file holds that can be shown: linear cells, curved cells, or a surface.
-using ShownMesh = std::variant<VolumeMesh, HighOrderFile, PolygonMesh>;
+using ShownMesh = LoadedMesh;
 
 /// Loads such a file; volume meshes are not checked: what is wrong with them is to be seen. InputError as the readers.
 ShownMesh load_shown_mesh(const std::filesystem::path& path, std::vector<std::string>& warnings,

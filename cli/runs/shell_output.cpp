@@ -151,8 +151,8 @@ void write_shell(const Output& output, const ShellResult& shell, const WritingOp
   if (shows_surface(output)) {
     write_scene(output.path, scene_of(shell, scene_options(output, options)));
   } else if (holds_polynomial_cells(output)) {
-    write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell));
-    require_written(output.path, shell.mesh);
+    write_volume(output.path, shell.mesh, shell.quality.cell_minima, thickness_fields(shell), options.msh_version);
+    require_written(output.path, shell.mesh, options.msh_version);
   } else {
     write_output(output, shell.mesh, options);
   }
@@ -168,6 +168,7 @@ void write_shell(const Output& output, const ShellResult& shell, const CurvedShe
                               {.cell_minima = curved.quality.cell_minima,
                                .reference = shell_reference(shell.layers, shell.limited),
                                .references = shell.mesh.references,
+                               .msh_version = options.msh_version,
                                .fields = fields,
                                .map_tolerance_percent = options.map_tolerance_percent});
   }

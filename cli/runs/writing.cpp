@@ -3,6 +3,7 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/loading.h"
+#include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/export/animation.h"
@@ -11,11 +12,13 @@
 #include "subvol/export/gltf_writer.h"
 #include "subvol/export/obj_writer.h"
 #include "subvol/export/read_back.h"
+#include "subvol/export/surface_writer.h"
 #include "subvol/export/usd_writer.h"
 #include "subvol/export/volume_writer.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 
@@ -32,19 +35,21 @@ SceneValue scene_value(const Json& value) {
   return as_utf8(value.is_string() ? value.get<std::string>() : value.dump());
 }
 
-void write_cells(const Output& output, const VolumeMesh& mesh) {
+void write_cells(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
   if (holds_polynomial_cells(output)) {
-    write_volume(output.path, mesh, measure_quality(mesh).cell_minima);
+    write_volume(output.path, mesh, measure_quality(mesh).cell_minima, {}, options.msh_version);
   } else {
     write_volume_mesh(output.path, mesh);
   }
-  require_written(output.path, mesh);
+  require_written(output.path, mesh, options.msh_version);
 }
 
 void write_polygons(const Output& output, const PolygonMesh& surface, const FeatureTags& tags,
                     const WritingOptions& options) {
   if (output.extension == ".obj") {
     write_obj(output.path, surface);
+  } else if (is_surface_output(output.extension)) {
+    write_surface(output.path, surface);
   } else {
     const SurfaceSceneOptions scene = scene_options(output, options);
     write_usd(output.path, surface, tags, {.metres_per_unit = scene.metres_per_unit, .up_axis = scene.up_axis});
@@ -92,8 +97,18 @@ void write_boundary_file(const Output& output, const PolygonMesh& boundary, cons
     throw IoError(output.path.string() + ": was written, but does not hold what it should");
 }
 
+/// Writes the faces of a mesh as XDMF and compares the file with the text: IoError.
+void write_xdmf_faces(const Output& output, const NodalMesh& mesh) {
+  const std::string text = xdmf_faces_text(mesh);
+  write_file_atomically(output.path, text);
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(output.path, ignored) && read_file(output.path.string()) != text)
+    throw IoError(output.path.string() + ": was written, but does not hold what it should");
+}
+
 /// Writes the faces of the boundary with the numbers of their vertices and cells in the mesh.
 void write_boundary_faces(const Output& output, const VolumeMesh& mesh) {
+  if (output.extension == ".xdmf") return write_xdmf_faces(output, nodal_mesh(mesh));
   const MeshTopology topology(mesh);
   std::vector<Index> vertices, cells;
   const PolygonMesh boundary = boundary_surface(mesh, topology, &vertices);
@@ -112,6 +127,17 @@ SurfaceSceneOptions grouped_scene_options(const Output& output, const WritingOpt
   SurfaceSceneOptions scene = scene_options(output, options);
   scene.face_groups = boundary_groups(groups, topology);
   return scene;
+}
+
+HighOrderFileOptions file_options(const HighOrderFile& file, std::span<const double> minima,
+                                  const WritingOptions& options) {
+  return {.cell_minima = minima,
+          .references = file.references,
+          .face_groups = &file.face_groups,
+          .regions = file.regions,
+          .msh_version = options.msh_version,
+          .linear_intervals = options.linear_intervals,
+          .map_tolerance_percent = options.map_tolerance_percent};
 }
 
 }  // namespace
@@ -167,7 +193,7 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
   if (output.part == Part::boundary) return write_boundary_faces(output, mesh);
-  if (output.is_volume()) return write_cells(output, mesh);
+  if (output.is_volume()) return write_cells(output, mesh, options);
   if (output.part == Part::cutaway)
     return write_scene(output.path, cutaway_scene(mesh, measure_quality(mesh).cell_minima, options.cut,
                                                  scene_options(output, options)));
@@ -179,7 +205,9 @@ void write_output(const Output& output, const VolumeMesh& mesh, const WritingOpt
 void write_output(const Output& output, const HighOrderFile& file, const WritingOptions& options) {
   const HighOrderMesh& mesh = file.mesh;
   require_for_curved_cells(output);
-  if (output.extension == ".obj" || output.part == Part::boundary) {
+  if (output.part == Part::boundary && output.extension == ".xdmf")
+    return write_xdmf_faces(output, written_nodes(mesh, output.extension, file_options(file, {}, options)));
+  if (output.part == Part::boundary || (!output.is_volume() && !output.is_scene())) {
     const FaceGroups groups = boundary_groups(file.face_groups, mesh.space.topology());
     const PolygonMesh polygons = polygons_of(curved_boundary(mesh, options.chord_percent), groups);
     return output.part == Part::boundary ? write_boundary_file(output, polygons)
@@ -192,16 +220,13 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
   if (output.is_scene())
     return write_scene(output.path, surface_scene(mesh, minima, grouped_scene_options(output, options, file.face_groups,
                                                                                       mesh.space.topology())));
-  write_curved_cells(output, mesh,
-                     {.cell_minima = minima,
-                      .references = file.references,
-                      .face_groups = &file.face_groups,
-                      .regions = file.regions,
-                      .linear_intervals = options.linear_intervals,
-                      .map_tolerance_percent = options.map_tolerance_percent});
+  write_curved_cells(output, mesh, file_options(file, minima, options));
 }
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
+  if (output.part == Part::boundary && output.extension == ".xdmf")
+    throw UsageError(output.path.string() + ": faces with the numbers of cells' nodes, but there is only a surface; take "
+                     ".vtu or .vtk");
   if (output.part == Part::boundary) return write_boundary_file(output, surface);
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");
   if (output.is_scene()) return write_scene(output.path, polygon_scene(surface, {}, scene_options(output, options)));

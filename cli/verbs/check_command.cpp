@@ -46,19 +46,16 @@ MeshCheck against(const std::optional<Target>& target, const Check& check) {
   return std::visit([&](const auto& geometry) { return check(&geometry); }, *target);
 }
 
-Checked check_linear(const CheckArguments& arguments, const std::optional<Target>& target, const WorkProgress& progress,
-                     std::vector<std::string>& warnings) {
-  VolumeMesh mesh = load_volume(arguments.mesh, warnings, false, arguments.run.references);
-  if (!arguments.region.empty()) mesh = cells_of_region(mesh, arguments.region);
+Checked check_linear(const CheckArguments& arguments, const VolumeMesh& mesh, const std::optional<Target>& target,
+                     const WorkProgress& progress) {
   Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, geometry, {.progress = progress}); }),
                   describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   checked.audit = checked.check.subdivision_audit;
   return checked;
 }
 
-Checked check_high_order(const CheckArguments& arguments, const std::optional<Target>& target,
-                         const WorkProgress& progress, std::vector<std::string>& warnings) {
-  const HighOrderMesh mesh = load_high_order(arguments.mesh, &warnings, arguments.run.references).mesh;
+Checked check_high_order(const CheckArguments& arguments, const HighOrderMesh& mesh,
+                         const std::optional<Target>& target, const WorkProgress& progress) {
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
   Checked checked{
       against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
@@ -102,11 +99,11 @@ void tell_check(const CheckArguments& arguments, const std::vector<std::string>&
 }
 
 /// Says what is in the way of filling a surface.
-int check_surface(const CheckArguments& arguments, const CLI::App& verb) {
+int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, const CLI::App& verb,
+                  const std::vector<std::string>& warnings) {
   if (!arguments.target.empty())
     throw UsageError("--target: " + arguments.mesh + " is a surface; only a volume mesh is compared with a target");
-  std::vector<std::string> warnings;
-  const FileSurface surface = load_file_surface(arguments.mesh, warnings);
+  const FileSurface surface = file_surface(polygons);
   catch_interrupt();
   SurfaceDiagnosis diagnosis = diagnose(surface.mesh, interrupted);
   number_by_faces(diagnosis, surface);
@@ -133,15 +130,20 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   apply_resources(arguments.run);
   require_known_file(arguments.mesh);
   require_choice_of_references(arguments.mesh, arguments.run.references);
-  if (is_surface_file(arguments.mesh)) return check_surface(arguments, verb);
-  if (!arguments.region.empty() && is_high_order_file(arguments.mesh))
-    throw UsageError("--region: " + arguments.mesh + " holds no linear cells to choose from");
   std::vector<std::string> warnings;
+  LoadedMesh mesh = load_mesh(arguments.mesh, warnings, false, arguments.run.references);
+  if (!arguments.region.empty()) {
+    auto* cells = std::get_if<VolumeMesh>(&mesh);
+    if (!cells) throw UsageError("--region: " + arguments.mesh + " holds no linear cells to choose from");
+    *cells = cells_of_region(*cells, arguments.region);
+  }
+  if (const auto* surface = std::get_if<PolygonMesh>(&mesh)) return check_surface(arguments, *surface, verb, warnings);
   std::optional<Target> target;
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet || arguments.json);
-  const Checked checked = is_high_order_file(arguments.mesh) ? check_high_order(arguments, target, teller.work(), warnings)
-                                                             : check_linear(arguments, target, teller.work(), warnings);
+  const auto* curved = std::get_if<HighOrderFile>(&mesh);
+  const Checked checked = curved ? check_high_order(arguments, curved->mesh, target, teller.work())
+                                 : check_linear(arguments, std::get<VolumeMesh>(mesh), target, teller.work());
   teller.finish();
   tell_check(arguments, warnings, report_json(arguments, verb, checked, warnings), text_of(checked));
   return checked.valid() ? kDone : kFailed;

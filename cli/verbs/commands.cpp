@@ -46,6 +46,7 @@ void describe_program(CLI::App& app, Action& action) {
   add_view_command(app, action);
   add_report_command(app, action);
   add_batch_command(app, action);
+  add_formats_command(app, action);
   add_completion_command(app, action);
 }
 

@@ -26,5 +26,6 @@ void add_view_command(CLI::App& app, Action& action);
 void add_report_command(CLI::App& app, Action& action);
 void add_batch_command(CLI::App& app, Action& action);
 void add_completion_command(CLI::App& app, Action& action);
+void add_formats_command(CLI::App& app, Action& action);
 
 }  // namespace subvol::cli

@@ -24,13 +24,12 @@ struct ConvertArguments {
   bool limit = false;
 };
 
-void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outputs,
+void convert_volume(const ConvertArguments& arguments, VolumeMesh mesh, std::vector<Output>& outputs,
                     const WritingOptions& writing, std::vector<std::string>& warnings) {
-  VolumeMesh mesh = load_volume(arguments.input, warnings, true, arguments.run.references);
   if (!arguments.region.empty()) mesh = cells_of_region(mesh, arguments.region);
   warn_of_losses(marks_of(mesh), marks_of(mesh), outputs, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) {
-    if (arguments.limit && output.extension == ".obj") {
+    if (arguments.limit && !output.is_volume() && !output.is_scene() && output.extension != ".usda") {
       write_polygons(output, tessellated_limit(mesh, writing), writing);
     } else if (arguments.limit && shows_surface(output)) {
       const TessellatedSurface limit = tessellated_limit(mesh, writing);
@@ -42,11 +41,10 @@ void convert_volume(const ConvertArguments& arguments, std::vector<Output>& outp
 }
 
 /// returns  an ExitStatus: that of the polynomial cells that were written.
-int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& outputs, const WritingOptions& writing,
-                       std::vector<std::string>& warnings) {
+int convert_high_order(const ConvertArguments& arguments, const HighOrderFile& file, std::vector<Output>& outputs,
+                       const WritingOptions& writing, std::vector<std::string>& warnings) {
   if (arguments.limit) throw UsageError("--limit: curved cells have no limit surface; leave it out");
   for (const Output& output : outputs) require_for_curved_cells(output);
-  const HighOrderFile file = load_high_order(arguments.input, &warnings, arguments.run.references);
   const auto is_set = [](int reference) { return reference != 0; };
   const auto num_set = std::count_if(file.references.begin(), file.references.end(), is_set);
   const Marks marks{.references = static_cast<std::size_t>(num_set), .groups = file.face_groups.groups.size()};
@@ -61,8 +59,8 @@ int convert_high_order(const ConvertArguments& arguments, std::vector<Output>& o
   return polynomial_cells_status(polynomials);
 }
 
-void convert_surface(const ConvertArguments& arguments, std::vector<Output>& outputs,
-                     const WritingOptions& writing, std::vector<std::string>& warnings) {
+void convert_surface(const ConvertArguments& arguments, const PolygonMesh& surface, std::vector<Output>& outputs,
+                     const WritingOptions& writing) {
   if (arguments.limit)
     throw UsageError("--limit: " + arguments.input + " is a surface, and the limit surface is that of cells");
   for (const Output& output : outputs) {
@@ -72,7 +70,6 @@ void convert_surface(const ConvertArguments& arguments, std::vector<Output>& out
       throw UsageError(output.path.string() + ": this format holds cells, but " + arguments.input + " is a surface");
     }
   }
-  const PolygonMesh surface = load_polygons(arguments.input, warnings);
   require_all_written(write_each(outputs, [&](const Output& output) { write_output(output, surface, writing); }));
 }
 
@@ -86,15 +83,16 @@ int run_convert(const ConvertArguments& arguments, const CLI::App& verb) {
   int status = kDone;
   require_known_file(arguments.input);
   require_choice_of_references(arguments.input, arguments.run.references);
-  const bool is_linear = is_volume_file(arguments.input);
-  if (!arguments.region.empty() && !is_linear)
+  LoadedMesh mesh = load_mesh(arguments.input, warnings, true, arguments.run.references);
+  auto* cells = std::get_if<VolumeMesh>(&mesh);
+  if (!arguments.region.empty() && !cells)
     throw UsageError("--region: " + arguments.input + " holds no linear cells to choose from");
-  if (is_high_order_file(arguments.input)) {
-    status = convert_high_order(arguments, outputs, writing, warnings);
-  } else if (is_linear) {
-    convert_volume(arguments, outputs, writing, warnings);
+  if (cells) {
+    convert_volume(arguments, std::move(*cells), outputs, writing, warnings);
+  } else if (const auto* curved = std::get_if<HighOrderFile>(&mesh)) {
+    status = convert_high_order(arguments, *curved, outputs, writing, warnings);
   } else {
-    convert_surface(arguments, outputs, writing, warnings);
+    convert_surface(arguments, std::get<PolygonMesh>(mesh), outputs, writing);
   }
   if (!arguments.run.quiet) {
     for (const std::string& warning : warnings) std::cerr << "subvol: warning: " << warning << '\n';

@@ -293,6 +293,8 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->check(number_in(0.0, 180.0) | CLI::IsMember({kAutomaticAngle, kNoAngle}))
       ->type_name("DEGREES|auto|none")
       ->capture_default_str();
+  verb.add_flag("--keep-groups", fit.keeps_groups,
+                "Keep borders between groups of the target's faces in the same way, also where the surface is smooth");
 }
 
 void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
@@ -312,7 +314,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
       ->needs(order)
       ->group(group);
-  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--lambda-far",
+  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--keep-groups", "--lambda-far",
                             "--quality", "--quality-floor"})
     order->excludes(verb.get_option(other));
 }
@@ -350,6 +352,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
   fit.quality = arguments.quality;
   fit.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
   fit.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
+  fit.keeps_groups = arguments.fit.keeps_groups;
   fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
   fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
   fit.max_iterations = arguments.fit.max_iterations;

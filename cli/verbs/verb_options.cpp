@@ -134,6 +134,15 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
 }
 
 void add_writing_options(CLI::App& verb, WritingOptions& options) {
+  verb.add_option_function<std::string>(
+          "--msh-version",
+          [&options](const std::string& text) {
+            options.msh_version = text == "2.2" ? MshVersion::v2_2 : MshVersion::v4_1;
+          },
+          "Version of .msh files: 4.1, or 2.2, which more programs read")
+      ->check(CLI::IsMember({"2.2", "4.1"}))
+      ->type_name("2.2|4.1")
+      ->default_str("4.1");
   const auto group = "Surfaces for DCC tools";
   options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,

@@ -25,6 +25,11 @@ struct Side {
   bool rising;  ///< the triangle runs from low to high
 };
 
+std::array<Index, 3> sorted_corners(std::array<Index, 3> triangle) {
+  std::sort(triangle.begin(), triangle.end());
+  return triangle;
+}
+
 std::vector<std::array<Index, 2>> sharp_edges(const TriangleMesh& mesh, double angle_degrees) {
   std::vector<Side> sides;
   std::vector<Vec3> normals;
@@ -122,6 +127,30 @@ class EdgeWalk {
 };
 
 }  // namespace
+
+std::vector<std::array<Index, 2>> group_borders(const TriangleMesh& mesh, const TriangleMesh& grouped) {
+  if (grouped.face_groups.empty()) return {};
+  std::vector<std::pair<std::array<Index, 3>, Index>> groups;
+  for (std::size_t t = 0; t < grouped.triangles.size(); ++t)
+    groups.emplace_back(sorted_corners(grouped.triangles[t]), grouped.face_groups.of_face[t]);
+  std::sort(groups.begin(), groups.end());
+  std::vector<std::tuple<Index, Index, Index>> sides;  // vertices, group
+  for (const auto& triangle : mesh.triangles) {
+    const std::array<Index, 3> corners = sorted_corners(triangle);
+    const auto found = std::lower_bound(groups.begin(), groups.end(), std::pair(corners, kNoIndex));
+    const Index group = found != groups.end() && found->first == corners ? found->second : kNoIndex;
+    for (const auto& [low, high] : {std::pair(0, 1), std::pair(0, 2), std::pair(1, 2)})
+      if (corners[low] != corners[high]) sides.emplace_back(corners[low], corners[high], group);
+  }
+  std::sort(sides.begin(), sides.end());
+  std::vector<std::array<Index, 2>> borders;
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    const auto [low, high, group] = sides[i];
+    while (end < sides.size() && std::get<0>(sides[end]) == low && std::get<1>(sides[end]) == high) ++end;
+    if (end - i == 2 && std::get<2>(sides[i + 1]) != group) borders.push_back({low, high});
+  }
+  return borders;
+}
 
 double FeatureCurve::length() const { return polyline_length(points); }
 

@@ -38,6 +38,14 @@ struct CreaseSegment {
   Index curve;
 };
 
+/// Returns the edges between exactly two triangles that are in different groups, or one of them in none, ascending; the
+/// lower vertex of each comes first.
+///
+/// mesh    connected by common vertices.
+/// grouped the same vertices, with groups; it may have more triangles. A triangle of the mesh has the group of the one
+///         with the same three vertices. Without groups, the result is empty. Cost: sorts of triangles and edges.
+std::vector<std::array<Index, 2>> group_borders(const TriangleMesh& mesh, const TriangleMesh& grouped);
+
 /// Finds the edges between exactly two triangles whose normals differ by more than an angle, and joins them to curves.
 ///
 /// mesh           connected by common vertices; triangles may be oriented inconsistently. Triangles without area make

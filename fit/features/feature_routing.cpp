@@ -49,8 +49,13 @@ constexpr double kLeastLength = 0.5;
 /// Convex edges below this angle, in degrees, want one cell; up to 180, one or two do equally well.
 constexpr double kSharpAngle = 125;
 
+/// Deviation from 180 degrees, in degrees, below which a curve is flat: a border between groups on a smooth surface. It
+/// wants two cells.
+constexpr double kFlatAngle = 20;
+
 std::array<double, 3> edge_factors(double angle) {
   if (angle < kSharpAngle) return {1, 1.5, 3};
+  if (std::abs(angle - 180) < kFlatAngle) return {3, 1, 1.5};
   if (angle < 180) return {1.5, 1.5, 1};
   return {3, 1.5, 1};
 }

@@ -60,7 +60,7 @@ struct FeatureRouting {
 ///
 ///   integral of (d^2 + (0.12 h)^2) f ds,   d: distance to the curve,
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;
-///       1.5, and 1 at edges of 3 cells, in between
+///       3, 1, 1.5 if it is within 20 degrees of 180; else 1.5, and 1 at edges of 3 cells
 ///
 /// Closed curves pass through the vertices nearest to three of their points. A path is accepted if it and the curve
 /// stay within 1.1 h of one another. No two paths share an edge, or a vertex but corners and joins. Up to eight rounds

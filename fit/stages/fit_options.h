@@ -42,6 +42,8 @@ struct FitOptions {
   /// edges become creases and are drawn to the target's edges. In [0, 180]. Empty: only the template's own tags are
   /// creases, and they are drawn to target edges above 40 degrees.
   std::optional<double> crease_angle_degrees;
+  /// Borders between groups of the target's faces are kept in the same way, also where the surface is smooth.
+  bool keeps_groups = false;
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< weights of a point cloud's points

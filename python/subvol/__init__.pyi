@@ -242,6 +242,7 @@ def fit(
     boundary: BoundaryRule = "catmull-clark",
     cage_only: bool = False,
     crease_angle: Optional[float] = None,
+    keep_groups: bool = False,
     lambda_far: float = 1.0,
     quality: float = 0.65,
     lambda_close: Optional[float] = None,
@@ -268,6 +269,7 @@ def fill(
     cells: Optional[int] = None,
     quality: float = 0.65,
     crease_angle: Optional[float] = None,
+    keep_groups: bool = False,
     tolerance: float = 0.02,
     max_tolerance: float = 0.5,
     max_iterations: int = 0,
@@ -357,4 +359,5 @@ def write(
     wireframe: bool = True,
     quantize: bool = False,
     map_tolerance: float = 0.001,
+    msh_version: Literal["2.2", "4.1"] = "4.1",
 ) -> None: ...

@@ -4,8 +4,10 @@
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/file_formats.h"
 #include "subvol/io/mesh_formats.h"
 #include "subvol/io/nodal_formats.h"
+#include "subvol/io/surface_io.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
@@ -19,50 +21,6 @@ namespace subvol {
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Format {
-  const char* extension;
-  const char* description;
-  ParsedMesh (*parse)(const std::string& name, std::string_view bytes, const std::string& references);
-  std::string (*format)(const VolumeMesh& mesh);  ///< null: written elsewhere (export/volume_writer.h)
-};
-
-/// Parses a file of cells of any order, which must be linear.
-template <NodalMesh (*parse)(const std::string&, std::string_view, const std::string&)>
-ParsedMesh parse_linear(const std::string& name, std::string_view bytes, const std::string& references) {
-  NodalMesh mesh = parse(name, bytes, references);
-  if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
-    mesh.references.clear();
-  normalise(mesh.face_groups);
-  std::vector<std::string> warnings = std::move(mesh.warnings);
-  return {linear_mesh(name, std::move(mesh)), std::move(warnings)};
-}
-
-ParsedMesh parse_mesh_file(const std::string& name, std::string_view bytes, const std::string& references) {
-  return is_mfem(bytes) ? parse_linear<parse_mfem>(name, bytes, references) : parse_medit(name, bytes, references);
-}
-
-constexpr const char* kNastran = "Nastran bulk data";
-constexpr Format kFormats[] = {
-    {".mesh", "Medit ASCII, versions 1 to 4, or MFEM 1.0", parse_mesh_file, format_medit},
-    {".vtk", "legacy VTK 2.0 to 5.1, ASCII or binary, unstructured grid", parse_linear<parse_nodal_vtk>,
-     format_legacy_vtk},
-    {".vtu", "VTK XML 0.1 to 2.2", parse_linear<parse_vtu>, nullptr},
-    {".msh", "Gmsh 2.2 to 4.1, ASCII or binary", parse_linear<parse_msh>, nullptr},
-    {".inp", "Abaqus and CalculiX", parse_linear<parse_inp>, nullptr},
-    {".bdf", kNastran, parse_linear<parse_nastran>, nullptr},
-    {".nas", kNastran, parse_linear<parse_nastran>, nullptr},
-    {".fem", kNastran, parse_linear<parse_nastran>, nullptr},
-    {".mfem", "MFEM 1.0", parse_linear<parse_mfem>, nullptr},
-};
-
-const Format& format_of(const fs::path& path) {
-  const std::string extension = lower_case(path.extension().string());
-  for (const Format& format : kFormats)
-    if (extension == format.extension) return format;
-  throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(extension) + ", expected " +
-                   volume_mesh_formats());
-}
 
 bool is_warning(const MeshDefect& defect) {
   return defect.kind == MeshDefect::Kind::inverted_cell || defect.kind == MeshDefect::Kind::unused_vertex;
@@ -192,33 +150,52 @@ void turn_over_mirrored(ParsedMesh& parsed, bool mend) {
 
 }  // namespace
 
-VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
-  const Format& format = format_of(path);
-  ParsedMesh parsed = format.parse(path.string(), read_file(path), options.references);
-  if (parsed.mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
-  require_extent(path.string(), parsed.mesh);
+FileCells read_cells(const fs::path& path, const ReadOptions& options) {
+  const std::string name = path.string(), bytes = read_file(path);
+  const bool is_medit = lower_case(path.extension().string()) == ".mesh" && !is_mfem(bytes);
+  ParsedMesh parsed;
+  if (is_medit) {
+    parsed = parse_medit(name, bytes, options.references);
+  } else {
+    NodalMesh mesh = parse_nodal(path, bytes, options.references);
+    if (mesh.num_cells() == 0 && mesh.shells.num_faces() > 0) {
+      mesh.shells.positions = std::move(mesh.positions);
+      if (options.warnings)
+        for (const std::string& warning : mesh.warnings) options.warnings->push_back(name + ": " + warning);
+      return sound_polygons(std::move(mesh.shells), name, options.warnings);
+    }
+    if (mesh.num_cells() > 0 && mesh.max_order() > 1) return mesh;
+    parsed.warnings = std::move(mesh.warnings);
+    if (mesh.num_cells() > 0) parsed.mesh = linear_mesh(name, std::move(mesh));
+  }
+  if (parsed.mesh.num_cells() == 0) throw InputError(name + ": no hexes, prisms or tets in the file");
+  require_extent(name, parsed.mesh);
   turn_over_mirrored(parsed, options.check);
-  if (options.check) check_mesh(path.string(), parsed);
+  if (options.check) check_mesh(name, parsed);
   if (options.warnings)
-    for (const std::string& warning : parsed.warnings) options.warnings->push_back(path.string() + ": " + warning);
+    for (const std::string& warning : parsed.warnings) options.warnings->push_back(name + ": " + warning);
   return std::move(parsed.mesh);
 }
 
+VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
+  FileCells cells = read_cells(path, options);
+  if (auto* mesh = std::get_if<VolumeMesh>(&cells)) return std::move(*mesh);
+  if (auto* curved = std::get_if<NodalMesh>(&cells)) return linear_mesh(path.string(), std::move(*curved));
+  throw InputError(path.string() + ": faces without cells: no hexes, prisms or tets in the file");
+}
+
 void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {
-  const Format& format = format_of(path);
-  if (!format.format) throw InputError(path.string() + ": expected the extension .mesh or .vtk");
+  const std::string extension = lower_case(path.extension().string());
+  if (extension != ".mesh" && extension != ".vtk")
+    throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(extension) +
+                     ", expected the extension .mesh or .vtk");
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind <= MeshDefect::Kind::not_finite || defect.kind == MeshDefect::Kind::bad_tag)
       throw InputError("write_volume_mesh: " + defect.message);
   require_groups(mesh.face_groups, "write_volume_mesh");
-  write_file_atomically(path, format.format(mesh));
+  write_file_atomically(path, extension == ".mesh" ? format_medit(mesh) : format_legacy_vtk(mesh));
 }
 
-std::string volume_mesh_formats() {
-  std::string text;
-  for (const Format& format : kFormats)
-    text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
-  return text;
-}
+std::string volume_mesh_formats() { return readable_formats(true); }
 
 }  // namespace subvol

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/io/nodal_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <filesystem>
 #include <string>
+#include <variant>
 #include <vector>
 
 namespace subvol {
@@ -21,6 +24,18 @@ struct ReadOptions {
   /// InputError if there are none of that name.
   std::string references{};
 };
+
+/// What a file of cells holds.
+using FileCells = std::variant<VolumeMesh, NodalMesh, PolygonMesh>;
+
+/// Reads a file of cells, once, and returns what it holds:
+///
+///   VolumeMesh   linear cells, as `read_volume_mesh`
+///   NodalMesh    cells, one of which at least has order 2 or more, as `read_nodal_mesh`; not checked, its warnings in it
+///   PolygonMesh  faces without cells (.msh, .inp), as `read_polygon_mesh`
+///
+/// InputError: as these.
+FileCells read_cells(const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// Reads a volume mesh of hexes, prisms and tets; the extension chooses the format (docs/file-formats.md).
 ///

@@ -21,6 +21,11 @@ NodalMesh parse_nodal_vtk(const std::string& name, std::string_view bytes, const
 NodalMesh parse_inp(const std::string& name, std::string_view bytes, const std::string& references);
 NodalMesh parse_nastran(const std::string& name, std::string_view bytes, const std::string& references);
 NodalMesh parse_mfem(const std::string& name, std::string_view bytes, const std::string& references);
+NodalMesh parse_exodus(const std::string& name, std::string_view bytes, const std::string& references);
+
+/// Parses a file by its extension, with unused references dropped and groups sorted. It may have no cells. InputError:
+/// also an unknown extension.
+NodalMesh parse_nodal(const std::filesystem::path& path, std::string_view bytes, const std::string& references);
 
 /// True if the bytes begin as an MFEM mesh; a .mesh may also be Medit's.
 bool is_mfem(std::string_view bytes);
@@ -37,8 +42,8 @@ enum class VtkCellUse { added, lower_dimension };
 VtkCellUse add_vtk_cell(NodalMesh& mesh, NodalCells& cells, int type, std::span<const std::int64_t> nodes,
                         bool old_numbers, const std::function<void(const std::string&)>& fail);
 
-/// Returns the corners of the faces S1, S2, .. of an element of Abaqus.
-std::vector<std::vector<int>> inp_faces(CellKind kind);
+/// Returns the cell seen in a mirror: node i of it is node places[i] of the cell, in `NodeOrdering::vtk`.
+std::vector<int> mirrored_places(CellKind kind, int order);
 
 /// Adds a face, given by its corners in any order, to a group of the mesh.
 void add_face(NodalMesh& mesh, std::span<const Index> corners, Index group);

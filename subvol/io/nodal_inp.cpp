@@ -4,6 +4,7 @@
 #include "subvol/io/left_out.h"
 #include "subvol/io/mesh_formats.h"
 #include "subvol/io/nodal_formats.h"
+#include "subvol/io/nodal_sides.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,6 +29,7 @@ constexpr InpType kInpTypes[] = {
     {15, CellKind::prism, 2}, {20, CellKind::hex, 2}, {27, CellKind::hex, 2},
 };
 constexpr const char* kSolidFamilies[] = {"C3D", "DC3D", "AC3D", "DCC3D", "F3D"};
+constexpr const char* kShellFamilies[] = {"STRI", "S", "M3D", "R3D", "SFM3D", "DS"};
 
 std::string upper_case(std::string_view text) {
   std::string upper(text);
@@ -99,6 +101,10 @@ class InpParser {
     const InpType* type;
     std::size_t first_node, num_nodes;
     std::size_t set;          ///< of *ELEMENT, ELSET=; kNone if it has none
+  };
+  struct Shell {
+    std::size_t end;          ///< of its nodes
+    std::size_t set, line;
   };
   struct Side {
     std::int64_t element;     ///< its number, if `set` is kNoSet
@@ -230,11 +236,13 @@ class InpParser {
     const std::string type = upper_case(parameter("TYPE"));
     if (type.empty()) fail("*ELEMENT: expected TYPE=");
     type_ = nullptr;
+    shell_corners_ = 0;
+    for (const std::string_view family : kShellFamilies)
+      if (const auto digits = digits_after(type, family); digits && shell_corners_ == 0)
+        shell_corners_ = *digits == 3 || *digits == 6 || *digits == 65 ? 3 : *digits == 4 || *digits == 8 ? 4 : 0;
     for (const std::string_view family : kSolidFamilies) {
       if (!type.starts_with(family)) continue;
-      std::size_t end = family.size();
-      while (end < type.size() && type[end] >= '0' && type[end] <= '9') ++end;
-      const auto digits = parse_integer(std::string_view(type).substr(family.size(), end - family.size()));
+      const auto digits = digits_after(type, family);
       if (!digits) continue;
       if (*digits == 5 || *digits == 13) fail(std::string("a pyramid: ") + kNoPyramids);
       const auto found = std::find_if(std::begin(kInpTypes), std::end(kInpTypes),
@@ -247,9 +255,24 @@ class InpParser {
     skipped_type_ = type;
   }
 
+  /// The number that a type has behind the letters of its family.
+  static std::optional<std::int64_t> digits_after(std::string_view type, std::string_view family) {
+    if (!type.starts_with(family)) return std::nullopt;
+    std::size_t end = family.size();
+    while (end < type.size() && type[end] >= '0' && type[end] <= '9') ++end;
+    return parse_integer(type.substr(family.size(), end - family.size()));
+  }
+
+  void read_shell(const std::vector<std::string>& fields) {
+    if (fields.size() <= shell_corners_) fail("fewer nodes than an element of its type has");
+    for (std::size_t i = 1; i <= shell_corners_; ++i) shell_nodes_.push_back(label(fields[i], "the number of a node"));
+    shells_.push_back({shell_nodes_.size(), set_, line_});
+  }
+
   void read_element(const std::vector<std::string>& fields) {
     if (!type_) {
       ++num_skipped_[skipped_type_];
+      if (shell_corners_ > 0) read_shell(fields);
       return;
     }
     std::size_t at = 0;
@@ -388,7 +411,23 @@ class InpParser {
 
   // --- Building the mesh ----------------------------------------------------------------------------------------------
 
+  /// Without cells, shells are a surface, whose groups are the sets of *ELEMENT.
+  void build_shells() {
+    GroupList groups;
+    std::vector<Index> of_face;
+    std::size_t begin = 0;
+    for (const Shell& shell : shells_) {
+      line_ = shell.line;
+      for (; begin < shell.end; ++begin) mesh_.shells.face_vertices.push_back(node_of(shell_nodes_[begin]));
+      mesh_.shells.face_offsets.push_back(mesh_.shells.face_vertices.size());
+      of_face.push_back(shell.set == kNone ? kNoIndex : groups.by_name(element_sets_[shell.set].name));
+    }
+    if (groups.groups().size() + (std::find(of_face.begin(), of_face.end(), kNoIndex) != of_face.end()) > 1)
+      mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
+  }
+
   void build() {
+    if (elements_.empty() && !shells_.empty()) return build_shells();
     std::vector<Index> nodes;
     for (std::size_t e = 0; e < elements_.size(); ++e) {
       const Element& element = elements_[e];
@@ -405,9 +444,11 @@ class InpParser {
   }
 
   Index node(const Element& element, std::size_t i, std::size_t e) {
-    const std::int64_t number = element_nodes_[element.first_node + i];
-    const auto found = nodes_.find(number);
     line_ = lines_[e];
+    return node_of(element_nodes_[element.first_node + i]);
+  }
+  Index node_of(std::int64_t number) const {
+    const auto found = nodes_.find(number);
     if (found == nodes_.end()) fail("an element names node " + std::to_string(number) + ", which the file does not have");
     return found->second;
   }
@@ -508,6 +549,9 @@ class InpParser {
   std::vector<Element> elements_;
   std::vector<std::size_t> lines_;                   ///< of elements
   std::vector<std::int64_t> element_nodes_;
+  std::vector<Shell> shells_;
+  std::vector<std::int64_t> shell_nodes_;            ///< corners
+  std::size_t shell_corners_ = 0;                    ///< of the elements being read; 0: no shells
   std::vector<InpSet> element_sets_;
   std::map<std::string, std::size_t> set_numbers_;   ///< by name in upper case
   std::map<std::string, std::size_t> num_skipped_;   ///< lines of elements of other types
@@ -522,12 +566,6 @@ class InpParser {
 };
 
 }  // namespace
-
-std::vector<std::vector<int>> inp_faces(CellKind kind) {
-  if (kind == CellKind::tet) return {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
-  if (kind == CellKind::prism) return {{0, 1, 2}, {3, 5, 4}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}};
-  return {{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
-}
 
 NodalMesh parse_inp(const std::string& name, std::string_view bytes, const std::string&) {
   return InpParser(name).parse(bytes);

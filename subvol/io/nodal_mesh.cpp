@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/file_formats.h"
 #include "subvol/io/nodal_formats.h"
 
 #include <Eigen/Geometry>
@@ -25,6 +26,7 @@ struct NodalFormat {
 constexpr NodalFormat kNodalFormats[] = {
     {".msh", parse_msh}, {".vtu", parse_vtu}, {".vtk", parse_nodal_vtk}, {".inp", parse_inp},   {".bdf", parse_nastran},
     {".nas", parse_nastran}, {".fem", parse_nastran}, {".mfem", parse_mfem}, {".mesh", parse_mfem},
+    {".e", parse_exodus}, {".exo", parse_exodus}, {".ex2", parse_exodus}, {".gen", parse_exodus},
 };
 
 const NodalFormat* nodal_format(const fs::path& path) {
@@ -35,19 +37,6 @@ const NodalFormat* nodal_format(const fs::path& path) {
 }
 
 std::array<int, 3> key_of(const LatticePoint& at) { return {at[0], at[1], at[2]}; }
-
-/// The cell seen in a mirror: node i of the turned cell is node turned[i] of the cell.
-std::vector<int> turned_places(CellKind kind, int order) {
-  const auto mirrored = [&](const LatticePoint& at) {
-    return LatticePoint(at[1], at[0], at[2]);
-  };
-  const auto lattice = cell_lattice(kind, order, NodeOrdering::vtk);
-  std::map<std::array<int, 3>, int> place;
-  for (std::size_t i = 0; i < lattice.size(); ++i) place[key_of(lattice[i])] = static_cast<int>(i);
-  std::vector<int> turned;
-  for (const LatticePoint& at : lattice) turned.push_back(place.at(key_of(mirrored(at))));
-  return turned;
-}
 
 /// True if the straight-sided cell is left-handed at every corner.
 bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
@@ -62,6 +51,15 @@ bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
 }
 
 }  // namespace
+
+std::vector<int> mirrored_places(CellKind kind, int order) {
+  const auto lattice = cell_lattice(kind, order, NodeOrdering::vtk);
+  std::map<std::array<int, 3>, int> place;
+  for (std::size_t i = 0; i < lattice.size(); ++i) place[key_of(lattice[i])] = static_cast<int>(i);
+  std::vector<int> mirrored;
+  for (const LatticePoint& at : lattice) mirrored.push_back(place.at({at[1], at[0], at[2]}));
+  return mirrored;
+}
 
 int NodalMesh::max_order() const { return orders.empty() ? 1 : *std::max_element(orders.begin(), orders.end()); }
 
@@ -131,28 +129,27 @@ void NodalCells::complete(CellKind kind, std::vector<Index>& nodes) {
   }
 }
 
-bool is_nodal_extension(const fs::path& path) { return nodal_format(path) != nullptr; }
+bool is_nodal_extension(const fs::path& path) {
+  const FileFormat* format = format_of_path(path);
+  return format && format->holds_cells && !format->read.empty();
+}
 
-NodalMesh read_nodal_mesh(const fs::path& path, const std::string& references) {
+NodalMesh parse_nodal(const fs::path& path, std::string_view bytes, const std::string& references) {
   const NodalFormat* format = nodal_format(path);
-  if (!format) throw InputError(path.string() + ": expected .msh, .vtu, .vtk, .inp, .bdf or an MFEM .mesh");
-  NodalMesh mesh = format->parse(path.string(), read_file(path), references);
-  if (mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  if (!format)
+    throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(path.extension().string()) +
+                     ", expected " + readable_formats(true));
+  NodalMesh mesh = format->parse(path.string(), bytes, references);
   if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
     mesh.references.clear();
   normalise(mesh.face_groups);
   return mesh;
 }
 
-bool holds_curved_cells(const fs::path& path) {
-  if (!is_nodal_extension(path)) return false;
-  try {
-    const std::string bytes = read_file(path);
-    if (lower_case(path.extension().string()) == ".mesh" && !is_mfem(bytes)) return false;
-    return nodal_format(path)->parse(path.string(), bytes, {}).max_order() > 1;
-  } catch (const InputError&) {
-    return false;  // whoever reads it next says why
-  }
+NodalMesh read_nodal_mesh(const fs::path& path, const std::string& references) {
+  NodalMesh mesh = parse_nodal(path, read_file(path), references);
+  if (mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  return mesh;
 }
 
 VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh) {
@@ -208,7 +205,7 @@ void turn_over_mirrored(NodalMesh& mesh) {
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     if (!all && mesh.kinds[c] != CellKind::prism) continue;
     std::vector<int>& turned = places[{mesh.kinds[c], mesh.orders[c]}];
-    if (turned.empty()) turned = turned_places(mesh.kinds[c], mesh.orders[c]);
+    if (turned.empty()) turned = mirrored_places(mesh.kinds[c], mesh.orders[c]);
     old.assign(mesh.cell(c).begin(), mesh.cell(c).end());
     for (std::size_t i = 0; i < old.size(); ++i)
       mesh.nodes[mesh.offsets[c] + i] = old[static_cast<std::size_t>(turned[i])];

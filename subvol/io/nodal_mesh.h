@@ -4,6 +4,7 @@
 #include "subvol/io/cell_lattice.h"
 #include "subvol/mesh/face_groups.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <filesystem>
@@ -36,6 +37,8 @@ struct NodalMesh {
   std::vector<int> references;             ///< one per cell, or empty (all 0)
   std::vector<Group> regions;              ///< names of references, where there are any
   VolumeFaceGroups face_groups;            ///< by the corners of faces
+  PolygonMesh shells;                      ///< without cells: elements of two dimensions by their corners, which are
+                                           ///< numbers of nodes; it has no positions of its own (.msh, .inp)
   NodeSpacing spacing = NodeSpacing::equal;
   std::vector<std::string> warnings;       ///< without the file's name
 
@@ -80,6 +83,7 @@ class NodalCells {
 ///   .inp                 Abaqus and CalculiX
 ///   .bdf .nas .fem       Nastran bulk data
 ///   .mfem, or a .mesh that begins with "MFEM mesh"       MFEM mesh v1.0, 1.2 and 1.3
+///   .e .exo .ex2 .gen    Exodus II, if the library was built with netCDF (`has_exodus`)
 ///
 /// references  name of the cell data that become the references (.vtu, .vtk); empty: the usual ones.
 /// InputError, naming the file and line: as `read_volume_mesh`, except that the cells may be curved, and that they need
@@ -89,9 +93,8 @@ NodalMesh read_nodal_mesh(const std::filesystem::path& path, const std::string& 
 /// True if `read_nodal_mesh` reads files of this name, as far as the extension says.
 bool is_nodal_extension(const std::filesystem::path& path);
 
-/// Returns true if a file that `read_nodal_mesh` reads has a cell of order 2 or more; false also if it cannot be read.
-/// Cost: that of reading it.
-bool holds_curved_cells(const std::filesystem::path& path);
+/// Returns true if Exodus files can be read and written: the library was built with netCDF.
+bool has_exodus();
 
 /// Returns the cells as linear ones; nodes keep their numbers. InputError: a cell of order 2 or more.
 VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh);

@@ -63,6 +63,7 @@ CellKind kind_of(Shape shape) {
 struct Element {
   const MshType* type;
   int physical;           ///< number of its first physical group, 0: none
+  const std::vector<int>* more;  ///< all of them, or null: only that one
   std::int64_t entity;    ///< the part of the geometry that it is on
   std::size_t line;
   std::size_t first_node; ///< in the list of all elements' nodes
@@ -190,8 +191,8 @@ class MshParser {
         const std::size_t groups = read_size("the number of physical groups", 1);
         for (std::size_t k = 0; k < groups; ++k) {
           const std::int64_t group = std::abs(read_int("a physical group"));
-          if (k == 0) physical_[dim][tag] = static_cast<int>(std::min<std::int64_t>(group, kMostNumber));
-          else ++num_more_groups_;
+          physical_[dim][tag].push_back(static_cast<int>(std::min<std::int64_t>(group, kMostNumber)));
+          num_more_groups_ += k > 0 && dim == 3;
         }
         if (dim == 0) continue;
         const std::size_t borders = read_size("the number of bounding entities", 1);
@@ -266,10 +267,10 @@ class MshParser {
     return *found;
   }
 
-  void add_element(const MshType& type, int physical, std::int64_t entity) {
-    const bool wanted = dimension(type.shape) == 3 || (dimension(type.shape) == 2 && physical != 0);
+  void add_element(const MshType& type, int physical, std::int64_t entity, const std::vector<int>* more = nullptr) {
+    const bool wanted = dimension(type.shape) >= 2;
     if (wanted)
-      elements_.push_back({&type, physical, entity, scan_.word_line(), element_nodes_.size()});
+      elements_.push_back({&type, physical, more, entity, scan_.word_line(), element_nodes_.size()});
     else
       ++num_skipped_;
     for (int i = 0; i < type.size; ++i) {
@@ -295,7 +296,8 @@ class MshParser {
       const auto group = groups.find(entity);
       for (std::size_t i = 0; i < n; ++i) {
         read_tag("the tag of an element");
-        add_element(type, group == groups.end() ? 0 : group->second, entity);
+        const bool in_none = group == groups.end() || group->second.empty();
+        add_element(type, in_none ? 0 : group->second[0], entity, in_none ? nullptr : &group->second);
       }
     }
     end_section("$Elements");
@@ -331,21 +333,21 @@ class MshParser {
     const bool has_groups = std::any_of(elements_.begin(), elements_.end(), [&](const Element& element) {
       return is_cell(element) && element.physical != 0;
     });
+    if (std::none_of(elements_.begin(), elements_.end(), is_cell)) return build_shells();
     NodalCells cells(mesh_);
     GroupList faces;
     std::vector<Index> nodes;
     for (const Element& element : elements_) {
-      nodes.clear();
-      for (int i = 0; i < element.type->size; ++i) {
-        const std::int64_t tag = element_nodes_[element.first_node + static_cast<std::size_t>(i)];
-        const auto found = numbers_.find(tag);
-        if (found == numbers_.end())
-          scan_.fail("an element names node " + std::to_string(tag) + ", which the file does not have", element.line);
-        nodes.push_back(found->second);
+      if (!is_cell(element) && element.physical == 0) {
+        ++num_skipped_;
+        continue;
       }
+      take_nodes(element, nodes);
       if (!is_cell(element)) {
         const std::size_t corners = element.type->shape == Shape::quad ? 4 : 3;
-        add_face(mesh_, std::span(nodes).first(corners), faces.by_number(element.physical));
+        const auto add = [&](int group) { add_face(mesh_, std::span(nodes).first(corners), faces.by_number(group)); };
+        if (element.more) std::for_each(element.more->begin(), element.more->end(), add);
+        else add(element.physical);
         continue;
       }
       cells.add(kind_of(element.type->shape), element.type->order, NodeOrdering::gmsh, nodes);
@@ -361,10 +363,44 @@ class MshParser {
     name_regions();
     if (num_more_groups_ > 0)
       mesh_.warnings.push_back(std::to_string(num_more_groups_) +
-                               " parts of the geometry are in more than one physical group: only the first is used");
+                               " physical groups of volumes are not used: each volume has a physical group before them");
     if (num_skipped_ > 0)
       mesh_.warnings.push_back(std::to_string(num_skipped_) +
                                " elements of lower dimension that are no face of a physical group are skipped");
+  }
+
+  void take_nodes(const Element& element, std::vector<Index>& nodes) const {
+    nodes.clear();
+    for (int i = 0; i < element.type->size; ++i) {
+      const std::int64_t tag = element_nodes_[element.first_node + static_cast<std::size_t>(i)];
+      const auto found = numbers_.find(tag);
+      if (found == numbers_.end())
+        scan_.fail("an element names node " + std::to_string(tag) + ", which the file does not have", element.line);
+      nodes.push_back(found->second);
+    }
+  }
+
+  /// Without cells, the elements of two dimensions are a surface. Its groups are the physical ones; without any, the
+  /// surfaces of the geometry.
+  void build_shells() {
+    const bool has_groups =
+        std::any_of(elements_.begin(), elements_.end(), [](const Element& element) { return element.physical != 0; });
+    GroupList groups;
+    std::vector<Index> nodes, of_face;
+    for (const Element& element : elements_) {
+      take_nodes(element, nodes);
+      nodes.resize(element.type->shape == Shape::quad ? 4 : 3);
+      mesh_.shells.face_vertices.insert(mesh_.shells.face_vertices.end(), nodes.begin(), nodes.end());
+      mesh_.shells.face_offsets.push_back(mesh_.shells.face_vertices.size());
+      const std::int64_t entity = std::clamp<std::int64_t>(element.entity, -kMostNumber, kMostNumber);
+      const int number = has_groups ? element.physical : static_cast<int>(entity);
+      of_face.push_back(has_groups && number == 0 ? kNoIndex : groups.by_number(number));
+    }
+    if (!has_groups && groups.groups().size() < 2) return;
+    mesh_.shells.face_groups = {groups.take(), std::move(of_face)};
+    for (Group& group : mesh_.shells.face_groups.groups)
+      if (const auto name = names_[2].find(group.number); has_groups && name != names_[2].end())
+        group.name = name->second;
   }
 
   /// A group that `write_volume` has named after a reference stands for that reference.
@@ -394,7 +430,7 @@ class MshParser {
   ValueType size_type_ = kUInt64;
   std::unordered_map<std::int64_t, Index> numbers_;             ///< of nodes by their tags
   std::array<std::map<int, std::string>, 4> names_;             ///< of physical groups, by dimension
-  std::array<std::map<std::int64_t, int>, 4> physical_;         ///< of entities
+  std::array<std::map<std::int64_t, std::vector<int>>, 4> physical_;  ///< groups of entities
   std::vector<Element> elements_;
   std::vector<std::int64_t> element_nodes_;
   std::size_t num_skipped_ = 0, num_more_groups_ = 0;

@@ -5,13 +5,12 @@
 #include "subvol/io/left_out.h"
 #include "subvol/io/nodal_formats.h"
 #include "subvol/io/reference_arrays.h"
-#include "subvol/io/vtk_xml_arrays.h"
+#include "subvol/io/vtk_xml_file.h"
 
 #include <pugixml.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -22,19 +21,11 @@ namespace {
 class VtuParser {
  public:
   VtuParser(const std::string& name, std::string_view bytes, const std::string& references)
-      : name_(name), asked_(references) {
-    require_no_utf16(name, bytes);
-    load(bytes);
-  }
+      : file_(name, bytes, "UnstructuredGrid"), asked_(references) {}
 
   NodalMesh parse() {
-    const pugi::xml_node file = document_.child("VTKFile");
-    if (!file) fail("expected the element VTKFile");
-    read_header(file);
-    const pugi::xml_node grid = file.child("UnstructuredGrid");
-    if (!grid) fail("expected the element UnstructuredGrid");
     std::size_t num_pieces = 0;
-    for (const pugi::xml_node piece : grid.children("Piece")) {
+    for (const pugi::xml_node piece : file_.grid().children("Piece")) {
       read_piece(piece);
       ++num_pieces;
     }
@@ -45,6 +36,7 @@ class VtuParser {
     if (num_skipped_ > 0)
       mesh_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
     choose_references();
+    if (num_pieces == 1) read_groups();
     mesh_size_ = mesh_.positions.size();
     return std::move(mesh_);
   }
@@ -53,8 +45,7 @@ class VtuParser {
   /// pieces.
   std::vector<CellValues> cell_values() const {
     std::vector<CellValues> all;
-    const pugi::xml_node grid = document_.child("VTKFile").child("UnstructuredGrid");
-    const pugi::xml_node piece = grid.child("Piece");
+    const pugi::xml_node piece = file_.grid().child("Piece");
     if (piece.next_sibling("Piece")) return all;
     for (const bool is_on_points : {false, true})
       for (const pugi::xml_node node : piece.child(is_on_points ? "PointData" : "CellData").children("DataArray")) {
@@ -63,7 +54,7 @@ class VtuParser {
         if (node.attribute("NumberOfComponents").as_int(1) != 1 || is_ghost) continue;
         std::vector<double> found;
         try {
-          found = decode_vtk_xml_array(described(node), storage_);
+          found = decode_vtk_xml_array(described(node), file_.storage());
         } catch (const InputError&) {
           continue;  // what a reader of meshes does not need may be in a form that it does not know
         }
@@ -78,90 +69,18 @@ class VtuParser {
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const { throw InputError(name_ + ": " + what); }
+  [[noreturn]] void fail(const std::string& what) const { file_.fail(what); }
 
-  /// Cuts the appended data off, which need not be XML, and parses the rest.
-  void load(std::string_view bytes) {
-    constexpr std::string_view kAppended = "<AppendedData";
-    const std::size_t begin = bytes.find(kAppended);
-    text_ = std::string(bytes.substr(0, begin));
-    if (begin != std::string_view::npos) {
-      const std::size_t end = bytes.find('>', begin), start = bytes.find('_', std::min(end, bytes.size()));
-      if (end == std::string_view::npos || start == std::string_view::npos)
-        fail("AppendedData: expected an underscore before the data");
-      storage_.appended_base64 = bytes.substr(begin, end - begin).find("base64") != std::string_view::npos;
-      storage_.appended = bytes.substr(start + 1);
-      text_ += "</VTKFile>";
-    }
-    const pugi::xml_parse_result result =
-        document_.load_buffer_inplace(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
-    if (result) return;
-    const auto line = std::count(bytes.begin(), bytes.begin() + std::min<std::ptrdiff_t>(result.offset, text_.size()),
-                                 '\n') + 1;
-    throw InputError(name_ + ":" + std::to_string(line) + ": not whole XML: " + result.description());
-  }
-
-  void read_header(const pugi::xml_node& file) {
-    const std::string type = file.attribute("type").value(), order = file.attribute("byte_order").value(),
-                      header = file.attribute("header_type").value();
-    if (type != "UnstructuredGrid") fail("expected the type UnstructuredGrid, found " + in_quotes(type));
-    const auto version = parse_number(file.attribute("version").as_string("0.1"));
-    if (!version || *version < 0 || *version > 2.2) fail("expected version 0.1 to 2.2 of VTK XML");
-    old_numbers_ = *version < 2.1;
-    if (order == "BigEndian") storage_.endian = std::endian::big;
-    else if (!order.empty() && order != "LittleEndian") fail("unknown byte_order " + in_quotes(order));
-    if (header == "UInt64") storage_.header = kUInt64;
-    else if (!header.empty() && header != "UInt32") fail("unknown header_type " + in_quotes(header));
-    storage_.compressor = file.attribute("compressor").value();
-  }
-
-  static VtkXmlArray described(const pugi::xml_node& node) {
-    return {node.attribute("Name").value(), node.attribute("type").value(), node.attribute("format").value(),
-            node.child_value(), node.attribute("offset").value()};
-  }
-
-  std::vector<double> values(const pugi::xml_node& node) const {
-    try {
-      return decode_vtk_xml_array(described(node), storage_);
-    } catch (const InputError& error) {
-      fail(error.what());
-    }
-  }
-
-  std::vector<std::int64_t> whole_numbers(const pugi::xml_node& cells, const char* array) const {
-    const pugi::xml_node node = cells.find_child_by_attribute("DataArray", "Name", array);
-    if (!node) fail(std::string("Cells: expected an array ") + array);
-    std::vector<std::int64_t> numbers;
-    for (const double value : values(node)) {
-      if (value != std::floor(value) || std::abs(value) > 1e15)
-        fail(std::string(array) + ": expected whole numbers");
-      numbers.push_back(static_cast<std::int64_t>(value));
-    }
-    return numbers;
-  }
-
-  static std::size_t claimed(const pugi::xml_node& piece, const char* attribute) {
-    return static_cast<std::size_t>(piece.attribute(attribute).as_ullong());
-  }
+  static VtkXmlArray described(const pugi::xml_node& node) { return VtkXmlFile::described(node); }
 
   void read_piece(const pugi::xml_node& piece) {
-    const std::size_t num_cells = claimed(piece, "NumberOfCells"), num_points = claimed(piece, "NumberOfPoints");
+    const std::size_t num_cells = VtkXmlFile::claimed(piece, "NumberOfCells");
     if (num_cells == 0) return;
     const std::size_t first_point = mesh_.positions.size();
-    const std::vector<double> points = values(piece.child("Points").child("DataArray"));
-    if (points.size() != 3 * num_points || points.size() / 3 != num_points)
-      fail("Points: expected three coordinates for each of " + std::to_string(num_points) + " points, found " +
-           std::to_string(points.size()) + " numbers");
-    if (first_point + num_points > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
-      fail("Points: more points than an index can tell");
-    for (std::size_t i = 0; i < num_points; ++i) {
-      mesh_.positions.emplace_back(&points[3 * i]);
-      if (!mesh_.positions.back().allFinite())
-        fail("point " + std::to_string(i) + " has a coordinate that is not finite");
-    }
+    file_.append_points(piece, mesh_.positions);
     const pugi::xml_node cells = piece.child("Cells");
-    const auto nodes = whole_numbers(cells, "connectivity"), ends = whole_numbers(cells, "offsets"),
-               types = whole_numbers(cells, "types");
+    const auto nodes = file_.whole_numbers(cells, "connectivity"), ends = file_.whole_numbers(cells, "offsets"),
+               types = file_.whole_numbers(cells, "types");
     if (ends.size() != num_cells || types.size() != num_cells)
       fail("Cells: expected one offset and one type for each of " + std::to_string(num_cells) + " cells");
     add_cells(nodes, ends, types, first_point);
@@ -187,7 +106,7 @@ class VtuParser {
         node += static_cast<std::int64_t>(first_point);
       }
       const int type = static_cast<int>(std::clamp<std::int64_t>(types[c], -1, 1000000));
-      const bool added = add_vtk_cell(mesh_, cells, type, cell, old_numbers_, refuse) == VtkCellUse::added;
+      const bool added = add_vtk_cell(mesh_, cells, type, cell, file_.old_numbers(), refuse) == VtkCellUse::added;
       num_skipped_ += !added;
       is_volume_.push_back(added);
     }
@@ -207,7 +126,7 @@ class VtuParser {
       CellNumbers numbers{described_array.name, is_real, {}};
       if (components == 1)
         try {
-          for (const double value : decode_vtk_xml_array(described_array, storage_)) {
+          for (const double value : decode_vtk_xml_array(described_array, file_.storage())) {
             if (value != std::floor(value)) break;  // also of what is not a number
             numbers.values.push_back(static_cast<std::int64_t>(std::clamp(value, -1e15, 1e15)));
           }
@@ -257,11 +176,50 @@ class VtuParser {
                                " cells are beyond 32 bits, and become 0");
   }
 
-  std::string name_, asked_, text_;
-  pugi::xml_document document_;
-  VtkXmlStorage storage_;
+  /// Reads the groups of faces and the names of references that subvol writes (docs/file-formats.md), in the grid or
+  /// behind it.
+  void read_groups() {
+    pugi::xml_node data;
+    for (const pugi::xml_node parent : {file_.grid(), file_.grid().parent()})
+      for (const pugi::xml_node child : parent.children("FieldData"))
+        if (child.find_child_by_attribute("DataArray", "Name", "subvol_group_numbers")) data = child;
+    if (!data) return;
+    const auto array = [&](const char* name) { return file_.whole_numbers(data, name); };
+    const auto numbers = array("subvol_group_numbers"), dimensions = array("subvol_group_dimensions"),
+               codes = array("subvol_group_names"), points = array("subvol_group_faces"),
+               of_faces = array("subvol_group_of_faces");
+    std::string names;
+    for (const std::int64_t code : codes) names += static_cast<char>(code);
+    std::size_t at = 0;
+    if (dimensions.size() != numbers.size() || points.size() != 4 * of_faces.size())
+      fail("subvol_group_numbers: expected as many dimensions, and four points for each face");
+    for (std::size_t g = 0; g < numbers.size(); ++g) {
+      const std::size_t end = std::min(names.find('\n', at), names.size());
+      const Group group{names.substr(at, end - at), static_cast<int>(numbers[g]), static_cast<int>(dimensions[g])};
+      if ((group.dimension != 2 && group.dimension != 3) || (group.dimension == 2 && !mesh_.regions.empty()) ||
+          std::abs(numbers[g]) > std::numeric_limits<int>::max())
+        fail("subvol_group_dimensions: expected 2 for groups of faces, then 3 for references");
+      (group.dimension == 2 ? mesh_.face_groups.groups : mesh_.regions).push_back(group);
+      at = std::min(end + 1, names.size());
+    }
+    for (std::size_t f = 0; f < of_faces.size(); ++f) {
+      const std::size_t size = points[4 * f + 3] == kNoIndex ? 3 : 4;
+      std::array<Index, 4> corners{};
+      for (std::size_t k = 0; k < size; ++k) {
+        const std::int64_t v = points[4 * f + k];
+        if (v < 0 || static_cast<std::uint64_t>(v) >= mesh_.positions.size())
+          fail("subvol_group_faces: face " + std::to_string(f) + ": expected numbers of points");
+        corners[k] = static_cast<Index>(v);
+      }
+      if (of_faces[f] < 0 || static_cast<std::size_t>(of_faces[f]) >= mesh_.face_groups.groups.size())
+        fail("subvol_group_of_faces: face " + std::to_string(f) + ": expected the place of a group of faces");
+      add_face(mesh_, std::span<const Index>(corners).first(size), static_cast<Index>(of_faces[f]));
+    }
+  }
+
+  VtkXmlFile file_;
+  std::string asked_;
   NodalMesh mesh_;
-  bool old_numbers_ = false;
   std::vector<bool> is_volume_;           ///< of all cells of the file: whether it is one of the mesh
   std::vector<CellNumbers> arrays_;
   std::vector<std::string> others_;

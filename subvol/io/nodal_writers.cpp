@@ -3,38 +3,19 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
-#include "subvol/io/nodal_formats.h"
+#include "subvol/io/nodal_sides.h"
 #include "subvol/io/positive_numbers.h"
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <map>
+#include <numeric>
 #include <set>
 
 namespace subvol {
 
 namespace {
-
-int common_order(const NodalMesh& mesh, const char* format, int most) {
-  const int order = mesh.orders.front();
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    if (mesh.orders[c] != order)
-      throw InputError(std::string(format) + ": cells of several orders, expected one for all");
-  if (order > most)
-    throw InputError(std::string(format) + ": cells of order " + std::to_string(order) + ", expected order 1 to " +
-                     std::to_string(most));
-  return order;
-}
-
-std::size_t num_corners(CellKind kind) { return static_cast<std::size_t>(cell_topology(kind).num_vertices); }
-
-/// Number of the corners, and of the middles of edges in order 2.
-std::size_t num_written(CellKind kind, int order) {
-  return num_corners(kind) + (order == 2 ? static_cast<std::size_t>(cell_topology(kind).num_edges) : 0);
-}
-
-int reference_of(const NodalMesh& mesh, std::size_t c) { return mesh.references.empty() ? 0 : mesh.references[c]; }
 
 /// The text of a number that is closest to it, of at most so many characters. form: makes a format's text of a plain one.
 template <class Form>
@@ -54,15 +35,6 @@ std::string number_within(double value, std::size_t width, const Form& form) {
 void append_inp_position(std::string& text, const Vec3& p) {
   constexpr std::size_t kWidth = 20;
   for (int k = 0; k < 3; ++k) text += ", " + number_within(p[k], kWidth, [](const std::string& plain) { return plain; });
-}
-
-std::vector<bool> used_nodes(const NodalMesh& mesh, int order) {
-  std::vector<bool> used(mesh.positions.size(), false);
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    for (const Index node : mesh.cell(c).first(num_written(mesh.kinds[c], order)))
-      used[static_cast<std::size_t>(node)] = true;
-  if (order == 1) used.assign(used.size(), true);  // vertices of no cell keep their place
-  return used;
 }
 
 // --- Abaqus and CalculiX --------------------------------------------------------------------------------------------
@@ -111,7 +83,7 @@ void append_inp_elements(std::string& text, const NodalMesh& mesh, int order) {
     if (c == 0 || mesh.kinds[c - 1] != kind)
       text += std::string("*ELEMENT, TYPE=") + kTypes[order - 1][static_cast<std::size_t>(kind)] + ", ELSET=EALL\n";
     text += std::to_string(c + 1);
-    const auto nodes = mesh.cell(c).first(num_written(kind, order));
+    const auto nodes = mesh.cell(c).first(num_edge_nodes(kind, order));
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       text += i == 10 ? ",\n" : ", ";  // a line takes sixteen numbers
       text += std::to_string(nodes[i] + 1);
@@ -133,61 +105,18 @@ void append_inp_references(std::string& text, const NodalMesh& mesh, SetNames& n
   }
 }
 
-/// A face of a cell: S1, S2, ..
-struct Side {
-  std::size_t cell;
-  int number;
-};
-
-/// The sides of the grouped faces, each of the first cell that has it.
-std::map<FaceKey, Side> sides_of(const NodalMesh& mesh) {
-  std::set<FaceKey> wanted;
-  for (const GroupedFace& face : mesh.face_groups.faces) wanted.insert(face.face);
-  std::map<FaceKey, Side> sides;
-  std::vector<Index> corners;
-  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    int number = 0;
-    for (const std::vector<int>& face : inp_faces(mesh.kinds[c])) {
-      ++number;
-      corners.clear();
-      for (const int i : face) corners.push_back(mesh.cell(c)[static_cast<std::size_t>(i)]);
-      if (const FaceKey key = face_key(corners); wanted.contains(key)) sides.try_emplace(key, Side{c, number});
-    }
-  }
-  return sides;
-}
-
-void add_side_nodes(const NodalMesh& mesh, const Side& side, int order, std::set<Index>& nodes) {
-  const CellKind kind = mesh.kinds[side.cell];
-  const std::vector<int> face = inp_faces(kind)[static_cast<std::size_t>(side.number) - 1];
-  const auto cell = mesh.cell(side.cell);
-  for (const int i : face) nodes.insert(cell[static_cast<std::size_t>(i)]);
-  if (order == 1) return;
-  const auto lattice = cell_lattice(kind, 2, NodeOrdering::vtk);
-  for (std::size_t i = num_corners(kind); i < num_written(kind, 2); ++i)
-    for (const int a : face)
-      for (const int b : face)
-        if (a < b && lattice[static_cast<std::size_t>(a)] + lattice[static_cast<std::size_t>(b)] == 2 * lattice[i])
-          nodes.insert(cell[i]);
-}
-
-void append_inp_groups(std::string& text, const NodalMesh& mesh, int order) {
-  const std::map<FaceKey, Side> sides = sides_of(mesh);
+void append_inp_groups(std::string& text, const NodalMesh& mesh) {
+  const std::vector<GroupSides> groups = sides_of_groups(mesh, inp_faces, false);
   SetNames names;
-  for (std::size_t g = 0; g < mesh.face_groups.groups.size(); ++g) {
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    if (groups[g].sides.empty()) continue;
     const Group& group = mesh.face_groups.groups[g];
-    std::string lines;
-    std::set<Index> nodes;
-    for (const GroupedFace& face : mesh.face_groups.faces) {
-      const auto side = sides.find(face.face);
-      if (static_cast<std::size_t>(face.group) != g || side == sides.end()) continue;
-      lines += std::to_string(side->second.cell + 1) + ", S" + std::to_string(side->second.number) + "\n";
-      add_side_nodes(mesh, side->second, order, nodes);
-    }
-    if (nodes.empty()) continue;
     const std::string name = names.take(group.name, numbered("GROUP_", group.number));
-    text += "*SURFACE, NAME=" + name + ", TYPE=ELEMENT\n" + lines + "*NSET, NSET=" + name + "\n";
-    append_set(text, nodes);
+    text += "*SURFACE, NAME=" + name + ", TYPE=ELEMENT\n";
+    for (const Side& side : groups[g].sides)
+      text += std::to_string(side.cell + 1) + ", S" + std::to_string(side.number) + "\n";
+    text += "*NSET, NSET=" + name + "\n";
+    append_set(text, groups[g].nodes);
   }
 }
 
@@ -211,6 +140,15 @@ std::string nastran_field(double value) {
 
 }  // namespace
 
+std::vector<std::size_t> exodus_order(const NodalMesh& mesh) {
+  std::vector<std::size_t> order(mesh.num_cells());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(reference_of(mesh, a), mesh.kinds[a]) < std::pair(reference_of(mesh, b), mesh.kinds[b]);
+  });
+  return order;
+}
+
 NodalMesh nodal_mesh(const VolumeMesh& mesh) {
   NodalMesh result;
   result.positions = mesh.positions;
@@ -226,7 +164,7 @@ NodalMesh nodal_mesh(const VolumeMesh& mesh) {
 
 std::string inp_text(const NodalMesh& mesh) {
   const int order = common_order(mesh, "Abaqus", 2);
-  const std::vector<bool> used = used_nodes(mesh, order);
+  const std::vector<bool> used = edge_nodes(mesh, order);
   std::string text = "*HEADING\nsubvol volume mesh\n*NODE, NSET=NALL\n";
   for (std::size_t n = 0; n < mesh.positions.size(); ++n) {
     if (!used[n]) continue;
@@ -238,13 +176,13 @@ std::string inp_text(const NodalMesh& mesh) {
   SetNames names;
   names.take("EALL", "EALL");
   append_inp_references(text, mesh, names);
-  append_inp_groups(text, mesh, order);
+  append_inp_groups(text, mesh);
   return text;
 }
 
 std::string nastran_text(const NodalMesh& mesh) {
   const int order = common_order(mesh, "Nastran", 2);
-  const std::vector<bool> used = used_nodes(mesh, order);
+  const std::vector<bool> used = edge_nodes(mesh, order);
   PositiveNumbers properties(mesh.references);
   std::string text = "$ subvol volume mesh\nBEGIN BULK\n";
   for (std::size_t n = 0; n < mesh.positions.size(); ++n) {
@@ -262,7 +200,7 @@ std::string nastran_text(const NodalMesh& mesh) {
     const CellKind kind = mesh.kinds[c];
     text += padded(kCards[static_cast<std::size_t>(kind)], 8) + padded(std::to_string(c + 1), 8) +
             padded(std::to_string(properties.of(reference_of(mesh, c))), 8);
-    const std::size_t count = num_written(kind, order);
+    const std::size_t count = num_edge_nodes(kind, order);
     for (std::size_t i = 0; i < count; ++i) {
       if ((i + 2) % 8 == 0) text += "+\n+       ";  // some readers take no blank as the mark of a continuation
       const std::size_t place = kind == CellKind::hex ? kHex[i] : kind == CellKind::prism ? kPrism[i] : i;

@@ -30,6 +30,30 @@ std::string nastran_text(const NodalMesh& mesh);
 /// InputError: cells of several orders; cells of order 3 or more without Gauss-Lobatto nodes.
 std::string mfem_text(const NodalMesh& mesh);
 
+/// Returns the cells as an Exodus II file, netCDF of the classic format with 64-bit offsets.
+///
+/// There is a block for each reference and kind of cell, in this order; its number is the reference, or, for those
+/// below 1 and for a second kind, the first free one. It is named as the region, or "reference 7"; a second kind has
+/// "_prisms" and the like behind it. Elements are HEX8, WEDGE and TETRA, of order 2 HEX20, WEDGE15 and TETRA10 if all
+/// cells are determined by their nodes on edges, else HEX27, WEDGE18 and TETRA10. Each group of faces becomes a side
+/// set and a node set. InputError: orders other than 1 and 2, or both of them; the library has no netCDF
+/// (`has_exodus`).
+std::string exodus_bytes(const NodalMesh& mesh);
+
+/// Returns the cells in the order of an Exodus file: by reference, then kind, then number.
+std::vector<std::size_t> exodus_order(const NodalMesh& mesh);
+
+/// Returns the cells as XDMF 3 with all arrays in the text: one grid "mesh" with the cell data "reference", which
+/// meshio, dolfinx and ParaView read. Order 2 has all nodes of the grid (Hexahedron_27). Several kinds of cells make a
+/// mixed topology, which dolfinx does not read. Groups of faces are not in it. InputError: orders other than 1 and 2, or
+/// both of them.
+std::string xdmf_text(const NodalMesh& mesh);
+
+/// Returns the faces of the boundary and of groups as XDMF: a grid "groups" of triangles and quads with the nodes of the
+/// cells, all nodes of the mesh, and the cell data "group": the number of the face's first group (below 1: the first free
+/// number), 0 for none. dolfinx reads it as tags of facets. InputError: as above.
+std::string xdmf_faces_text(const NodalMesh& mesh);
+
 /// Returns linear cells as a NodalMesh.
 NodalMesh nodal_mesh(const VolumeMesh& mesh);
 

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/file_formats.h"
 #include "subvol/io/sound_points.h"
 #include "subvol/io/surface_formats.h"
 #include "subvol/surface/boundary.h"
@@ -24,15 +25,13 @@ namespace {
 /// rounding.
 constexpr double kNoArea = 1e-15;
 
-struct Format {
+struct Parser {
   const char* extension;
-  const char* description;
   ParsedSurface (*parse)(const std::string& name, std::string_view bytes);
 };
-constexpr Format kFormats[] = {{".off", "OFF text", parse_off},
-                               {".obj", "Wavefront OBJ polygons", parse_obj},
-                               {".stl", "STL text or binary", parse_stl},
-                               {".ply", "PLY 1.0 text or binary", parse_ply}};
+/// By the extensions of `file_formats()` of surfaces that are read.
+constexpr Parser kParsers[] = {{".off", parse_off}, {".obj", parse_obj}, {".stl", parse_stl}, {".ply", parse_ply},
+                               {".vtp", parse_vtp}, {".3mf", parse_3mf}, {".glb", parse_gltf}, {".gltf", parse_gltf}};
 
 /// Warnings and errors about one file.
 class Remarks {
@@ -192,24 +191,32 @@ std::size_t drop_repeated(std::vector<Vec3>& points) {
 
 PolygonMesh read_polygon_mesh(const fs::path& path, std::vector<std::string>* warnings) {
   const std::string extension = lower_case(path.extension().string());
-  const auto* format = std::find_if(std::begin(kFormats), std::end(kFormats),
-                                    [&](const Format& f) { return extension == f.extension; });
-  if (format == std::end(kFormats))
+  const auto* parser = std::find_if(std::begin(kParsers), std::end(kParsers),
+                                    [&](const Parser& p) { return extension == p.extension; });
+  if (parser == std::end(kParsers))
     throw InputError(path.string() + ": unknown surface extension " + in_quotes(extension) + ", expected " +
                      surface_formats());
   Remarks remarks(path.string(), warnings);
-  ParsedSurface parsed = format->parse(path.string(), read_file(path));
+  ParsedSurface parsed = parser->parse(path.string(), read_file(path));
   remarks.tell(parsed.warnings);
-  PolygonMesh& mesh = parsed.mesh;
+  return sound_polygons(std::move(parsed.mesh), path.string(), warnings);
+}
+
+PolygonMesh sound_polygons(PolygonMesh mesh, const std::string& name, std::vector<std::string>* warnings) {
+  Remarks remarks(name, warnings);
   drop_bad_faces(mesh, remarks);
   remarks.count(drop_unused(mesh.positions, mesh.face_vertices), "vertices belong to no face: dropped");
   check_extent(mesh.positions, remarks);
-  return std::move(mesh);
+  return mesh;
 }
 
 TriangleMesh read_triangle_mesh(const fs::path& path, std::vector<std::string>* warnings) {
-  Remarks remarks(path.string(), warnings);
-  TriangleMesh mesh = triangulate(read_polygon_mesh(path, warnings));
+  return sound_triangles(read_polygon_mesh(path, warnings), path.string(), warnings);
+}
+
+TriangleMesh sound_triangles(PolygonMesh polygons, const std::string& name, std::vector<std::string>* warnings) {
+  Remarks remarks(name, warnings);
+  TriangleMesh mesh = triangulate(polygons);
   const std::size_t num_flat =
       drop_triangles(mesh, [&](std::size_t i) { return !has_area(mesh.positions, mesh.triangles[i]); });
   remarks.count(num_flat, "triangles have no area: dropped");
@@ -262,16 +269,11 @@ std::vector<double> read_vertex_attribute(const fs::path& path, const std::strin
 }
 
 bool is_surface_extension(const std::string& extension) {
-  return std::any_of(std::begin(kFormats), std::end(kFormats),
-                     [&](const Format& format) { return extension == format.extension; });
+  const FileFormat* format = format_of_extension(extension);
+  return format && !format->holds_cells && !format->read.empty();
 }
 
-std::string surface_formats() {
-  std::string text;
-  for (const Format& format : kFormats)
-    text.append(text.empty() ? "" : ", ").append(format.extension).append(" (").append(format.description).append(")");
-  return text;
-}
+std::string surface_formats() { return readable_formats(false); }
 
 std::string point_cloud_formats() { return ".xyz (text), .ply (without faces)"; }
 

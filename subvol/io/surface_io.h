@@ -18,6 +18,8 @@ inline constexpr std::size_t kMaxPolygonCorners = 1000;
 ///
 ///   .off  OFF, COFF, NOFF, CNOFF, STOFF and the like, text     .stl  text or binary
 ///   .obj  polygons only; materials and the like are skipped    .ply  1.0, text or binary of either byte order
+///   .vtp  VTK XML 0.1 to 2.2: polygons and strips              .3mf  objects of the build in their places
+///   .glb .gltf  2.0: triangles of the scene's nodes in their places, equal positions merged; lines are skipped
 ///
 /// warnings  receives the warnings, one line each with the file's name; may be null.
 /// returns   faces and vertices in the file's order. Dropped, with a warning: corners that repeat the one before, faces
@@ -33,6 +35,11 @@ PolygonMesh read_polygon_mesh(const std::filesystem::path& path, std::vector<std
 /// triangles without area, and all but the first of triangles with the same three positions. InputError: also if no
 /// triangle has any area.
 TriangleMesh read_triangle_mesh(const std::filesystem::path& path, std::vector<std::string>* warnings = nullptr);
+
+/// Checks polygons that come from elsewhere as `read_polygon_mesh` does with those of a file, or triangles as
+/// `read_triangle_mesh`. name: their source for messages.
+PolygonMesh sound_polygons(PolygonMesh mesh, const std::string& name, std::vector<std::string>* warnings = nullptr);
+TriangleMesh sound_triangles(PolygonMesh mesh, const std::string& name, std::vector<std::string>* warnings = nullptr);
 
 /// Smallest number of points that a cloud may have.
 inline constexpr std::size_t kLeastCloudPoints = 10;

@@ -4,10 +4,10 @@
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/surface_formats.h"
+#include "subvol/io/triangle_welder.h"
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 
 namespace subvol {
@@ -18,30 +18,6 @@ constexpr std::size_t kHeaderBytes = 84;    // 80 arbitrary bytes, then the numb
 constexpr std::size_t kFacetBytes = 50;     // normal, three vertices, number of attribute bytes that follow (two bytes)
 constexpr std::size_t kFirstVertexByte = 12;
 constexpr std::size_t kAttributeCountByte = 48;
-
-/// Merges equal positions into one vertex, because STL repeats a vertex in every facet.
-class Welder {
- public:
-  void add(const Vec3& position) {
-    // + 0.0 turns -0.0 into 0.0.
-    const std::array<double, 3> key = {position[0] + 0.0, position[1] + 0.0, position[2] + 0.0};
-    const auto [it, is_new] = vertices_.try_emplace(key, static_cast<Index>(mesh_.positions.size()));
-    if (is_new) mesh_.positions.push_back(position);
-    mesh_.face_vertices.push_back(it->second);
-    if (mesh_.face_vertices.size() % 3 == 0) mesh_.face_offsets.push_back(mesh_.face_vertices.size());
-  }
-  /// Puts the facet that was added last into a group.
-  void set_group(Index group) { mesh_.face_groups.of_face.push_back(group); }
-  /// Names the groups of the facets.
-  void name_groups(std::vector<Group> groups) { mesh_.face_groups.groups = std::move(groups); }
-  void drop_groups() { mesh_.face_groups = {}; }
-  bool is_empty() const { return mesh_.face_vertices.empty(); }
-  PolygonMesh take() { return std::move(mesh_); }
-
- private:
-  std::map<std::array<double, 3>, Index> vertices_;
-  PolygonMesh mesh_;
-};
 
 std::size_t num_binary_facets(std::string_view bytes) {
   return static_cast<std::size_t>(decode(bytes.data() + kHeaderBytes - 4, kUInt32, std::endian::little));
@@ -105,7 +81,7 @@ BinaryFacets binary_facets(const std::string& name, std::string_view bytes, std:
 
 PolygonMesh parse_binary(const std::string& name, std::string_view bytes, std::vector<std::string>& warnings) {
   const BinaryFacets facets = binary_facets(name, bytes, warnings);
-  Welder welder;
+  TriangleWelder welder;
   LeftOut left_out;
   for (std::size_t f = 0; f < facets.begins.size(); ++f) {
     const std::size_t facet = facets.begins[f];
@@ -130,7 +106,7 @@ void expect(TextScanner& scan, const char* word) {
   if (lower_case(found) != word) scan.fail(std::string("expected ") + word + ", found " + in_quotes(found));
 }
 
-void parse_facet(TextScanner& scan, Welder& welder) {
+void parse_facet(TextScanner& scan, TriangleWelder& welder) {
   expect(scan, "normal");
   for (int i = 0; i < 3; ++i) scan.word("a normal");  // not used, and often nan
   expect(scan, "outer");
@@ -156,7 +132,7 @@ std::string trimmed(std::string_view text) {
 /// Each solid is a group; a single solid, whose name often only names the program that wrote it, is none.
 PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
   TextScanner scan(name, bytes, TextScanner::Comments::none);
-  Welder welder;
+  TriangleWelder welder;
   GroupList groups;
   int num_solids = 0;
   Index group = kNoIndex;

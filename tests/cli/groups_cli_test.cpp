@@ -126,3 +126,36 @@ TEST_CASE("Without groups, results are as before, and groups that no output hold
   CHECK(has(place.run("convert template.mesh -o boundary:a.stl").err, "the extension must be"));
   CHECK(place.run("convert template.mesh -o boundary:faces.obj").status == 2);
 }
+
+TEST_CASE("Groups go through every format that holds them, on the command line", "[cli]") {
+  const Workplace place;
+  write_volume_mesh(place / "b.mesh", test::with_floor_and_roof(test::lattice(1, 1, 1), 1));
+  const auto run = [&](const std::string& words) {
+    const Run done = place.run(words);
+    INFO(words << '\n' << done.err);
+    CHECK(done.status == 0);
+    return done;
+  };
+  for (const std::string extension : {"stl", "vtp", "3mf", "glb", "gltf"}) {
+    CAPTURE(extension);
+    run("convert b.mesh -o s." + extension);
+    run("convert s." + extension + " --force -o s.obj");
+    const std::string text = content_of(place / "s.obj");
+    CHECK(has(text, "g floor\n"));
+    CHECK(has(text, "g roof\n"));
+  }
+  run("convert b.mesh --msh-version 2.2 -o old.msh");
+  CHECK(content_of(place / "old.msh").starts_with("$MeshFormat\n2.2 0 8\n"));
+  for (const std::string name : {"old.msh", "b.vtu", "b.inp", "b.e"}) {
+    CAPTURE(name);
+    if (name == "b.e" && !has_exodus()) continue;
+    if (name != "old.msh") run("convert b.mesh -o " + name);
+    run("convert " + name + " --force -o again.mesh");
+    CHECK(has(content_of(place / "again.mesh"), "floor\n"));
+  }
+  run("convert b.mesh -o b.xdmf -o boundary:b_faces.xdmf");
+  CHECK(has(content_of(place / "b_faces.xdmf"), "Quadrilateral"));
+  CHECK(place.run("convert s.obj -o boundary:c.xdmf").status == 2);
+  CHECK(place.run("convert b.mesh --msh-version 3 -o c.msh").status == 2);
+  CHECK(has(run("formats").out, "| `.3mf` (3MF) |"));
+}

@@ -8,21 +8,18 @@
 #include "subvol/fit/quality/quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/validate.h"
-#include "tests/support/data.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/run_python.h"
 #include "tests/support/skipping.h"
 #include "tests/support/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
 #include <numeric>
 #include <set>
 #include <utility>
-
-#include <sys/wait.h>
 
 using namespace subvol;
 using namespace subvol::test;
@@ -62,22 +59,6 @@ std::string refusal(const std::string& bytes) {
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   REQUIRE(text.find(from) != std::string::npos);
   return text.replace(text.find(from), from.size(), to);
-}
-
-/// Exit status of a script under the first Python that has what it needs; kSkippedStatus where none has.
-int run_python(const std::string& script, const std::filesystem::path& mesh, const std::filesystem::path& queries) {
-  constexpr int kNoSuchProgram = 127;  // as shells say
-  for (const std::string python : {"python3", "/usr/bin/python3"}) {
-    const int status = std::system((python + " \"" + test::source_dir() + "/tests/" + script + "\" \"" + mesh.string() +
-                                    "\" \"" + queries.string() + "\" > \"" + queries.string() + ".out\" 2>&1")
-                                       .c_str());
-    const int exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 1;
-    if (exit_status == 0) return 0;
-    if (exit_status == kSkippedStatus || exit_status == kNoSuchProgram) continue;
-    UNSCOPED_INFO(content_of(queries.string() + ".out"));
-    return exit_status;
-  }
-  return kSkippedStatus;
 }
 
 /// The cell's position and derivatives at a point, for the readers.

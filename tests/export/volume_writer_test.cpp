@@ -2,7 +2,11 @@
 #include "subvol/export/volume_writer.h"
 
 #include "subvol/base/error.h"
+#include "subvol/export/read_back.h"
+#include "subvol/io/mesh_io.h"
+#include "tests/support/grouped_meshes.h"
 #include "tests/support/sample_meshes.h"
+#include "tests/support/temporary_folder.h"
 
 #include <catch2/catch.hpp>
 
@@ -12,6 +16,7 @@
 
 using namespace subvol;
 using namespace subvol::test;
+using Catch::Contains;
 
 namespace {
 
@@ -171,4 +176,38 @@ TEST_CASE("fields stand at the vertices of a .vtu and a .msh") {
   CHECK_THROWS_AS(vtu_text(mesh, {}, std::vector<VertexField>{{"short", {1}}}), InputError);
   field.values[0] = std::numeric_limits<double>::infinity();
   CHECK_THROWS_AS(msh_text(mesh, {}, std::vector<VertexField>{field}), InputError);
+}
+
+TEST_CASE("a .msh of version 2.2 has the physical group of every element") {
+  VolumeMesh mesh = with_floor_and_roof(mixed_cells(), 1);
+  mesh.face_groups.groups[1].number = 9;
+  mesh.face_groups.faces.push_back({mesh.face_groups.faces[0].face, 1});  // a face of two groups
+  normalise(mesh.face_groups);
+  mesh.references.assign(mesh.num_cells(), 3);
+  mesh.references[0] = 0;
+  mesh.regions = {{"steel", 3, 3}};
+  const TemporaryFolder folder;
+  const std::vector<double> minima(mesh.num_cells(), 0.5);
+  for (const MshVersion version : {MshVersion::v2_2, MshVersion::v4_1}) {
+    write_volume(folder / "a.msh", mesh, minima, {}, version);
+    CHECK_NOTHROW(require_written(folder / "a.msh", mesh, version));
+    std::vector<std::string> warnings;
+    const VolumeMesh found = read_volume_mesh(folder / "a.msh", {.warnings = &warnings});
+    CHECK(warnings.empty());
+    CHECK(found.positions == mesh.positions);
+    CHECK(found.face_groups == mesh.face_groups);
+    CHECK(found.regions == mesh.regions);
+    CHECK(found.references[0] == 0);
+    CHECK(found.references.back() == 3);
+  }
+  CHECK_THAT(content_of(folder / "a.msh"), Contains("$MeshFormat\n4.1 0 8"));
+  const std::string old = msh_text(mesh, minima, {}, MshVersion::v2_2);
+  CHECK_THAT(old, Contains("$MeshFormat\n2.2 0 8") && Contains("$PhysicalNames") && !Contains("$Entities"));
+  const std::size_t elements = mesh.num_cells() + mesh.face_groups.faces.size();
+  CHECK_THAT(old, Contains("$Elements\n" + std::to_string(elements) + "\n") &&
+                      Contains("\n3\n0\n1\n" + std::to_string(elements) + "\n"));
+  VolumeMesh other = mesh;
+  other.face_groups.faces.pop_back();
+  write_volume(folder / "b.msh", mesh, {}, {}, MshVersion::v2_2);
+  CHECK_THROWS_AS(require_written(folder / "b.msh", other, MshVersion::v2_2), IoError);
 }

@@ -46,10 +46,15 @@ void read_points(const std::filesystem::path& file) {
 /// Linear cells as such, and all cells as polynomials, also those of a .vtu with an exact map.
 void read_cells(const std::filesystem::path& file) {
   std::vector<std::string> warnings;
-  if (!subvol::holds_exact_map(file) && !subvol::holds_curved_cells(file)) {
-    const subvol::VolumeMesh mesh = subvol::read_volume_mesh(file, {.check = false, .warnings = &warnings});
-    require_finite(mesh.positions);
-    require_indices(mesh.cell_vertices, mesh.positions.size());
+  const subvol::FileCells cells = subvol::read_cells(file, {.check = false, .warnings = &warnings});
+  if (const auto* mesh = std::get_if<subvol::VolumeMesh>(&cells)) {
+    require_finite(mesh->positions);
+    require_indices(mesh->cell_vertices, mesh->positions.size());
+  }
+  if (const auto* surface = std::get_if<subvol::PolygonMesh>(&cells)) {
+    require_finite(surface->positions);
+    require_indices(surface->face_vertices, surface->positions.size());
+    return;
   }
   const subvol::HighOrderMesh mesh = subvol::read_curved(file, &warnings).mesh;
   require(mesh.coefficients.size() == mesh.space.num_nodes());

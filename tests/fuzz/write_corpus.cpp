@@ -48,12 +48,12 @@ void write_volumes(const fs::path& folder) {
       fs::create_directories(folder / extension);
       write_volume_mesh(folder / extension / (name + '.' + extension), mesh);
     }
-    for (const char* extension : {"vtu", "msh", "inp", "bdf", "mfem"}) {
+    for (const char* extension : {"vtu", "msh", "inp", "bdf", "mfem", "e"}) {
       fs::create_directories(folder / extension);
       write_volume(folder / extension / (name + '.' + extension), mesh);
     }
     const HighOrderMesh quadratic(ElementSpace(mesh, Basis::legendre, 2), mesh);
-    for (const char* extension : {"msh", "inp", "bdf", "mfem"})
+    for (const char* extension : {"msh", "inp", "bdf", "mfem", "e"})
       write_volume(folder / extension / (name + "2." + extension), quadratic);
     for (const int order : {1, 3})
       write(folder / "vtu", (name + std::to_string(order)).c_str(),

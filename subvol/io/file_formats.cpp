@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/io/file_formats.h"
+
+#include "subvol/base/text_scanner.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace subvol {
+
+namespace {
+
+constexpr Held kNumbers = Held::numbers, kNames = Held::names, kNone = Held::none;
+constexpr std::string_view kGmshOrders = "tets 1 to 10, hexes 1 to 9, prisms 1 and 2", kQuadratic = "1, 2",
+                           kLagrange = "1, 2, Lagrange to 16", kText = "text", kBoth = "text, binary";
+
+FileFormat exodus(std::string_view extension, std::string_view written) {
+  return {.extension = extension, .name = "Exodus II", .holds_cells = true, .read = "yes", .written = written,
+          .orders_read = kQuadratic, .orders_written = kQuadratic, .groups_read = kNames, .groups_written = kNames,
+          .regions_read = kNames, .regions_written = kNames, .needs_netcdf = true};
+}
+
+FileFormat nastran(std::string_view extension, std::string_view written) {
+  return {.extension = extension, .name = "Nastran", .holds_cells = true, .read = "yes", .written = written,
+          .orders_read = kQuadratic, .orders_written = kQuadratic, .groups_read = kNumbers, .regions_read = kNumbers,
+          .regions_written = kNumbers};
+}
+
+FileFormat gltf(std::string_view extension) {
+  return {.extension = extension, .name = "glTF", .read = "2.0", .written = "2.0", .groups_read = kNames,
+          .groups_written = kNames, .is_scene = true};
+}
+
+const FileFormat kFormats[] = {
+    {.extension = ".mesh", .name = "Medit; MFEM is read, too", .holds_cells = true, .read = "1 to 4, ASCII", .written = "2",
+     .orders_read = "1", .orders_written = "1", .groups_read = kNames, .groups_written = kNames, .regions_read = kNames,
+     .regions_written = kNames, .holds_features = true},
+    {.extension = ".vtk", .name = "legacy VTK", .holds_cells = true, .read = "2.0 to 5.1, ASCII, binary",
+     .written = "3.0, ASCII", .orders_read = kLagrange, .orders_written = "1", .regions_read = kNumbers,
+     .regions_written = kNumbers},
+    {.extension = ".vtu", .name = "VTK XML", .holds_cells = true,
+     .read = "0.1 to 2.2; ASCII, base64, appended, zlib, LZ4", .written = "1.0 linear, 2.2 curved",
+     .orders_read = kLagrange, .orders_written = "1 to 12", .groups_read = kNames, .groups_written = kNames,
+     .regions_read = kNames, .regions_written = kNames},
+    {.extension = ".msh", .name = "Gmsh", .holds_cells = true, .read = "2.2, 4.0, 4.1; ASCII, binary",
+     .written = "2.2 or 4.1, ASCII", .orders_read = kGmshOrders, .orders_written = kGmshOrders, .groups_read = kNames,
+     .groups_written = kNames, .regions_read = kNames, .regions_written = kNames},
+    {.extension = ".inp", .name = "Abaqus, CalculiX", .holds_cells = true, .read = "yes", .written = "yes",
+     .orders_read = kQuadratic, .orders_written = kQuadratic, .groups_read = kNames, .groups_written = kNames,
+     .regions_read = kNames, .regions_written = kNames},
+    nastran(".bdf", "yes"),
+    nastran(".nas", ""),
+    nastran(".fem", ""),
+    {.extension = ".mfem", .name = "MFEM", .holds_cells = true, .read = "1.0, 1.2, 1.3", .written = "1.0",
+     .orders_read = "1 to 16", .orders_written = "1 to 16", .groups_read = kNumbers, .groups_written = kNumbers,
+     .regions_read = kNumbers, .regions_written = kNumbers},
+    exodus(".e", "yes"),
+    exodus(".exo", "yes"),
+    exodus(".ex2", ""),
+    exodus(".gen", ""),
+    {.extension = ".xdmf", .name = "XDMF", .holds_cells = true, .written = "3, in text", .orders_written = kQuadratic,
+     .regions_written = kNames},
+    {.extension = ".off", .name = "OFF", .read = kText, .groups_read = kNames},
+    {.extension = ".obj", .name = "Wavefront OBJ", .read = kText, .written = kText, .groups_read = kNames,
+     .groups_written = kNames},
+    {.extension = ".stl", .name = "STL", .read = kBoth, .written = kBoth, .groups_read = kNames,
+     .groups_written = kNames},
+    {.extension = ".ply", .name = "PLY", .read = "1.0, text, binary", .written = "1.0, binary", .groups_read = kNumbers,
+     .groups_written = kNumbers},
+    {.extension = ".vtp", .name = "VTK XML polygons", .read = "0.1 to 2.2", .written = "1.0", .groups_read = kNames,
+     .groups_written = kNames},
+    {.extension = ".3mf", .name = "3MF", .read = "yes", .written = "yes", .groups_read = kNames,
+     .groups_written = kNames},
+    gltf(".glb"),
+    gltf(".gltf"),
+    {.extension = ".usda", .name = "USD", .written = kText, .groups_written = kNames, .holds_features = true},
+};
+
+std::string_view said(Held held) {
+  return held == Held::none ? "no" : held == Held::numbers ? "numbers" : "names";
+}
+
+/// What is read and what is written, in one word if that is the same.
+std::string both(std::string_view read, std::string_view written) {
+  return read == written ? std::string(read) : std::string(read) + " / " + std::string(written);
+}
+
+std::string or_no(std::string_view text) { return text.empty() ? "no" : std::string(text); }
+
+void append_row(std::string& text, std::initializer_list<std::string> cells) {
+  text += '|';
+  for (const std::string& cell : cells) ((text += ' ') += cell) += " |";
+  text += '\n';
+}
+
+std::string extension_cell(const FileFormat& format) {
+  return "`" + std::string(format.extension) + "` (" + std::string(format.name) + ")";
+}
+
+}  // namespace
+
+std::span<const FileFormat> file_formats() { return kFormats; }
+
+const FileFormat* format_of_extension(std::string_view extension) {
+  const std::string wanted = lower_case(extension);
+  const auto found = std::find_if(std::begin(kFormats), std::end(kFormats),
+                                  [&](const FileFormat& format) { return wanted == format.extension; });
+  return found == std::end(kFormats) ? nullptr : found;
+}
+
+const FileFormat* format_of_path(const std::filesystem::path& path) {
+  return format_of_extension(path.extension().string());
+}
+
+std::string cell_formats_table() {
+  std::string text = "| cells | read | written | orders read | orders written | face groups | regions | features |\n"
+                     "|---|---|---|---|---|---|---|---|\n";
+  for (const FileFormat& format : kFormats)
+    if (format.holds_cells)
+      append_row(text, {extension_cell(format), or_no(format.read), or_no(format.written), or_no(format.orders_read),
+                        format.written.empty() ? "no" : or_no(format.orders_written),
+                        both(said(format.groups_read), said(format.groups_written)),
+                        both(said(format.regions_read), said(format.regions_written)),
+                        format.holds_features ? "yes" : "no"});
+  return text;
+}
+
+std::string surface_formats_table() {
+  std::string text = "| surfaces | read | written | face groups | features |\n|---|---|---|---|---|\n";
+  for (const FileFormat& format : kFormats)
+    if (!format.holds_cells)
+      append_row(text, {extension_cell(format), or_no(format.read), or_no(format.written),
+                        both(said(format.groups_read), said(format.groups_written)),
+                        format.holds_features ? "yes" : "no"});
+  return text;
+}
+
+std::string readable_formats(bool of_cells) {
+  std::string text;
+  for (const FileFormat& format : kFormats) {
+    if (format.holds_cells != of_cells || format.read.empty()) continue;
+    text += (text.empty() ? "" : ", ") + std::string(format.extension) + " (" + std::string(format.name);
+    text += format.read == "yes" ? ")" : " " + std::string(format.read) + ")";
+  }
+  return text;
+}
+
+}  // namespace subvol

@@ -1,0 +1,689 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Exodus II, the netCDF files of finite elements. Without netCDF, both directions refuse.
+
+#include "subvol/base/error.h"
+#include "subvol/io/nodal_formats.h"
+#include "subvol/io/nodal_writers.h"
+
+#ifdef SUBVOL_NETCDF
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
+#include "subvol/io/mesh_formats.h"
+#include "subvol/io/nodal_sides.h"
+#include "subvol/io/positive_numbers.h"
+
+#include <netcdf.h>
+#include <netcdf_mem.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <set>
+#endif
+
+namespace subvol {
+
+#ifndef SUBVOL_NETCDF
+
+namespace {
+constexpr const char* kMissing =
+    "Exodus: this program was built without netCDF; install libnetcdf-dev and build it again, or take another format";
+}  // namespace
+
+NodalMesh parse_exodus(const std::string& name, std::string_view, const std::string&) {
+  throw InputError(name + ": " + kMissing);
+}
+std::string exodus_bytes(const NodalMesh&) { throw InputError(kMissing); }
+bool has_exodus() { return false; }
+
+#else
+
+namespace {
+
+/// netCDF keeps a list of open files and must not be called by two threads at once.
+std::mutex& netcdf_lock() {
+  static std::mutex lock;
+  return lock;
+}
+
+/// The name that a second block of a reference has after that of the first: Exodus has one kind of cell in a block.
+const char* kind_suffix(CellKind kind) {
+  return kind == CellKind::tet ? "_tets" : kind == CellKind::prism ? "_prisms" : "_hexes";
+}
+
+constexpr std::string_view kReference = "reference ";  ///< name of the block of a reference without a name
+
+/// Places in an element of Exodus of the nodes of `NodeOrdering::vtk`: Exodus has upright edges before those of the
+/// top, and of a hex the nodes of the cell, the bottom and the top before those of the other faces.
+std::vector<std::size_t> exodus_places(CellKind kind, std::size_t num_nodes) {
+  std::vector<std::size_t> places;
+  if (kind == CellKind::hex)
+    places = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20};
+  else if (kind == CellKind::prism)
+    places = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11, 15, 16, 17};
+  else
+    places = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
+  places.resize(num_nodes);
+  return places;
+}
+
+// --- Reading --------------------------------------------------------------------------------------------------------
+
+/// A file in memory. All numbers are bounded by its size before memory is taken for them.
+class ExodusFile {
+ public:
+  ExodusFile(const std::string& name, std::string_view bytes) : name_(name) {
+    // netCDF does not write to what it only reads.
+    const int status = nc_open_mem("mesh", NC_NOWRITE, bytes.size(), const_cast<char*>(bytes.data()), &id_);
+    if (status != NC_NOERR) fail(std::string("no netCDF file: ") + nc_strerror(status));
+    int format = 0;
+    nc_inq_format(id_, &format);
+    constexpr std::size_t kMostCompressed = 1032;  // zlib's largest ratio
+    const bool packed = format == NC_FORMAT_NETCDF4 || format == NC_FORMAT_NETCDF4_CLASSIC;
+    most_bytes_ = bytes.size() * (packed ? kMostCompressed : 1);
+    if (!packed) require_whole(bytes.size());
+  }
+  ~ExodusFile() { nc_close(id_); }
+  ExodusFile(const ExodusFile&) = delete;
+  ExodusFile& operator=(const ExodusFile&) = delete;
+
+  [[noreturn]] void fail(const std::string& what) const { throw InputError(name_ + ": " + what); }
+
+  /// Returns the length of a dimension; nothing if there is none of that name.
+  std::optional<std::size_t> dimension(const std::string& name) const {
+    int dim = 0;
+    std::size_t length = 0;
+    if (nc_inq_dimid(id_, name.c_str(), &dim) != NC_NOERR || nc_inq_dimlen(id_, dim, &length) != NC_NOERR)
+      return std::nullopt;
+    return length;
+  }
+  bool has(const std::string& name) const {
+    int variable = 0;
+    return nc_inq_varid(id_, name.c_str(), &variable) == NC_NOERR;
+  }
+
+  std::vector<double> reals(const std::string& name, std::size_t count) const {
+    const int variable = variable_of(name, count);
+    std::vector<double> values(count);
+    require_read(name, nc_get_var_double(id_, variable, values.data()));
+    return values;
+  }
+  std::vector<long long> integers(const std::string& name, std::size_t count) const {
+    const int variable = variable_of(name, count);
+    std::vector<long long> values(count);
+    require_read(name, nc_get_var_longlong(id_, variable, values.data()));
+    return values;
+  }
+  /// Returns the rows of a table of characters, without what follows a zero and blanks at the end; empty names if there
+  /// is no such table.
+  std::vector<std::string> names(const std::string& name, std::size_t count) const {
+    std::vector<std::string> rows(count);
+    int variable = 0, num_dims = 0;
+    nc_type type = 0;
+    if (nc_inq_varid(id_, name.c_str(), &variable) != NC_NOERR) return rows;
+    int dims[NC_MAX_VAR_DIMS];
+    std::size_t length = 0;
+    if (nc_inq_var(id_, variable, nullptr, &type, &num_dims, dims, nullptr) != NC_NOERR || type != NC_CHAR ||
+        num_dims != 2 || nc_inq_dimlen(id_, dims[1], &length) != NC_NOERR || length == 0)
+      fail(name + ": expected a table of characters");
+    std::vector<char> text(size_of(name, count, length));
+    variable_of(name, text.size());
+    require_read(name, nc_get_var_text(id_, variable, text.data()));
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::string_view row(text.data() + i * length, length);
+      const std::string_view used = row.substr(0, row.find('\0'));
+      rows[i] = std::string(used.substr(0, used.find_last_not_of(" \t\r\n") + 1));
+    }
+    return rows;
+  }
+  /// Returns an attribute of a variable that is a text; empty if there is none.
+  std::string attribute(const std::string& variable_name, const char* name) const {
+    int variable = 0;
+    std::size_t length = 0;
+    nc_type type = 0;
+    if (nc_inq_varid(id_, variable_name.c_str(), &variable) != NC_NOERR ||
+        nc_inq_att(id_, variable, name, &type, &length) != NC_NOERR || type != NC_CHAR || length > most_bytes_)
+      return {};
+    std::string text(length, '\0');
+    if (nc_get_att_text(id_, variable, name, text.data()) != NC_NOERR) return {};
+    return text.substr(0, text.find('\0'));
+  }
+  /// The product of two counts. InputError: more than the file can hold.
+  std::size_t size_of(const std::string& name, std::size_t rows, std::size_t columns) const {
+    if (columns > 0 && rows > most_bytes_ / columns) fail(name + ": more entries than the file can hold");
+    return rows * columns;
+  }
+
+ private:
+  /// Throws InputError if the variables are larger than the file: netCDF reads zeros behind its end.
+  void require_whole(std::size_t file_size) const {
+    int num_variables = 0;
+    nc_inq_nvars(id_, &num_variables);
+    std::size_t sum = 0;
+    for (int variable = 0; variable < num_variables; ++variable) {
+      nc_type type = 0;
+      int num_dims = 0, dims[NC_MAX_VAR_DIMS];
+      nc_inq_var(id_, variable, nullptr, &type, &num_dims, dims, nullptr);
+      std::size_t size = 0;
+      nc_inq_type(id_, type, nullptr, &size);
+      for (int k = 0; k < num_dims; ++k) {
+        std::size_t length = 0;
+        nc_inq_dimlen(id_, dims[k], &length);
+        if (length > 0 && size > file_size / length) fail("is cut short: a variable is larger than the file");
+        size *= length;
+      }
+      sum += size;
+      if (sum > file_size) fail("is cut short: its variables are larger than the file");
+    }
+  }
+  /// Finds a variable. InputError: there is none, or it has not this number of entries.
+  int variable_of(const std::string& name, std::size_t count) const {
+    int variable = 0, num_dims = 0;
+    if (nc_inq_varid(id_, name.c_str(), &variable) != NC_NOERR) fail("expected the variable " + name);
+    int dims[NC_MAX_VAR_DIMS];
+    if (nc_inq_var(id_, variable, nullptr, nullptr, &num_dims, dims, nullptr) != NC_NOERR)
+      fail(name + ": cannot be read");
+    std::size_t total = 1;
+    for (int k = 0; k < num_dims; ++k) {
+      std::size_t length = 0;
+      nc_inq_dimlen(id_, dims[k], &length);
+      total = size_of(name, total, length);
+    }
+    if (total != count || count > most_bytes_)
+      fail(name + ": expected " + std::to_string(count) + " entries, found " + std::to_string(total));
+    return variable;
+  }
+  void require_read(const std::string& name, int status) const {
+    if (status != NC_NOERR) fail(name + ": " + nc_strerror(status));
+  }
+
+  std::string name_;
+  int id_ = 0;
+  std::size_t most_bytes_ = 0;
+};
+
+std::string upper_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  return text;
+}
+
+class ExodusParser {
+ public:
+  ExodusParser(const std::string& name, std::string_view bytes) : file_(name, bytes), cells_(mesh_) {}
+
+  NodalMesh parse() {
+    read_nodes();
+    read_blocks();
+    name_references();
+    read_side_sets();
+    warn_of_node_sets();
+    left_out_.tell(mesh_.warnings);
+    return std::move(mesh_);
+  }
+
+ private:
+  struct Block {
+    std::string name;
+    long long id;
+    std::optional<CellKind> kind;        ///< none: elements that are no cells
+    std::size_t num_elements, first_cell;
+  };
+
+  std::size_t count_of(const std::string& dimension) const {
+    const std::size_t n = file_.dimension(dimension).value_or(0);
+    if (n > static_cast<std::size_t>(std::numeric_limits<Index>::max()))
+      file_.fail(dimension + ": expected at most 2^31 - 1");
+    return n;
+  }
+  int number_of(long long id, const std::string& what) const {
+    if (id < 0 || id > std::numeric_limits<int>::max()) file_.fail(what + ": expected a positive number of 32 bits");
+    return static_cast<int>(id);
+  }
+
+  void read_nodes() {
+    const std::size_t n = count_of("num_nodes");
+    if (!file_.dimension("num_nodes") || !file_.dimension("num_dim")) file_.fail("no Exodus file: expected num_nodes");
+    if (count_of("num_dim") != 3)
+      file_.fail("expected three coordinates for each node, found " + std::to_string(count_of("num_dim")));
+    std::vector<double> x, y, z;
+    if (file_.has("coord")) {
+      const std::vector<double> all = file_.reals("coord", file_.size_of("coord", 3, n));
+      const auto first = all.begin(), step = first + static_cast<std::ptrdiff_t>(n);
+      x.assign(first, step);
+      y.assign(step, step + (step - first));
+      z.assign(step + (step - first), all.end());
+    } else {
+      x = file_.reals("coordx", n), y = file_.reals("coordy", n), z = file_.reals("coordz", n);
+    }
+    for (std::size_t v = 0; v < n; ++v) {
+      mesh_.positions.emplace_back(x[v], y[v], z[v]);
+      if (!mesh_.positions.back().allFinite())
+        file_.fail("node " + std::to_string(v + 1) + ": expected finite coordinates");
+    }
+    num_nodes_ = n;
+  }
+
+  std::vector<long long> ids(const std::string& variable, std::size_t count) const {
+    if (file_.has(variable)) return file_.integers(variable, count);
+    std::vector<long long> numbers(count);
+    for (std::size_t i = 0; i < count; ++i) numbers[i] = static_cast<long long>(i) + 1;
+    return numbers;
+  }
+
+  void read_blocks() {
+    const std::size_t n = count_of("num_el_blk");
+    const std::vector<long long> numbers = ids("eb_prop1", file_.size_of("eb_prop1", n, 1));
+    const std::vector<std::string> names = file_.names("eb_names", n);
+    for (std::size_t b = 0; b < n; ++b) {
+      const std::string number = std::to_string(b + 1), connect = "connect" + number;
+      const std::size_t size = count_of("num_el_in_blk" + number);
+      const std::string type = upper_case(file_.attribute(connect, "elem_type"));
+      Block block{names[b], numbers[b], std::nullopt, size, mesh_.num_cells()};
+      if (size > 0) read_block(block, connect, type, count_of("num_nod_per_el" + number));
+      blocks_.push_back(std::move(block));
+    }
+  }
+
+  void read_block(Block& block, const std::string& connect, const std::string& type, std::size_t size) {
+    if (type.starts_with("PYR")) file_.fail(connect + ": pyramids: " + kNoPyramids);
+    if (type.starts_with("HEX")) block.kind = CellKind::hex;
+    if (type.starts_with("WED")) block.kind = CellKind::prism;
+    if (type.starts_with("TET")) block.kind = CellKind::tet;
+    if (!block.kind) {
+      left_out_.add("elements of type " + (type.empty() ? "(none)" : type), block.num_elements);
+      return;
+    }
+    const CellKind kind = *block.kind;
+    const int order = size == num_corners(kind) ? 1 : 2;
+    if (!NodalCells::is_size(kind, order, size))
+      file_.fail(connect + ": " + in_quotes(type) + " with " + std::to_string(size) +
+                 " nodes is not read, expected HEX8, 20, 27, WEDGE6, 15, 18, TET4 or 10");
+    const std::vector<std::size_t> places = exodus_places(kind, size);
+    const std::vector<long long> nodes =
+        file_.integers(connect, file_.size_of(connect, block.num_elements, size));
+    std::vector<Index> cell(size);
+    for (std::size_t e = 0; e < block.num_elements; ++e) {
+      for (std::size_t i = 0; i < size; ++i) {
+        const long long node = nodes[e * size + places[i]];
+        if (node < 1 || node > static_cast<long long>(num_nodes_))
+          file_.fail(connect + ": element " + std::to_string(e + 1) + " names node " + std::to_string(node) + " of " +
+                     std::to_string(num_nodes_));
+        cell[i] = static_cast<Index>(node - 1);
+      }
+      cells_.add(kind, order, NodeOrdering::vtk, cell);
+    }
+  }
+
+  /// The block whose name a block continues for another kind of cell; itself if there is none.
+  const Block& first_of(const Block& block) const {
+    for (const Block& other : blocks_)
+      if (block.kind && !other.name.empty() && block.name == other.name + kind_suffix(*block.kind)) return other;
+    return block;
+  }
+  /// The reference that subvol has named a block after.
+  static std::optional<int> own_reference(const Block& block) {
+    if (!block.name.starts_with(kReference)) return std::nullopt;
+    const auto number = parse_integer(std::string_view(block.name).substr(kReference.size()));
+    if (!number || std::abs(*number) > std::numeric_limits<int>::max()) return std::nullopt;
+    return static_cast<int>(*number);
+  }
+
+  void name_references() {
+    const auto is_of_cells = [](const Block& block) { return block.kind.has_value(); };
+    const bool has_one = std::count_if(blocks_.begin(), blocks_.end(), is_of_cells) == 1;
+    mesh_.references.assign(mesh_.num_cells(), 0);
+    std::set<int> named;
+    for (const Block& block : blocks_) {
+      if (!block.kind) continue;
+      const Block& first = first_of(block);
+      const std::optional<int> own = own_reference(first);
+      if (has_one && !own && first.name.empty()) continue;  // nothing is told by a single block without a name
+      const int reference = own ? *own : number_of(first.id, "eb_prop1");
+      std::fill_n(mesh_.references.begin() + static_cast<std::ptrdiff_t>(block.first_cell), block.num_elements,
+                  reference);
+      if (!own && !first.name.empty() && named.insert(reference).second)
+        mesh_.regions.push_back({first.name, reference, 3});
+    }
+  }
+
+  void read_side_sets() {
+    const std::size_t n = count_of("num_side_sets");
+    const std::vector<long long> numbers = ids("ss_prop1", file_.size_of("ss_prop1", n, 1));
+    side_names_ = file_.names("ss_names", n);
+    const SideTable table = exodus_faces;
+    const std::vector<std::vector<int>> faces[] = {table(CellKind::tet), table(CellKind::prism), table(CellKind::hex)};
+    GroupList groups;
+    std::vector<Index> corners;
+    for (std::size_t s = 0; s < n; ++s) {
+      const std::string number = std::to_string(s + 1);
+      const std::size_t size = count_of("num_side_ss" + number);
+      const Index group = groups.by_number(number_of(numbers[s], "ss_prop1"));
+      if (size == 0) continue;
+      const std::vector<long long> elements = file_.integers("elem_ss" + number, size),
+                                   sides = file_.integers("side_ss" + number, size);
+      for (std::size_t i = 0; i < size; ++i) {
+        const std::optional<std::size_t> cell = cell_of(elements[i], "elem_ss" + number);
+        if (!cell) {
+          left_out_.add("sides of elements that are no cells");
+          continue;
+        }
+        const auto& of_cell = faces[static_cast<std::size_t>(mesh_.kinds[*cell])];
+        if (sides[i] < 1 || sides[i] > static_cast<long long>(of_cell.size()))
+          file_.fail("side_ss" + number + ": an element has no side " + std::to_string(sides[i]));
+        corners.clear();
+        for (const int k : of_cell[static_cast<std::size_t>(sides[i]) - 1])
+          corners.push_back(mesh_.cell(*cell)[static_cast<std::size_t>(k)]);
+        add_face(mesh_, corners, group);
+      }
+    }
+    mesh_.face_groups.groups = groups.take();
+    for (std::size_t s = 0; s < n; ++s)
+      for (Group& group : mesh_.face_groups.groups)
+        if (group.number == numbers[s] && group.name.empty()) group.name = side_names_[s];
+  }
+
+  /// Elements are numbered from 1 through all blocks.
+  std::optional<std::size_t> cell_of(long long element, const std::string& where) const {
+    long long first = 1;
+    for (const Block& block : blocks_) {
+      const auto size = static_cast<long long>(block.num_elements);
+      if (element >= first && element < first + size)
+        return block.kind ? std::optional(block.first_cell + static_cast<std::size_t>(element - first)) : std::nullopt;
+      first += size;
+    }
+    file_.fail(where + ": there is no element " + std::to_string(element));
+  }
+
+  /// Sets of the nodes of side sets say nothing new.
+  void warn_of_node_sets() {
+    const std::size_t n = count_of("num_node_sets");
+    for (const std::string& name : file_.names("ns_names", n))
+      if (name.empty() || std::find(side_names_.begin(), side_names_.end(), name) == side_names_.end())
+        left_out_.add("node sets");
+  }
+
+  ExodusFile file_;
+  NodalMesh mesh_;
+  NodalCells cells_;
+  LeftOut left_out_;
+  std::vector<Block> blocks_;
+  std::vector<std::string> side_names_;
+  std::size_t num_nodes_ = 0;
+};
+
+// --- Writing --------------------------------------------------------------------------------------------------------
+
+/// A file in memory, of which first all dimensions and variables are declared.
+class ExodusWriter {
+ public:
+  ExodusWriter() {
+    // The classic format has no times and the like in it, and bytes between variables are filled: equal meshes give
+    // equal bytes.
+    constexpr std::size_t kFirstSize = 1 << 16;
+    require(nc_create_mem("mesh", NC_64BIT_OFFSET, kFirstSize, &id_));
+  }
+  ~ExodusWriter() {
+    if (id_ >= 0) nc_abort(id_);
+  }
+  ExodusWriter(const ExodusWriter&) = delete;
+  ExodusWriter& operator=(const ExodusWriter&) = delete;
+
+  int dimension(const std::string& name, std::size_t length) {
+    int dim = 0;
+    require(nc_def_dim(id_, name.c_str(), length, &dim));
+    return dim;
+  }
+  int variable(const std::string& name, nc_type type, std::initializer_list<int> dims) {
+    int variable = 0;
+    require(nc_def_var(id_, name.c_str(), type, static_cast<int>(dims.size()), dims.begin(), &variable));
+    return variable;
+  }
+  void attribute(int variable, const char* name, const std::string& text) {
+    require(nc_put_att_text(id_, variable, name, text.size(), text.data()));
+  }
+  void attribute(const char* name, float value) {
+    require(nc_put_att_float(id_, NC_GLOBAL, name, NC_FLOAT, 1, &value));
+  }
+  void attribute(const char* name, int value) { require(nc_put_att_int(id_, NC_GLOBAL, name, NC_INT, 1, &value)); }
+  void end_declarations() { require(nc_enddef(id_)); }
+
+  void put(int variable, const std::vector<double>& values) { require(nc_put_var_double(id_, variable, values.data())); }
+  void put(int variable, const std::vector<int>& values) { require(nc_put_var_int(id_, variable, values.data())); }
+  void put(int variable, const std::vector<char>& text) { require(nc_put_var_text(id_, variable, text.data())); }
+
+  std::string take() {
+    NC_memio memory{};
+    const int id = id_;
+    id_ = -1;
+    require(nc_close_memio(id, &memory));
+    std::string bytes(static_cast<const char*>(memory.memory), memory.size);
+    std::free(memory.memory);
+    return bytes;
+  }
+
+ private:
+  void require(int status) const {
+    if (status == NC_ENOMEM) throw std::bad_alloc();
+    if (status != NC_NOERR) throw InputError(std::string("Exodus: netCDF cannot hold the mesh: ") + nc_strerror(status));
+  }
+  int id_ = -1;
+};
+
+/// A block to be written.
+struct WrittenBlock {
+  int reference;
+  CellKind kind;
+  std::vector<std::size_t> cells;
+  int id = 0;
+  std::string name{};
+};
+
+std::vector<WrittenBlock> blocks_of(const NodalMesh& mesh) {
+  std::vector<WrittenBlock> blocks;
+  for (const std::size_t c : exodus_order(mesh)) {
+    const int reference = reference_of(mesh, c);
+    if (blocks.empty() || blocks.back().reference != reference || blocks.back().kind != mesh.kinds[c])
+      blocks.push_back({reference, mesh.kinds[c], {}});
+    blocks.back().cells.push_back(c);
+  }
+  PositiveNumbers ids(mesh.references);
+  std::set<std::string> taken;
+  const WrittenBlock* first = nullptr;  // of the same reference
+  for (WrittenBlock& block : blocks) {
+    const bool continues = first && first->reference == block.reference;
+    block.id = continues ? ids.take_free() : ids.of(block.reference);
+    block.name = std::string(kReference) + std::to_string(block.reference);
+    for (const Group& region : mesh.regions)
+      if (region.number == block.reference && !region.name.empty() && !taken.contains(region.name))
+        block.name = region.name;
+    if (continues) block.name = first->name + kind_suffix(block.kind);
+    else first = &block;
+    taken.insert(block.name);
+  }
+  return blocks;
+}
+
+std::string type_name(CellKind kind, std::size_t num_nodes) {
+  if (kind == CellKind::tet) return num_nodes == 4 ? "TETRA" : "TETRA10";
+  if (kind == CellKind::prism) return num_nodes == 6 ? "WEDGE" : "WEDGE" + std::to_string(num_nodes);
+  return "HEX" + std::to_string(num_nodes);
+}
+
+/// Rows of characters of equal length.
+std::vector<char> table_of(const std::vector<std::string>& names, std::size_t length) {
+  std::vector<char> table(names.size() * length, '\0');
+  for (std::size_t i = 0; i < names.size(); ++i)
+    std::copy_n(names[i].begin(), std::min(names[i].size(), length - 1),
+                table.begin() + static_cast<std::ptrdiff_t>(i * length));
+  return table;
+}
+
+/// Cuts a name to what readers take, not within a character.
+std::string exodus_name(std::string name) {
+  constexpr std::size_t kLongest = 255;
+  std::size_t end = std::min(name.size(), kLongest);
+  while (end > 0 && end < name.size() && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;
+  name.resize(end);
+  return name;
+}
+
+std::string bytes_of(const NodalMesh& mesh) {
+  const int order = common_order(mesh, "Exodus", 2);
+  const bool edges_only = order == 2 && has_edge_nodes_only(mesh);
+  // Nodes that no element has are left out, but for vertices.
+  std::vector<bool> used(mesh.positions.size(), true);
+  if (edges_only) used = edge_nodes(mesh, order);
+  std::vector<Index> number(mesh.positions.size(), kNoIndex);
+  std::vector<double> coordinates[3];
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    if (!used[v]) continue;
+    number[v] = static_cast<Index>(coordinates[0].size());
+    for (int k = 0; k < 3; ++k) coordinates[k].push_back(mesh.positions[v][k]);
+  }
+  const auto one_based = [&](Index node) { return number[static_cast<std::size_t>(node)] + 1; };
+  const std::vector<WrittenBlock> blocks = blocks_of(mesh);
+  const auto num_nodes = [&](CellKind kind) {
+    return edges_only ? num_edge_nodes(kind, 2) : num_lattice_points(kind, order);
+  };
+  std::vector<int> element(mesh.num_cells());  // number of each cell
+  int next = 0;
+  for (const WrittenBlock& block : blocks)
+    for (const std::size_t c : block.cells) element[c] = ++next;
+
+  std::vector<GroupSides> sides = sides_of_groups(mesh, exodus_faces, !edges_only);
+  std::vector<int> group_numbers;
+  for (const Group& group : mesh.face_groups.groups) group_numbers.push_back(group.number);
+  PositiveNumbers positive(group_numbers);
+  std::vector<int> set_ids;
+  std::vector<std::string> set_names, block_names;
+  std::vector<const GroupSides*> sets;
+  for (std::size_t g = 0; g < sides.size(); ++g) {
+    if (sides[g].sides.empty()) continue;
+    sets.push_back(&sides[g]);
+    set_ids.push_back(positive.of(group_numbers[g]));
+    set_names.push_back(exodus_name(mesh.face_groups.groups[g].name));
+  }
+  std::vector<int> block_ids;
+  for (const WrittenBlock& block : blocks) {
+    block_ids.push_back(block.id);
+    block_names.push_back(exodus_name(block.name));
+  }
+  std::size_t longest = 32;  // of names; older readers expect at least so many
+  for (const auto* names : {&set_names, &block_names})
+    for (const std::string& name : *names) longest = std::max(longest, name.size());
+
+  ExodusWriter file;
+  constexpr float kVersion = 5.1f;
+  file.attribute("api_version", kVersion);
+  file.attribute("version", kVersion);
+  file.attribute("floating_point_word_size", 8);
+  file.attribute("file_size", 1);
+  file.attribute("maximum_name_length", static_cast<int>(longest));
+  file.attribute(NC_GLOBAL, "title", "subvol volume mesh");
+  const int len_string = file.dimension("len_string", 33), len_name = file.dimension("len_name", longest + 1);
+  file.dimension("len_line", 81);
+  file.dimension("four", 4);
+  const int time_step = file.dimension("time_step", NC_UNLIMITED);
+  const int num_dim = file.dimension("num_dim", 3), nodes = file.dimension("num_nodes", coordinates[0].size());
+  file.dimension("num_elem", mesh.num_cells());
+  const int num_blocks = file.dimension("num_el_blk", blocks.size());
+  file.variable("time_whole", NC_DOUBLE, {time_step});
+  const int coor_names = file.variable("coor_names", NC_CHAR, {num_dim, len_string});
+  int coordinate_variables[3];
+  constexpr const char* kCoordinates[] = {"coordx", "coordy", "coordz"};
+  for (int k = 0; k < 3; ++k) coordinate_variables[k] = file.variable(kCoordinates[k], NC_DOUBLE, {nodes});
+  const int eb_status = file.variable("eb_status", NC_INT, {num_blocks});
+  const int eb_prop = file.variable("eb_prop1", NC_INT, {num_blocks});
+  file.attribute(eb_prop, "name", "ID");
+  const int eb_names = file.variable("eb_names", NC_CHAR, {num_blocks, len_name});
+  std::vector<int> connects;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const std::string suffix = std::to_string(b + 1);
+    const int elements = file.dimension("num_el_in_blk" + suffix, blocks[b].cells.size());
+    const int of_element = file.dimension("num_nod_per_el" + suffix, num_nodes(blocks[b].kind));
+    connects.push_back(file.variable("connect" + suffix, NC_INT, {elements, of_element}));
+    file.attribute(connects.back(), "elem_type", type_name(blocks[b].kind, num_nodes(blocks[b].kind)));
+  }
+  struct SetVariables {
+    int elements, sides, nodes;
+  };
+  std::vector<SetVariables> set_variables;
+  int ss_status = 0, ss_prop = 0, ss_names = 0, ns_status = 0, ns_prop = 0, ns_names = 0;
+  if (!sets.empty()) {
+    const int num_side_sets = file.dimension("num_side_sets", sets.size()),
+              num_node_sets = file.dimension("num_node_sets", sets.size());
+    ss_status = file.variable("ss_status", NC_INT, {num_side_sets});
+    ss_prop = file.variable("ss_prop1", NC_INT, {num_side_sets});
+    file.attribute(ss_prop, "name", "ID");
+    ss_names = file.variable("ss_names", NC_CHAR, {num_side_sets, len_name});
+    ns_status = file.variable("ns_status", NC_INT, {num_node_sets});
+    ns_prop = file.variable("ns_prop1", NC_INT, {num_node_sets});
+    file.attribute(ns_prop, "name", "ID");
+    ns_names = file.variable("ns_names", NC_CHAR, {num_node_sets, len_name});
+    for (std::size_t s = 0; s < sets.size(); ++s) {
+      const std::string suffix = std::to_string(s + 1);
+      const int num_sides = file.dimension("num_side_ss" + suffix, sets[s]->sides.size()),
+                num_set_nodes = file.dimension("num_nod_ns" + suffix, sets[s]->nodes.size());
+      set_variables.push_back({file.variable("elem_ss" + suffix, NC_INT, {num_sides}),
+                               file.variable("side_ss" + suffix, NC_INT, {num_sides}),
+                               file.variable("node_ns" + suffix, NC_INT, {num_set_nodes})});
+    }
+  }
+  file.end_declarations();
+
+  file.put(coor_names, table_of({"x", "y", "z"}, 33));
+  for (int k = 0; k < 3; ++k) file.put(coordinate_variables[k], coordinates[k]);
+  file.put(eb_status, std::vector<int>(blocks.size(), 1));
+  file.put(eb_prop, block_ids);
+  file.put(eb_names, table_of(block_names, longest + 1));
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const std::size_t size = num_nodes(blocks[b].kind);
+    const std::vector<std::size_t> places = exodus_places(blocks[b].kind, size);
+    std::vector<int> connect(blocks[b].cells.size() * size);
+    for (std::size_t e = 0; e < blocks[b].cells.size(); ++e)
+      for (std::size_t i = 0; i < size; ++i)
+        connect[e * size + places[i]] = one_based(mesh.cell(blocks[b].cells[e])[i]);
+    file.put(connects[b], connect);
+  }
+  if (sets.empty()) return file.take();
+  const std::vector<int> present(sets.size(), 1);
+  file.put(ss_status, present);
+  file.put(ss_prop, set_ids);
+  file.put(ss_names, table_of(set_names, longest + 1));
+  file.put(ns_status, present);
+  file.put(ns_prop, set_ids);
+  file.put(ns_names, table_of(set_names, longest + 1));
+  for (std::size_t s = 0; s < sets.size(); ++s) {
+    std::vector<int> elements, numbers, set_nodes;
+    for (const Side& side : sets[s]->sides) {
+      elements.push_back(element[side.cell]);
+      numbers.push_back(side.number);
+    }
+    for (const Index node : sets[s]->nodes) set_nodes.push_back(one_based(node));
+    file.put(set_variables[s].elements, elements);
+    file.put(set_variables[s].sides, numbers);
+    file.put(set_variables[s].nodes, set_nodes);
+  }
+  return file.take();
+}
+
+}  // namespace
+
+NodalMesh parse_exodus(const std::string& name, std::string_view bytes, const std::string&) {
+  const std::lock_guard lock(netcdf_lock());
+  return ExodusParser(name, bytes).parse();
+}
+
+std::string exodus_bytes(const NodalMesh& mesh) {
+  const std::lock_guard lock(netcdf_lock());
+  return bytes_of(mesh);
+}
+
+bool has_exodus() { return true; }
+
+#endif
+
+}  // namespace subvol

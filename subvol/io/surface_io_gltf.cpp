@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/base/error.h"
+#include "subvol/base/text_scanner.h"
+#include "subvol/io/left_out.h"
+#include "subvol/io/surface_formats.h"
+#include "subvol/io/triangle_welder.h"
+
+#include <Eigen/Geometry>
+#include <tiny_gltf.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <type_traits>
+
+namespace subvol {
+
+namespace {
+
+namespace gltf = tinygltf;
+using Transform = Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>;
+
+class GltfParser {
+ public:
+  GltfParser(const std::string& name, std::string_view bytes) : name_(name) { load(bytes); }
+
+  ParsedSurface parse() {
+    for (const std::string& extension : model_.extensionsRequired)
+      if (extension != "KHR_mesh_quantization" && !extension.starts_with("KHR_materials_") &&
+          extension != "KHR_texture_transform")
+        fail("requires the extension " + in_quotes(extension) + ", which is not read");
+    if (model_.scenes.empty()) {
+      for (std::size_t n = 0; n < model_.nodes.size(); ++n)
+        if (!is_child(static_cast<int>(n))) add_node(static_cast<int>(n), Transform::Identity(), 0);
+    } else {
+      const std::size_t scene = model_.defaultScene >= 0 ? static_cast<std::size_t>(model_.defaultScene) : 0;
+      for (const int node : at(model_.scenes, static_cast<int>(scene), "scene").nodes)
+        add_node(node, Transform::Identity(), 0);
+    }
+    name_groups();
+    ParsedSurface parsed{welder_.take(), {}};
+    left_out_.tell(parsed.warnings);
+    return parsed;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const { throw InputError(name_ + ": " + what); }
+
+  template <class List>
+  const typename List::value_type& at(const List& list, int place, const char* what) const {
+    if (place < 0 || static_cast<std::size_t>(place) >= list.size())
+      fail(std::string("there is no ") + what + " " + std::to_string(place));
+    return list[static_cast<std::size_t>(place)];
+  }
+
+  void load(std::string_view bytes) {
+    gltf::TinyGLTF reader;
+    reader.SetImageLoader([](gltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
+                             void*) { return true; },
+                          nullptr);  // pictures do not matter
+    std::string errors, warnings;
+    const std::string folder = std::filesystem::path(name_).parent_path().string();
+    const auto size = static_cast<unsigned>(bytes.size());
+    const bool is_binary = bytes.starts_with("glTF");
+    const bool read = is_binary
+                          ? reader.LoadBinaryFromMemory(&model_, &errors, &warnings,
+                                                        reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
+                          : reader.LoadASCIIFromString(&model_, &errors, &warnings, bytes.data(), size, folder);
+    if (read) return;
+    std::replace(errors.begin(), errors.end(), '\n', ' ');
+    fail("no glTF 2.0 file that can be read: " + errors.substr(0, errors.find_last_not_of(' ') + 1));
+  }
+
+  bool is_child(int node) const {
+    return std::any_of(model_.nodes.begin(), model_.nodes.end(), [&](const gltf::Node& other) {
+      return std::find(other.children.begin(), other.children.end(), node) != other.children.end();
+    });
+  }
+
+  static Transform transform_of(const gltf::Node& node) {
+    Transform transform = Transform::Identity();
+    if (node.matrix.size() == 16) {
+      transform.matrix() = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
+      return transform;
+    }
+    if (node.translation.size() == 3) transform.translate(Vec3(node.translation.data()));
+    if (node.rotation.size() == 4)
+      transform.rotate(
+          Eigen::Quaterniond(node.rotation[3], node.rotation[0], node.rotation[1], node.rotation[2]).normalized());
+    if (node.scale.size() == 3) transform.scale(Vec3(node.scale.data()));
+    return transform;
+  }
+
+  void add_node(int place, const Transform& above, int depth) {
+    constexpr int kMostDepth = 64;
+    const gltf::Node& node = at(model_.nodes, place, "node");
+    if (depth > kMostDepth || ++num_nodes_ > model_.nodes.size()) fail("nodes are children of themselves");
+    const Transform transform = above * transform_of(node);
+    if (!transform.matrix().allFinite()) fail("node " + std::to_string(place) + ": a transform that is not finite");
+    if (node.mesh >= 0) add_mesh(at(model_.meshes, node.mesh, "mesh"), node, transform);
+    for (const int child : node.children) add_node(child, transform, depth + 1);
+  }
+
+  void add_mesh(const gltf::Mesh& mesh, const gltf::Node& node, const Transform& transform) {
+    for (const gltf::Primitive& primitive : mesh.primitives) {
+      const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
+      if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP && mode != TINYGLTF_MODE_TRIANGLE_FAN)
+        continue;  // points and lines, such as wireframes
+      const auto position = primitive.attributes.find("POSITION");
+      if (position == primitive.attributes.end()) fail("a primitive without POSITION");
+      const std::vector<double> x = numbers(position->second, 3, "POSITION");
+      std::vector<std::size_t> corners;
+      if (primitive.indices >= 0) {
+        for (const double v : numbers(primitive.indices, 1, "indices")) {
+          if (!(v >= 0 && v < static_cast<double>(x.size() / 3))) fail("indices: a vertex that does not exist");
+          corners.push_back(static_cast<std::size_t>(v));
+        }
+      } else {
+        for (std::size_t v = 0; v < x.size() / 3; ++v) corners.push_back(v);
+      }
+      const std::string material =
+          primitive.material < 0 ? std::string() : at(model_.materials, primitive.material, "material").name;
+      add_triangles(x, corners, mode, transform, place_of(materials_, material),
+                    place_of(objects_, node.name.empty() ? mesh.name : node.name));
+    }
+  }
+
+  void add_triangles(const std::vector<double>& x, const std::vector<std::size_t>& corners, int mode,
+                     const Transform& transform, int material, int object) {
+    const bool mirrors = transform.linear().determinant() < 0;
+    const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
+      if (mirrors) std::swap(b, c);
+      for (const std::size_t v : {a, b, c}) {
+        const Vec3 p = transform * Vec3(&x[3 * v]);
+        if (!p.allFinite()) fail("POSITION: a coordinate that is not finite");
+        welder_.add(p);
+      }
+      material_of_face_.push_back(material);
+      object_of_face_.push_back(object);
+    };
+    if (mode == TINYGLTF_MODE_TRIANGLES) {
+      if (corners.size() % 3 != 0) fail("indices: expected three for each triangle");
+      for (std::size_t k = 0; k + 2 < corners.size(); k += 3) add(corners[k], corners[k + 1], corners[k + 2]);
+      return;
+    }
+    for (std::size_t k = 2; k < corners.size(); ++k) {
+      if (mode == TINYGLTF_MODE_TRIANGLE_FAN) add(corners[0], corners[k - 1], corners[k]);
+      else if (k % 2 == 0) add(corners[k - 2], corners[k - 1], corners[k]);
+      else add(corners[k - 1], corners[k - 2], corners[k]);
+    }
+  }
+
+  /// The numbers of an accessor, `components` for each entry; normalized ones from -1 or 0 to 1.
+  std::vector<double> numbers(int place, int components, const char* what) const {
+    const gltf::Accessor& accessor = at(model_.accessors, place, "accessor");
+    if (accessor.sparse.isSparse) fail(std::string(what) + ": sparse accessors are not read");
+    if (gltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)) != components)
+      fail(std::string(what) + ": expected " + std::to_string(components) + " numbers for each entry");
+    const gltf::BufferView& view = at(model_.bufferViews, accessor.bufferView, "buffer view");
+    const std::vector<unsigned char>& bytes = at(model_.buffers, view.buffer, "buffer").data;
+    const int size = gltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
+    const int stride = accessor.ByteStride(view);
+    const std::size_t entry = static_cast<std::size_t>(std::max(size, 0) * components);
+    if (size <= 0 || stride < static_cast<int>(entry)) fail(std::string(what) + ": unknown type of numbers");
+    const std::size_t begin = view.byteOffset + accessor.byteOffset, step = static_cast<std::size_t>(stride);
+    if (begin < view.byteOffset || begin > bytes.size() ||
+        (accessor.count > 0 && ((accessor.count - 1) > (bytes.size() - begin) / step ||
+                                (accessor.count - 1) * step + entry > bytes.size() - begin)))
+      fail(std::string(what) + ": the data end beyond their buffer");
+    std::vector<double> values;
+    values.reserve(accessor.count * static_cast<std::size_t>(components));
+    for (std::size_t i = 0; i < accessor.count; ++i)
+      for (int k = 0; k < components; ++k)
+        values.push_back(decode(bytes.data() + begin + i * step + static_cast<std::size_t>(k * size), accessor, what));
+    return values;
+  }
+
+  template <class T>
+  static double as_number(const unsigned char* bytes, bool normalized) {
+    T value;
+    std::memcpy(&value, bytes, sizeof value);
+    if constexpr (std::is_integral_v<T>)
+      if (normalized) return std::max(static_cast<double>(value) / static_cast<double>(std::numeric_limits<T>::max()), -1.0);
+    return static_cast<double>(value);
+  }
+
+  double decode(const unsigned char* bytes, const gltf::Accessor& accessor, const char* what) const {
+    switch (accessor.componentType) {
+      case TINYGLTF_COMPONENT_TYPE_FLOAT: return as_number<float>(bytes, false);
+      case TINYGLTF_COMPONENT_TYPE_DOUBLE: return as_number<double>(bytes, false);
+      case TINYGLTF_COMPONENT_TYPE_BYTE: return as_number<std::int8_t>(bytes, accessor.normalized);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return as_number<std::uint8_t>(bytes, accessor.normalized);
+      case TINYGLTF_COMPONENT_TYPE_SHORT: return as_number<std::int16_t>(bytes, accessor.normalized);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return as_number<std::uint16_t>(bytes, accessor.normalized);
+      case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return as_number<std::uint32_t>(bytes, false);
+      default: fail(std::string(what) + ": unknown type of numbers");
+    }
+  }
+
+  /// Place of a name in a list, which it is added to; -1 for no name.
+  static int place_of(std::vector<std::string>& names, const std::string& name) {
+    if (name.empty()) return -1;
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end()) names.push_back(name);
+    return static_cast<int>(found - names.begin());
+  }
+
+  /// Materials that tell faces apart are groups; else nodes are.
+  void name_groups() {
+    const auto has_several = [](const std::vector<int>& list) {
+      return std::any_of(list.begin(), list.end(), [&](int entry) { return entry != list.front(); });
+    };
+    const bool by_material = has_several(material_of_face_);
+    if (!by_material && !has_several(object_of_face_)) return;
+    GroupList groups;
+    const std::vector<std::string>& names = by_material ? materials_ : objects_;
+    std::vector<Index> places;
+    for (const int place : by_material ? material_of_face_ : object_of_face_)
+      welder_.set_group(place < 0 ? kNoIndex : groups.by_name(names[static_cast<std::size_t>(place)]));
+    welder_.name_groups(groups.take());
+  }
+
+  std::string name_;
+  gltf::Model model_;
+  TriangleWelder welder_;
+  LeftOut left_out_;
+  std::vector<std::string> materials_, objects_;
+  std::vector<int> material_of_face_, object_of_face_;
+  std::size_t num_nodes_ = 0;
+};
+
+}  // namespace
+
+ParsedSurface parse_gltf(const std::string& name, std::string_view bytes) { return GltfParser(name, bytes).parse(); }
+
+}  // namespace subvol

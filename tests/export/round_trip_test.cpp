@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes go from every format of cells to every other and back: what both of them hold is the same as before.
+
+#include "subvol/export/curved_file.h"
+#include "subvol/export/high_order_file.h"
+#include "subvol/export/volume_writer.h"
+#include "subvol/io/file_formats.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "tests/support/element_fixtures.h"
+#include "tests/support/grouped_meshes.h"
+#include "tests/support/sample_meshes.h"
+#include "tests/support/temporary_folder.h"
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+using namespace subvol;
+using namespace subvol::test;
+
+namespace {
+
+VolumeMesh marked_cells() {
+  VolumeMesh mesh = with_floor_and_roof(mixed_cells(), 1);
+  mesh.references.assign(mesh.num_cells(), 4);
+  mesh.references.back() = 7;
+  mesh.regions = {{"steel", 4, 3}, {"brass", 7, 3}};
+  return mesh;
+}
+
+std::vector<const FileFormat*> formats_of_cells(bool curved) {
+  std::vector<const FileFormat*> formats;
+  for (const FileFormat& format : file_formats()) {
+    if (!format.holds_cells || format.read.empty() || format.written.empty()) continue;
+    if (curved && (format.orders_written == "1" || format.orders_read == "1")) continue;
+    if (format.needs_netcdf && !has_exodus()) continue;
+    formats.push_back(&format);
+  }
+  if (!has_exodus()) WARN("SKIPPED: Exodus, built without netCDF (libnetcdf-dev)");
+  return formats;
+}
+
+Held least(std::initializer_list<Held> held) { return std::min(held); }
+Held groups_of(const FileFormat& a, const FileFormat& b) {
+  return least({a.groups_read, a.groups_written, b.groups_read, b.groups_written});
+}
+Held regions_of(const FileFormat& a, const FileFormat& b) {
+  return least({a.regions_read, a.regions_written, b.regions_read, b.regions_written});
+}
+
+/// Largest difference of coordinates: numbers have sixteen characters in Nastran's files, twenty in those of Abaqus.
+double rounding(const FileFormat& a, const FileFormat& b) {
+  const auto has = [&](std::string_view extension) { return a.extension == extension || b.extension == extension; };
+  return has(".bdf") ? 1e-7 : has(".inp") ? 1e-11 : 0;
+}
+
+using Corners = std::vector<std::array<double, 3>>;
+
+/// The corners of a cell as they are in the first mesh, whose vertices are told by their places.
+Corners corners_of(const std::vector<Vec3>& positions, std::span<const Index> cell, const std::vector<Vec3>& wanted) {
+  Corners corners;
+  for (const Index v : cell) {
+    const auto nearest = std::ranges::min_element(wanted, {}, [&](const Vec3& x) {
+      return (x - positions[static_cast<std::size_t>(v)]).squaredNorm();
+    });
+    corners.push_back({(*nearest)[0], (*nearest)[1], (*nearest)[2]});
+  }
+  std::sort(corners.begin(), corners.end());
+  return corners;
+}
+
+std::string mark_of(const Group& group, Held held) {
+  return held == Held::none ? "" : held == Held::names ? group.name : std::to_string(group.number);
+}
+
+/// The groups of each grouped face, by its corners.
+std::map<Corners, std::set<std::string>> faces_of(const VolumeMesh& mesh, const VolumeFaceGroups& groups,
+                                                  const std::vector<Vec3>& wanted, Held held) {
+  std::map<Corners, std::set<std::string>> faces;
+  if (held == Held::none) return faces;
+  for (const GroupedFace& entry : groups.faces) {
+    const std::size_t size = entry.face.back() == kNoIndex ? 3 : 4;
+    faces[corners_of(mesh.positions, std::span(entry.face).first(size), wanted)].insert(
+        mark_of(groups.groups[static_cast<std::size_t>(entry.group)], held));
+  }
+  return faces;
+}
+
+/// The kind of each cell and the region that it is in, by its corners.
+std::map<Corners, std::pair<CellKind, std::string>> cells_of(const VolumeMesh& mesh, std::span<const int> references,
+                                                             std::span<const Group> regions,
+                                                             const std::vector<Vec3>& wanted, Held held) {
+  std::map<Corners, std::pair<CellKind, std::string>> cells;
+  for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+    std::string mark;
+    const int reference = references.empty() ? 0 : references[c];
+    if (held == Held::numbers) mark = std::to_string(reference);
+    for (const Group& region : regions)
+      if (held == Held::names && region.number == reference) mark = region.name;
+    cells[corners_of(mesh.positions, mesh.cell(c), wanted)] = {mesh.kinds[c], mark};
+  }
+  return cells;
+}
+
+void write_linear(const std::filesystem::path& path, const VolumeMesh& mesh) {
+  const std::string extension = path.extension().string();
+  extension == ".mesh" || extension == ".vtk" ? write_volume_mesh(path, mesh) : write_volume(path, mesh);
+}
+
+/// Returns for each cell of a mesh the cell of another one with the same corners.
+std::vector<std::size_t> matched(const HighOrderMesh& found, const HighOrderMesh& wanted) {
+  const VolumeMesh a = found.straight_sided(), b = wanted.straight_sided();
+  std::map<Corners, std::size_t> places;
+  for (std::size_t c = 0; c < b.num_cells(); ++c) places[corners_of(b.positions, b.cell(c), b.positions)] = c;
+  std::vector<std::size_t> result;
+  for (std::size_t c = 0; c < a.num_cells(); ++c)
+    result.push_back(places.at(corners_of(a.positions, a.cell(c), b.positions)));
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("round trips: linear cells, regions and groups go through every pair of formats", "[export]") {
+  const TemporaryFolder folder;
+  const VolumeMesh mesh = marked_cells();
+  const auto formats = formats_of_cells(false);
+  REQUIRE(formats.size() >= 7);
+  for (const FileFormat* a : formats)
+    for (const FileFormat* b : formats) {
+      CAPTURE(a->extension, b->extension);
+      const auto first = folder.path() / ("a" + std::string(a->extension)),
+                 second = folder.path() / ("b" + std::string(b->extension));
+      write_linear(first, mesh);
+      write_linear(second, read_volume_mesh(first));
+      write_linear(first, read_volume_mesh(second));
+      const VolumeMesh found = read_volume_mesh(first);
+      REQUIRE(found.num_vertices() == mesh.num_vertices());
+      const double tolerance = rounding(*a, *b);
+      for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
+        CHECK((found.positions[v] - mesh.positions[v]).cwiseAbs().maxCoeff() <= tolerance);
+      const Held groups = groups_of(*a, *b), regions = regions_of(*a, *b);
+      CHECK(cells_of(found, found.references, found.regions, mesh.positions, regions) ==
+            cells_of(mesh, mesh.references, mesh.regions, mesh.positions, regions));
+      CHECK(faces_of(found, found.face_groups, mesh.positions, groups) ==
+            faces_of(mesh, mesh.face_groups, mesh.positions, groups));
+    }
+}
+
+TEST_CASE("round trips: cells of order 2 go through every pair of formats that holds them", "[export]") {
+  const TemporaryFolder folder;
+  PointSource source(5);
+  const VolumeMesh cells = marked_cells();
+  // Without modes of faces and inside, which C3D20 and the like do not have.
+  const HighOrderMesh mesh = file_cells(random_mesh(ElementSpace(cells, Basis::legendre, 2), source), ".inp").mesh;
+  const HighOrderFileOptions options{
+      .references = cells.references, .face_groups = &cells.face_groups, .regions = cells.regions};
+  const auto formats = formats_of_cells(true);
+  REQUIRE(formats.size() >= 5);
+  const auto write_file = [](const std::filesystem::path& path, const HighOrderFile& file) {
+    write_volume(path, file.mesh,
+                 {.references = file.references, .face_groups = &file.face_groups, .regions = file.regions});
+  };
+  for (const FileFormat* a : formats)
+    for (const FileFormat* b : formats) {
+      CAPTURE(a->extension, b->extension);
+      const auto first = folder.path() / ("a" + std::string(a->extension)),
+                 second = folder.path() / ("b" + std::string(b->extension));
+      write_volume(first, mesh, options);
+      write_file(second, read_curved(first));
+      write_file(first, read_curved(second));
+      const HighOrderFile found = read_curved(first);
+      const VolumeMesh corners = found.mesh.straight_sided();
+      REQUIRE(found.mesh.space.num_cells() == cells.num_cells());
+      CHECK(found.mesh.space.max_order() == 2);
+      const Held groups = groups_of(*a, *b), regions = regions_of(*a, *b);
+      const VolumeMesh straight = mesh.straight_sided();
+      CHECK(cells_of(corners, found.references, found.regions, straight.positions, regions) ==
+            cells_of(straight, cells.references, cells.regions, straight.positions, regions));
+      CHECK(faces_of(corners, found.face_groups, straight.positions, groups) ==
+            faces_of(straight, cells.face_groups, straight.positions, groups));
+      const std::vector<std::size_t> same = matched(found.mesh, mesh);
+      for (std::size_t c = 0; c < same.size(); ++c) {
+        const auto at = [&](const HighOrderMesh& m, std::size_t cell) { return m.position(cell, Vec3(0.3, 0.3, 0.3)); };
+        CHECK((at(found.mesh, c) - at(mesh, same[c])).norm() < 1e-12 + 10 * rounding(*a, *b));
+      }
+    }
+}

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Surfaces of .vtp, .3mf, .glb, .gltf, .msh and .inp, and the surfaces that we write.
+
+#include "subvol/base/error.h"
+#include "subvol/export/gltf_writer.h"
+#include "subvol/export/export.h"
+#include "subvol/export/read_back.h"
+#include "subvol/export/surface_writer.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/io/surface_io.h"
+#include "subvol/io/zip_archive.h"
+#include "subvol/surface/boundary.h"
+#include "tests/support/grouped_meshes.h"
+#include "tests/support/sample_meshes.h"
+#include "tests/support/temporary_folder.h"
+
+#include <catch2/catch.hpp>
+
+#include <map>
+
+using namespace subvol;
+using namespace subvol::test;
+using Catch::Contains;
+
+namespace {
+
+const TemporaryFolder& folder() {
+  static const TemporaryFolder kFolder;
+  return kFolder;
+}
+
+PolygonMesh grouped_surface() {
+  const VolumeMesh mesh = with_floor_and_roof(lattice(2, 1, 1), 1);
+  return boundary_surface(mesh, MeshTopology(mesh));
+}
+
+/// Area of the faces of each name; faces of no group have none.
+std::map<std::string, double> areas(const PolygonMesh& mesh) {
+  std::map<std::string, double> result;
+  const TriangleMesh triangles = triangulate(mesh);
+  for (std::size_t t = 0; t < triangles.triangles.size(); ++t) {
+    const auto x = [&](int k) -> const Vec3& { return triangles.positions[triangles.triangles[t][k]]; };
+    const Index group = triangles.face_groups.empty() ? kNoIndex : triangles.face_groups.of_face[t];
+    result[group == kNoIndex ? "" : label_of(triangles.face_groups.groups[group])] +=
+        (x(1) - x(0)).cross(x(2) - x(0)).norm() / 2;
+  }
+  return result;
+}
+
+std::string refusal(const std::string& name, std::string_view bytes) {
+  try {
+    read_polygon_mesh(folder().file(name, bytes));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("surface formats: surfaces that are written come back with their groups", "[io]") {
+  PolygonMesh surface = grouped_surface();
+  surface.face_groups.groups[0].name = "in & \"out\" <1>";
+  const std::map<std::string, double> wanted = areas(surface);
+  for (const std::string extension : {".stl", ".ply", ".vtp", ".3mf"}) {
+    CAPTURE(extension);
+    const auto path = folder().path() / ("a" + extension);
+    write_surface(path, surface);
+    CHECK_NOTHROW(require_written(path, surface));
+    std::vector<std::string> warnings;
+    const PolygonMesh found = read_polygon_mesh(path, &warnings);
+    CHECK(warnings.empty());
+    CHECK(found.positions.size() == surface.positions.size());
+    auto names = areas(found);
+    if (extension == ".stl") names[""] = std::exchange(names["none"], 0), names.erase("none");
+    if (extension == ".ply") {
+      CHECK(names.at("group 1") == Approx(wanted.at("in & \"out\" <1>")));
+      CHECK(names.at("group 2") == Approx(wanted.at("roof")));
+      continue;
+    }
+    REQUIRE(names.size() == wanted.size());
+    for (const auto& [name, area] : wanted) CHECK(names.at(name) == Approx(area));
+    PolygonMesh other = surface;
+    other.positions[0][0] += 1;
+    CHECK_THROWS_AS(require_written(path, other), IoError);
+  }
+  surface.face_groups = {};
+  for (const std::string extension : {".stl", ".ply", ".vtp", ".3mf"}) {
+    write_surface(folder().path() / ("b" + extension), surface);
+    const PolygonMesh found = read_polygon_mesh(folder().path() / ("b" + extension));
+    CHECK(found.face_groups.empty());
+    CHECK(areas(found).at("") == Approx(10));
+  }
+  CHECK_THROWS_AS(surface_bytes(".obj", surface), InputError);
+  surface.face_vertices[0] = 99;
+  CHECK_THROWS_AS(surface_bytes(".stl", surface), InputError);
+}
+
+TEST_CASE("surface formats: glTF is read in place, without its lines, with materials as groups", "[io]") {
+  const VolumeMesh mesh = with_floor_and_roof(lattice(2, 1, 1), 1);
+  for (const char* name : {"a.glb", "a.gltf"})
+    for (const bool quantize : {false, true}) {
+      CAPTURE(name, quantize);
+      SurfaceSceneOptions options;
+      options.up_axis = UpAxis::y;
+      options.quantize = quantize;
+      write_gltf(folder() / name, boundary_scene(mesh, options));
+      const PolygonMesh found = read_polygon_mesh(folder() / name);
+      CHECK(found.positions.size() == 12);
+      const auto names = areas(found);
+      CHECK(names.at("floor") == Approx(2).epsilon(1e-3));
+      CHECK(names.at("roof") == Approx(2).epsilon(1e-3));
+      Vec3 low = found.positions[0], high = low;
+      for (const Vec3& x : found.positions) low = low.cwiseMin(x), high = high.cwiseMax(x);
+      CHECK((low - Vec3(0, 0, 0)).norm() < 1e-3);
+      CHECK((high - Vec3(2, 1, 1)).norm() < 1e-3);
+    }
+  const std::string glb = content_of(folder() / "a.glb");
+  for (std::size_t size = 0; size < glb.size(); size += 1 + glb.size() / 60)
+    CHECK_FALSE(refusal("cut.glb", std::string_view(glb).substr(0, size)).empty());
+  CHECK_THAT(refusal("a.gltf", R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
+    "extensionsUsed":["KHR_draco_mesh_compression"]})"), Contains("KHR_draco_mesh_compression"));
+  CHECK_THAT(refusal("b.gltf", R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})"),
+             Contains("children of themselves"));
+}
+
+TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "[io]") {
+  const std::string model = R"(<?xml version="1.0"?><model unit="millimeter" xmlns="x"><resources>
+<basematerials id="9"><base name="steel" displaycolor="#FFF"/><base name="brass" displaycolor="#000"/></basematerials>
+<object id="1" name="one" MAT><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/>
+<vertex x="0" y="1" z="0"/></vertices><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object>
+<object id="2" name="two"><components><component objectid="1" transform="2 0 0 0 2 0 0 0 2 5 6 7"/></components></object>
+</resources><build><item objectid="1"/><item objectid="2" transform="1 0 0 0 1 0 0 0 1 0 0 1"/></build></model>)";
+  const auto archive = [&](const std::string& from, const std::string& to) {
+    std::string text = model;
+    ZipWriter zip;
+    zip.add("3D/part.model", text.replace(text.find(from), from.size(), to));
+    return zip.take();
+  };
+  const PolygonMesh found = read_polygon_mesh(folder().file("a.3mf", archive("MAT", "")));
+  REQUIRE(found.num_faces() == 2);
+  CHECK(found.positions[4] == Vec3(7, 6, 8));
+  CHECK(areas(found) == std::map<std::string, double>{{"one", 0.5}, {"two", 2}});
+  CHECK_THAT(refusal("b.3mf", archive("v3=\"2\"", "v3=\"3\"")), Contains("number of a vertex"));
+  CHECK_THAT(refusal("b.3mf", archive("objectid=\"1\" transform", "objectid=\"2\" transform")), Contains("themselves"));
+  CHECK_THAT(refusal("b.3mf", archive("objectid=\"2\"", "objectid=\"5\"")), Contains("no object"));
+  CHECK_THAT(refusal("b.3mf", archive("x=\"1\"", "x=\"nan\"")), Contains("expected a number x"));
+  const std::string bytes = archive("MAT", "");
+  for (std::size_t size = 0; size < bytes.size(); size += 7)
+    CHECK_FALSE(refusal("cut.3mf", std::string_view(bytes).substr(0, size)).empty());
+  std::string damaged = bytes;
+  damaged[60] = static_cast<char>(damaged[60] ^ 4);
+  CHECK_THAT(refusal("d.3mf", damaged), Contains("damaged"));
+}
+
+TEST_CASE("surface formats: polygons and strips of a .vtp, and labels of its cells", "[io]") {
+  const std::string text = R"(<VTKFile type="PolyData" version="0.1"><PolyData><Piece NumberOfPoints="5" NumberOfVerts="1"
+NumberOfPolys="1" NumberOfStrips="1"><Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">
+0 0 0 1 0 0 0 1 0 1 1 0 2 1 0</DataArray></Points><Polys><DataArray type="Int64" Name="connectivity" format="ascii">
+0 1 2</DataArray><DataArray type="Int64" Name="offsets" format="ascii">3</DataArray></Polys><Strips>
+<DataArray type="Int64" Name="connectivity" format="ascii">1 3 2 4</DataArray><DataArray type="Int64" Name="offsets"
+format="ascii">4</DataArray></Strips><CellData><DataArray type="Int32" Name="material" format="ascii">9 5 7</DataArray>
+</CellData></Piece></PolyData></VTKFile>)";
+  std::vector<std::string> warnings;
+  const PolygonMesh found = read_polygon_mesh(folder().file("a.vtp", text), &warnings);
+  REQUIRE(found.num_faces() == 3);
+  CHECK(found.face_groups.groups == std::vector<Group>{{"", 5, 2}, {"", 7, 2}});
+  CHECK(found.face_groups.of_face == std::vector<Index>{0, 1, 1});
+  CHECK(std::vector<Index>(found.face_vertices.begin() + 3, found.face_vertices.end()) ==
+        std::vector<Index>{1, 3, 2, 2, 3, 4});
+  CHECK(warnings.size() == 1);
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string other = text;
+    return other.replace(other.find(from), from.size(), to);
+  };
+  CHECK_THAT(refusal("b.vtp", changed("0 1 2</", "0 1 5</")), Contains("names point 5 of 5"));
+  CHECK_THAT(refusal("b.vtp", changed(">3<", ">4<")), Contains("beyond the connectivity"));
+  CHECK_THAT(refusal("b.vtp", changed("PolyData\" v", "ImageData\" v")), Contains("expected the type PolyData"));
+}
+
+TEST_CASE("surface formats: elements of two dimensions in a .msh or .inp without cells are a surface", "[io]") {
+  const FileCells msh = read_cells(folder().file(
+      "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 8 \"inlet\"\n$EndPhysicalNames\n$Nodes\n5\n"
+               "9 0 0 0\n3 1 0 0\n5 0 1 0\n4 1 1 0\n7 2 1 0\n$EndNodes\n$Elements\n3\n1 2 2 8 1 9 3 5\n"
+               "2 2 2 0 1 3 4 5\n3 1 2 0 1 9 3\n$EndElements\n"));
+  const auto& surface = std::get<PolygonMesh>(msh);
+  CHECK(surface.num_faces() == 2);
+  CHECK(surface.positions.size() == 4);  // the fifth belongs to no face
+  CHECK(surface.face_groups.groups == std::vector<Group>{{"inlet", 8, 2}});
+  CHECK(surface.face_groups.of_face == std::vector<Index>{0, kNoIndex});
+  const FileCells inp = read_cells(folder().file(
+      "a.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,1,1,0\n*ELEMENT,TYPE=S3,ELSET=left\n1,1,2,3\n"
+               "*ELEMENT,TYPE=S4R,ELSET=right\n2,2,4,3,1\n"));
+  CHECK(std::get<PolygonMesh>(inp).face_groups.groups == std::vector<Group>{{"left", 1, 2}, {"right", 2, 2}});
+  CHECK_THROWS_WITH(read_volume_mesh(folder() / "a.msh"), Contains("faces without cells"));
+}
