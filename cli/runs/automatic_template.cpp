@@ -23,7 +23,6 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
     return !interrupted();
   };
   options.cancelled = interrupted;
-  catch_interrupt();
   TemplateChoice choice = choose_template(std::get<TriangleMesh>(target), options);
   teller.finish();
   warnings.insert(warnings.end(), choice.warnings.begin(), choice.warnings.end());

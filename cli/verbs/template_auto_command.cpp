@@ -49,7 +49,6 @@ Json topology_json(const BettiNumbers& topology) {
 
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
-  catch_interrupt();
   const SurfaceRepair repair = repair_surface(load_surface(arguments.target, arguments.warnings), interrupted);
   const TriangleMesh& target = repair.surface;
   add_remarks(repair, arguments.warnings);
