@@ -47,6 +47,7 @@ struct Change {
   enum class Kind { collapse, flip, move } kind;
   Index a, b;                    ///< the ends of an edge; collapse: a becomes b; move: the vertex is a
   Vec3 position = Vec3::Zero();  ///< of a moved vertex
+  double distance = 0;           ///< by which the surface changes, at most
 };
 
 /// The triangles around a fault and all that are near them, with numbers of their own.
@@ -111,9 +112,10 @@ bool Patch::apply(const Change& change) {
 /// How good a patch is: less is better.
 struct Rating {
   std::size_t faults = 0;
-  double hiddenness = 0;  ///< 1 - the least visibility of a triangle from its corners' directions
+  bool is_hard = false;   ///< from the best direction at some vertex, a triangle is seen almost edge-on
+  double distance = 0;    ///< of the changes
   friend bool operator<(const Rating& a, const Rating& b) {
-    return std::tie(a.faults, a.hiddenness) < std::tie(b.faults, b.hiddenness);
+    return std::tie(a.faults, a.is_hard, a.distance) < std::tie(b.faults, b.is_hard, b.distance);
   }
 };
 
@@ -121,7 +123,8 @@ Vec3 area_vector(const TriangleMesh& mesh, const Corners& t) {
   return (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
 }
 
-Rating rating_of(const Patch& patch) {
+Rating rating_of(const Patch& patch, double distance) {
+  constexpr double kEdgeOn = 0.1;  // cosine between a direction and a normal: 6 degrees
   TriangleMesh alive{patch.mesh.positions, {}};
   std::vector<std::vector<Vec3>> normals(patch.mesh.positions.size());
   for (const Corners& t : patch.mesh.triangles) {
@@ -131,7 +134,7 @@ Rating rating_of(const Patch& patch) {
     for (const Index v : t) normals[v].push_back(normal);
   }
   const SelfIntersections found = self_intersections(alive);
-  Rating rating{found.pairs.size() + found.degenerate.size(), 0};
+  Rating rating{found.pairs.size() + found.degenerate.size(), false, distance};
   double least = 1;
   for (std::size_t v = 0; v < normals.size(); ++v) {
     if (!patch.is_inner[v] || normals[v].empty()) continue;
@@ -144,7 +147,7 @@ Rating rating_of(const Patch& patch) {
     }
     for (const Vec3& n : normals[v]) least = std::min(least, direction->dot(n));
   }
-  rating.hiddenness = 1 - least;
+  rating.is_hard = least < kEdgeOn;
   return rating;
 }
 
@@ -281,13 +284,15 @@ std::vector<Change> LocalMender::changes(const Patch& patch, const std::vector<I
   for (const auto& [a, b] : edges) {
     if (!patch.is_inner[a] || !patch.is_inner[b]) continue;
     if ((x[a] - x[b]).norm() <= distance_) {
-      found.push_back({Change::Kind::collapse, a, b});
-      found.push_back({Change::Kind::collapse, b, a});
+      const double length = (x[a] - x[b]).norm();
+      found.push_back({Change::Kind::collapse, a, b, Vec3::Zero(), length});
+      found.push_back({Change::Kind::collapse, b, a, Vec3::Zero(), length});
     }
     const std::vector<std::size_t> sides = patch.at_edge(a, b);
     if (sides.size() != 2) continue;
     const Index c = third(patch.mesh.triangles[sides[0]], a, b), d = third(patch.mesh.triangles[sides[1]], a, b);
-    if (segment_distance(x[a], x[b], x[c], x[d]) <= distance_) found.push_back({Change::Kind::flip, a, b});
+    const double between = segment_distance(x[a], x[b], x[c], x[d]);
+    if (between <= distance_) found.push_back({Change::Kind::flip, a, b, Vec3::Zero(), between});
   }
   constexpr std::array<double, 3> kShares{0.25, 0.5, 0.9};  // of the distance
   for (const Index v : near) {
@@ -306,7 +311,7 @@ std::vector<Change> LocalMender::changes(const Patch& patch, const std::vector<I
       for (const double share : kShares) ways.push_back(mean * std::min(1.0, share * distance_ / length));
     for (const Vec3& way : ways)
       if ((x[v] + way - given_[vertices[v]]).norm() <= distance_)
-        found.push_back({Change::Kind::move, v, kNoIndex, x[v] + way});
+        found.push_back({Change::Kind::move, v, kNoIndex, x[v] + way, way.norm()});
   }
   return found;
 }
@@ -341,10 +346,10 @@ void LocalMender::accept(const Patch& patch, const std::vector<Change>& changes,
 
 bool LocalMender::mend(const std::vector<Index>& seeds) {
   constexpr std::size_t kBest = 6;       // first changes for which a second one is tried
-  constexpr int kMostPairSearches = 60;  // each takes up to a second on large patches
+  constexpr int kMostPairSearches = 20;  // each takes up to a second on large patches
   std::vector<Index> triangles, vertices, seed_vertices;
   const Patch patch = patch_around(seeds, triangles, vertices, seed_vertices);
-  const Rating before = rating_of(patch);
+  const Rating before = rating_of(patch, 0);
   struct Trial {
     Rating rating;
     Patch patch;
@@ -358,7 +363,9 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
       if (!changed.apply(change)) continue;
       std::vector<Change> all = first;
       all.push_back(change);
-      const Rating rating = rating_of(changed);
+      double distance = 0;
+      for (const Change& one : all) distance += one.distance;
+      const Rating rating = rating_of(changed, distance);
       trials.push_back({rating, std::move(changed), std::move(all)});
     }
   };

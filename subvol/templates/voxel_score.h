@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_topology.h"
 
 #include <span>

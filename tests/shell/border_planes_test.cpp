@@ -21,7 +21,7 @@ namespace {
 
 /// A pipe around the z axis, radius 1; its lower end lies in z = 0, its upper one in z = 2 + slope x.
 PolygonMesh pipe(double slope, Faces faces = Faces::triangles) {
-  constexpr int kAround = 32, kAlong = 8;
+  constexpr int kAround = 16, kAlong = 4;
   return grid(kAround, kAlong, faces, [&](double i, double j) {
     const double angle = 2 * std::numbers::pi * i / kAround, x = std::cos(angle), y = std::sin(angle);
     return Vec3(x, y, j / kAlong * (2 + slope * x));
@@ -49,7 +49,7 @@ TEST_CASE("Flat ends of a pipe have planes, straight and oblique ones", "[shell]
   const std::vector<BorderPlane> planes = flat_border_planes(surface, layers.topology);
   REQUIRE(planes.size() == 2);
   for (const BorderPlane& plane : planes) {
-    CHECK(plane.vertices.size() == 32);
+    CHECK(plane.vertices.size() == 16);
     const bool is_lower = surface.positions[plane.vertices[0]].z() < 1;
     const Vec3 normal = is_lower ? Vec3::UnitZ() : Vec3(-0.6, 0, 1).normalized();
     CHECK(std::abs(plane.normal.dot(normal)) == Approx(1).epsilon(1e-12));
@@ -83,32 +83,32 @@ TEST_CASE("Projectors keep points in planes, on lines, or free", "[shell]") {
   CHECK(ColumnPlanes().projector(std::vector<Index>{7}) == Mat3::Identity());
 }
 
-TEST_CASE("Layers end in the plane of a flat border, straight, solved and curved", "[shell]") {
+TEST_CASE("Layers end in the plane of a flat border, solved and curved", "[shell][slow]") {
   for (const double slope : {0.0, 0.6, 1.5})
     for (const ShellSide side : {ShellSide::outward, ShellSide::both}) {
       const ShellResult shell = make_shell(pipe(slope), {.thickness = 0.2, .side = side, .layers = 3});
       CAPTURE(slope);
       CHECK(shell.failures.none());
-      CHECK(shell.layers.planes.num_columns() == 64);
+      CHECK(shell.layers.planes.num_columns() == 32);
       CHECK(shell.border_distance_max < 1e-14);
       const std::size_t n = shell.layers.num_columns();
       for (std::size_t i = 0; i < shell.mesh.num_vertices(); ++i) {
         const Vec3& p = shell.mesh.positions[i];
-        if (i % n < 32) CHECK(std::abs(p.z()) < 1e-13);
-        if (i % n >= n - 32) CHECK(std::abs(p.z() - 2 - slope * p.x()) < 1e-13);
+        if (i % n < 16) CHECK(std::abs(p.z()) < 1e-13);
+        if (i % n >= n - 16) CHECK(std::abs(p.z() - 2 - slope * p.x()) < 1e-13);
       }
-      if (side == ShellSide::both) continue;
+      if (side == ShellSide::both || slope != 0.6) continue;
       const CurvedShell curved = curve_shell(shell, {.order = 2});
       CHECK(curved.valid());
       const ElementSpace& space = curved.mesh.space;
       for (std::size_t v = 0; v < space.num_vertices(); ++v)
-        if (v % n >= n - 32)
+        if (v % n >= n - 16)
           CHECK(std::abs(curved.mesh.coefficients[v].z() - 2 - slope * curved.mesh.coefficients[v].x()) < 1e-12);
       // Modes are displacements.
       const MeshTopology& topology = space.topology();
       for (std::size_t e = 0; e < topology.num_edges(); ++e) {
         const auto [a, b] = topology.edge(static_cast<Index>(e));
-        if (static_cast<std::size_t>(a) % n < n - 32 || static_cast<std::size_t>(b) % n < n - 32) continue;
+        if (static_cast<std::size_t>(a) % n < n - 16 || static_cast<std::size_t>(b) % n < n - 16) continue;
         for (std::size_t i = space.edge_nodes(e); i < space.edge_nodes(e + 1); ++i)
           CHECK(std::abs(curved.mesh.coefficients[i].z() - slope * curved.mesh.coefficients[i].x()) < 1e-12);
       }
