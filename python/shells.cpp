@@ -2,11 +2,13 @@
 #include "cli/runs/check_report.h"
 #include "cli/runs/report.h"
 #include "cli/runs/shell_output.h"
+#include "cli/runs/shell_surface.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/mesh_check.h"
@@ -25,23 +27,27 @@ class Growing {
   Growing(const py::object& surface, const py::object& thickness, const py::kwargs& given)
       : keywords_("shell", given), work_(keywords_) {
     read_options();
-    surface_ = surface_from(surface, "surface");
-    const TriangleMesh triangles = triangulate(surface_.polygons);
+    given_ = surface_from(surface, "surface");
+    const TriangleMesh triangles = triangulate(given_.polygons);
     diagonal_ = bounding_box_diagonal(triangles);
     inward_warning_ = cli::inward_warning(triangles);
     read_thickness(thickness);
-    options_.tags = surface_.tags;
-    if (crease_angle_)
-      options_.tags = merge_tags(options_.tags, surface_features(surface_.polygons, *crease_angle_));
+    if (!first_height_.empty()) plan_layers();
+    preparation_.repair_distance = cli::parse_length("repair", repair_, diagonal_);
   }
 
   std::shared_ptr<Shelled> run() {
     const auto result = std::make_shared<Shelled>();
     options_.progress = work_.progress();
     options_.cancelled = work_.cancelled();
+    preparation_.cancelled = work_.cancelled();
+    surface_ = work_.run("repair", [&] { return cli::prepared_surface(given_, preparation_); });
+    if (crease_angle_) options_.tags = surface_features(surface_.polygons, *crease_angle_);
+    cli::take_surface(surface_, options_);
     result->shell = work_.run("grow", [&] { return make_shell(surface_.polygons, options_); });
     if (curved_options_.order != 1) curve(*result);
     std::vector<std::string> warnings = result->shell.report.warnings;
+    if (const auto repaired = cli::repair_warning(surface_, diagonal_)) warnings.insert(warnings.begin(), *repaired);
     if (inward_warning_) warnings.insert(warnings.begin(), *inward_warning_);
     result->report = make_report("shell", report_of(*result), keywords_, work_, warnings);
     return result;
@@ -52,6 +58,9 @@ class Growing {
     bool straight = false;
     keywords_.take("layers", options_.layers);
     keywords_.take("growth", options_.growth);
+    take_length("first_height", first_height_);
+    take_length("repair", repair_);
+    take_patches();
     keywords_.take("side", options_.side,
                    {{"outward", ShellSide::outward}, {"inward", ShellSide::inward}, {"both", ShellSide::both}});
     keywords_.take("free_surface", options_.free_surface);
@@ -78,10 +87,39 @@ class Growing {
       options_.thickness = thickness.cast<double>();
     } else {
       options_.vertex_thickness = values_from(thickness, "thickness");
-      if (options_.vertex_thickness.size() != surface_.polygons.positions.size())
+      if (options_.vertex_thickness.size() != given_.polygons.positions.size())
         throw InputError("thickness must be a length, a percentage as '2%', or have one entry for each of the " +
-                         std::to_string(surface_.polygons.positions.size()) + " points");
+                         std::to_string(given_.polygons.positions.size()) + " points");
     }
+  }
+
+  /// Takes a length: a number, or text with a number or a percentage.
+  void take_length(const char* name, std::string& text) {
+    const py::object given = keywords_.object(name);
+    if (!given.is_none()) text = py::str(given).cast<std::string>();
+  }
+
+  /// Takes the patches to leave out: one text, or a sequence of texts or of group numbers.
+  void take_patches() {
+    const py::object given = keywords_.object("skip");
+    if (given.is_none()) return;
+    if (py::isinstance<py::str>(given) || py::isinstance<py::int_>(given)) {
+      preparation_.skipped.push_back(py::str(given).cast<std::string>());
+      return;
+    }
+    if (!py::isinstance<py::sequence>(given)) throw py::type_error("skip must be a text or a sequence of texts");
+    for (const py::handle patch : given) preparation_.skipped.push_back(py::str(patch).cast<std::string>());
+  }
+
+  void plan_layers() {
+    if (!options_.vertex_thickness.empty())
+      throw InputError("shell: first_height goes with one thickness, not with one for each point");
+    const cli::LayerPlan plan = cli::planned_layers(
+        options_.thickness, cli::parse_length("first_height", first_height_, diagonal_),
+        keywords_.has("layers") ? std::optional(options_.layers) : std::nullopt,
+        keywords_.has("growth") ? std::optional(options_.growth) : std::nullopt);
+    options_.layers = plan.layers;
+    options_.growth = plan.growth;
   }
 
   // Uses the time that the linear shell has left. If none is left, or the run must end, the cells get the requested
@@ -100,20 +138,26 @@ class Growing {
     curved_options_.cancelled = work_.cancelled();
     result.curved_shell = work_.run("curve", [&] { return curve_shell(shell, curved_options_); });
     cli::take_figures(*result.curved_shell, shell);
-    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{result.curved_shell->mesh, shell.mesh.references});
+    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{result.curved_shell->mesh, shell.mesh.references, shell.mesh.face_groups});
   }
 
   Json report_of(const Shelled& result) const {
     const ShellResult& shell = result.shell;
-    return {{"input", {{"surface", cli::describe("", surface_.polygons)}}},
+    return {{"input", {{"surface", cli::describe("", given_.polygons)}}},
+            {"repair", cli::repair_json(surface_, diagonal_)},
+            {"skipped", cli::skipped_json(surface_)},
             {"stop_reason", to_string(shell.report.stop_reason)},
             {"explanation", shell.report.explanation},
             {"converged", shell.report.stop_reason == StopReason::converged},
             {"stages", cli::stages_json(shell.report)},
             {"valid", shell.failures.none()},
             {"thickness", cli::thickness_json(shell, diagonal_)},
+            {"layers", cli::layers_json(shell)},
+            {"border", cli::border_json(shell, diagonal_)},
+            {"groups", cli::shell_groups_json(shell)},
             {"surface_distance_max_percent", 100 * shell.surface_distance_max / diagonal_},
             {"quality", cli::quality_json(shell.quality)},
+            {"corner_quality", cli::corner_quality_json(shell)},
             {"not_certified_cells", shell.failures.certificate.not_certified},
             {"boundary_self_intersections", shell.failures.intersecting.size()},
             {"intersecting_faces", shell.failures.intersecting},
@@ -126,7 +170,10 @@ class Growing {
   CurvedShellOptions curved_options_;
   cli::WritingOptions writing_;
   std::optional<double> crease_angle_;
-  SurfaceMesh surface_;
+  SurfaceMesh given_;
+  cli::ShellSurfaceOptions preparation_;
+  cli::ShellSurface surface_;
+  std::string first_height_, repair_ = formatted("%.6g%%", 100 * kMendingShare);
   double diagonal_ = 0;
   std::optional<std::string> inward_warning_;
 };
@@ -146,7 +193,7 @@ auto by_side(std::vector<double> ShellResult::* values) {
 
 constexpr const char* kHelp =
     R"(shell(surface, thickness, *, layers=1, growth=1.0, side='outward', free_surface=False, straight=False,
-    crease_angle=None, order=1, basis='legendre', max_iterations=0, time_limit=0.0, chord=0.005, progress=None,
+    crease_angle=None, first_height=None, skip=None, repair='0.02%', order=1, basis='legendre', max_iterations=0, time_limit=0.0, chord=0.005, progress=None,
     threads=None)
 --
 
@@ -156,6 +203,10 @@ surface       SurfaceMesh, VolumeMesh (its boundary), or the path of either
 thickness     of each side: a length, '2%' of the bounding box's diagonal, or (n,) lengths, one for each point
 layers        on each side
 growth        thickness of a layer against that of the one nearer the surface
+first_height  thickness of the layer at the surface, as text: a length, or '2%': the growth follows from layers, or the
+              layers from growth
+skip          list of patches without layers: names or numbers of groups, or points 'X,Y,Z' on patches between sharp edges
+repair        faults of the surface are repaired by changes within this distance, as text: a length, or '2%'; '0': none
 side          'outward' where the faces' normals point, 'inward', or 'both'
 free_surface  the surface's points may slide along it for the cells' sake
 straight      straight columns, no optimisation
@@ -170,7 +221,11 @@ max_iterations, time_limit, chord, progress and threads as of `fit`.)";
 void add_shell(py::module_& module) {
   py::class_<Shelled, Reported, std::shared_ptr<Shelled>> type(module, "ShellResult",
       "What `shell` returns. Point s n + i of the cells is point i of the surface on sheet s, of n points and from the "
-      "innermost sheet.");
+      "innermost sheet. The surface is the given one without the patches that were left out, and after its repair: "
+      "`surface`.");
+  type.def_property_readonly("surface", [](const Shelled& result) {
+    return SurfaceMesh{result.shell.layers.surface, {}};
+  }, "The surface that the layers stand on: SurfaceMesh.");
   type.def_property_readonly("mesh", [](const std::shared_ptr<Shelled>& result) {
     return result->curved ? py::cast(result->curved) : py::cast(linear_mesh(result));
   }, "The layers, a VolumeMesh whose references number them from the innermost; or curved cells, a HighOrderMesh.");

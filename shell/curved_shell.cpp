@@ -109,7 +109,8 @@ class CurvedShellCheck {
   std::function<CurvedBoundary(const HighOrderMesh&)> make_boundary_;
 };
 
-/// Makes the problem with the surface's sheet fixed: nodes without a strand are not degrees of freedom.
+/// Makes the problem with the surface's sheet fixed: nodes without a strand are not degrees of freedom. Those of columns
+/// that stay in a plane move in it.
 FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, const NodeStrands& strands,
                         std::vector<Vec3>& unknowns) {
   constexpr int kLeastPoints = 5;
@@ -126,6 +127,17 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
     nodes.offsets.push_back(nodes.columns.size());
   }
   nodes.num_cols = unknowns.size();
+  std::vector<Mat3> projectors;
+  if (!shell.layers.planes.empty()) {
+    std::vector<Index> columns;
+    for (std::size_t i = 0; i < fixed.size(); ++i) {
+      if (strands.of_node(i).empty()) continue;
+      columns.clear();
+      for (const Index strand : strands.of_node(i))
+        columns.push_back(static_cast<Index>(static_cast<std::size_t>(strand) % shell.layers.num_columns()));
+      projectors.push_back(shell.layers.planes.projector(columns));
+    }
+  }
   const std::vector<int> points(mesh.space.num_cells(),
                                 std::max(kLeastPoints, points_for_order(mesh.space.max_order())));
   auto energy =
@@ -133,6 +145,7 @@ FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, con
   energy->set_most_own_emphasis(0);  // cells in creases end near inversion and must not outweigh all others
   FitProblem problem(std::move(nodes), select_rows(nodes, {}), std::move(energy), nullptr, 1);
   problem.fixed_nodes = std::move(fixed);
+  problem.projectors = std::move(projectors);
   return problem;
 }
 

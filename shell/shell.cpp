@@ -8,6 +8,7 @@
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/solver/free_nodes.h"
 #include "subvol/fit/solver/newton.h"
+#include "subvol/shell/surface_faults.h"
 #include "subvol/shell/thickness.h"
 #include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
@@ -25,18 +26,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Largest number of entities named in a message.
-constexpr std::size_t kMaxNamed = 10;
 constexpr int kMaxRounds = 12;
 constexpr int kDefaultIterations = 60;
-
-std::string list_of(const std::vector<Index>& numbers) {
-  std::string text;
-  for (std::size_t i = 0; i < std::min(numbers.size(), kMaxNamed); ++i)
-    text += (i ? ", " : "") + std::to_string(numbers[i]);
-  if (numbers.size() > kMaxNamed) text += ", ... (" + std::to_string(numbers.size()) + " in all)";
-  return text;
-}
 
 void check_options(const PolygonMesh& surface, const ShellOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
@@ -76,22 +67,25 @@ struct Normalization {
 class ShellMaker {
  public:
   ShellMaker(const PolygonMesh& surface, const ShellOptions& options)
-      : options_(options),
+      : given_(surface),
+        options_(options),
         normalization_(surface),
-        layers_(make_layers(normalization_.normalized(surface), options.side == ShellSide::outward ? 0 : options.layers,
-                            options.side == ShellSide::inward ? 0 : options.layers, options.growth)),
+        layers_(normalized_layers(surface)),
         cells_(stack_cells(layers_)),
         check_(layers_, cells_, CheckedSheets::outer, options.free_surface) {}
 
   ShellResult run(const PolygonMesh& surface);
 
  private:
-  void require_no_intersections() const;
+  void require_no_faults(const PolygonMesh& surface) const;
+  void find_planes();
   void find_directions();
   void find_thickness();
   void start();
   void optimize();
   std::vector<std::uint8_t> fixed_vertices() const;
+  std::vector<Mat3> projectors(std::span<const std::uint8_t> is_fixed) const;
+  void return_to_planes();
   FitProblem make_problem(std::vector<Vec3>& unknowns) const;
   MinimizerStop solve(int round);
   void finish(const PolygonMesh& surface, ShellResult& result);
@@ -101,7 +95,21 @@ class ShellMaker {
   bool goes_on(bool wanted);
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   void timed(const char* part, void (ShellMaker::*work)());
+  /// Names vertices of the surface with their given coordinates.
+  std::string text_of(std::span<const Index> vertices) const {
+    return text_of_vertices(vertices, given_.positions, options_.vertex_numbers);
+  }
 
+  /// Messages of `make_layers` name the given coordinates.
+  ShellLayers normalized_layers(const PolygonMesh& surface) const {
+    ShellLayers layers = make_layers(surface, options_.side == ShellSide::outward ? 0 : options_.layers,
+                                     options_.side == ShellSide::inward ? 0 : options_.layers, options_.growth,
+                                     {options_.vertex_numbers, options_.face_numbers});
+    layers.surface = normalization_.normalized(std::move(layers.surface));
+    return layers;
+  }
+
+  const PolygonMesh& given_;
   const ShellOptions& options_;
   Normalization normalization_;
   ShellLayers layers_;
@@ -141,29 +149,29 @@ void ShellMaker::timed(const char* part, void (ShellMaker::*work)()) {
   report_.seconds.emplace_back(part, seconds() - before);
 }
 
-void ShellMaker::require_no_intersections() const {
-  const int base[] = {layers_.inside};
-  PolygonMesh polygons = sheet_polygons(layers_, base);
-  polygons.face_offsets.resize(layers_.surface.num_faces() + 1);  // no walls
-  polygons.face_vertices.resize(polygons.face_offsets.back());
-  polygons.positions = cells_.positions;
-  std::vector<Index> polygon;
-  const SelfIntersections found = self_intersections(fan_triangles(polygons, &polygon), options_.cancelled);
-  std::vector<Index> faces;
-  for (const auto& [t, s] : found.pairs) faces.insert(faces.end(), {polygon[t], polygon[s]});
-  for (const Index t : found.degenerate) faces.push_back(polygon[t]);
-  std::sort(faces.begin(), faces.end());
-  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
-  if (!faces.empty())
-    throw InputError("the surface meets itself, or has no area, at faces " + list_of(faces));
+void ShellMaker::require_no_faults(const PolygonMesh& surface) const {
+  const SurfaceFaults faults = find_faults(surface, options_.cancelled);
+  const std::string text = to_text(faults, surface, {options_.vertex_numbers, options_.face_numbers});
+  if (!text.empty()) throw InputError(text);
+}
+
+/// Finds the planes of flat borders. Vertices for which the caller has given planes have no others.
+void ShellMaker::find_planes() {
+  std::vector<BorderPlane> planes = options_.border_planes;
+  std::vector<char> is_given(layers_.num_columns(), 0);
+  for (const BorderPlane& plane : planes)
+    for (const Index v : plane.vertices) is_given[v] = 1;
+  for (BorderPlane& plane : flat_border_planes(layers_.surface, layers_.topology)) {
+    std::erase_if(plane.vertices, [&](Index v) { return is_given[v]; });
+    if (!plane.vertices.empty()) planes.push_back(std::move(plane));
+  }
+  layers_.planes = ColumnPlanes(std::move(planes), layers_.num_columns());
 }
 
 void ShellMaker::find_directions() {
-  require_no_intersections();
-  VisibleNormals visible = visible_normals(layers_.surface);
-  if (!visible.hidden.empty())
-    throw InputError("no direction sees all faces around from their front at vertices " + list_of(visible.hidden));
-  directions_ = std::move(visible.directions);
+  directions_ = visible_normals(layers_.surface).directions;
+  find_planes();
+  if (!layers_.planes.empty()) turn_into_planes(layers_, directions_);
 }
 
 void ShellMaker::find_thickness() {
@@ -178,7 +186,8 @@ void ShellMaker::find_thickness() {
 }
 
 void ShellMaker::start() {
-  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_, options_.cancelled);
+  const std::vector<Vec3> thin = thinnest_shell(layers_, check_, directions_, thickness_, options_.cancelled,
+                                                [this](std::span<const Index> v) { return text_of(v); });
   if (thin.empty()) {
     goes_on(true);
     return;
@@ -202,9 +211,32 @@ std::vector<std::uint8_t> ShellMaker::fixed_vertices() const {
   return fixed;
 }
 
+/// Returns the projectors of the free vertices; none if no column stays in a plane.
+std::vector<Mat3> ShellMaker::projectors(std::span<const std::uint8_t> is_fixed) const {
+  std::vector<Mat3> result;
+  if (layers_.planes.empty()) return result;
+  for (std::size_t i = 0; i < is_fixed.size(); ++i) {
+    const auto column = static_cast<Index>(i % layers_.num_columns());
+    if (!is_fixed[i]) result.push_back(layers_.planes.projector({&column, 1}));
+  }
+  return result;
+}
+
+/// Moves the ends of columns exactly into their planes, from which rounding may have taken them.
+void ShellMaker::return_to_planes() {
+  if (layers_.planes.empty()) return;
+  for (std::size_t i = 0; i < positions_.size(); ++i) {
+    const auto column = static_cast<Index>(i % layers_.num_columns());
+    const Mat3 projector = layers_.planes.projector({&column, 1});
+    const Vec3& foot = layers_.surface.positions[column];
+    if (projector != Mat3::Identity()) positions_[i] = foot + projector * (positions_[i] - foot);
+  }
+}
+
 /// Makes the problem with the surface's vertices fixed, or drawn to the original surface.
 FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
-  FreeNodes free = free_nodes(fixed_vertices(), positions_);
+  const std::vector<std::uint8_t> is_fixed = fixed_vertices();
+  FreeNodes free = free_nodes(is_fixed, positions_);
   unknowns = std::move(free.unknowns);
   SparseMap nodes = std::move(free.map);
   std::vector<Vec3> fixed = std::move(free.fixed);
@@ -229,6 +261,7 @@ FitProblem ShellMaker::make_problem(std::vector<Vec3>& unknowns) const {
                      std::move(surface), lambda);
   problem.fixed_nodes = std::move(fixed);
   problem.fixed_samples = std::move(fixed_samples);
+  problem.projectors = projectors(is_fixed);
   return problem;
 }
 
@@ -262,6 +295,7 @@ MinimizerStop ShellMaker::solve(int round) {
   stage.stop = std::move(found.explanation);
   stage.seconds = seconds() - before;
   problem.apply_nodes(unknowns, positions_);
+  return_to_planes();
   return found.stop;
 }
 
@@ -296,6 +330,7 @@ void ShellMaker::optimize() {
 ShellResult ShellMaker::run(const PolygonMesh& surface) {
   cells_.tags = shell_tags(layers_, options_.tags);
   tell("directions", 0, 0, 0);
+  require_no_faults(surface);
   timed("directions", &ShellMaker::find_directions);
   tell("thickness", 0, 0, 0.02);
   timed("thickness", &ShellMaker::find_thickness);
@@ -333,6 +368,10 @@ void ShellMaker::finish(const PolygonMesh& surface, ShellResult& result) {
   result.clearance = std::move(measured.clearance);
   result.surface_distance_max = measured.surface_distance_max;
   result.quality = measure_quality(result.mesh, 5, shell_reference(layers, result.limited));
+  result.growth = options_.growth;
+  result.corner_quality = measure_corner_quality(result.mesh);
+  result.border_distance_max = distance_from_planes(layers, result.mesh.positions);
+  result.mesh.face_groups = shell_groups(layers);
   result.failures = ShellCheck(layers, result.mesh, CheckedSheets::all).failures(result.mesh.positions);
   report_.seconds.emplace_back("check", seconds() - before);
   result.report = std::move(report_);

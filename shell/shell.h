@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/quality/corner_quality.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/shell/border_planes.h"
 #include "subvol/shell/shell_check.h"
 #include "subvol/shell/shell_layers.h"
 
@@ -23,6 +25,11 @@ struct ShellOptions {
   /// Lets the surface's own vertices slide along it if that helps the cells; those of its border and tags stay fixed.
   bool free_surface = false;
   FeatureTags tags;                      ///< tags of the surface, repeated on the outer sheets
+  /// Planes in which columns on the border stay; `without_faces` returns those of patches that were left out. The flat
+  /// parts of the rest of the border are found (`flat_border_planes`).
+  std::vector<BorderPlane> border_planes;
+  /// Numbers of the surface's vertices and faces for messages; empty: their own.
+  std::vector<Index> vertex_numbers, face_numbers;
   int max_iterations = 0;                ///< per solve; 0: the default number
   double time_limit_seconds = 0;         ///< 0: no limit
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
@@ -34,7 +41,8 @@ struct ShellOptions {
 /// layers has thickness 0.
 struct ShellResult {
   ShellLayers layers;
-  VolumeMesh mesh;                 ///< layer by layer; references number the layers, from 1 for the innermost
+  /// Layer by layer; references number the layers, from 1 for the innermost; face groups are those of `shell_groups`.
+  VolumeMesh mesh;
   std::vector<double> asked;       ///< the requested thickness
   std::vector<double> limited;     ///< the thickness that there is room for, used in the cells' references
   std::vector<double> achieved;    ///< distance between a column's end and its surface vertex
@@ -42,6 +50,9 @@ struct ShellResult {
   /// Largest distance of the sheet's vertices from the given surface, if they were free.
   double surface_distance_max = 0;
   QualityReport quality;           ///< relative to `shell_reference(layers, limited)`
+  CornerQuality corner_quality;    ///< at the corners of the linear cells, as other programs measure
+  double growth = 1;               ///< that of the options
+  double border_distance_max = 0;  ///< largest distance of a column's end from the planes in which it stays
   ShellFailures failures;          ///< for all sheets; faces are numbered as in `sheet_polygons` of all sheets
   FitReport report;
 };
@@ -60,12 +71,15 @@ struct ShellResult {
 /// thickness aimed at is lowered there, with a bounded slope, and the solve is repeated. Whatever still intersects in
 /// the end is moved back toward the straight columns.
 ///
+/// Where the border of the surface is flat, layers end in its plane: the columns of its vertices stay in the plane
+/// through them, unless no direction in the plane sees the front of the faces there well (`layers.planes`).
+///
 /// returns  for every surface that is not rejected, a shell with certified cells and sheets that do not intersect,
 ///          except for rounding if the caller's coordinates are much larger than the surface; `failures` is decisive.
 ///          Only the report if the caller cancels before there is a shell.
 /// InputError: options out of range; whatever `make_layers` rejects; a surface that intersects itself; vertices from
-/// which no direction sees the front of all adjacent faces, or on which not even a very thin layer fits. Messages name
-/// at most the first ten of them.
+/// which no direction sees the front of all adjacent faces, or on which not even a very thin layer fits. Messages tell how
+/// many there are, and the coordinates of the first ten.
 /// Same bits for any number of threads.
 ShellResult make_shell(const PolygonMesh& surface, const ShellOptions& options);
 

@@ -2,6 +2,7 @@
 #include "subvol/shell/shell_layers.h"
 
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/mesh/features.h"
 #include "subvol/shell/visible_normals.h"
 
@@ -21,27 +22,36 @@ std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {
   return {surface.face_vertices.data() + begin, surface.face_offsets[f + 1] - begin};
 }
 
-void require_faces(const PolygonMesh& surface) {
+void require_faces(const PolygonMesh& surface, const SurfaceNames& names) {
   if (surface.num_faces() == 0) throw InputError("the surface has no faces");
+  const auto face_name = [&](std::size_t f) {
+    return "face " + std::to_string(names.faces.empty() ? static_cast<Index>(f) : names.faces[f]);
+  };
   std::vector<char> used(surface.positions.size(), 0);
+  std::vector<Index> flat;
   for (std::size_t v = 0; v < used.size(); ++v)
     if (!surface.positions[v].allFinite()) throw InputError("vertex " + std::to_string(v) + " is not finite");
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
     const auto face = face_of(surface, f);
     for (std::size_t k = 0; k < face.size(); ++k) {
       if (face[k] < 0 || static_cast<std::size_t>(face[k]) >= used.size())
-        throw InputError("face " + std::to_string(f) + " names vertex " + std::to_string(face[k]) + " of " +
+        throw InputError(face_name(f) + " names vertex " + std::to_string(face[k]) + " of " +
                          std::to_string(used.size()));
       if (std::find(face.begin(), face.begin() + k, face[k]) != face.begin() + k)
-        throw InputError("face " + std::to_string(f) + " names vertex " + std::to_string(face[k]) + " twice");
+        throw InputError(face_name(f) + " names vertex " + std::to_string(face[k]) + " twice");
       used[face[k]] = 1;
     }
     if (face.size() != 3 && face.size() != 4)
-      throw InputError("face " + std::to_string(f) + " has " + std::to_string(face.size()) +
+      throw InputError(face_name(f) + " has " + std::to_string(face.size()) +
                        " corners; only triangles and quads can be extruded");
     Vec3 area = Vec3::Zero();
     for (std::size_t k = 0; k < face.size(); ++k) area += corner_normal(surface, f, k);
-    if (!(area.norm() > 1e-12)) throw InputError("face " + std::to_string(f) + " has no area");
+    if (!(area.norm() > 1e-12)) flat.push_back(static_cast<Index>(f));
+  }
+  if (!flat.empty()) {
+    SurfaceFaults faults;
+    faults.flat = std::move(flat);
+    throw InputError(to_text(faults, surface, names));
   }
   const auto unused = std::find(used.begin(), used.end(), 0);
   if (unused != used.end())
@@ -81,12 +91,60 @@ std::vector<double> layer_shares(int num_layers, double growth) {
   return shares;
 }
 
-ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth) {
-  require_faces(surface);
+double growth_of_layers(double thickness, double first_height, int num_layers) {
+  constexpr double kLeastGrowth = 0.01, kMostGrowth = 100;
+  const auto text = [](double x) { return formatted("%.6g", x); };
+  if (!(thickness > 0) || !(first_height > 0) || !std::isfinite(thickness) || num_layers < 1)
+    throw InputError("shell: thickness, first height and number of layers must be positive");
+  const auto sum = [&](double growth) {
+    double total = 0, height = first_height;
+    for (int k = 0; k < num_layers && total <= 2 * thickness; ++k, height *= growth) total += height;
+    return total;
+  };
+  if (num_layers == 1) {
+    if (std::abs(first_height - thickness) <= 1e-9 * thickness) return 1;
+    throw InputError("shell: one layer is as thick as the shell, " + text(thickness) + ", but its height is to be " +
+                     text(first_height) + "; ask for more layers, or for a growth");
+  }
+  double low = kLeastGrowth, high = kMostGrowth;
+  if (!(sum(low) <= thickness))
+    throw InputError("shell: a first layer " + text(first_height) + " high leaves no room for " +
+                     std::to_string(num_layers - 1) + " more within a thickness of " + text(thickness));
+  if (!(sum(high) >= thickness))
+    throw InputError("shell: " + std::to_string(num_layers) + " layers, the first " + text(first_height) +
+                     " high, do not reach a thickness of " + text(thickness) + " even if each is 100 times as thick as "
+                     "the one before; ask for more layers");
+  for (int i = 0; i < 200 && low < high; ++i) {
+    const double growth = std::sqrt(low * high);
+    (sum(growth) < thickness ? low : high) = growth;
+  }
+  return std::sqrt(low * high);
+}
+
+int number_of_layers(double thickness, double first_height, double growth) {
+  constexpr int kMostLayers = 1000;
+  if (!(thickness > 0) || !(first_height > 0) || !(growth > 0) || !std::isfinite(thickness))
+    throw InputError("shell: thickness, first height and growth must be positive");
+  if (first_height > thickness)
+    throw InputError(formatted("shell: the first layer, %.6g high, is thicker than the shell, %.6g", first_height,
+                               thickness));
+  double total = 0, height = first_height;
+  for (int k = 1; k <= kMostLayers; ++k, height *= growth) {
+    const double before = total;
+    total += height;
+    if (total < thickness) continue;
+    return k > 1 && thickness - before < total - thickness ? k - 1 : k;
+  }
+  throw InputError(formatted("shell: layers that begin with a height of %.6g and grow by %.6g reach %.6g at most, not "
+                             "the thickness of %.6g", first_height, growth, total, thickness));
+}
+
+ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth, const SurfaceNames& names) {
+  require_faces(surface, names);
   require_numberable(surface, inside, outside);
   ShellLayers layers;
   layers.topology = build_surface(surface.positions.size(), {surface.face_offsets.begin(), surface.face_offsets.end()},
-                                  surface.face_vertices, {}, SurfaceKind::maybe_open, surface.positions);
+                                  surface.face_vertices, names.vertices, SurfaceKind::maybe_open, surface.positions);
   layers.surface = std::move(surface);
   layers.inside = inside;
   layers.outside = outside;
@@ -179,6 +237,48 @@ CellReference shell_reference(const ShellLayers& layers, std::vector<double> thi
     reference.col(2) = share * height * reference.col(0).cross(reference.col(1)).normalized();
     return reference;
   };
+}
+
+VolumeFaceGroups shell_groups(const ShellLayers& layers) {
+  const FaceGroups& own = layers.surface.face_groups;
+  VolumeFaceGroups result{own.groups, {}};
+  const auto is_taken = [&](const std::string& name) {
+    return std::any_of(own.groups.begin(), own.groups.end(), [&](const Group& group) { return group.name == name; });
+  };
+  const auto add_group = [&](const std::string& name) {
+    result.groups.push_back({is_taken(name) ? "shell " + name : name, free_number(result.groups), 2});
+    return static_cast<Index>(result.groups.size() - 1);
+  };
+  std::array<Index, 4> corners;
+  const auto add_sheet = [&](int sheet, const auto& group_of_face) {
+    for (std::size_t f = 0; f < layers.surface.num_faces(); ++f) {
+      const auto face = face_of(layers.surface, f);
+      for (std::size_t k = 0; k < face.size(); ++k) corners[k] = layers.vertex(sheet, face[k]);
+      result.faces.push_back({face_key({corners.data(), face.size()}), group_of_face(f)});
+    }
+  };
+  Index wall = kNoIndex;
+  add_sheet(layers.inside, [&](std::size_t f) {
+    if (!own.empty() && own.of_face[f] != kNoIndex) return own.of_face[f];
+    if (wall == kNoIndex) wall = add_group("wall");
+    return wall;
+  });
+  if (layers.inside > 0) add_sheet(0, [inner = add_group("inner")](std::size_t) { return inner; });
+  if (layers.outside > 0) add_sheet(layers.num_sheets() - 1, [outer = add_group("outer")](std::size_t) { return outer; });
+  Index rim = kNoIndex;
+  const SurfaceTopology& topology = layers.topology;
+  for (std::size_t h = 0; h < topology.twins.size(); ++h) {
+    if (topology.twins[h] != kNoIndex) continue;
+    if (rim == kNoIndex) rim = add_group("rim");
+    const Index from = topology.corner_vertices[h], to = topology.corner_vertices[topology.next(static_cast<Index>(h))];
+    for (int layer = 0; layer + 1 < layers.num_sheets(); ++layer) {
+      corners = {layers.vertex(layer, from), layers.vertex(layer, to), layers.vertex(layer + 1, to),
+                 layers.vertex(layer + 1, from)};
+      result.faces.push_back({face_key(corners), rim});
+    }
+  }
+  normalise(result);
+  return result;
 }
 
 PolygonMesh sheet_surface(const ShellLayers& layers, const VolumeMesh& cells, int sheet) {

@@ -3,6 +3,8 @@
 
 #include "subvol/fit/elements/cell_reference.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/shell/border_planes.h"
+#include "subvol/shell/surface_faults.h"
 #include "subvol/surface/surface_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -35,6 +37,7 @@ struct ShellLayers {
   int inside = 0, outside = 0;     ///< number of layers on each side of the surface; at least one in total
   /// Share of a side's thickness that its first k layers occupy, counted from the surface: 0 .. 1.
   std::vector<double> inside_shares, outside_shares;
+  ColumnPlanes planes;             ///< those in which columns on the border stay; none unless they are set
 
   std::size_t num_columns() const { return surface.positions.size(); }
   int num_sheets() const { return inside + outside + 1; }
@@ -59,12 +62,24 @@ struct ShellLayers {
 /// returns     num_layers + 1 numbers from 0 to 1.
 std::vector<double> layer_shares(int num_layers, double growth);
 
+/// Returns the growth for which layers of a given first height have a given thickness together:
+///
+///   thickness = first_height (1 + g + ... + g^(num_layers - 1))
+///
+/// InputError: lengths that are not positive, num_layers < 1, or no such growth from 1/100 to 100.
+double growth_of_layers(double thickness, double first_height, int num_layers);
+
+/// Returns the number of layers, from 1, whose thickness comes closest to the given one if each is `growth` times as
+/// thick as the one before. InputError: as above, or growth < 1 and a thickness that no number of layers reaches.
+int number_of_layers(double thickness, double first_height, double growth);
+
 /// Pairs the surface's edges and checks the requirements of a shell.
 ///
+/// names  numbers for messages; those of faces and vertices are followed by coordinates.
 /// InputError: no faces; more cells than can be numbered; vertices that are out of range, not finite, repeated in a
 /// face or in no face; a face that is neither a triangle nor a quad; an edge with more than two faces, or with two that
 /// run along it in the same direction; a vertex whose faces form more than one fan; a face without area.
-ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth);
+ShellLayers make_layers(PolygonMesh surface, int inside, int outside, double growth, const SurfaceNames& names = {});
 
 /// Returns the cells, with all sheets at the position of the surface. References number the layers, from 1 for the
 /// innermost.
@@ -96,6 +111,13 @@ std::vector<Vec3> straight_columns(const ShellLayers& layers, std::span<const Ve
 /// layers     must outlive the result.
 /// thickness  per strand, > 0 on sides with layers.
 CellReference shell_reference(const ShellLayers& layers, std::vector<double> thickness);
+
+/// Returns the groups of the shell's faces: those of the surface's faces on its own sheet; "wall" for its faces without
+/// one; "inner" and "outer" for the innermost and the outermost sheet, if they are not the surface; "rim" for the faces
+/// along its border. If the surface uses one of these names, "shell " stands before it.
+///
+/// The surface's own sheet is inside the mesh if there are layers on both sides.
+VolumeFaceGroups shell_groups(const ShellLayers& layers);
 
 /// Returns one sheet of the cells as a surface with the original surface's faces.
 PolygonMesh sheet_surface(const ShellLayers& layers, const VolumeMesh& cells, int sheet);

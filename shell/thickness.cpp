@@ -5,6 +5,8 @@
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/shell/ray_gap.h"
+#include "subvol/shell/surface_faults.h"
+#include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>
@@ -123,8 +125,41 @@ MeasuredThickness measure_thickness(const ShellLayers& layers, std::span<const V
   return measured;
 }
 
+void turn_into_planes(ShellLayers& layers, std::span<Vec3> directions) {
+  constexpr double kLeastVisibility = 0.1;
+  const PolygonMesh& surface = layers.surface;
+  std::vector<double> visibility(layers.num_columns(), 1);
+  std::vector<Vec3> turned(directions.begin(), directions.end());
+  for (std::size_t v = 0; v < turned.size(); ++v) {
+    const auto column = static_cast<Index>(v);
+    turned[v] = (layers.planes.projector({&column, 1}) * directions[v]).stableNormalized();
+  }
+  for (std::size_t f = 0; f < surface.num_faces(); ++f)
+    for (std::size_t h = surface.face_offsets[f]; h < surface.face_offsets[f + 1]; ++h) {
+      const Index v = surface.face_vertices[h];
+      const double seen = turned[v].dot(corner_normal(surface, f, h - surface.face_offsets[f]));
+      visibility[v] = std::min(visibility[v], seen);
+    }
+  for (std::size_t v = 0; v < turned.size(); ++v) {
+    if (visibility[v] >= kLeastVisibility) directions[v] = turned[v];
+    else layers.planes.release(static_cast<Index>(v));
+  }
+}
+
+double distance_from_planes(const ShellLayers& layers, std::span<const Vec3> positions) {
+  double largest = 0;
+  if (layers.planes.empty()) return largest;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const auto column = static_cast<Index>(i % layers.num_columns());
+    const Vec3 way = positions[i] - layers.surface.positions[column];
+    largest = std::max(largest, (way - layers.planes.projector({&column, 1}) * way).norm());
+  }
+  return largest;
+}
+
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
-                                 std::span<const double> thickness, const std::function<bool()>& cancelled) {
+                                 std::span<const double> thickness, const std::function<bool()>& cancelled,
+                                 const std::function<std::string(std::span<const Index>)>& names) {
   constexpr double kShareOfEdge = 0.02;
   constexpr int kMaxHalvings = 30;
   const std::size_t n = layers.num_columns();
@@ -144,12 +179,10 @@ std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& ch
     if (halving == kMaxHalvings || strands.empty()) {
       std::set<Index> columns;
       for (const Index strand : strands) columns.insert(static_cast<Index>(strand % n));
-      std::string text = "not even a very thin layer fits at vertices";
-      std::size_t named = 0;
-      for (auto it = columns.begin(); it != columns.end() && named < 10; ++it, ++named)
-        text += (named ? ", " : " ") + std::to_string(*it);
-      if (columns.size() > named) text += ", ... (" + std::to_string(columns.size()) + " in all)";
-      throw InputError(text);
+      const std::vector<Index> vertices(columns.begin(), columns.end());
+      throw InputError("not even a very thin layer fits at " + std::to_string(vertices.size()) +
+                       (vertices.size() == 1 ? " vertex: " : " vertices: ") +
+                       (names ? names(vertices) : text_of_vertices(vertices, layers.surface.positions)));
     }
     for (const Index strand : strands) thin[strand] *= 0.5;
   }

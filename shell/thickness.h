@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace subvol {
@@ -29,9 +30,18 @@ void limit_slope(const ShellLayers& layers, std::span<double> thickness);
 ///
 /// thickness  per strand: upper bounds. InputError, naming vertices, if no thickness is found to be thin enough.
 /// cancelled  polled within long searches, from the calling thread; returns true to end the work; may be empty.
+/// names      returns vertices of the surface as messages name them; empty: `text_of_vertices`.
 /// returns    one position per vertex; nothing if the work was ended.
 std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& check, std::span<const Vec3> directions,
-                                 std::span<const double> thickness, const std::function<bool()>& cancelled = {});
+                                 std::span<const double> thickness, const std::function<bool()>& cancelled = {},
+                                 const std::function<std::string(std::span<const Index>)>& names = {});
+
+/// Turns the directions of columns that stay in planes (`layers.planes`) into these. A column is released from its planes
+/// if no direction in them sees the front of all faces around its vertex at 6 degrees or more.
+void turn_into_planes(ShellLayers& layers, std::span<Vec3> directions);
+
+/// Returns the largest distance of a shell's vertices from the planes in which their columns stay.
+double distance_from_planes(const ShellLayers& layers, std::span<const Vec3> positions);
 
 /// The actual thickness of a shell, in the surface's unit.
 struct MeasuredThickness {

@@ -32,7 +32,6 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
     return !interrupted();
   };
   options.cancelled = interrupted;
-  catch_interrupt();
   if (const std::optional<RegionSurface> regions = find_regions(std::get<TriangleMesh>(target))) {
     AutomaticFitOptions fit{.cells = source.cells.value_or(kRegionTemplateCells)};
     fit.crease_angle_degrees = options.crease_angle_degrees.value_or(kUsualCreaseAngle);

@@ -17,10 +17,18 @@ constexpr long long kOneSignalNanoseconds = 200'000'000;
 
 /// Time of the first signal; 0: none yet.
 std::atomic<long long> first{0};
-static_assert(std::atomic<long long>::is_always_lock_free);
+/// True: a signal ends the program at once.
+std::atomic<bool> ends_at_once{true};
+static_assert(std::atomic<long long>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 // Calls only functions that are allowed in a signal handler.
 void note(int) {
+  if (ends_at_once) {
+    constexpr char kWords[] = "subvol: interrupted\n";
+    (void)!write(STDERR_FILENO, kWords, sizeof kWords - 1);
+    delete_temporaries();
+    _exit(kInterrupted);
+  }
   timespec time{};
   clock_gettime(CLOCK_MONOTONIC, &time);
   const long long now = time.tv_sec * 1'000'000'000LL + time.tv_nsec + 1;
@@ -32,14 +40,24 @@ void note(int) {
   _exit(kInterrupted);
 }
 
-}  // namespace
-
-void catch_interrupt() {
+void handle_signals() {
   struct sigaction action {};
   action.sa_handler = note;
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+}
+
+}  // namespace
+
+void end_on_interrupt() {
+  ends_at_once = true;
+  handle_signals();
+}
+
+void catch_interrupt() {
+  ends_at_once = false;
+  handle_signals();
 }
 
 bool interrupted() { return first != 0; }

@@ -169,10 +169,11 @@ void write_shell(const Output& output, const ShellResult& shell, const CurvedShe
                                .reference = shell_reference(shell.layers, shell.limited),
                                .references = shell.mesh.references,
                                .msh_version = options.msh_version,
+                               .face_groups = &shell.mesh.face_groups,
                                .fields = fields,
                                .map_tolerance_percent = options.map_tolerance_percent});
   }
-  write_output(output, HighOrderFile{curved.mesh, shell.mesh.references}, options);
+  write_output(output, HighOrderFile{curved.mesh, shell.mesh.references, shell.mesh.face_groups}, options);
 }
 
 void take_figures(const CurvedShell& curved, ShellResult& shell) {
@@ -228,6 +229,54 @@ Json thickness_json(const ShellResult& shell, double diagonal) {
                   {"limited_vertices", num_limited}};
   });
   return json;
+}
+
+Json layers_json(const ShellResult& shell) {
+  const ShellLayers& layers = shell.layers;
+  Json json{{"inside", layers.inside}, {"outside", layers.outside}, {"growth", shell.growth}};
+  for_each_side(layers, [&](const char* side, std::size_t first) {
+    const ThicknessFigures asked({shell.asked.data() + first, layers.num_columns()});
+    const double share = first == 0 ? layers.inside_shares[1] : layers.outside_shares[1];
+    json[std::string("first_height_") + side] = share * asked.mean;
+  });
+  return json;
+}
+
+Json border_json(const ShellResult& shell, double diagonal) {
+  const ShellLayers& layers = shell.layers;
+  const auto& twins = layers.topology.twins;
+  return {{"edges", std::count(twins.begin(), twins.end(), kNoIndex)},
+          {"planes", layers.planes.num_planes()},
+          {"columns_in_planes", layers.planes.num_columns()},
+          {"distance_max_percent", diagonal > 0 ? 100 * shell.border_distance_max / diagonal : 0}};
+}
+
+Json shell_groups_json(const ShellResult& shell) {
+  const VolumeFaceGroups& groups = shell.mesh.face_groups;
+  std::vector<std::size_t> faces(groups.groups.size(), 0);
+  std::vector<double> areas(groups.groups.size(), 0);
+  const MeshTopology topology(shell.mesh);
+  for (std::size_t f = 0; f < topology.num_faces(); ++f) {
+    const auto corners = topology.face(static_cast<Index>(f));
+    const Index group = group_of(groups, corners);
+    if (group == kNoIndex) continue;
+    ++faces[group];
+    const auto x = [&](std::size_t k) -> const Vec3& { return shell.mesh.positions[corners[k]]; };
+    for (std::size_t k = 1; k + 1 < corners.size(); ++k)
+      areas[group] += (x(k) - x(0)).cross(x(k + 1) - x(0)).norm() / 2;
+  }
+  Json json = Json::array();
+  for (std::size_t g = 0; g < faces.size(); ++g)
+    json.push_back({{"name", as_utf8(groups.groups[g].name)},
+                    {"number", groups.groups[g].number},
+                    {"area", areas[g]},
+                    {"faces", faces[g]}});
+  return json;
+}
+
+Json corner_quality_json(const ShellResult& shell) {
+  return {{"min_scaled_jacobian", shell.corner_quality.min_scaled_jacobian},
+          {"mean_scaled_jacobian", shell.corner_quality.mean_scaled_jacobian}};
 }
 
 std::string thickness_text(const ShellResult& shell) {

@@ -30,6 +30,14 @@ void refuse_curved(const std::vector<Output>& outputs, const PolygonMesh& surfac
 /// Thicknesses of each side that has layers: requested, limited, achieved, and clearance, also in percent of a
 /// diagonal.
 Json thickness_json(const ShellResult& shell, double diagonal);
+/// Number of layers on each side, their growth, and the first layer's height in the middle of what was achieved.
+Json layers_json(const ShellResult& shell);
+/// Columns that stay in planes of the border, and their largest distance from them.
+Json border_json(const ShellResult& shell, double diagonal);
+/// The groups of the shell's faces: name, number, number of faces and area.
+Json shell_groups_json(const ShellResult& shell);
+/// Scaled Jacobian at the corners of the linear cells, relative to the ideal cells.
+Json corner_quality_json(const ShellResult& shell);
 /// The thicknesses as text, one line for each side.
 std::string thickness_text(const ShellResult& shell);
 

@@ -28,7 +28,6 @@ void untangle_template(const std::string& path, const RunOptions& run, OptimizeO
     return !interrupted();
   };
   options.cancelled = interrupted;
-  catch_interrupt();
   try {
     const UntangledStart start = untangle_before_fit(mesh, options);
     if (start.ended_early())

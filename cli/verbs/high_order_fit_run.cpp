@@ -52,14 +52,15 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
   options.keep_states = keep_states;
   if (options.time_limit_seconds > 0) options.time_limit_seconds = std::max(1e-3, options.time_limit_seconds - seconds);
   options.progress = [&](const FitProgress& progress) {
+    catch_interrupt();
     teller.tell(progress);
     return !interrupted();
   };
   options.cancelled = interrupted;
-  catch_interrupt();
   HighOrderFitResult result =
       std::visit([&](const auto& geometry) { return fit_high_order(geometry, template_mesh, options); }, target);
   teller.finish();
+  if (!interrupted()) end_on_interrupt();
   return result;
 }
 

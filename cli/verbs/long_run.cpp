@@ -4,7 +4,9 @@
 #include "cli/runs/exit_status.h"
 #include "cli/runs/report.h"
 
+#include <algorithm>
 #include <iostream>
+#include <iterator>
 
 namespace subvol::cli {
 
@@ -13,6 +15,11 @@ void LongRun::prepare(const std::vector<Part>& parts) {
     throw UsageError(verb_.get_name() + ": nothing to write; give -o FILE or --report FILE");
   outputs_ = checked_outputs(run_, parts);
   apply_resources(run_);
+}
+
+bool LongRun::precedes_result(std::string_view stage) {
+  constexpr std::string_view kEarly[] = {"template", "directions", "thickness", "start"};
+  return std::find(std::begin(kEarly), std::end(kEarly), stage) != std::end(kEarly);
 }
 
 void LongRun::tell_warnings() {

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace subvol::cli {
@@ -36,16 +37,18 @@ class LongRun {
     (static_cast<Run*>(this)->*work)();
     seconds_[part] = seconds_since(begin);
   }
-  /// Calls work(progress), which reports progress as the options say and is interrupted by Ctrl-C.
+  /// Calls work(progress), which reports progress as the options say and is interrupted by Ctrl-C. As long as there
+  /// is no result to save (`precedes_result`), and after the work, a signal ends the program at once.
   template <class Work>
   auto followed(const Work& work) const {
     ProgressTeller teller(run_.progress, run_.quiet);
-    catch_interrupt();
     auto result = work([&](const FitProgress& progress) {
+      if (!precedes_result(progress.stage)) catch_interrupt();
       teller.tell(progress);
       return !interrupted();
     });
     teller.finish();
+    if (!interrupted()) end_on_interrupt();
     return result;
   }
 
@@ -56,6 +59,10 @@ class LongRun {
     ProgressTeller teller(run_.progress, run_.quiet);
     return work(teller.work());
   }
+
+  /// True if a stage comes before anything that a run that is interrupted would write: the template of an automatic fit,
+  /// and what a shell needs before its first valid state.
+  static bool precedes_result(std::string_view stage);
 
   double seconds() const { return seconds_since(start_); }
   /// Adds the last entries of every report, and writes the report if one was requested. parts: seconds of parts of the

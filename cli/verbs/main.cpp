@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/exit_status.h"
+#include "cli/runs/interrupt.h"
 #include "cli/runs/report.h"
 #include "cli/runs/standard_output.h"
 #include "cli/verbs/commands.h"
@@ -200,6 +201,7 @@ int main(int argc, char** argv) {
   std::set_new_handler(run_out);
   std::set_terminate(end_in_order);
   std::signal(SIGXFSZ, SIG_IGN);  // reaching the limit on file sizes becomes a write error, like a full disk
+  subvol::cli::end_on_interrupt();
   prepare_standard_output();
   return finished_standard_output(run_to_status(argc, argv));
 }

@@ -4,12 +4,14 @@
 #include "cli/runs/loading.h"
 #include "cli/runs/report.h"
 #include "cli/runs/shell_output.h"
+#include "cli/runs/shell_surface.h"
 #include "cli/runs/writing.h"
 #include "cli/runs/written_result.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/long_run.h"
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/base/version.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/mesh_check.h"
@@ -33,7 +35,9 @@ struct ShellArguments {
   RunOptions run;
   WritingOptions writing;
   ShellOptions shell;
-  std::string surface, thickness, thickness_file, thickness_attribute, side = "outward";
+  std::string surface, thickness, thickness_file, thickness_attribute, side = "outward", first_height;
+  std::vector<std::string> skipped;
+  std::string repair = formatted("%.6g%%", 100 * kMendingShare);
   int order = 1;
   std::string basis = "legendre";
   std::optional<double> crease_angle_degrees;
@@ -50,6 +54,8 @@ class ShellRun : public LongRun {
  private:
   void require_one_per_vertex(const std::string& file, const std::vector<double>& thickness) const;
   void load();
+  void mend();
+  void plan_layers(ShellOptions& options) const;
   void grow();
   void curve();
   void write();
@@ -61,7 +67,8 @@ class ShellRun : public LongRun {
   std::vector<double> thickness_from_attribute() const;
 
   const ShellArguments& arguments_;
-  TaggedPolygons surface_;
+  TaggedPolygons given_;
+  ShellSurface surface_;  ///< on which the layers grow
   double diagonal_ = 0;
   ShellResult result_;
   std::optional<CurvedShell> curved_;
@@ -72,11 +79,23 @@ class ShellRun : public LongRun {
 };
 
 void ShellRun::load() {
-  surface_ = load_tagged_polygons(arguments_.surface, warnings_);
-  const TriangleMesh triangles = triangulate(surface_.polygons);
+  given_ = load_tagged_polygons(arguments_.surface, warnings_);
+  const TriangleMesh triangles = triangulate(given_.polygons);
   diagonal_ = bounding_box_diagonal(triangles);
   if (const auto warning = inward_warning(triangles)) warnings_.push_back(arguments_.surface + ": " + *warning);
   tell_warnings();
+}
+
+void ShellRun::mend() {
+  catch_interrupt();
+  try {
+    surface_ = prepared_surface(given_, {.skipped = arguments_.skipped,
+                                         .repair_distance = parse_length("--repair", arguments_.repair, diagonal_),
+                                         .cancelled = interrupted});
+  } catch (const InputError& error) {
+    throw InputError(arguments_.surface + ": " + error.what());
+  }
+  if (const auto warning = repair_warning(surface_, diagonal_)) add_warnings({arguments_.surface + ": " + *warning});
 }
 
 std::vector<double> ShellRun::thickness_from_file() const {
@@ -92,9 +111,9 @@ std::vector<double> ShellRun::thickness_from_attribute() const {
 }
 
 void ShellRun::require_one_per_vertex(const std::string& file, const std::vector<double>& thickness) const {
-  if (thickness.size() != surface_.polygons.positions.size())
+  if (thickness.size() != given_.polygons.positions.size())
     throw InputError(file + ": expected one thickness for each of the " +
-                     std::to_string(surface_.polygons.positions.size()) + " vertices of the surface, got " +
+                     std::to_string(given_.polygons.positions.size()) + " vertices of the surface, got " +
                      std::to_string(thickness.size()));
 }
 
@@ -108,10 +127,11 @@ void ShellRun::grow() {
                  : arguments_.side == "inward" ? ShellSide::inward
                                                : ShellSide::outward;
   options.optimize = !arguments_.straight;
-  options.tags = surface_.tags;
-  if (arguments_.crease_angle_degrees)
-    options.tags = merge_tags(options.tags, surface_features(surface_.polygons, *arguments_.crease_angle_degrees));
+  if (!arguments_.first_height.empty()) plan_layers(options);
   try {
+    if (arguments_.crease_angle_degrees)
+      options.tags = surface_features(surface_.polygons, *arguments_.crease_angle_degrees);
+    take_surface(surface_, options);
     result_ = followed([&](auto progress) {
       options.progress = progress;
       options.cancelled = interrupted;
@@ -123,6 +143,16 @@ void ShellRun::grow() {
   if (result_.mesh.num_cells() == 0)
     throw EndedEarly(arguments_.surface + ": the work was ended before there was a shell", kInterrupted);
   add_warnings(result_.report.warnings);
+}
+
+void ShellRun::plan_layers(ShellOptions& options) const {
+  const auto is_given = [&](const char* option) { return verb_.get_option(option)->count() > 0; };
+  const LayerPlan plan = planned_layers(options.thickness,
+                                        parse_length("--first-height", arguments_.first_height, diagonal_),
+                                        is_given("--layers") ? std::optional(options.layers) : std::nullopt,
+                                        is_given("--growth") ? std::optional(options.growth) : std::nullopt);
+  options.layers = plan.layers;
+  options.growth = plan.growth;
 }
 
 // Uses the time that the linear shell has left. If none is left, or the run must end, the cells get the requested order
@@ -200,15 +230,21 @@ Json ShellRun::report() const {
   Json json{{"subvol", version()},
             {"command", "shell"},
             {"options", options_in_force(verb_)},
-            {"input", {{"surface", describe(arguments_.surface, surface_.polygons)}}},
+            {"input", {{"surface", describe(arguments_.surface, given_.polygons)}}},
+            {"repair", repair_json(surface_, diagonal_)},
+            {"skipped", skipped_json(surface_)},
             {"stop_reason", to_string(report.stop_reason)},
             {"explanation", report.explanation},
             {"converged", report.stop_reason == StopReason::converged},
             {"stages", stages_json(report)},
             {"valid", failures_.none()},
             {"thickness", thickness_json(result_, diagonal_)},
+            {"layers", layers_json(result_)},
+            {"border", border_json(result_, diagonal_)},
+            {"groups", shell_groups_json(result_)},
             {"surface_distance_max_percent", 100 * result_.surface_distance_max / diagonal_},
             {"quality", quality_json(result_.quality)},
+            {"corner_quality", corner_quality_json(result_)},
             {"not_certified_cells", failures_.certificate.not_certified},
             {"boundary_self_intersections", failures_.intersecting.size()},
             {"intersecting_faces", failures_.intersecting},
@@ -229,6 +265,8 @@ void ShellRun::summarise() const {
   std::cerr << thickness_text(result_);
   std::fprintf(stderr, "scaled Jacobian     min %.4f, mean %.4f against the references\n",
                result_.quality.min_scaled_jacobian, result_.quality.mean_scaled_jacobian);
+  std::fprintf(stderr, "at corners          min %.4f, mean %.4f against ideal cells, as other programs measure\n",
+               result_.corner_quality.min_scaled_jacobian, result_.corner_quality.mean_scaled_jacobian);
   std::fprintf(stderr, "certified cells     %zu of %zu\n", failures_.certificate.certified, result_.mesh.num_cells());
   std::fprintf(stderr, "self-intersections  %zu pairs of faces\n", failures_.intersecting.size());
   for (std::size_t i = 0; i < std::min<std::size_t>(5, failures_.certificate.not_certified.size()); ++i)
@@ -244,9 +282,13 @@ int ShellRun::run() {
   if (arguments_.thickness.empty() + arguments_.thickness_file.empty() + arguments_.thickness_attribute.empty() != 2)
     throw UsageError("shell: give one of --thickness, --thickness-file and --thickness-attribute");
   if (!arguments_.thickness.empty()) parse_length("--thickness", arguments_.thickness, 1);
+  if (!arguments_.first_height.empty() && arguments_.thickness.empty())
+    throw UsageError("shell: --first-height goes with --thickness, not with one thickness for each vertex");
+  parse_length("--repair", arguments_.repair, 1);
   if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
-  prepare({Part::cage, Part::cutaway});
+  prepare({Part::cage, Part::cutaway, Part::boundary});
   timed("read", &ShellRun::load);
+  timed("repair", &ShellRun::mend);
   if (arguments_.order > 1) refuse_curved(outputs_, surface_.polygons, arguments_.order);
   timed("grow", &ShellRun::grow);
   timed("curve", &ShellRun::curve);
@@ -278,6 +320,19 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
   verb.add_option("--growth", shell.growth, "Thickness of a layer against that of the one nearer the surface")
       ->check(number_in(0.01, 100.0))
       ->type_name("FACTOR")
+      ->capture_default_str();
+  verb.add_option("--first-height", arguments.first_height,
+                  "Thickness of the layer at the surface, as a length or 2%: the growth follows from --layers, or the\n"
+                  "layers from --growth")
+      ->type_name("H");
+  verb.add_option("--skip", arguments.skipped,
+                  "Patch of SURFACE without layers: a group's name or number, or a point X,Y,Z on a patch between sharp\n"
+                  "edges; may be given several times. Layers end in its plane if it is flat")
+      ->allow_extra_args(false)
+      ->type_name("PATCH");
+  verb.add_option("--repair", arguments.repair,
+                  "Faults of the surface are repaired by changes within this distance, a length or 2%; 0: none are")
+      ->type_name("DISTANCE")
       ->capture_default_str();
   verb.add_option("--side", arguments.side, "Where the faces' normals point, or against them")
       ->check(CLI::IsMember({"outward", "inward", "both"}))

@@ -90,7 +90,6 @@ int run_with_regions(AutoArguments arguments, const CLI::App& verb, const std::v
 
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
-  catch_interrupt();
   const SurfaceRepair repair = load_to_fill(arguments.target, region_rule(arguments.regions), arguments.warnings);
   const TriangleMesh& target = repair.surface;
   add_remarks(repair, arguments.warnings);

@@ -87,7 +87,7 @@ NewtonRun::NewtonRun(FitProblem& problem, std::vector<Vec3>& x, const MinimizerO
 
 bool NewtonRun::find_direction(IterationRecord& record) {
   ReducedHessian reduced(problem_);
-  if (inverse_diagonal_.empty()) inverse_diagonal_ = inverse_blocks(reduced.diagonal());
+  if (inverse_diagonal_.empty()) inverse_diagonal_ = inverse_blocks(reduced.diagonal(), problem_.projectors);
   record.linear_iterations += conjugate_gradients(reduced, inverse_diagonal_, linearized_.gradient(), options_, d_);
   constexpr double kLevel = 1e-26;  // dimensionless, like E; smaller slopes are rounding
   slope_ = dot(linearized_.gradient(), d_);

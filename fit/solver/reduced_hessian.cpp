@@ -62,11 +62,22 @@ void ReducedHessian::multiply(std::span<const Vec3> in, std::span<Vec3> out) {
   for (std::size_t j = 0; j < in.size(); ++j) out[j] += added_[j] * in[j];
 }
 
-std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks) {
+std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks, std::span<const Mat3> projectors) {
   std::vector<Mat3> inverse(blocks.size());
 #pragma omp parallel for schedule(static)
-  for (std::size_t j = 0; j < blocks.size(); ++j)
-    inverse[j] = blocks[j].trace() > 0 ? Mat3(blocks[j].inverse()) : Mat3(Mat3::Zero());
+  for (std::size_t j = 0; j < blocks.size(); ++j) {
+    const double trace = blocks[j].trace();
+    if (!(trace > 0)) {
+      inverse[j].setZero();
+    } else if (projectors.empty()) {
+      inverse[j] = blocks[j].inverse();
+    } else {
+      const Mat3& p = projectors[j];
+      // Any positive value across the image serves: it is projected away again.
+      const Mat3 block = p * blocks[j] * p + trace * (Mat3::Identity() - p);
+      inverse[j] = p * block.inverse() * p;
+    }
+  }
   return inverse;
 }
 

@@ -45,7 +45,10 @@ class ReducedHessian {
 };
 
 /// Returns the inverse blocks, 0 for those with no positive trace: vertices of no cell do not move.
-std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks);
+///
+/// projectors  P, one per block: the inverse is that of the block on the image of P, and 0 across it, so that the
+///             directions of `conjugate_gradients` stay in the images. Empty: the identity for all.
+std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks, std::span<const Mat3> projectors = {});
 
 /// Solves H d = -g approximately by conjugate gradients, preconditioned by the inverse diagonal blocks, with
 /// `cg_tolerance` and `cg_max_iterations`. Ends early if the caller asks for an end (`ended`).

@@ -11,15 +11,23 @@ constexpr std::size_t kMostListed = 10;
 
 }  // namespace
 
-void CrowdedEdges::add(const std::string& from, const std::string& to, std::size_t num_faces) {
+void PlaceList::add(const std::string& place) {
   if (++count_ > kMostListed) return;
-  list_ += (list_.empty() ? "" : "; ") + ("from vertex " + from) + " to " + to + " has " + std::to_string(num_faces);
+  list_ += (list_.empty() ? "" : "; ") + place;
+}
+
+std::string PlaceList::text(const std::string& one, const std::string& many) const {
+  return std::to_string(count_) + " " + (count_ == 1 ? one : many) +
+         (count_ > kMostListed ? ", the first " + std::to_string(kMostListed) : "") + ": " + list_ +
+         " (vertices are numbered from 0, those of no face left out)";
+}
+
+void CrowdedEdges::add(const std::string& from, const std::string& to, std::size_t num_faces) {
+  places_.add("from vertex " + from + " to " + to + " has " + std::to_string(num_faces));
 }
 
 std::string CrowdedEdges::text() const {
-  return std::to_string(count_) + (count_ == 1 ? " edge has" : " edges have") + " more than two faces" +
-         (count_ > kMostListed ? ", the first " + std::to_string(kMostListed) : "") + ": " + list_ +
-         " (vertices are numbered from 0, those of no face left out)";
+  return places_.text("edge has more than two faces", "edges have more than two faces");
 }
 
 std::string vertex_text(Index number, const Vec3* position) {

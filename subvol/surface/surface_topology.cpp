@@ -11,10 +11,6 @@ namespace subvol {
 
 namespace {
 
-std::string name_of(Index v, std::span<const Index> names) {
-  return std::to_string(names.empty() ? v : names[static_cast<std::size_t>(v)]);
-}
-
 /// Prefix for messages: a closed surface is the boundary of a volume mesh.
 std::string prefix(SurfaceKind kind) { return kind == SurfaceKind::closed ? "boundary " : ""; }
 
@@ -48,7 +44,7 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
     return (begin == v && end == w) || (begin == w && end == v);
   };
   CrowdedEdges crowded;
-  std::string first_fault;
+  PlaceList turned, unpaired;  // edges
   const auto vertex = [&](Index v) {
     return vertex_text(names.empty() ? v : names[static_cast<std::size_t>(v)],
                        positions.empty() ? nullptr : &positions[static_cast<std::size_t>(v)]);
@@ -56,12 +52,15 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
   for (std::size_t i = 0; i < num_corners; ++i) {
     const Index h = static_cast<Index>(i);
     const Index from = surface.corner_vertices[h], to = surface.corner_vertices[surface.next(h)];
-    Index twin = kNoIndex;
+    Index twin = kNoIndex, other = kNoIndex;  // the corner that runs back, and another one that runs the same way
     int same = 0, opposite = 0;
     for (Index g = head[hook(from, to)]; g != kNoIndex; g = next[g]) {
       const Index begin = surface.corner_vertices[g], end = surface.corner_vertices[surface.next(g)];
       if (begin == to && end == from) twin = g, ++opposite;
-      if (begin == from && end == to) ++same;
+      if (begin == from && end == to) {
+        ++same;
+        if (g != h) other = g;
+      }
     }
     const bool border = kind == SurfaceKind::maybe_open && opposite == 0;
     if (same + opposite > 2) {
@@ -72,11 +71,9 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
       continue;
     }
     if (same != 1 || (opposite != 1 && !border)) {
-      const std::string edge = prefix(kind) + "edge " + name_of(from, names) + "-" + name_of(to, names);
-      if (first_fault.empty())
-        first_fault = same > 1 ? edge + ": its two faces run the same way along it"
-                               : edge + " must lie between two " + prefix(kind) +
-                                     "faces of opposite direction; it has " + std::to_string(same + opposite);
+      const std::string edge = "from vertex " + vertex(from) + " to " + vertex(to);
+      if (same == 1) unpaired.add(edge);
+      else if (h < other) turned.add(edge);
       continue;
     }
     surface.twins[h] = twin;
@@ -88,10 +85,18 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
     }
   }
   if (!crowded.empty()) throw InputError((kind == SurfaceKind::closed ? "boundary: " : "surface: ") + crowded.text());
-  if (!first_fault.empty()) throw InputError(first_fault);
+  if (!turned.empty())
+    throw InputError(turned.text(prefix(kind) + "edge has two faces that run the same way along it: their normals disagree",
+                                 prefix(kind) + "edges have two faces that run the same way along them: their normals "
+                                                "disagree"));
+  if (!unpaired.empty())
+    throw InputError(unpaired.text(prefix(kind) + "edge lies at one face instead of between two",
+                                   prefix(kind) + "edges lie at one face instead of between two"));
 }
 
-void check_fans(const SurfaceTopology& surface, std::span<const Index> names, SurfaceKind kind) {
+void check_fans(const SurfaceTopology& surface, std::span<const Index> names, SurfaceKind kind,
+                std::span<const Vec3> positions) {
+  PlaceList crowded;
   std::vector<int> counts(surface.num_vertices(), 0);
   for (Index v : surface.corner_vertices) ++counts[v];
   for (std::size_t v = 0; v < surface.num_vertices(); ++v) {
@@ -102,9 +107,12 @@ void check_fans(const SurfaceTopology& surface, std::span<const Index> names, Su
     if (h == kNoIndex)  // an open fan: also count the corners clockwise of the start
       for (h = start; (h = surface.twins[h]) != kNoIndex; h = surface.next(h)) ++fan;
     if (fan != counts[v])
-      throw InputError(prefix(kind) + "vertex " + name_of(static_cast<Index>(v), names) + " must have one fan of " +
-                       prefix(kind) + "faces; it has more");
+      crowded.add("vertex " + vertex_text(names.empty() ? static_cast<Index>(v) : names[v],
+                                          positions.empty() ? nullptr : &positions[v]));
   }
+  if (!crowded.empty())
+    throw InputError(crowded.text(prefix(kind) + "vertex has more than one fan of faces: surfaces touch there",
+                                  prefix(kind) + "vertices have more than one fan of faces: surfaces touch there"));
 }
 
 float checked_sharpness(double sharpness, const std::string& what) {
@@ -125,7 +133,7 @@ SurfaceTopology build_surface(std::size_t num_vertices, std::vector<Index> face_
     for (Index h = surface.face_offsets[f]; h < surface.face_offsets[f + 1]; ++h)
       surface.corner_faces[h] = static_cast<Index>(f);
   pair_corners(surface, num_vertices, names, kind, positions);
-  check_fans(surface, names, kind);
+  check_fans(surface, names, kind, positions);
   surface.edge_sharpness.assign(surface.num_edges(), 0.0f);
   surface.vertex_sharpness.assign(num_vertices, 0.0f);
   return surface;

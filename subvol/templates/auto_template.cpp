@@ -165,9 +165,9 @@ double Search::pillowed_size(const Mat3& frame) const {
   for (int i = 0; i < kHalvings && !stop_.is_stopped(); ++i) {
     const double size = std::sqrt(low * high);
     const VoxelGrid grid = placed_grid(solid_.surface, {frame, size, {}});
-    const std::vector<double> fractions = solid_fractions(solid_.surface, grid, kLines);
+    const std::vector<double> fractions = solid_fractions(solid_.surface, grid, kLines, &stop_);
     VoxelSolid solid(grid.cells, VertexRule::pillowable);
-    for (std::size_t c = 0; c < fractions.size(); ++c)
+    for (std::size_t c = 0; c < fractions.size() && !stop_.is_stopped_at(c); ++c)
       if (fractions[c] > 0.5 && solid.may_flip(static_cast<Index>(c))) solid.flip(static_cast<Index>(c));
     (count_of(solid) > cells_ ? low : high) = size;
   }
@@ -190,10 +190,12 @@ std::vector<Placement> Search::placements() const {
 /// Returns the best solid in a grid.
 std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
                                          std::size_t& num_right) const {
+  constexpr int kLinesOfCell = 4;  // as by default
   constexpr double kWanted = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
   constexpr std::array<double, 9> kThresholds{0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.12, 0.9};
   Candidate best{frame, std::move(grid), {}, 0, 0};
-  const std::vector<double> fractions = solid_fractions(solid_.surface, best.grid);
+  const std::vector<double> fractions = solid_fractions(solid_.surface, best.grid, kLinesOfCell, &stop_);
+  if (stop_.is_stopped()) return std::nullopt;
   const std::vector<double> volumes = cell_volumes(best.grid);
   const auto look_at = [&](VoxelStart start, double threshold) {
     if (stop_.is_stopped()) return;
@@ -208,8 +210,8 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
     if (!range.holds(share)) return;
     ++num_right;
     const double score =
-        voxel_score(*solid, fractions, volumes) + kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
-    if (!best.kept.empty() && score >= best.score) return;
+        voxel_score(*solid, fractions, volumes, &stop_) + kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
+    if (stop_.is_stopped() || (!best.kept.empty() && score >= best.score)) return;
     best.score = score;
     best.share = share;
     best.kept.assign(solid->filled().begin(), solid->filled().end());

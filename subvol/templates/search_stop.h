@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <thread>
 #include <utility>
@@ -25,6 +26,12 @@ class SearchStop {
     asked_ = now;
     if (!goes_on_()) stopped_.store(true, std::memory_order_relaxed);
     return stopped_.load(std::memory_order_relaxed);
+  }
+
+  /// Returns true if the search is to end; asks at every 4096th count only, for loops over millions of cells.
+  bool is_stopped_at(std::size_t count) {
+    constexpr std::size_t kBetween = 4096;
+    return count % kBetween == 0 && is_stopped();
   }
 
   /// Asks until all work is done: for the thread that asks, once it has no work left itself.

@@ -28,8 +28,8 @@ double side_of(const Vec3& a, const Vec3& b, double x, double y) {
 
 class LineCrossings {
  public:
-  LineCrossings(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines)
-      : grid_(grid), axes_{Axis(grid, 0, num_lines), Axis(grid, 1, num_lines)} {
+  LineCrossings(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines, SearchStop* stop)
+      : grid_(grid), stop_(stop), axes_{Axis(grid, 0, num_lines), Axis(grid, 1, num_lines)} {
     const Mat3 to_grid = grid.edges.inverse();
     points_.reserve(surface.positions.size());
     for (const Vec3& p : surface.positions) {
@@ -38,7 +38,8 @@ class LineCrossings {
       q.y() *= axes_[1].scale;
       points_.push_back(q);
     }
-    for (const auto& t : surface.triangles) add(t);
+    for (std::size_t t = 0; t < surface.triangles.size() && !(stop && stop->is_stopped_at(t)); ++t)
+      add(surface.triangles[t]);
   }
 
   /// Crossings sorted by line, and from below along each line.
@@ -84,7 +85,7 @@ class LineCrossings {
     if (y0 > y1) return;
     const Vec3 normal = (b - a).cross(c - a);
     const auto num_along_x = static_cast<Index>(axes_[0].places.size());
-    for (int j = y0; j <= y1; ++j)
+    for (int j = y0; j <= y1 && !is_stopped(); ++j)
       for (int i = x0; i <= x1; ++i) {
         const double x = axes_[0].places[i], y = axes_[1].places[j];
         const int side = common_side(t, x, y);
@@ -106,7 +107,10 @@ class LineCrossings {
     return sum == 3 ? 1 : sum == -3 ? -1 : 0;
   }
 
+  bool is_stopped() const { return stop_ && stop_->is_stopped(); }
+
   const VoxelGrid& grid_;
+  SearchStop* stop_;
   std::array<Axis, 2> axes_;
   std::vector<Vec3> points_;
   std::vector<Crossing> crossings_;
@@ -124,8 +128,10 @@ void add_length(double low, double high, int count, Index first, Index stride, d
 
 }  // namespace
 
-std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines) {
-  LineCrossings lines(surface, grid, num_lines);
+std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines,
+                                    SearchStop* stop) {
+  LineCrossings lines(surface, grid, num_lines, stop);
+  if (stop && stop->is_stopped()) return std::vector<double>(grid.num_cells(), 0.0);
   const std::vector<Crossing>& crossings = lines.sorted();
   const Index lines_along_x = grid.cells[0] * num_lines, layer = grid.cells[0] * grid.cells[1];
   const double weight = 1.0 / (num_lines * num_lines);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/surface/triangle_mesh.h"
+#include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_grid.h"
 
 #include <vector>
@@ -20,8 +21,10 @@ namespace subvol {
 ///            surface is not closed, a line may end inside; such lines contribute nothing.
 /// grid       equal cells, or those between given lines (`VoxelGrid::lines`).
 /// num_lines  n >= 1, lines per cell along each of its first two edges.
+/// stop       if given and stopped, the work ends early; the numbers then mean nothing.
 /// returns    one number in [0, 1] per cell.
 /// Cost: linear in the numbers of triangles and lines. Serial.
-std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines = 4);
+std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines = 4,
+                                    SearchStop* stop = nullptr);
 
 }  // namespace subvol

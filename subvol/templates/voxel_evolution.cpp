@@ -89,6 +89,7 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
   constexpr std::size_t kLookedAt = 40;  // most promising flips, whose loops are measured
   std::vector<HandleFlip> flips;
   for (std::size_t c = 0; c < solid.num_cells(); ++c) {
+    if (goal.is_stopped_at(c)) return std::nullopt;
     HandleFlip flip;
     flip.gain = solid.may_flip(static_cast<Index>(c)) ? goal.gain(solid, static_cast<Index>(c)) : -1;
     if (flip.gain > -tolerance && handle_flip(solid, static_cast<Index>(c), add_handle, flip)) flips.push_back(flip);
@@ -123,7 +124,7 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
     waiting[c] = 1;
     queue.push({goal.gain(solid, c), c});
   };
-  for (std::size_t c = 0; c < solid.num_cells(); ++c) offer(static_cast<Index>(c));
+  for (std::size_t c = 0; c < solid.num_cells() && !goal.is_stopped_at(c); ++c) offer(static_cast<Index>(c));
   // A cell is flipped at most once: afterwards it is as wanted.
   while (!queue.empty() && !goal.is_stopped()) {
     const Index c = queue.top().second;
@@ -182,14 +183,15 @@ bool drop_surplus(VoxelSolid& solid, const VoxelGoal& goal) {
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return size[a] > size[b]; });
     std::vector<char> kept(size.size(), 0);
     for (int i = 0; i < wanted; ++i) kept[order[i]] = 1;
-    for (std::size_t c = 0; c < component.size(); ++c)
+    for (std::size_t c = 0; c < component.size() && !goal.is_stopped_at(c); ++c)
       if (component[c] >= 0 && !kept[component[c]]) solid.flip(static_cast<Index>(c));
-    return true;
+    return !goal.is_stopped();
   };
   return drop(true, goal.topology.components) && drop(false, goal.topology.cavities + 1);
 }
 
 bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
+  if (goal.is_stopped()) return false;
   const BettiNumbers now = solid.topology();
   if (now.components != goal.topology.components || now.cavities != goal.topology.cavities) return false;
   // Many wrong handles mean that the grid is too coarse; correcting them one by one would not give a good likeness.
@@ -218,7 +220,8 @@ void reach_thin_parts(VoxelSolid& solid, const VoxelGoal& goal) {
   for (int round = 0; round < kRounds; ++round) {
     const std::vector<int> steps = voxel_steps(
         solid, [&](Index c) { return solid.filled(c); }, [&](Index c) { return goal.fractions[c] > kLeastFraction; },
-        &previous);
+        &previous, goal.stop);
+    if (goal.is_stopped()) return;
     far.clear();
     for (std::size_t c = 0; c < steps.size(); ++c)
       if (steps[c] >= kNear && !given_up[c]) far.push_back(static_cast<Index>(c));
@@ -240,7 +243,7 @@ std::optional<VoxelSolid> start_solid(VoxelStart start, const std::array<int, 3>
                                       const VoxelGoal& goal) {
   VoxelSolid solid(cells, rule);
   const auto fill = [&](const auto& chosen) {
-    for (std::size_t c = 0; c < solid.num_cells(); ++c)
+    for (std::size_t c = 0; c < solid.num_cells() && !goal.is_stopped_at(c); ++c)
       if (solid.may_flip(static_cast<Index>(c)) && chosen(static_cast<Index>(c))) solid.flip(static_cast<Index>(c));
   };
   if (start == VoxelStart::cut) {

@@ -17,6 +17,7 @@ struct VoxelGoal {
   SearchStop* stop = nullptr;         ///< if it is stopped, the functions below end early; null: they do not
 
   bool is_stopped() const { return stop && stop->is_stopped(); }
+  bool is_stopped_at(std::size_t count) const { return stop && stop->is_stopped_at(count); }
   bool wants(Index cell) const { return fractions[cell] > threshold; }
   /// Gain of flipping a cell, in [-1, 1]: positive if the cell is not as wanted.
   double gain(const VoxelSolid& solid, Index cell) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/templates/search_stop.h"
 #include "subvol/templates/voxel_topology.h"
 
 #include <span>
@@ -16,7 +17,9 @@ namespace subvol {
 /// its maximum taken over cells with f > 0.02; stray: steps from a filled cell to the nearest one with f > 0.3. The
 /// volume alone would accept a template that lacks a finger or spans a hole with a sheet of cells.
 /// fractions  f, one per cell, in [0, 1], not all 0. Cost: linear.
+/// stop       if given and stopped, the work ends early; the result then means nothing.
 /// volumes    weights of the cells in the sums, one per cell, > 0, in any unit (`cell_volumes`); empty: all 1.
-double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, std::span<const double> volumes = {});
+double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, std::span<const double> volumes = {},
+                   SearchStop* stop = nullptr);
 
 }  // namespace subvol

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/shell/border_planes.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+namespace subvol {
+namespace {
+
+/// Returns the normal of the plane of some points, or nothing if they are not in one plane, or nearly on a line.
+std::optional<Vec3> plane_of(std::span<const Index> vertices, std::span<const Vec3> positions, double tolerance) {
+  constexpr double kLeastWidth = 1e-3;  // of the points, relative to their length
+  if (vertices.size() < 3) return std::nullopt;
+  Vec3 mean = Vec3::Zero();
+  for (const Index v : vertices) mean += positions[v] / static_cast<double>(vertices.size());
+  Mat3 spread = Mat3::Zero();
+  for (const Index v : vertices) spread += (positions[v] - mean) * (positions[v] - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(spread);  // eigenvalues ascend
+  const Vec3& squares = axes.eigenvalues();
+  if (!(squares[1] > kLeastWidth * kLeastWidth * squares[2])) return std::nullopt;
+  const Vec3 normal = axes.eigenvectors().col(0);
+  for (const Index v : vertices)
+    if (!(std::abs(normal.dot(positions[v] - mean)) <= tolerance)) return std::nullopt;
+  return normal;
+}
+
+/// A run of border edges, one after the other: the corners from which they start.
+using Run = std::vector<Index>;
+
+/// Finds the flat parts of a border.
+class FlatBorders {
+ public:
+  FlatBorders(const PolygonMesh& surface, const SurfaceTopology& topology)
+      : positions_(surface.positions), topology_(topology) {
+    Eigen::AlignedBox3d box;
+    for (const Vec3& p : surface.positions) box.extend(p);
+    tolerance_ = box.isEmpty() ? 0 : kFlatShare * box.diagonal().norm();
+  }
+  std::vector<BorderPlane> find();
+
+ private:
+  std::vector<Run> loops() const;
+  std::vector<Run> pieces_of(const Run& loop) const;
+  std::optional<BorderPlane> plane_of_run(const Run& run) const;
+  Index from(Index corner) const { return topology_.corner_vertices[corner]; }
+  Index to(Index corner) const { return topology_.corner_vertices[topology_.next(corner)]; }
+  Vec3 way(Index corner) const { return (positions_[to(corner)] - positions_[from(corner)]).stableNormalized(); }
+  Vec3 normal_of_face(Index corner) const;
+
+  std::span<const Vec3> positions_;
+  const SurfaceTopology& topology_;
+  double tolerance_ = 0;
+};
+
+Vec3 FlatBorders::normal_of_face(Index corner) const {
+  const auto face = topology_.face(topology_.corner_faces[corner]);
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t k = 1; k + 1 < face.size(); ++k)
+    sum += (positions_[face[k]] - positions_[face[0]]).cross(positions_[face[k + 1]] - positions_[face[0]]);
+  return sum.stableNormalized();
+}
+
+std::vector<Run> FlatBorders::loops() const {
+  std::vector<Index> at(topology_.num_vertices(), kNoIndex);  // border edge that begins at each vertex
+  for (std::size_t h = 0; h < topology_.twins.size(); ++h)
+    if (topology_.twins[h] == kNoIndex) at[from(static_cast<Index>(h))] = static_cast<Index>(h);
+  std::vector<Run> result;
+  for (std::size_t v = 0; v < at.size(); ++v) {
+    if (at[v] == kNoIndex) continue;
+    Run& loop = result.emplace_back();
+    for (auto next = static_cast<Index>(v); at[next] != kNoIndex; next = to(loop.back()))
+      loop.push_back(std::exchange(at[next], kNoIndex));
+  }
+  return result;
+}
+
+/// Cuts a loop at its sharp turns.
+std::vector<Run> FlatBorders::pieces_of(const Run& loop) const {
+  constexpr double kTurnDegrees = 30;
+  const double least = std::cos(kTurnDegrees * std::numbers::pi / 180);
+  const std::size_t n = loop.size();
+  std::vector<std::size_t> turns;
+  for (std::size_t i = 0; i < n; ++i)
+    if (way(loop[i]).dot(way(loop[(i + n - 1) % n])) < least) turns.push_back(i);
+  std::vector<Run> pieces;
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    const std::size_t last = k + 1 < turns.size() ? turns[k + 1] : turns[0] + n;
+    Run& piece = pieces.emplace_back();
+    for (std::size_t i = turns[k]; i < last; ++i) piece.push_back(loop[i % n]);
+  }
+  return pieces;
+}
+
+/// Returns the plane of a run, if it has one that the faces at the border do not lie in themselves.
+std::optional<BorderPlane> FlatBorders::plane_of_run(const Run& run) const {
+  constexpr double kMostAlike = 0.95;  // cosine of the angle between the normals of the plane and of a face
+  BorderPlane plane{Vec3::Zero(), {}};
+  for (const Index h : run) plane.vertices.insert(plane.vertices.end(), {from(h), to(h)});
+  std::sort(plane.vertices.begin(), plane.vertices.end());
+  plane.vertices.erase(std::unique(plane.vertices.begin(), plane.vertices.end()), plane.vertices.end());
+  const std::optional<Vec3> normal = plane_of(plane.vertices, positions_, tolerance_);
+  if (!normal) return std::nullopt;
+  for (const Index h : run)
+    if (std::abs(normal->dot(normal_of_face(h))) > kMostAlike) return std::nullopt;
+  plane.normal = *normal;
+  return plane;
+}
+
+std::vector<BorderPlane> FlatBorders::find() {
+  std::vector<BorderPlane> planes;
+  for (const Run& loop : loops()) {
+    if (std::optional<BorderPlane> plane = plane_of_run(loop)) {
+      planes.push_back(std::move(*plane));
+      continue;
+    }
+    const std::vector<Run> pieces = pieces_of(loop);
+    std::vector<char> is_taken(pieces.size(), 0);
+    for (std::size_t first = 0; first < pieces.size(); ++first) {
+      if (is_taken[first]) continue;
+      // A straight piece has a plane only together with its neighbors.
+      Run run = pieces[first];
+      std::optional<BorderPlane> plane = plane_of_run(run);
+      std::vector<std::size_t> members{first};
+      for (const std::size_t step : {std::size_t{1}, pieces.size() - 1})
+        for (std::size_t next = (first + step) % pieces.size(); next != first && !is_taken[next];
+             next = (next + step) % pieces.size()) {
+          Run longer = run;
+          longer.insert(longer.end(), pieces[next].begin(), pieces[next].end());
+          std::optional<BorderPlane> common = plane_of_run(longer);
+          if (!common || std::find(members.begin(), members.end(), next) != members.end()) break;
+          run = std::move(longer);
+          plane = std::move(common);
+          members.push_back(next);
+        }
+      if (!plane) continue;
+      for (const std::size_t member : members) is_taken[member] = 1;
+      planes.push_back(std::move(*plane));
+    }
+  }
+  return planes;
+}
+
+}  // namespace
+
+std::vector<BorderPlane> flat_border_planes(const PolygonMesh& surface, const SurfaceTopology& topology) {
+  return FlatBorders(surface, topology).find();
+}
+
+ColumnPlanes::ColumnPlanes(std::vector<BorderPlane> planes, std::size_t num_columns)
+    : planes_(std::move(planes)), of_column_(num_columns, {kNoIndex, kNoIndex}) {
+  for (std::size_t p = 0; p < planes_.size(); ++p)
+    for (const Index v : planes_[p].vertices) {
+      auto& [first, second] = of_column_[v];
+      if (first == kNoIndex) first = static_cast<Index>(p);
+      else if (second == kNoIndex) second = static_cast<Index>(p);
+    }
+}
+
+std::size_t ColumnPlanes::num_columns() const {
+  return static_cast<std::size_t>(
+      std::count_if(of_column_.begin(), of_column_.end(), [](const auto& planes) { return planes[0] != kNoIndex; }));
+}
+
+void ColumnPlanes::release(Index column) { of_column_[column] = {kNoIndex, kNoIndex}; }
+
+Mat3 ColumnPlanes::projector(std::span<const Index> columns) const {
+  constexpr double kParallel = 1e-6;  // sine of the angle below which two planes are one
+  if (planes_.empty() || columns.empty()) return Mat3::Identity();
+  std::array<Index, 2> common = of_column_[columns[0]];
+  for (const Index column : columns)
+    for (Index& plane : common)
+      if (const auto& own = of_column_[column]; own[0] != plane && own[1] != plane) plane = kNoIndex;
+  if (common[0] == kNoIndex) std::swap(common[0], common[1]);
+  if (common[0] == kNoIndex) return Mat3::Identity();
+  const Vec3& n = planes_[common[0]].normal;
+  if (common[1] != kNoIndex) {
+    const Vec3 line = n.cross(planes_[common[1]].normal);
+    if (line.norm() > kParallel) return line.normalized() * line.normalized().transpose();
+  }
+  return Mat3::Identity() - n * n.transpose();
+}
+
+}  // namespace subvol
