@@ -59,6 +59,8 @@ set(entry_points
   # Shells
   shell/curved_shell.h
   shell/extrude.h
+  shell/mend_surface.h
+  shell/partial_surface.h
   shell/shell.h
   # Files of results
   export/animation.h

@@ -5,11 +5,10 @@
 #include "subvol/base/format.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/shell/local_mending.h"
+#include "subvol/shell/partial_surface.h"
 #include "subvol/shell/surface_faults.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/welded_surface.h"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -89,7 +88,6 @@ class Mender {
 
  private:
   void drop(const std::vector<char>& is_dropped);
-  FeatureTags numbered(const FeatureTags& tags) const;
 
   const PolygonMesh& given_;
   double distance_, diagonal_ = 0;
@@ -207,26 +205,6 @@ bool Mender::mend_locally() {
   return true;
 }
 
-FeatureTags Mender::numbered(const FeatureTags& tags) const {
-  std::set<std::pair<Index, Index>> done;
-  std::map<std::pair<Index, Index>, double> sharpness;
-  for (const CreaseEdge& crease : tags.creases) sharpness[{crease.v0, crease.v1}] = crease.sharpness;
-  FeatureTags result;
-  for (const auto& t : mesh_.triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
-      const auto [v, w] = std::minmax(vertex_numbers_[a], vertex_numbers_[b]);
-      const auto found = sharpness.find({v, w});
-      if (found != sharpness.end() && done.insert({a, b}).second) result.creases.push_back({a, b, found->second});
-    }
-  for (std::size_t v = 0; v < vertex_numbers_.size(); ++v)
-    for (const CornerVertex& corner : tags.corners)
-      if (corner.vertex == vertex_numbers_[v]) result.corners.push_back({static_cast<Index>(v), corner.sharpness});
-  std::sort(result.creases.begin(), result.creases.end(),
-            [](const CreaseEdge& a, const CreaseEdge& b) { return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1); });
-  return result;
-}
-
 MendedSurface Mender::result(const FeatureTags& tags) {
   // Vertices that no face names any more are dropped.
   std::vector<Index> number(mesh_.positions.size(), kNoIndex);
@@ -244,14 +222,9 @@ MendedSurface Mender::result(const FeatureTags& tags) {
   for (auto& t : mesh_.triangles)
     for (Index& v : t) v = number[v];
   MendedSurface result = std::move(counts_);
-  result.tags = numbered(tags);
   result.surface = as_polygons(mesh_);
-  if (!given_.face_groups.empty()) {
-    result.surface.face_groups.groups = given_.face_groups.groups;
-    result.surface.face_groups.of_face.clear();
-    for (const Index f : face_numbers_)
-      result.surface.face_groups.of_face.push_back(given_.face_groups.of_face[f]);
-  }
+  result.surface.face_groups = groups_by_number(given_.face_groups, face_numbers_);
+  result.tags = tags_by_number(tags, result.surface, vertex_numbers_);
   if (!mesh_.triangles.empty()) result.distance = surface_distance(mesh_, triangulate(given_)).max();
   result.vertex_numbers = std::move(vertex_numbers_);
   result.face_numbers = std::move(face_numbers_);

@@ -3,16 +3,19 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
+#include "subvol/mesh/features.h"
 #include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <numeric>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace subvol {
@@ -93,15 +96,40 @@ Index closest_face(const PolygonMesh& surface, const Vec3& point) {
   return face_of_triangle[hit[0].triangle];
 }
 
+FeatureTags tags_by_number(const FeatureTags& tags, const PolygonMesh& surface,
+                           std::span<const Index> vertex_numbers) {
+  std::map<std::pair<Index, Index>, double> creases;
+  for (const CreaseEdge& crease : tags.creases) creases[std::minmax(crease.v0, crease.v1)] = crease.sharpness;
+  std::map<Index, double> corners;
+  for (const CornerVertex& corner : tags.corners) corners[corner.vertex] = corner.sharpness;
+  FeatureTags result;
+  for (std::size_t f = 0; f < surface.num_faces() && !creases.empty(); ++f) {
+    const auto face = corners_of(surface, f);
+    for (std::size_t k = 0; k < face.size(); ++k) {
+      const Index a = face[k], b = face[(k + 1) % face.size()];
+      const auto found = creases.find(std::minmax(vertex_numbers[a], vertex_numbers[b]));
+      if (found != creases.end()) result.creases.push_back({a, b, found->second});
+    }
+  }
+  for (std::size_t v = 0; v < vertex_numbers.size() && !corners.empty(); ++v)
+    if (const auto found = corners.find(vertex_numbers[v]); found != corners.end())
+      result.corners.push_back({static_cast<Index>(v), found->second});
+  return merge_tags(result, {});
+}
+
+FaceGroups groups_by_number(const FaceGroups& groups, std::span<const Index> face_numbers) {
+  FaceGroups result{groups.groups, {}};
+  if (groups.empty()) return result;
+  for (const Index f : face_numbers) result.of_face.push_back(groups.of_face[f]);
+  return result;
+}
+
 PartialSurface without_faces(const PolygonMesh& surface, const FeatureTags& tags, std::span<const char> is_left_out) {
   PartialSurface result;
   std::vector<Index> number(surface.positions.size(), kNoIndex);
-  const FaceGroups& groups = surface.face_groups;
-  result.surface.face_groups.groups = groups.groups;
   for (std::size_t f = 0; f < surface.num_faces(); ++f) {
     if (is_left_out[f]) continue;
     result.face_numbers.push_back(static_cast<Index>(f));
-    if (!groups.empty()) result.surface.face_groups.of_face.push_back(groups.of_face[f]);
     for (const Index v : corners_of(surface, f)) {
       if (number[v] == kNoIndex) {
         number[v] = static_cast<Index>(result.vertex_numbers.size());
@@ -113,23 +141,8 @@ PartialSurface without_faces(const PolygonMesh& surface, const FeatureTags& tags
     result.surface.face_offsets.push_back(result.surface.face_vertices.size());
   }
   if (result.face_numbers.empty()) throw InputError("all faces are left out");
-  std::map<std::pair<Index, Index>, bool> edges;
-  for (const Index f : result.face_numbers) {
-    const auto corners = corners_of(surface, static_cast<std::size_t>(f));
-    for (std::size_t k = 0; k < corners.size(); ++k)
-      edges[std::minmax(corners[k], corners[(k + 1) % corners.size()])] = true;
-  }
-  for (const CreaseEdge& crease : tags.creases)
-    if (edges.contains({crease.v0, crease.v1})) {
-      const auto [a, b] = std::minmax(number[crease.v0], number[crease.v1]);
-      result.tags.creases.push_back({a, b, crease.sharpness});
-    }
-  for (const CornerVertex& corner : tags.corners)
-    if (number[corner.vertex] != kNoIndex) result.tags.corners.push_back({number[corner.vertex], corner.sharpness});
-  std::sort(result.tags.creases.begin(), result.tags.creases.end(),
-            [](const CreaseEdge& a, const CreaseEdge& b) { return std::pair(a.v0, a.v1) < std::pair(b.v0, b.v1); });
-  std::sort(result.tags.corners.begin(), result.tags.corners.end(),
-            [](const CornerVertex& a, const CornerVertex& b) { return a.vertex < b.vertex; });
+  result.surface.face_groups = groups_by_number(surface.face_groups, result.face_numbers);
+  result.tags = tags_by_number(tags, result.surface, result.vertex_numbers);
 
   // The planes of flat patches that were left out.
   Eigen::AlignedBox3d box;

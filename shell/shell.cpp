@@ -4,8 +4,6 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/energies/volume_energy.h"
-#include "subvol/fit/geometry/boundary_triangles.h"
-#include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/solver/free_nodes.h"
 #include "subvol/fit/solver/newton.h"
 #include "subvol/shell/surface_faults.h"

@@ -87,7 +87,6 @@ void ShellRun::load() {
 }
 
 void ShellRun::mend() {
-  catch_interrupt();
   try {
     surface_ = prepared_surface(given_, {.skipped = arguments_.skipped,
                                          .repair_distance = parse_length("--repair", arguments_.repair, diagonal_),
