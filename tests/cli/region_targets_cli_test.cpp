@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "samples/shapes.h"
+#include "subvol/io/mesh_io.h"
+#include "subvol/mesh/interfaces.h"
+#include "tests/support/region_fixtures.h"
+#include "tests/support/workplace.h"
+
+#include <catch2/catch.hpp>
+
+#include <string>
+
+using namespace subvol;
+using namespace subvol::test;
+
+namespace {
+
+bool has(const std::string& text, const char* words) { return text.find(words) != std::string::npos; }
+
+std::string npy(const LabelGrid& grid) {
+  std::string header = "{'descr': '|u1', 'fortran_order': True, 'shape': (" + std::to_string(grid.counts[0]) + ", " +
+                       std::to_string(grid.counts[1]) + ", " + std::to_string(grid.counts[2]) + "), }";
+  header.resize(118, ' ');
+  header.back() = '\n';
+  std::string bytes = std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(header.size()) + '\0' + header;
+  for (const int label : grid.labels) bytes += static_cast<char>(label);
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("A surface with sheets inside is filled region by region, with the target's volumes beside the result's",
+          "[cli][regions]") {
+  const Workplace place;
+  place.file("slabs.off", samples::off_text(slabs_surface(5)));
+  const Run check = place.run("check slabs.off");
+  CHECK(check.status == 0);
+  CHECK(has(check.out, "5: region 1 of volume 0.2"));
+  const Run fit = place.run("fit slabs.off --cells 500 -o a.mesh -o a.msh -o a.inp -o a.vtu --report a.json");
+  CAPTURE(fit.err);
+  REQUIRE(fit.status == 0);
+  const nlohmann::json report = place.json("a.json");
+  REQUIRE(report["regions"]["cells"].size() == 5);
+  for (const auto& region : report["regions"]["cells"]) {
+    CHECK(region["target_volume"].get<double>() == Approx(0.2));
+    CHECK(region["volume"].get<double>() == Approx(0.2).epsilon(1e-9));
+    CHECK(region["not_certified"] == 0);
+  }
+  for (const auto& interface : report["regions"]["interfaces"]) CHECK(interface["target_area"].get<double>() == Approx(1));
+  CHECK(report["warnings"].empty());
+  const VolumeMesh mesh = read_volume_mesh(place / "a.mesh");
+  CHECK(region_references(mesh) == std::vector<int>{1, 2, 3, 4, 5});
+  CHECK(mesh.face_groups.groups.size() == 4);
+  CHECK(place.run("check a.mesh --region 3").status == 0);
+  CHECK(place.run("check a.mesh --region none").status == 2);
+  const Run merged = place.run("check a.mesh --references none");
+  CHECK(merged.status == 0);
+  CHECK(!has(merged.out, "region"));
+  const Run page = place.run("report a.json -o a.html --no-viewer");
+  CHECK(page.status == 0);
+  CHECK(has(content_of(place / "a.html"), "<h2>Regions</h2>"));
+  const Run one = place.run("fit slabs.off --regions merge --cells 300 -o b.mesh");
+  CHECK(one.status == 0);
+  CHECK(has(one.err, "are left out"));
+  CHECK(region_references(read_volume_mesh(place / "b.mesh")).size() == 1);
+  // A mesh with regions is a target, too.
+  CHECK(place.run("template auto a.mesh --cells 300 -o c.mesh").status == 0);
+  CHECK(region_references(read_volume_mesh(place / "c.mesh")).size() == 5);
+}
+
+TEST_CASE("A segmentation becomes a template with a region for each label", "[cli][regions]") {
+  const Workplace place;
+  place.file("a.npy", npy(Phantom{32}.grid()));
+  const Run run = place.run("template auto a.npy --cells 2000 --pillow -o a.mesh");
+  CAPTURE(run.err);
+  CHECK((run.status == 0 || run.status == 4));
+  CHECK(region_references(read_volume_mesh(place / "a.mesh")) == std::vector<int>{1, 2, 3, 4});
+  CHECK(place.run("template auto a.npy --regions merge --cells 200 -o b.mesh").status == 0);
+  place.file("b.npy", "no array");
+  const Run bad = place.run("fit b.npy -o b.mesh --force");
+  CHECK(bad.status == 3);
+  CHECK(has(bad.err, "b.npy"));
+}
