@@ -121,7 +121,6 @@ class AutomaticFit {
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
   bool judge(AutomaticFitTrial trial);
-  void note_missed_edges();
   void conclude();
   bool is_worth_trying(const Attempt& attempt) const {
     // A grid without planes is the grid of the attempt before; with many of them, grids not through them are worse.
@@ -297,18 +296,10 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   result_.chosen = result_.trials.size() - 1;
   result_.mesh = mesh_;
   result_.report.creases = edges;
-  note_missed_edges();
-  return going;
-}
-
-void AutomaticFit::note_missed_edges() {
   result_.missed_edges.clear();
-  if (!layout_) return;
-  for (const UnfollowedCurve& curve : layout_->routing.unfollowed)
-    result_.missed_edges.push_back({curve.reason, target_.normalisation.from_unit({curve.place})[0],
-                                    100 * edges_.features.curves.curves[curve.curve].length()});
-  std::stable_sort(result_.missed_edges.begin(), result_.missed_edges.end(),
-                   [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
+  if (layout_)
+    result_.missed_edges = missed_edges(layout_->routing.unfollowed, edges_.features.curves, target_.normalisation);
+  return going;
 }
 
 /// Fits a pillowed template. Returns false if the fit must end.
@@ -427,14 +418,7 @@ void AutomaticFit::conclude() {
                                         miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(),
                                         miss.place.z()));
   }
-  if (!result_.missed_edges.empty()) {
-    const MissedEdge& longest = result_.missed_edges.front();
-    report.warnings.push_back(formatted("%zu of %zu sharp edges are not followed; the longest, %.3g %% of the "
-                                        "diagonal, at (%.6g, %.6g, %.6g): %s",
-                                        result_.missed_edges.size(), best.curves, longest.length_percent,
-                                        longest.place.x(), longest.place.y(), longest.place.z(),
-                                        to_string(longest.reason).c_str()));
-  }
+  warn_of_missed_edges(result_.missed_edges, best.curves, "sharp edges", report);
 }
 
 AutomaticFitResult AutomaticFit::run() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/automatic_trials.h"
 
+#include "subvol/base/format.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/templates/auto_template.h"
 
@@ -50,6 +51,27 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
 bool is_good_enough(const AutomaticFitTrial& trial) {
   const double excused = trial.least_share >= kEnoughQuality ? kQualityWeight * (1 - trial.least_share) : 0;
   return trial.merit - excused < kGoodMerit;
+}
+
+std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves,
+                                     const Normalisation& normalisation) {
+  std::vector<MissedEdge> missed;
+  for (const UnfollowedCurve& curve : unfollowed)
+    missed.push_back({curve.reason, normalisation.from_unit({curve.place})[0],
+                      100 * curves.curves[curve.curve].length()});
+  std::stable_sort(missed.begin(), missed.end(),
+                   [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
+  return missed;
+}
+
+void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_curves, const char* name,
+                          FitReport& report) {
+  if (missed.empty()) return;
+  const MissedEdge& longest = missed.front();
+  report.warnings.push_back(formatted("%zu of %zu %s are not followed; the longest, %.3g %% of the diagonal, at (%.6g, "
+                                      "%.6g, %.6g): %s",
+                                      missed.size(), num_curves, name, longest.length_percent, longest.place.x(),
+                                      longest.place.y(), longest.place.z(), to_string(longest.reason).c_str()));
 }
 
 }  // namespace subvol

@@ -2,6 +2,12 @@
 #pragma once
 
 #include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/target/fit_target.h"
+
+#include <cstddef>
+#include <span>
+#include <vector>
 
 namespace subvol {
 
@@ -20,5 +26,15 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
 
 /// Returns true if no other template needs to be tried.
 bool is_good_enough(const AutomaticFitTrial& trial);
+
+/// Returns the curves that no path follows, longest first, in the target's own coordinates.
+/// curves  in normalized coordinates, as are the places of `unfollowed`.
+std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves,
+                                     const Normalisation& normalisation);
+
+/// Adds a warning about missed edges to a report, if there are any, with the place of the longest.
+/// num_curves  number of those to be followed.  name  what they are called.
+void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_curves, const char* name,
+                          FitReport& report);
 
 }  // namespace subvol

@@ -271,11 +271,7 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   result_.report.creases = edges;
   result_.missed_edges.clear();
   if (layout_)
-    for (const UnfollowedCurve& curve : layout_->routing.unfollowed)
-      result_.missed_edges.push_back({curve.reason, target_.normalisation.from_unit({curve.place})[0],
-                                      100 * curves_.features.curves.curves[curve.curve].length()});
-  std::stable_sort(result_.missed_edges.begin(), result_.missed_edges.end(),
-                   [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
+    result_.missed_edges = missed_edges(layout_->routing.unfollowed, curves_.features.curves, target_.normalisation);
   return going;
 }
 
@@ -374,14 +370,7 @@ void RegionFit::conclude() {
     report.warnings.push_back(formatted("%zu interfaces or parts of the boundary have another topology than in the "
                                         "target; more --cells may mend that",
                                         template_.wrong_sheets));
-  if (!result_.missed_edges.empty()) {
-    const MissedEdge& longest = result_.missed_edges.front();
-    report.warnings.push_back(formatted("%zu of %zu curves are not followed; the longest, %.3g %% of the diagonal, at "
-                                        "(%.6g, %.6g, %.6g): %s",
-                                        result_.missed_edges.size(), best.curves, longest.length_percent,
-                                        longest.place.x(), longest.place.y(), longest.place.z(),
-                                        to_string(longest.reason).c_str()));
-  }
+  warn_of_missed_edges(result_.missed_edges, best.curves, "curves", report);
 }
 
 AutomaticFitResult RegionFit::run() {
