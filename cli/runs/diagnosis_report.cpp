@@ -6,6 +6,7 @@
 #include "cli/runs/writing.h"
 #include "subvol/base/format.h"
 #include "subvol/io/label_grid_io.h"
+#include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/boundary.h"
@@ -87,13 +88,18 @@ FileSurface file_surface(const PolygonMesh& polygons) {
 }
 
 SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings) {
-  if (rule != RegionRule::merge && is_volume_file(path))
-    if (const VolumeMesh mesh = load_volume(path, warnings); region_references(mesh).size() > 1) {
+  if (rule != RegionRule::merge && is_nodal_extension(path)) {
+    std::vector<std::string> own_warnings;
+    const LoadedMesh mesh = load_mesh(path, own_warnings);
+    const auto* cells = std::get_if<VolumeMesh>(&mesh);
+    if (cells && region_references(*cells).size() > 1) {
+      warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
       SurfaceRepair loaded;
-      loaded.regions = surface_of_regions(mesh);
+      loaded.regions = surface_of_regions(*cells);
       loaded.surface = loaded.regions->mesh;
       return loaded;
     }
+  }
   if (!is_label_grid_file(path)) return repair_surface(load_surface(path, warnings), interrupted, rule);
   LabelGrid grid = read_label_grid(path);
   if (rule == RegionRule::merge)

@@ -168,8 +168,8 @@ void write_shell(const Output& output, const ShellResult& shell, const CurvedShe
                               {.cell_minima = curved.quality.cell_minima,
                                .reference = shell_reference(shell.layers, shell.limited),
                                .references = shell.mesh.references,
-                               .msh_version = options.msh_version,
                                .face_groups = &shell.mesh.face_groups,
+                               .msh_version = options.msh_version,
                                .fields = fields,
                                .map_tolerance_percent = options.map_tolerance_percent});
   }
