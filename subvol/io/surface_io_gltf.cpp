@@ -201,9 +201,9 @@ class GltfParser {
   /// Place of a name in a list, which it is added to; -1 for no name.
   static int place_of(std::vector<std::string>& names, const std::string& name) {
     if (name.empty()) return -1;
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) names.push_back(name);
-    return static_cast<int>(found - names.begin());
+    const auto place = static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+    if (place == names.size()) names.push_back(name);
+    return static_cast<int>(place);
   }
 
   /// Materials that tell faces apart are groups; else nodes are.

@@ -192,7 +192,8 @@ class PlyParser {
     left_out_.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
   }
 
-  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label.
+  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label. In the property
+  /// that subvol writes, 0 is no group.
   void add_groups() {
     if (colors_) mesh_.face_groups = colors_->take(left_out_, "colours of faces");
     if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;
@@ -200,6 +201,8 @@ class PlyParser {
     std::sort(found.begin(), found.end());
     found.erase(std::unique(found.begin(), found.end()), found.end());
     if (found.size() > kMostLabels) return left_out_.add("properties of face");
+    if (label_name_ == "reference" && found.front() == 0) found.erase(found.begin());
+    if (found.empty()) return;
     const bool are_numbers = found.front() > 0 && found.back() <= std::numeric_limits<int>::max();
     FaceGroups& groups = mesh_.face_groups;
     for (const std::int64_t label : found) {
@@ -207,9 +210,11 @@ class PlyParser {
       groups.groups.push_back({are_numbers ? "" : label_name_ + " " + std::to_string(label),
                                are_numbers ? static_cast<int>(label) : next, 2});
     }
-    for (const std::int64_t label : labels_)
-      groups.of_face.push_back(
-          static_cast<Index>(std::lower_bound(found.begin(), found.end(), label) - found.begin()));
+    for (const std::int64_t label : labels_) {
+      const auto place = std::lower_bound(found.begin(), found.end(), label);
+      const bool is_group = place != found.end() && *place == label;
+      groups.of_face.push_back(is_group ? static_cast<Index>(place - found.begin()) : kNoIndex);
+    }
   }
 
   ValueType type_of(std::string_view word) const {

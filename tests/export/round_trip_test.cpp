@@ -23,6 +23,8 @@ using namespace subvol::test;
 
 namespace {
 
+constexpr int kNumGroups = 2;
+
 VolumeMesh marked_cells() {
   VolumeMesh mesh = with_floor_and_roof(mixed_cells(), 1);
   mesh.references.assign(mesh.num_cells(), 4);
@@ -82,6 +84,8 @@ std::map<Corners, std::set<std::string>> faces_of(const VolumeMesh& mesh, const 
   std::map<Corners, std::set<std::string>> faces;
   if (held == Held::none) return faces;
   for (const GroupedFace& entry : groups.faces) {
+    // MFEM gives a number to all faces of the boundary: those of no group have one more.
+    if (groups.groups[static_cast<std::size_t>(entry.group)].number > kNumGroups) continue;
     const std::size_t size = entry.face.back() == kNoIndex ? 3 : 4;
     faces[corners_of(mesh.positions, std::span(entry.face).first(size), wanted)].insert(
         mark_of(groups.groups[static_cast<std::size_t>(entry.group)], held));
@@ -123,20 +127,21 @@ std::vector<std::size_t> matched(const HighOrderMesh& found, const HighOrderMesh
 
 }  // namespace
 
-TEST_CASE("round trips: linear cells, regions and groups go through every pair of formats", "[export]") {
+TEST_CASE("round trips: linear cells, regions and groups go through every pair of formats", "[export][slow]") {
   const TemporaryFolder folder;
   const VolumeMesh mesh = marked_cells();
   const auto formats = formats_of_cells(false);
   REQUIRE(formats.size() >= 7);
-  for (const FileFormat* a : formats)
+  for (const FileFormat* a : formats) {
+    const auto first = folder.path() / ("a" + std::string(a->extension));
+    write_linear(first, mesh);
     for (const FileFormat* b : formats) {
       CAPTURE(a->extension, b->extension);
-      const auto first = folder.path() / ("a" + std::string(a->extension)),
-                 second = folder.path() / ("b" + std::string(b->extension));
-      write_linear(first, mesh);
+      const auto second = folder.path() / ("b" + std::string(b->extension)),
+                 third = folder.path() / ("c" + std::string(a->extension));
       write_linear(second, read_volume_mesh(first));
-      write_linear(first, read_volume_mesh(second));
-      const VolumeMesh found = read_volume_mesh(first);
+      write_linear(third, read_volume_mesh(second));
+      const VolumeMesh found = read_volume_mesh(third);
       REQUIRE(found.num_vertices() == mesh.num_vertices());
       const double tolerance = rounding(*a, *b);
       for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
@@ -147,9 +152,10 @@ TEST_CASE("round trips: linear cells, regions and groups go through every pair o
       CHECK(faces_of(found, found.face_groups, mesh.positions, groups) ==
             faces_of(mesh, mesh.face_groups, mesh.positions, groups));
     }
+  }
 }
 
-TEST_CASE("round trips: cells of order 2 go through every pair of formats that holds them", "[export]") {
+TEST_CASE("round trips: cells of order 2 go through every pair of formats that holds them", "[export][slow]") {
   const TemporaryFolder folder;
   PointSource source(5);
   const VolumeMesh cells = marked_cells();
@@ -163,15 +169,16 @@ TEST_CASE("round trips: cells of order 2 go through every pair of formats that h
     write_volume(path, file.mesh,
                  {.references = file.references, .face_groups = &file.face_groups, .regions = file.regions});
   };
-  for (const FileFormat* a : formats)
+  for (const FileFormat* a : formats) {
+    const auto first = folder.path() / ("a" + std::string(a->extension));
+    write_volume(first, mesh, options);
     for (const FileFormat* b : formats) {
       CAPTURE(a->extension, b->extension);
-      const auto first = folder.path() / ("a" + std::string(a->extension)),
-                 second = folder.path() / ("b" + std::string(b->extension));
-      write_volume(first, mesh, options);
+      const auto second = folder.path() / ("b" + std::string(b->extension)),
+                 third = folder.path() / ("c" + std::string(a->extension));
       write_file(second, read_curved(first));
-      write_file(first, read_curved(second));
-      const HighOrderFile found = read_curved(first);
+      write_file(third, read_curved(second));
+      const HighOrderFile found = read_curved(third);
       const VolumeMesh corners = found.mesh.straight_sided();
       REQUIRE(found.mesh.space.num_cells() == cells.num_cells());
       CHECK(found.mesh.space.max_order() == 2);
@@ -187,4 +194,5 @@ TEST_CASE("round trips: cells of order 2 go through every pair of formats that h
         CHECK((at(found.mesh, c) - at(mesh, same[c])).norm() < 1e-12 + 10 * rounding(*a, *b));
       }
     }
+  }
 }

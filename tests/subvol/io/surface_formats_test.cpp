@@ -127,7 +127,7 @@ TEST_CASE("surface formats: glTF is read in place, without its lines, with mater
 TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "[io]") {
   const std::string model = R"(<?xml version="1.0"?><model unit="millimeter" xmlns="x"><resources>
 <basematerials id="9"><base name="steel" displaycolor="#FFF"/><base name="brass" displaycolor="#000"/></basematerials>
-<object id="1" name="one" MAT><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/>
+<object id="1" name="one"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/>
 <vertex x="0" y="1" z="0"/></vertices><triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh></object>
 <object id="2" name="two"><components><component objectid="1" transform="2 0 0 0 2 0 0 0 2 5 6 7"/></components></object>
 </resources><build><item objectid="1"/><item objectid="2" transform="1 0 0 0 1 0 0 0 1 0 0 1"/></build></model>)";
@@ -137,7 +137,7 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
     zip.add("3D/part.model", text.replace(text.find(from), from.size(), to));
     return zip.take();
   };
-  const PolygonMesh found = read_polygon_mesh(folder().file("a.3mf", archive("MAT", "")));
+  const PolygonMesh found = read_polygon_mesh(folder().file("a.3mf", archive("one", "one")));
   REQUIRE(found.num_faces() == 2);
   CHECK(found.positions[4] == Vec3(7, 6, 8));
   CHECK(areas(found) == std::map<std::string, double>{{"one", 0.5}, {"two", 2}});
@@ -145,7 +145,7 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
   CHECK_THAT(refusal("b.3mf", archive("objectid=\"1\" transform", "objectid=\"2\" transform")), Contains("themselves"));
   CHECK_THAT(refusal("b.3mf", archive("objectid=\"2\"", "objectid=\"5\"")), Contains("no object"));
   CHECK_THAT(refusal("b.3mf", archive("x=\"1\"", "x=\"nan\"")), Contains("expected a number x"));
-  const std::string bytes = archive("MAT", "");
+  const std::string bytes = archive("one", "one");
   for (std::size_t size = 0; size < bytes.size(); size += 7)
     CHECK_FALSE(refusal("cut.3mf", std::string_view(bytes).substr(0, size)).empty());
   std::string damaged = bytes;
