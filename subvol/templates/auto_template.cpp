@@ -141,6 +141,7 @@ class Search {
   double size_through(const AxisPlanes& planes) const;
   std::optional<Candidate> best_of(const Placement& placement, std::size_t& num_right) const {
     constexpr ShareRange kAccepted{kLeastCellShare, kMostCellShare};
+    if (stop_.is_stopped()) return std::nullopt;
     return best_in(placement.frame, placed_grid(solid_.surface, placement), kAccepted, num_right);
   }
   std::optional<Candidate> best_in(const Mat3& frame, VoxelGrid grid, const ShareRange& range,
