@@ -19,6 +19,7 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/fit/target/region_matching.h"
 #include "subvol/templates/voxel_grid.h"
 
 #include <algorithm>
@@ -98,6 +99,14 @@ Json report_json(const char* command, Json options, Json input, const FitReport&
   return json;
 }
 
+/// Returns what the boundary of a result is compared with: of a target with the regions of the template, the outer surface.
+Target boundary_target(const Target& target, const VolumeMesh& template_mesh) {
+  if (const auto* surface = std::get_if<TriangleMesh>(&target))
+    if (const std::optional<RegionSurface> regions = regions_as_in(*surface, template_mesh))
+      return outer_surface(*regions);
+  return target;
+}
+
 int status(const FitReport& report, bool valid) {
   if (report.stop_reason == StopReason::cancelled) return kInterrupted;
   if (!valid) return kFailed;
@@ -175,7 +184,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   writing.options = options_used(arguments, options_of_result(verb));
   HighOrderFile file{std::move(result.mesh), template_mesh.references, template_mesh.face_groups,
                      template_mesh.regions};
-  const GroupsFound groups = carry_groups(target, file);
+  const Target outer = boundary_target(target, template_mesh);
+  const GroupsFound groups = carry_groups(outer, file);
   warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
   tell_warnings();
   const std::vector<std::string> failures = write_each(outputs, [&](const Output& output) {
@@ -187,7 +197,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const double write_seconds = seconds_since(write_start);
 
   const Clock::time_point check_start = Clock::now();
-  const auto check_curved = [&](const HighOrderMesh& mesh) { return check(mesh, target, writing, arguments.run); };
+  const auto check_curved = [&](const HighOrderMesh& mesh) { return check(mesh, outer, writing, arguments.run); };
   const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
   const MeshCheck mesh_check = check_curved(written ? *written : file.mesh);
   hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
@@ -199,7 +209,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     warnings.insert(warnings.end(), found.begin(), found.end());
   }
   tell_warnings();
-  const std::optional<MeshCheck> linear = check_linear(outputs, target, arguments.run);
+  const std::optional<MeshCheck> linear = check_linear(outputs, outer, arguments.run);
   if (linear) {
     const std::vector<std::string> found = linear_cells_warnings(*linear);
     warnings.insert(warnings.end(), found.begin(), found.end());

@@ -293,10 +293,10 @@ class RegionFinder {
     orient_sheets(surface);
     name_regions(surface);
     if (nested_ > 0)
-      surface.notes.push_back(formatted("%zu closed part%s inside another do%s not face inward and became region%s; "
+      surface.notes.push_back(formatted("%zu closed part%s not face inward though inside another, and bound%s a region; "
                                         "--regions merge makes voids of %s",
-                                        nested_, nested_ == 1 ? "" : "s", nested_ == 1 ? "es" : "",
-                                        nested_ == 1 ? "" : "s", nested_ == 1 ? "it" : "them"));
+                                        nested_, nested_ == 1 ? " does" : "s do", nested_ == 1 ? "s" : "",
+                                        nested_ == 1 ? "it" : "them"));
     if (loose > 0)
       surface.notes.push_back(formatted("%zu triangles divide nothing and were left out", loose));
     return surface;

@@ -48,8 +48,8 @@ inline TriangleMesh slabs_surface(int count) {
       mesh.positions.push_back(Vec3(i == 1 || i == 2, i >= 2, static_cast<double>(k) / count));
   for (int k = 0; k <= count; ++k) {
     const Index a = 4 * k;
-    mesh.triangles.push_back({a, a + 1, a + 2});
-    mesh.triangles.push_back({a, a + 2, a + 3});
+    mesh.triangles.push_back(k == 0 ? std::array<Index, 3>{a, a + 2, a + 1} : std::array<Index, 3>{a, a + 1, a + 2});
+    mesh.triangles.push_back(k == 0 ? std::array<Index, 3>{a, a + 3, a + 2} : std::array<Index, 3>{a, a + 2, a + 3});
     for (int i = 0; i < 4 && k < count; ++i) {
       const Index b = a + (i + 1) % 4;
       mesh.triangles.push_back({a + i, b, b + 4});
