@@ -16,6 +16,7 @@
 #include "subvol/base/format.h"
 #include "subvol/base/version.h"
 #include "subvol/io/label_grid_io.h"
+#include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/surface/solid_topology.h"
 
@@ -58,8 +59,8 @@ class AutomaticFitRun : public LongRun {
 void AutomaticFitRun::load() {
   bool has_only_points = false;
   if (!is_label_grid_file(arguments_.target)) {
-    require_surface_file(arguments_.target);
-    has_only_points = is_point_cloud_file(arguments_.target);
+    require_known_file(arguments_.target);
+    has_only_points = !is_nodal_extension(arguments_.target) && is_point_cloud_file(arguments_.target);
   }
   require_fitting_options(verb_, has_only_points);
   if (has_only_points)
