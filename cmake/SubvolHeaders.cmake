@@ -11,6 +11,7 @@ set(entry_points
   subvol/base/version.h
   subvol/io/color_groups.h
   subvol/io/file_formats.h
+  subvol/io/label_grid_io.h
   subvol/io/mesh_io.h
   subvol/io/nodal_mesh.h
   subvol/io/surface_io.h
@@ -23,6 +24,7 @@ set(entry_points
   subvol/mesh/volume_mesh.h
   subvol/surface/boundary.h
   subvol/surface/point_cloud.h
+  subvol/surface/region_surface.h
   subvol/surface/solid_topology.h
   subvol/surface/surface_topology.h
   subvol/surface/triangle_mesh.h
@@ -36,8 +38,10 @@ set(entry_points
   subvol/templates/auto_template.h
   subvol/templates/carve.h
   subvol/templates/cell_split.h
+  subvol/templates/label_surface.h
   subvol/templates/pillow.h
   subvol/templates/refine.h
+  subvol/templates/region_template.h
   subvol/templates/sheet.h
   subvol/templates/template_edit.h
   subvol/templates/vertex_merge.h

@@ -100,7 +100,15 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, s
       return loaded;
     }
   }
-  if (!is_label_grid_file(path)) return repair_surface(load_surface(path, warnings), interrupted, rule);
+  if (!is_label_grid_file(path)) {
+    const std::size_t told = warnings.size();
+    SurfaceRepair repair = repair_surface(load_surface(path, warnings), interrupted, rule);
+    const bool may_have_copies = warnings.size() > told && is_surface_file(path);
+    if (repair.regions || !repair.done.empty() || rule != RegionRule::automatic || !may_have_copies) return repair;
+    // The reader drops copies of triangles, which tell that a solid lies on either side of them.
+    repair.regions = find_regions(triangulate(read_polygon_mesh(path)), rule);
+    return repair;
+  }
   LabelGrid grid = read_label_grid(path);
   if (rule == RegionRule::merge)
     for (int& label : grid.labels) label = std::min(label, 1);

@@ -45,8 +45,8 @@ double area_of(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
   return 0.5 * (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm();
 }
 
-/// Drops all but the first of triangles with the same corners.
-void drop_copies(TriangleMesh& mesh) {
+/// Drops all but the first of triangles with the same corners. Returns 1 for those kept of which there were several.
+std::vector<char> drop_copies(TriangleMesh& mesh) {
   std::vector<std::pair<std::array<Index, 3>, Index>> keys;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     auto key = mesh.triangles[t];
@@ -55,16 +55,23 @@ void drop_copies(TriangleMesh& mesh) {
   }
   std::sort(keys.begin(), keys.end());
   std::vector<char> is_copy(mesh.triangles.size(), 0);
-  for (std::size_t i = 1; i < keys.size(); ++i) is_copy[keys[i].second] = keys[i].first == keys[i - 1].first;
+  std::vector<char> has_copy(mesh.triangles.size(), 0);
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    is_copy[keys[i].second] = keys[i].first == keys[i - 1].first;
+    if (is_copy[keys[i].second]) has_copy[keys[i - 1].second] = 1;
+  }
   std::size_t kept = 0;
   for (std::size_t t = 0; t < is_copy.size(); ++t) {
     if (is_copy[t]) continue;
     mesh.triangles[kept] = mesh.triangles[t];
+    has_copy[kept] = has_copy[t];
     if (!mesh.face_groups.empty()) mesh.face_groups.of_face[kept] = mesh.face_groups.of_face[t];
     ++kept;
   }
   mesh.triangles.resize(kept);
   if (!mesh.face_groups.empty()) mesh.face_groups.of_face.resize(kept);
+  has_copy.resize(kept);
+  return has_copy;
 }
 
 /// The triangles at an edge in the order of their angles around it, and for each whether its front faces the next.
@@ -96,8 +103,8 @@ EdgeFan sorted_around(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge>
 /// front.
 class RegionFinder {
  public:
-  RegionFinder(TriangleMesh mesh, RegionRule rule)
-      : mesh_(std::move(mesh)), rule_(rule), cells_(2 * mesh_.triangles.size()), parts_(mesh_.triangles.size()) {}
+  RegionFinder(TriangleMesh mesh, std::vector<char> has_copy, RegionRule rule)
+      : mesh_(std::move(mesh)), has_copy_(std::move(has_copy)), rule_(rule), cells_(2 * mesh_.triangles.size()), parts_(mesh_.triangles.size()) {}
 
   std::optional<RegionSurface> run() {
     if (mesh_.triangles.empty() || !join_around_edges()) return std::nullopt;
@@ -224,6 +231,11 @@ class RegionFinder {
     return whole > 0 ? part.own_volume / whole : 1;
   }
 
+  /// Returns true if each triangle of a part is there twice, for the solids on either side of it.
+  bool has_copies(const Part& part) const {
+    return std::ranges::all_of(part.triangles, [&](Index t) { return has_copy_[t] != 0; });
+  }
+
   std::size_t part_of_cell(std::size_t cell) const {
     for (std::size_t p = 0;; ++p)
       if (std::ranges::find(parts_with_cells_[p].cells, cell) != parts_with_cells_[p].cells.end()) return p;
@@ -250,7 +262,7 @@ class RegionFinder {
         joined[part.outer] = joined[*part.inside];
         const bool in_region = is_region[joined[*part.inside]] != 0;
         is_void = rule_ == RegionRule::automatic && in_region && is_manifold(p) &&
-                  facing(part) * root_facing[p] < -kMostly;
+                  facing(part) * root_facing[p] < -kMostly && !has_copies(part);
         if (in_region && !is_void && is_manifold(p) && rule_ == RegionRule::automatic) ++nested_;
       } else {
         root_facing[p] = is_manifold(p) && facing(part) < -kMostly ? -1 : 1;
@@ -331,6 +343,7 @@ class RegionFinder {
   }
 
   TriangleMesh mesh_;
+  std::vector<char> has_copy_;
   RegionRule rule_;
   JoinedSets cells_, parts_;
   std::vector<Index> curve_triangles_;
@@ -375,8 +388,8 @@ const char* to_string(RegionRule rule) {
 std::optional<RegionSurface> find_regions(const TriangleMesh& surface, RegionRule rule) {
   if (rule == RegionRule::merge) return std::nullopt;
   TriangleMesh mesh = welded(surface).mesh;
-  drop_copies(mesh);
-  return RegionFinder(std::move(mesh), rule).run();
+  std::vector<char> has_copy = drop_copies(mesh);
+  return RegionFinder(std::move(mesh), std::move(has_copy), rule).run();
 }
 
 void orient_sheets(RegionSurface& surface) {

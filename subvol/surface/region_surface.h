@@ -52,7 +52,8 @@ const char* to_string(RegionRule rule);
 ///
 /// With RegionRule::automatic, the inside of a closed part P, which lies in another one, is a void if P faces inward as
 /// a whole (more than half of its volume, by signed sum, is negative, seen from the part that all others lie in), and a
-/// region otherwise: if it faces outward, or if its triangles disagree about the outside.
+/// region otherwise: if it faces outward, if its triangles disagree about the outside, or if each of them is there twice,
+/// for the solids on either side.
 ///
 /// Regions are numbered from 1 on by their first triangles. A region gets the name of a group of triangles if they all
 /// bound it, and are half or more of its boundary by area.

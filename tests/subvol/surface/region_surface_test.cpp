@@ -74,6 +74,9 @@ TEST_CASE("A part inside another is a region unless it faces inward", "[regions]
   REQUIRE(nested->notes.size() == 1);
   CHECK(nested->notes[0].find("--regions merge") != std::string::npos);
   CHECK(find_regions(together(disordered(outer), disordered(inner))));
+  const auto twice = find_regions(together(together(outer, turned(inner)), inner));
+  REQUIRE(twice);
+  CHECK(are(twice->volumes, {56, 8}));
   const auto kept = find_regions(together(outer, turned(inner)), RegionRule::keep);
   REQUIRE(kept);
   CHECK(are(kept->volumes, {56, 8}));
