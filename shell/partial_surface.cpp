@@ -118,9 +118,22 @@ FeatureTags tags_by_number(const FeatureTags& tags, const PolygonMesh& surface,
 }
 
 FaceGroups groups_by_number(const FaceGroups& groups, std::span<const Index> face_numbers) {
-  FaceGroups result{groups.groups, {}};
-  if (groups.empty()) return result;
-  for (const Index f : face_numbers) result.of_face.push_back(groups.of_face[f]);
+  FaceGroups result;
+  std::vector<char> has_face(groups.groups.size(), 0), had_face(groups.groups.size(), 0);
+  for (const Index group : groups.of_face)
+    if (group != kNoIndex) had_face[group] = 1;
+  if (!groups.empty())
+    for (const Index f : face_numbers)
+      if (groups.of_face[f] != kNoIndex) has_face[groups.of_face[f]] = 1;
+  std::vector<Index> place(groups.groups.size(), kNoIndex);
+  for (std::size_t g = 0; g < place.size(); ++g) {
+    if (had_face[g] && !has_face[g]) continue;
+    place[g] = static_cast<Index>(result.groups.size());
+    result.groups.push_back(groups.groups[g]);
+  }
+  if (result.groups.empty()) return result;
+  for (const Index f : face_numbers)
+    result.of_face.push_back(groups.of_face[f] == kNoIndex ? kNoIndex : place[groups.of_face[f]]);
   return result;
 }
 

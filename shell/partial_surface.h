@@ -38,7 +38,8 @@ struct PartialSurface {
 /// vertex_numbers  the number that each vertex of the surface had there; several may have had the same.
 FeatureTags tags_by_number(const FeatureTags& tags, const PolygonMesh& surface, std::span<const Index> vertex_numbers);
 
-/// Returns the groups of faces, given the number that each had in the other surface.
+/// Returns the groups of faces, given the number that each had in the other surface. Groups that had faces there and have
+/// none here are dropped.
 FaceGroups groups_by_number(const FaceGroups& groups, std::span<const Index> face_numbers);
 
 /// Leaves faces out of a surface.
