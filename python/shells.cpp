@@ -33,7 +33,7 @@ class Growing {
     inward_warning_ = cli::inward_warning(triangles);
     read_thickness(thickness);
     if (!first_height_.empty()) plan_layers();
-    preparation_.repair_distance = cli::parse_length("repair", repair_, diagonal_);
+    preparation_.repair_distance = cli::parse_repair("repair", repair_, diagonal_);
   }
 
   std::shared_ptr<Shelled> run() {

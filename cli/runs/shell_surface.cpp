@@ -145,6 +145,12 @@ Json skipped_json(const ShellSurface& surface) {
   return json;
 }
 
+double parse_repair(const std::string& option, const std::string& text, double diagonal) {
+  const std::string number = text.ends_with('%') ? text.substr(0, text.size() - 1) : text;
+  if (const auto value = parse_number(number); value && *value == 0) return 0;
+  return parse_length(option, text, diagonal);
+}
+
 LayerPlan planned_layers(double thickness, double first_height, std::optional<int> layers,
                          std::optional<double> growth) {
   constexpr double kMostDifference = 0.01;  // of a growth that is given beside everything else

@@ -58,6 +58,9 @@ std::optional<std::string> repair_warning(const ShellSurface& surface, double di
 Json repair_json(const ShellSurface& surface, double diagonal);
 Json skipped_json(const ShellSurface& surface);
 
+/// Parses the distance of a repair: a length as `parse_length`, or 0 for none. UsageError: neither.
+double parse_repair(const std::string& option, const std::string& text, double diagonal);
+
 /// Layers and their growth.
 struct LayerPlan {
   int layers = 1;

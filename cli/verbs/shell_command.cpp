@@ -89,7 +89,7 @@ void ShellRun::load() {
 void ShellRun::mend() {
   try {
     surface_ = prepared_surface(given_, {.skipped = arguments_.skipped,
-                                         .repair_distance = parse_length("--repair", arguments_.repair, diagonal_),
+                                         .repair_distance = parse_repair("--repair", arguments_.repair, diagonal_),
                                          .cancelled = interrupted});
   } catch (const InputError& error) {
     throw InputError(arguments_.surface + ": " + error.what());
@@ -283,7 +283,7 @@ int ShellRun::run() {
   if (!arguments_.thickness.empty()) parse_length("--thickness", arguments_.thickness, 1);
   if (!arguments_.first_height.empty() && arguments_.thickness.empty())
     throw UsageError("shell: --first-height goes with --thickness, not with one thickness for each vertex");
-  parse_length("--repair", arguments_.repair, 1);
+  parse_repair("--repair", arguments_.repair, 1);
   if (arguments_.order > 1 && arguments_.straight) throw UsageError("shell: --straight and --order exclude each other");
   prepare({Part::cage, Part::cutaway, Part::boundary});
   timed("read", &ShellRun::load);
