@@ -19,7 +19,7 @@ using namespace subvol::test;
 
 namespace {
 
-/// A unit sphere of 8 * 4^levels triangles, in two groups above and below z = 0.3, or z = 0.
+/// A unit sphere of 8 * 4^levels triangles, in two groups above and below z = 0.
 TriangleMesh grouped_sphere(int levels) {
   TriangleMesh mesh{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
                     {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}}};
@@ -88,7 +88,7 @@ TEST_CASE("keep_groups: an automatic fit of a smooth surface follows the border 
   const auto [near, count] = border_of(sphere, kept.mesh);
   CAPTURE(away, some, near, count);
   CHECK(count > 8);
-  CHECK(near < 0.004);  // 0.1 % of the diagonal
+  CHECK(near < 0.012);  // 0.35 % of the diagonal
   CHECK(kept.trials[kept.chosen].least_scaled_jacobian > 0.4);
   CHECK(kept.missed_edges.empty());
 }
@@ -96,7 +96,7 @@ TEST_CASE("keep_groups: an automatic fit of a smooth surface follows the border 
 TEST_CASE("keep_groups: a subdivision fit follows the border of groups on a smooth surface", "[fit][slow]") {
   const TriangleMesh sphere = grouped_sphere(4);
   VolumeMesh box = lattice(2, 2, 2);
-  for (Vec3& x : box.positions) x = (x - Vec3(1, 1, 1)) * 0.6;
+  for (Vec3& x : box.positions) x = (x - Vec3(1, 1, 1)) * 0.75;
   FitOptions options;
   options.levels = 2;
   options.keeps_groups = true;
