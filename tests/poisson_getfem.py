@@ -17,7 +17,7 @@ from pathlib import Path
 
 SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's packages are for
 MOST_LOSS = 0.3  # of the power
-REFINEMENTS = {2: (1, 2), 3: (0, 1)}  # times that the two meshes of a degree are refined
+REFINEMENTS = {2: (1, 2), 3: (1, 2)}  # times that the two meshes of a degree are refined
 EXACT = "(sin(2*X(1))*cos(X(2))*exp(X(3)))"  # minus its Laplacian is 4 times itself
 
 try:
