@@ -112,10 +112,10 @@ TEST_CASE("A fit far from the origin is as good as one at it", "[slow]") {
     for (Vec3& p : *points) p = 1e3 * p + Vec3(1e5, -2e5, 3e5);
   const FitResult other = fit_subdivision_volume(moved.target, moved.template_mesh, quick());
   // The ball is nearly symmetric: roundings of the coordinates choose among equally close points, and cells slide along
-  // the surface by that. Distance and distortion do not change.
+  // the surface by that. Distance and distortion do not change by more than the last steps of a stage change them.
   CHECK(mesh_percent(other.mesh, moved.target) == Approx(mesh_percent(plain.mesh, sample.target)).epsilon(0.1));
   const auto volume = [](const FitResult& fit) { return fit.report.stages[1].iterations.back().volume_energy; };
-  CHECK(volume(other) == Approx(volume(plain)).epsilon(0.01));
+  CHECK(volume(other) == Approx(volume(plain)).epsilon(0.02));
 }
 
 TEST_CASE("A fit has the same bits with one and two threads", "[slow]") {
@@ -241,11 +241,11 @@ TEST_CASE("A time limit ends the fit with a result") {
 TEST_CASE("A fit says when the steps allowed were not enough, and when its start was inverted", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick(1);
-  options.max_iterations = 4;
+  options.max_iterations = 1;  // converged takes two
   const FitReport short_of_steps = fit_subdivision_volume(sample.target, sample.template_mesh, options).report;
   CHECK(short_of_steps.stop_reason == StopReason::iteration_limit);
   CHECK(short_of_steps.stages.back().ended == MinimizerStop::iteration_limit);
-  CHECK(short_of_steps.explanation.find("all of the 4 steps allowed") != std::string::npos);
+  CHECK(short_of_steps.explanation.find("all of the 1 steps allowed") != std::string::npos);
   options.tolerance_percent = 50;  // met all the same
   CHECK(fit_subdivision_volume(sample.target, sample.template_mesh, options).report.stop_reason ==
         StopReason::converged);
