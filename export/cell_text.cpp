@@ -236,15 +236,14 @@ void append_old_nodes(std::string& text, const CellView& mesh) {
   text += "$EndNodes\n";
 }
 
-/// Appends the elements with their types, physical groups and volumes or surfaces. of_element receives the cell of each.
+/// Appends the elements with their types, physical groups and volumes or surfaces.
 void append_old_elements(std::string& text, const CellView& mesh, const Blocks& blocks,
                          const std::map<Volume, int>& volumes, const std::map<int, int>& groups,
-                         const FaceBlocks& face_blocks, const std::map<Surface, int>& surfaces,
-                         std::vector<std::size_t>& of_element) {
+                         const FaceBlocks& face_blocks, const std::map<Surface, int>& surfaces) {
   std::string lines;
-  const auto append = [&](std::size_t cell, int type, int group, int entity, std::span<const Index> nodes) {
-    of_element.push_back(cell);
-    append_number(lines, of_element.size());
+  std::size_t count = 0;
+  const auto append = [&](int type, int group, int entity, std::span<const Index> nodes) {
+    append_number(lines, ++count);
     for (const int number : {type, 2, group, entity}) (lines += ' ') += std::to_string(number);
     for (const Index v : nodes) {
       lines += ' ';
@@ -254,15 +253,15 @@ void append_old_elements(std::string& text, const CellView& mesh, const Blocks& 
   };
   for (const auto& [key, cells] : blocks)
     for (const std::size_t c : cells)
-      append(c, gmsh_type(key.second, key.first.order), groups.at(key.first.reference), volumes.at(key.first),
+      append(gmsh_type(key.second, key.first.order), groups.at(key.first.reference), volumes.at(key.first),
              mesh.cell(c));
   const std::vector<int> numbers = mesh.faces ? physical_surfaces(mesh.faces->groups) : std::vector<int>{};
   for (const auto& [key, faces] : face_blocks)
     for (const std::size_t f : faces)
       for (const Index group : key.first.groups)
-        append(static_cast<std::size_t>(mesh.faces->cells[f]), gmsh_face_type(key.second, key.first.order),
-               numbers[static_cast<std::size_t>(group)], surfaces.at(key.first), mesh.faces->face(f));
-  text += "$Elements\n" + std::to_string(of_element.size()) + "\n" + lines + "$EndElements\n";
+        append(gmsh_face_type(key.second, key.first.order), numbers[static_cast<std::size_t>(group)],
+               surfaces.at(key.first), mesh.faces->face(f));
+  text += "$Elements\n" + std::to_string(count) + "\n" + lines + "$EndElements\n";
 }
 
 // --- Data -----------------------------------------------------------------------------------------------------------
@@ -386,17 +385,15 @@ std::string msh_document(const CellView& mesh, std::span<const double> cell_mini
   std::string text = is_old ? "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n" : "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
   const std::map<int, int> groups = physical_groups(blocks);
   append_physical_names(text, mesh, groups);
-  std::vector<std::size_t> of_element;
-  if (is_old) {
+  if (is_old) {  // without data of elements, which meshio does not read from this version
     append_old_nodes(text, mesh);
-    append_old_elements(text, mesh, blocks, volumes, groups, face_blocks, surfaces, of_element);
+    append_old_elements(text, mesh, blocks, volumes, groups, face_blocks, surfaces);
   } else {
     append_entities(text, mesh, surfaces, volumes, groups);
     append_nodes(text, mesh);
     append_elements(text, mesh, blocks, volumes, face_blocks, surfaces);
-    of_element = cells_of_elements(mesh, blocks, face_blocks);
+    if (!cell_minima.empty()) append_element_data(text, cells_of_elements(mesh, blocks, face_blocks), cell_minima);
   }
-  if (!cell_minima.empty()) append_element_data(text, of_element, cell_minima);
   for (const VertexField& field : fields) append_node_data(text, field);
   return text;
 }

@@ -16,6 +16,10 @@ from pathlib import Path
 
 SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's packages are for
 
+# What dolfinx compiles is kept in a folder of its own: one that an interrupted run has left unfinished is an error.
+CACHE = tempfile.TemporaryDirectory()
+os.environ["XDG_CACHE_HOME"] = CACHE.name
+
 try:
     import ufl
     from dolfinx import fem, io

@@ -180,6 +180,8 @@ class SurfaceMeshes(InFolder):
         with self.assertRaisesRegex(subvol.Error, "nowhere.off"):
             subvol.read("nowhere.off")
         with self.assertRaisesRegex(subvol.InputError, "unknown"):
+            subvol.read("what.abc")
+        with self.assertRaisesRegex(subvol.InputError, "holds points without faces"):
             subvol.read("what.xyz")
         with self.assertRaisesRegex(subvol.InputError, "extension"):
             subvol.write("what.xyz", cube())
