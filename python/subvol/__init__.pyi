@@ -81,6 +81,8 @@ class VolumeMesh:
     @property
     def references(self) -> Ints: ...
     @property
+    def regions(self) -> Dict[str, Any]: ...
+    @property
     def creases(self) -> Ints: ...
     @property
     def crease_sharpness(self) -> Floats: ...
@@ -217,6 +219,8 @@ class OptimizeResult(Result):
 
 class ShellResult(Result):
     @property
+    def surface(self) -> SurfaceMesh: ...  # with its repairs, without skipped patches
+    @property
     def mesh(self) -> Any: ...  # VolumeMesh; with order HighOrderMesh
     @property
     def linear_mesh(self) -> VolumeMesh: ...
@@ -313,7 +317,7 @@ def shell(
     straight: bool = False,
     crease_angle: Optional[float] = None,
     first_height: Optional[Union[float, str]] = None,
-    skip: Optional[Union[int, str, Sequence[Union[int, str, Sequence[float]]]]] = None,
+    skip: Optional[Union[int, str, Sequence[Union[int, str]]]] = None,
     repair: Union[float, str] = "0.02%",
     order: int = 1,
     basis: Basis = "legendre",
