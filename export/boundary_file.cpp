@@ -96,7 +96,9 @@ std::vector<std::int32_t> group_numbers_of_faces(const PolygonMesh& mesh) {
   return numbers_of_faces(mesh, positive_groups(mesh.face_groups.groups));
 }
 
-void append_group_fields(std::string& text, const FaceGroups& groups) { append_groups(text, positive_groups(groups.groups)); }
+void append_group_fields(std::string& text, const FaceGroups& groups) {
+  append_groups(text, positive_groups(groups.groups));
+}
 
 std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin& origin) {
   require_boundary(boundary, origin);

@@ -19,8 +19,8 @@ struct BoundaryOrigin {
 
 /// Returns the number of each face's group, 0 for none; a number below 1 of a group is replaced by the lowest free one.
 std::vector<std::int32_t> group_numbers_of_faces(const PolygonMesh& mesh);
-/// Appends the `<FieldData>` `group_numbers` and `group_names` of the groups, with the same numbers; nothing if there are
-/// none.
+/// Appends the `<FieldData>` `group_numbers` and `group_names` of the groups, with the same numbers; nothing if there
+/// are none.
 void append_group_fields(std::string& text, const FaceGroups& groups);
 
 /// Returns the faces of a boundary as a VTK XML unstructured grid of triangles, quads and polygons (5, 9, 7).

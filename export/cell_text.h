@@ -29,9 +29,9 @@ struct CellView {
   std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
 };
 
-/// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13) without `orders`, else of version 2.2 with Lagrange cells
-/// and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty. They stand behind the
-/// grid, because some readers stop at field data before it; the groups of plain cells stand at its end.
+/// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13) without `orders`, else of version 2.2 with Lagrange
+/// cells and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty. They stand
+/// behind the grid, because some readers stop at field data before it; the groups of plain cells stand at its end.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {}, const std::string& group_data = {});
 

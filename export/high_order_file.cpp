@@ -97,9 +97,10 @@ std::string nodal_text_of(const HighOrderMesh& mesh, const std::string& extensio
                           const HighOrderFileOptions& options) {
   require_writable(mesh, options);
   if (extension != ".mfem" && mesh.space.max_order() > 2)
-    throw InputError("cells of order " + std::to_string(mesh.space.max_order()) +
-                     ", but elements of this format have order 2 at most (C3D20, HEX27); fit with --order 2, or write a .msh, "
-                     ".mfem or .vtu");
+    throw InputError(
+        "cells of order " + std::to_string(mesh.space.max_order()) +
+        ", but elements of this format have order 2 at most (C3D20, HEX27); fit with --order 2, or write a .msh, "
+        ".mfem or .vtu");
   return nodal_text(extension, written_nodes(mesh, extension, options));
 }
 
@@ -312,7 +313,8 @@ void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh, 
     return write_volume_mesh(path, small_cells(mesh, options));
   }
   if (extension != ".vtu" && extension != ".msh" && !is_nodal_output(extension))
-    throw InputError(path.string() + ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .e, .exo, .xdmf, .mesh or .vtk");
+    throw InputError(path.string() +
+                     ": expected the extension .vtu, .msh, .inp, .bdf, .mfem, .e, .exo, .xdmf, .mesh or .vtk");
   try {
     if (is_nodal_output(extension)) return write_file_atomically(path, nodal_text_of(mesh, extension, options));
     write_file_atomically(path, extension == ".vtu" ? vtu_text(mesh, options) : msh_text(mesh, options));

@@ -50,8 +50,8 @@ inline constexpr int kMaxVtkOrder = 12;
 PolynomialMap file_cells(const HighOrderMesh& mesh, const std::string& extension,
                          double map_tolerance_percent = kMapTolerancePercent);
 
-/// Returns what a .inp, .bdf, .mfem, .e, .exo or .xdmf holds of a mesh: the cells of `file_cells` at the nodes of the format, with
-/// references and groups.
+/// Returns what a .inp, .bdf, .mfem, .e, .exo or .xdmf holds of a mesh: the cells of `file_cells` at the nodes of the
+/// format, with references and groups.
 NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension,
                         const HighOrderFileOptions& options = {});
 
@@ -78,9 +78,10 @@ std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
 /// InputError: as above, and for meshes of orders beyond what Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes.
 std::string msh_text(const HighOrderMesh& mesh, const HighOrderFileOptions& options = {});
 
-/// Writes .vtu or .msh as above, .inp, .bdf, .mfem, .e, .exo or .xdmf as the cells of `file_cells` (subvol/io/nodal_writers.h), or .mesh
-/// or .vtk as `linear_cells` (whose references are those of the curved cells); the whole file or nothing.
-/// InputError: another extension, orders above 2 in these but .mfem, and as above. IoError: the file cannot be written.
+/// Writes .vtu or .msh as above, .inp, .bdf, .mfem, .e, .exo or .xdmf as the cells of `file_cells`
+/// (subvol/io/nodal_writers.h), or .mesh or .vtk as `linear_cells` (whose references are those of the curved cells);
+/// the whole file or nothing. InputError: another extension, orders above 2 in these but .mfem, and as above. IoError:
+/// the file cannot be written.
 void write_volume(const std::filesystem::path& path, const HighOrderMesh& mesh,
                   const HighOrderFileOptions& options = {});
 

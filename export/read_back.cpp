@@ -147,8 +147,8 @@ void compare_vtu(const WrittenFile& file, const CellView& wanted) {
     file.same(std::equal(wanted.positions[v].begin(), wanted.positions[v].end(), &points[3 * v]), "point", v);
   for (std::size_t c = 0; c < wanted.num_cells(); ++c) {
     const bool is_linear = wanted.orders.empty();
-    file.same(types[c] == (is_linear ? vtk_linear_type(wanted.kinds[c]) : vtk_type(wanted.kinds[c])), "the kind of cell",
-              c);
+    file.same(types[c] == (is_linear ? vtk_linear_type(wanted.kinds[c]) : vtk_type(wanted.kinds[c])),
+              "the kind of cell", c);
     file.same(ends[c] == static_cast<std::int64_t>(wanted.offsets[c + 1]), "the end of cell", c);
     std::vector<std::int64_t> cell(wanted.cell(c).begin(), wanted.cell(c).end());
     if (is_linear && wanted.kinds[c] == CellKind::prism) turn_wedge(cell.data());
@@ -281,7 +281,8 @@ void compare_nodal(const WrittenFile& file, const std::string& extension, const 
     file.same(found.kinds[n] == wanted.kinds[c] && found.orders[n] == wanted.orders[c], "the kind of cell", c);
     for (int i = 0; i < cell_topology(wanted.kinds[c]).num_vertices; ++i) {
       const auto corner = [&](const NodalMesh& mesh) -> const Vec3& {
-        return mesh.positions[static_cast<std::size_t>(mesh.cell(&mesh == &found ? n : c)[static_cast<std::size_t>(i)])];
+        return mesh
+            .positions[static_cast<std::size_t>(mesh.cell(&mesh == &found ? n : c)[static_cast<std::size_t>(i)])];
       };
       const double size = corner(wanted).cwiseAbs().maxCoeff();
       // Sixteen characters hold eight digits at least, twenty characters twelve.
@@ -501,7 +502,8 @@ void require_written(const fs::path& path, const PolygonMesh& surface) {
   read_back(path, [&](const WrittenFile& file) {
     const std::string extension = lower_case_extension(path);
     if (is_surface_output(extension)) {
-      if (read_file(path.string()) != surface_bytes(extension, surface)) file.differs("its bytes are not what was written");
+      if (read_file(path.string()) != surface_bytes(extension, surface))
+        file.differs("its bytes are not what was written");
       return;
     }
     Vec3 origin = Vec3::Zero();

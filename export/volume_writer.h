@@ -42,8 +42,8 @@ enum class MshVersion {
 std::string msh_text(const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                      std::span<const VertexField> fields = {}, MshVersion version = MshVersion::v4_1);
 
-/// Writes `vtu_text`, `msh_text`, or the cells as .inp, .bdf, .mfem, .e, .exo or .xdmf (subvol/io/nodal_writers.h), which
-/// hold neither minima nor fields, depending on the extension; the whole text or nothing. InputError: another
+/// Writes `vtu_text`, `msh_text`, or the cells as .inp, .bdf, .mfem, .e, .exo or .xdmf (subvol/io/nodal_writers.h),
+/// which hold neither minima nor fields, depending on the extension; the whole text or nothing. InputError: another
 /// extension. IoError: the file cannot be written.
 void write_volume(const std::filesystem::path& path, const VolumeMesh& mesh, std::span<const double> cell_minima = {},
                   std::span<const VertexField> fields = {}, MshVersion version = MshVersion::v4_1);

@@ -275,27 +275,12 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
   trial.feature_miss = feature_miss(surface);
-  trial.cells = mesh_.num_cells();
   trial.mean_percent = 100 * distance.mean();
   trial.max_percent = 100 * distance.max();
-  trial.least_scaled_jacobian = quality.min_scaled_jacobian;
-  trial.mean_scaled_jacobian = quality.mean_scaled_jacobian;
   trial.least_share = least_share_;
-  trial.uncertified = quality.certificate.not_certified.size();
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
-  const std::optional<CreaseDistance> edges = distance_of_edges();
-  if (edges) {
-    trial.curves = edges->num_curves;
-    trial.followed_curves = edges->num_followed;
-    trial.within_share = edges->within_share();
-  }
-  trial.merit = merit_of(trial, options_);
-  result_.trials.push_back(trial);
   const bool going = trial.self_intersections.has_value();
-  if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return going;
-  result_.chosen = result_.trials.size() - 1;
-  result_.mesh = mesh_;
-  result_.report.creases = edges;
+  if (!add_trial(std::move(trial), mesh_, quality, distance_of_edges(), options_, result_)) return going;
   result_.missed_edges.clear();
   if (layout_)
     result_.missed_edges = missed_edges(layout_->routing.unfollowed, edges_.features.curves, target_.normalisation);

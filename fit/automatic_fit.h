@@ -27,8 +27,8 @@ inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5
 inline constexpr double kAutomaticFeatureShare = 0.1;
 /// Largest difference of a region's volume that an automatic fit aims at, in percent of that volume.
 inline constexpr double kAutomaticVolumePercent = 0.1;
-/// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp edges,
-/// and of parts with them.
+/// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp
+/// edges, and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
 inline constexpr std::array<std::size_t, 3> kAutomaticEdgeCells{3000, 10000, 30000};
 
@@ -95,14 +95,14 @@ struct AutomaticFitResult {
 /// poor or meets itself, a larger template is tried if the number of cells is free; otherwise one with as many cells as
 /// allowed, which is not refined.
 ///
-/// With sharp edges: a grid, through the target's planes where it has any, is fitted smoothly, only to find out what lies
-/// where. The edges are routed on it, and patches between them are padded (`edge_layout`). That mesh is fitted from the
-/// grid's positions, with creases, each patch against its own regions of the target. Edges at which cells stay poor are
-/// given up, and the rest is routed anew. A grid that is not through planes is tried, too, if less than 40 % of the
-/// target's area lies on them.
+/// With sharp edges: a grid, through the target's planes where it has any, is fitted smoothly, only to find out what
+/// lies where. The edges are routed on it, and patches between them are padded (`edge_layout`). That mesh is fitted
+/// from the grid's positions, with creases, each patch against its own regions of the target. Edges at which cells stay
+/// poor are given up, and the rest is routed anew. A grid that is not through planes is tried, too, if less than 40 %
+/// of the target's area lies on them.
 ///
-/// Faces on flat parts of such a target are made exactly flat (`flatten_faces`). A number of cells at which less than 80 %
-/// of the edges' length finds a path is skipped if a larger one follows.
+/// Faces on flat parts of such a target are made exactly flat (`flatten_faces`). A number of cells at which less than
+/// 80 % of the edges' length finds a path is skipped if a larger one follows.
 ///
 /// The best trial is kept; no other is made once the merit is below 0.1, not counting a share of the quality of 85 % or
 /// more:
@@ -118,15 +118,15 @@ struct AutomaticFitResult {
 /// Same bits for any number of threads, except under a time limit.
 AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options = {});
 
-/// Fills several regions with hexes whose interfaces conform: the references of cells are the regions' numbers, and faces
-/// between regions are in groups (`add_interface_groups`).
+/// Fills several regions with hexes whose interfaces conform: the references of cells are the regions' numbers, and
+/// faces between regions are in groups (`add_interface_groups`).
 ///
 /// The template is a grid labelled by region (`region_template`), with layers of cells on both sides of all sheets but
 /// those that lie exactly on the grid (`pillow_regions`). Sheets of regions (a, b) and the target's triangles between a
-/// and b correspond to each other and to nothing else. If the target is a designed part, sharp edges and the curves where
-/// sheets meet are routed on the sheets (`sheet_layout`), so that parts of sheets correspond to parts between curves, and
-/// faces on flat parts become exactly flat. Else the template has about an eighth of the cells and is refined once, unless
-/// the regions need more.
+/// and b correspond to each other and to nothing else. If the target is a designed part, sharp edges and the curves
+/// where sheets meet are routed on the sheets (`sheet_layout`), so that parts of sheets correspond to parts between
+/// curves, and faces on flat parts become exactly flat. Else the template has about an eighth of the cells and is
+/// refined once, unless the regions need more.
 ///
 /// Larger templates are tried as by `fit_automatically`; distances are the largest of the outer surface's and of all
 /// interfaces', and the merit also counts

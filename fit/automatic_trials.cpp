@@ -53,6 +53,27 @@ bool is_good_enough(const AutomaticFitTrial& trial) {
   return trial.merit - excused < kGoodMerit;
 }
 
+bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityReport& quality,
+               const std::optional<CreaseDistance>& edges, const AutomaticFitOptions& options,
+               AutomaticFitResult& result) {
+  trial.cells = mesh.num_cells();
+  trial.least_scaled_jacobian = quality.min_scaled_jacobian;
+  trial.mean_scaled_jacobian = quality.mean_scaled_jacobian;
+  trial.uncertified = quality.certificate.not_certified.size();
+  if (edges) {
+    trial.curves = edges->num_curves;
+    trial.followed_curves = edges->num_followed;
+    trial.within_share = edges->within_share();
+  }
+  trial.merit = merit_of(trial, options);
+  result.trials.push_back(trial);
+  if (result.trials.size() > 1 && trial.merit >= result.trials[result.chosen].merit) return false;
+  result.chosen = result.trials.size() - 1;
+  result.mesh = mesh;
+  result.report.creases = edges;
+  return true;
+}
+
 std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves,
                                      const Normalisation& normalisation) {
   std::vector<MissedEdge> missed;

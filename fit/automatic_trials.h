@@ -3,9 +3,11 @@
 
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/features/feature_routing.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/fit/target/fit_target.h"
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,6 +28,13 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
 
 /// Returns true if no other template needs to be tried.
 bool is_good_enough(const AutomaticFitTrial& trial);
+
+/// Completes a trial by what was measured of its mesh, and adds it to a result. Returns true if it is the best one so
+/// far; the result then holds the mesh and its edges. trial  with its distances, self-intersections and least share of
+/// the goal. edges  how well edges are followed; nothing: there are none to follow.
+bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityReport& quality,
+               const std::optional<CreaseDistance>& edges, const AutomaticFitOptions& options,
+               AutomaticFitResult& result);
 
 /// Returns the curves that no path follows, longest first, in the target's own coordinates.
 /// curves  in normalized coordinates, as are the places of `unfollowed`.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/mesh_check.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/length_range.h"
 #include "subvol/fit/certificate/high_order_certificate.h"
@@ -31,25 +32,11 @@ bool has_any(const std::vector<MeshDefect>& defects, std::initializer_list<Kind>
   });
 }
 
-/// Disjoint sets of the numbers 0 .. n - 1 (union-find).
-class Groups {
- public:
-  explicit Groups(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
-  void join(Index a, Index b) { parent_[root(a)] = root(b); }
-  Index root(Index a) {
-    while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
-    return a;
-  }
-
- private:
-  std::vector<Index> parent_;
-};
-
 void check_topology(const VolumeMesh& mesh, const MeshTopology& topology, MeshCheck& check) {
   check.has_topology = true;
   check.num_edges = topology.num_edges();
   check.num_faces = topology.num_faces();
-  Groups cells(mesh.num_cells()), vertices(mesh.num_vertices());
+  DisjointSets cells(mesh.num_cells()), vertices(mesh.num_vertices());
   for (std::size_t f = 0; f < topology.num_faces(); ++f) {
     const Index face = static_cast<Index>(f);
     const auto [first, second] = topology.face_cells(face);
@@ -58,14 +45,14 @@ void check_topology(const VolumeMesh& mesh, const MeshTopology& topology, MeshCh
       for (const Index v : topology.face(face)) vertices.join(v, topology.face(face)[0]);
   }
   for (std::size_t c = 0; c < mesh.num_cells(); ++c)
-    check.num_components += cells.root(static_cast<Index>(c)) == static_cast<Index>(c);
+    check.num_components += cells.of(static_cast<Index>(c)) == static_cast<Index>(c);
   std::vector<char> used(mesh.num_vertices(), 0);
   for (const Index v : mesh.cell_vertices) used[v] = 1;
   for (std::size_t i = 0; i < mesh.num_vertices(); ++i) {
     const Index v = static_cast<Index>(i);
     if (!topology.is_boundary_vertex(v)) continue;
     ++check.num_boundary_vertices;
-    check.num_boundary_components += vertices.root(v) == v;
+    check.num_boundary_components += vertices.of(v) == v;
   }
   for (std::size_t e = 0; e < topology.num_edges(); ++e)
     check.num_boundary_edges += topology.is_boundary_edge(static_cast<Index>(e));

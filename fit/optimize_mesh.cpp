@@ -125,8 +125,8 @@ class MeshOptimizer {
 
  private:
   enum class Boundary { fixed, sliding };
-  /// What is held for the sake of the regions' volumes, each after all before: nothing; the volumes, by lowering lambda;
-  /// the vertices of interfaces; those of the boundary.
+  /// What is held for the sake of the regions' volumes, each after all before: nothing; the volumes, by lowering
+  /// lambda; the vertices of interfaces; those of the boundary.
   enum class Held { nothing, volumes, interfaces, sheets };
 
   std::vector<std::array<Index, 2>> tagged_edges() const;
@@ -273,7 +273,8 @@ std::unique_ptr<SurfaceTerm> MeshOptimizer::surface_term(bool emphasize_far) con
   const int points = samples_.triangles.size() > target_.surface.triangles().size() ? 1 : 3;
   auto surface = std::make_unique<ClosestPointEnergy>(target_.surface, samples_.triangles, samples_.points.size(),
                                                       kTangentialWeight, points);
-  if (!interfaces_.empty()) surface->set_groups(groups_of_triangles(samples_.triangle_faces, face_groups_), target_.group_of_triangle);
+  if (!interfaces_.empty())
+    surface->set_groups(groups_of_triangles(samples_.triangle_faces, face_groups_), target_.group_of_triangle);
   if (emphasize_far) surface->emphasize_far(kFarDistance);
   surface->refine(refined_);
   if (!creases_.curves().empty())

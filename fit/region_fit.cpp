@@ -110,8 +110,8 @@ void RegionFit::find_curves() {
   if (follows_edges_) curves_ = sheet_curves(unit_, options_.crease_angle_degrees);
 }
 
-/// Returns a labelled grid that has about so many cells once it is pillowed; nothing if there is none, or if the fit must
-/// end.
+/// Returns a labelled grid that has about so many cells once it is pillowed; nothing if there is none, or if the fit
+/// must end.
 std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   RegionTemplateOptions options;
   options.cells = std::clamp(cells, kLeastTemplateCells, kMostTemplateCells);
@@ -233,8 +233,8 @@ double RegionFit::volume_percent() const {
   return largest;
 }
 
-/// Makes flat sheets of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the fit
-/// must end.
+/// Makes flat sheets of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
+/// fit must end.
 bool RegionFit::judge(AutomaticFitTrial trial) {
   constexpr double kLeastAfterFlattening = 0.3;  // a cell may become as poor, for what is exact
 
@@ -244,31 +244,19 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   const SurfaceDistance outer =
       target_.distance(refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_))));
   const SurfaceDistance inner = target_.interface_distance(mesh_);
-  trial.cells = mesh_.num_cells();
   trial.through_planes = template_.through_planes;
   trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
   trial.max_percent = 100 * std::max(outer.max(), inner.max());
   trial.volume_percent = volume_percent();
-  trial.least_scaled_jacobian = quality.min_scaled_jacobian;
-  trial.mean_scaled_jacobian = quality.mean_scaled_jacobian;
   trial.least_share = least_share_;
-  trial.uncertified = quality.certificate.not_certified.size();
   trial.self_intersections = runner_.intersecting_pairs(sheet_triangles(mesh_), result_.report);
   std::optional<CreaseDistance> edges;
   if (layout_ && !curves_.features.curves.empty()) {
     edges = crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
     edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
-    trial.curves = edges->num_curves;
-    trial.followed_curves = edges->num_followed;
-    trial.within_share = edges->within_share();
   }
-  trial.merit = merit_of(trial, options_);
-  result_.trials.push_back(trial);
   const bool going = trial.self_intersections.has_value();
-  if (result_.trials.size() > 1 && trial.merit >= result_.trials[result_.chosen].merit) return going;
-  result_.chosen = result_.trials.size() - 1;
-  result_.mesh = mesh_;
-  result_.report.creases = edges;
+  if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return going;
   result_.missed_edges.clear();
   if (layout_)
     result_.missed_edges = missed_edges(layout_->routing.unfollowed, curves_.features.curves, target_.normalisation);

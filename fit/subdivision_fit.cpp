@@ -438,8 +438,8 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
 }
 
 /// Raises the lowest scaled Jacobians of the finest mesh: by a lift alone or, if that brings nothing, by all quality
-/// stages. If the distances suffer, the surface counts more in another attempt. Rolls back if they suffer still. Returns
-/// false if the fit must end.
+/// stages. If the distances suffer, the surface counts more in another attempt. Rolls back if they suffer still.
+/// Returns false if the fit must end.
 bool SubdivisionFit::raise_quality() {
   // A cage has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free.
   struct Attempt {

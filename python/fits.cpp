@@ -83,8 +83,9 @@ class Fit {
     else
       keywords_.take("cells", choice_options_.cells);
     if (curved_) {
-      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far", "quality"},
-                       "does not go with order");
+      keywords_.refuse(
+          {"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far", "quality"},
+          "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
       choice_options_.order = high_order_.order;

@@ -138,7 +138,8 @@ class Growing {
     curved_options_.cancelled = work_.cancelled();
     result.curved_shell = work_.run("curve", [&] { return curve_shell(shell, curved_options_); });
     cli::take_figures(*result.curved_shell, shell);
-    result.curved = std::make_shared<CurvedMesh>(CurvedMesh{result.curved_shell->mesh, shell.mesh.references, shell.mesh.face_groups});
+    result.curved = std::make_shared<CurvedMesh>(
+        CurvedMesh{result.curved_shell->mesh, shell.mesh.references, shell.mesh.face_groups});
   }
 
   Json report_of(const Shelled& result) const {

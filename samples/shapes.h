@@ -33,8 +33,8 @@ std::vector<Sample> all_samples();
 PolygonMesh bowl_surface(int n = 12);
 
 /// A quarter of a plate with a hole, for a static analysis: 2 x 1 x 0.02, its hole of radius 0.25 around the origin.
-/// Quads with the groups symmetry_x, symmetry_y and symmetry_z (where x, y or z is 0), hole, loaded (x = 2), side and top;
-/// outward.
+/// Quads with the groups symmetry_x, symmetry_y and symmetry_z (where x, y or z is 0), hole, loaded (x = 2), side and
+/// top; outward.
 PolygonMesh plate_surface();
 
 /// A connecting rod with two bores: 2.8 long, 0.3 thick. Quads with the groups small_bore, large_bore, side, bottom and

@@ -96,7 +96,8 @@ PolygonMesh rod_surface() {
     const auto vertex = [&](std::size_t side, int ring, int layer) {
       const Vec3& out = outline[side % outline.size()];
       const double share = static_cast<double>(ring) / kRings;
-      const Vec3 at = ring == kRings ? out : Vec3((1 - share) * (center + end.bore * (out - center).normalized()) + share * out);
+      const Vec3 at =
+          ring == kRings ? out : Vec3((1 - share) * (center + end.bore * (out - center).normalized()) + share * out);
       return rod.vertex(at + Vec3(0, 0, kRodThickness * layer / kLayers));
     };
     for (std::size_t side = 0; side < outline.size(); ++side) {

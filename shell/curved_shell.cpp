@@ -109,8 +109,8 @@ class CurvedShellCheck {
   std::function<CurvedBoundary(const HighOrderMesh&)> make_boundary_;
 };
 
-/// Makes the problem with the surface's sheet fixed: nodes without a strand are not degrees of freedom. Those of columns
-/// that stay in a plane move in it.
+/// Makes the problem with the surface's sheet fixed: nodes without a strand are not degrees of freedom. Those of
+/// columns that stay in a plane move in it.
 FitProblem make_problem(const ShellResult& shell, const HighOrderMesh& mesh, const NodeStrands& strands,
                         std::vector<Vec3>& unknowns) {
   constexpr int kLeastPoints = 5;

@@ -5,6 +5,7 @@
 #include "subvol/shell/surface_faults.h"
 #include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/corner_fans.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
@@ -138,7 +139,8 @@ Rating rating_of(const Patch& patch, double distance) {
   double least = 1;
   for (std::size_t v = 0; v < normals.size(); ++v) {
     if (!patch.is_inner[v] || normals[v].empty()) continue;
-    const bool is_flat = std::any_of(normals[v].begin(), normals[v].end(), [](const Vec3& n) { return !(n.norm() > 0.5); });
+    const bool is_flat =
+        std::any_of(normals[v].begin(), normals[v].end(), [](const Vec3& n) { return !(n.norm() > 0.5); });
     const std::optional<Vec3> direction = is_flat ? std::nullopt : most_visible_direction(normals[v]);
     if (!direction) {
       ++rating.faults;
@@ -241,7 +243,8 @@ Patch LocalMender::patch_around(const std::vector<Index>& seeds, std::vector<Ind
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
     if (done_.is_dropped[t]) continue;
     const Eigen::AlignedBox3d box = box_of(static_cast<Index>(t));
-    if (whole.intersects(box) && std::any_of(boxes.begin(), boxes.end(), [&](const auto& b) { return b.intersects(box); }))
+    if (whole.intersects(box) &&
+        std::any_of(boxes.begin(), boxes.end(), [&](const auto& b) { return b.intersects(box); }))
       chosen.insert(static_cast<Index>(t));
   }
   Patch patch;
@@ -417,25 +420,14 @@ bool is_manifold(std::span<const std::array<Index, 3>> triangles, std::size_t nu
   });
   if (!result) return false;
   // Fans are told apart by following them from triangle to triangle.
-  std::vector<Index> root(3 * triangles.size());
-  for (std::size_t c = 0; c < root.size(); ++c) root[c] = static_cast<Index>(c);
-  const auto find = [&](Index c) {
-    while (root[c] != c) c = root[c] = root[root[c]];
-    return c;
-  };
-  const auto corner = [&](Index t, Index v) {
-    const Corners& c = triangles[t];
-    return static_cast<Index>(3 * t + (c[0] == v ? 0 : c[1] == v ? 1 : 2));
-  };
+  CornerFans fans(triangles);
   for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
-    if (edge.size() == 2)
-      for (const Index v : {edge[0].low, edge[0].high})
-        root[find(corner(edge[0].triangle, v))] = find(corner(edge[1].triangle, v));
+    if (edge.size() == 2) fans.join(edge[0], edge[1]);
   });
   std::vector<Index> fan(num_vertices, kNoIndex);
-  for (std::size_t c = 0; c < root.size(); ++c) {
+  for (std::size_t c = 0; c < fans.num_corners(); ++c) {
     Index& known = fan[triangles[c / 3][c % 3]];
-    const Index own = find(static_cast<Index>(c));
+    const Index own = fans.of(c);
     if (known == kNoIndex) known = own;
     if (known != own) return false;
   }

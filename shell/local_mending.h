@@ -11,15 +11,15 @@
 
 namespace subvol {
 
-/// Returns true if every edge has one triangle or two that run along it in opposite directions, and every vertex one fan
-/// of triangles.
+/// Returns true if every edge has one triangle or two that run along it in opposite directions, and every vertex one
+/// fan of triangles.
 bool is_manifold(std::span<const std::array<Index, 3>> triangles, std::size_t num_vertices);
 
 /// Moves vertices toward the middle of the triangles around them, by half the distance, or by a tenth of their shortest
 /// edge if that is less. Vertices whose neighbors lie all around stay.
 void move_toward_fans(TriangleMesh& mesh, std::span<const Index> vertices, double distance);
 
-/// What `mend_locally` did.
+/// The changes that `mend_locally` has made.
 struct LocalMending {
   std::vector<char> is_dropped;    ///< per triangle of the mesh
   std::size_t flipped_edges = 0, moved_vertices = 0;
@@ -30,7 +30,8 @@ struct LocalMending {
 /// leaves the fewest faults; see `mend_surface`.
 ///
 /// mesh      changed in place; dropped triangles keep some numbers.
-/// distance  largest change, in the mesh's unit: length of edges that collapse, distance of the diagonals of a flip, way
+/// distance  largest change, in the mesh's unit: length of edges that collapse, distance of the diagonals of a flip,
+/// way
 ///           of a vertex from where it was.
 /// Faults for which no change helps are left, and if there are more than a thousand, all are.
 LocalMending mend_locally(TriangleMesh& mesh, double distance, const std::function<bool()>& cancelled);

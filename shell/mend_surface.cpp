@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/shell/mend_surface.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/geometry/surface_distance.h"
@@ -8,6 +9,7 @@
 #include "subvol/shell/partial_surface.h"
 #include "subvol/shell/surface_faults.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/corner_fans.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <algorithm>
@@ -40,13 +42,9 @@ void require_valid(const PolygonMesh& surface) {
 /// Returns for each vertex the smallest number of a vertex that it is to become: one within a distance, directly or
 /// through others.
 std::vector<Index> merged_numbers(std::span<const Vec3> positions, double distance) {
-  std::vector<Index> root(positions.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](Index v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
-  std::vector<Index> order(root);
+  DisjointSets sets(positions.size());
+  std::vector<Index> order(positions.size());
+  std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) {
     return positions[a].x() != positions[b].x() ? positions[a].x() < positions[b].x() : a < b;
   });
@@ -55,11 +53,11 @@ std::vector<Index> merged_numbers(std::span<const Vec3> positions, double distan
       const Vec3 &p = positions[order[i]], &q = positions[order[j]];
       if (q.x() - p.x() > distance) break;
       if ((q - p).norm() > distance) continue;
-      const Index a = find(order[i]), b = find(order[j]);
-      root[std::max(a, b)] = std::min(a, b);
+      sets.join(order[i], order[j]);
     }
-  for (std::size_t v = 0; v < root.size(); ++v) root[v] = find(static_cast<Index>(v));
-  return root;
+  std::vector<Index> numbers(positions.size());
+  for (std::size_t v = 0; v < numbers.size(); ++v) numbers[v] = sets.of(static_cast<Index>(v));
+  return numbers;
 }
 
 /// A surface of triangles on which the steps of the mending work, one after the other.
@@ -125,7 +123,7 @@ void Mender::merge_vertices() {
   drop(is_dropped);
 }
 
-/// Of faces on the same vertices, those of equal orientation become one, and two that face each other vanish.
+/// Merges faces on the same vertices: those of equal orientation become one, and two that face each other vanish.
 void Mender::drop_repeated_faces() {
   std::map<std::array<Index, 3>, std::array<std::vector<std::size_t>, 2>> by_corners;
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -143,43 +141,28 @@ void Mender::drop_repeated_faces() {
   drop(is_dropped);
 }
 
-/// Gives each fan of faces a vertex of its own. Faces are in one fan if they share an edge there; at an edge of more than
-/// two faces those that bound one solid (`pair_around_edge`), if that can be told.
+/// Gives each fan of faces a vertex of its own. Faces are in one fan if they share an edge there; at an edge of more
+/// than two faces those that bound one solid (`pair_around_edge`), if that can be told.
 void Mender::split_fans() {
   const std::size_t num_vertices = mesh_.positions.size();
   const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh_.triangles, num_vertices);
   const bool outward = signed_volume_of(mesh_) >= 0;
-  std::vector<Index> root(3 * mesh_.triangles.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](Index c) {
-    while (root[c] != c) c = root[c] = root[root[c]];
-    return c;
-  };
-  const auto corner = [&](Index t, Index v) {
-    const auto& c = mesh_.triangles[t];
-    return static_cast<Index>(3 * t + (c[0] == v ? 0 : c[1] == v ? 1 : 2));
-  };
-  const auto join = [&](const SurfaceHalfEdge& s, const SurfaceHalfEdge& t) {
-    for (const Index v : {s.low, s.high}) {
-      const Index a = find(corner(s.triangle, v)), b = find(corner(t.triangle, v));
-      root[std::max(a, b)] = std::min(a, b);
-    }
-  };
+  CornerFans fans(mesh_.triangles);
   std::vector<std::array<std::size_t, 2>> pairs;
   for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
     pairs.clear();
     if (edge.size() > 2 && pair_around_edge(mesh_, edge, outward, pairs)) {
-      for (const auto& [i, j] : pairs) join(edge[i], edge[j]);
+      for (const auto& [i, j] : pairs) fans.join(edge[i], edge[j]);
     } else {
-      for (std::size_t i = 1; i < edge.size(); ++i) join(edge[0], edge[i]);
+      for (std::size_t i = 1; i < edge.size(); ++i) fans.join(edge[0], edge[i]);
     }
   });
   std::map<Index, Index> copy_of_fan;  // a vertex's fans but for the first
   std::vector<Index> first_fan(num_vertices, kNoIndex);
   std::set<Index> touched;
-  for (std::size_t c = 0; c < root.size(); ++c) {
+  for (std::size_t c = 0; c < fans.num_corners(); ++c) {
     Index& v = mesh_.triangles[c / 3][c % 3];
-    const Index fan = find(static_cast<Index>(c));
+    const Index fan = fans.of(c);
     if (first_fan[v] == kNoIndex) first_fan[v] = fan;
     if (first_fan[v] == fan) continue;
     const auto [copy, is_new] = copy_of_fan.try_emplace(fan, static_cast<Index>(mesh_.positions.size()));

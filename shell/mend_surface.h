@@ -41,7 +41,8 @@ struct MendedSurface {
 /// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one.
 /// - Where several fans of faces have a vertex or an edge in common, each gets its own copy of it, and the copies move
 ///   apart, each toward its fan.
-/// - At each fault (`find_faults`) the smallest change is made that leaves the fewest: an edge shorter than the distance collapses,
+/// - At each fault (`find_faults`) the smallest change is made that leaves the fewest: an edge shorter than the
+/// distance collapses,
 ///   an edge is exchanged for the other diagonal of its two triangles if these are as close, or a vertex moves by up to
 ///   the distance. If no change helps, two are tried together.
 ///
@@ -54,8 +55,8 @@ struct MendedSurface {
 MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, double distance,
                            const std::function<bool()>& cancelled = {});
 
-/// Returns a sentence that tells what was done, such as "mended within 0.003 (0.004 % of the diagonal): 2 faces dropped";
-/// empty if nothing was.
+/// Returns a sentence that tells what was done, such as "mended within 0.003 (0.004 % of the diagonal): 2 faces
+/// dropped"; empty if nothing was.
 std::string to_text(const MendedSurface& mended, double diagonal);
 
 }  // namespace subvol

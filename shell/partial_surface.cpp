@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/shell/partial_surface.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/mesh/features.h"
@@ -36,15 +37,10 @@ Vec3 area_vector(const PolygonMesh& surface, std::size_t face) {
   return sum;
 }
 
-/// The patches of a surface: faces connected through edges of two faces that are no sharper than an angle. Returns the
-/// smallest face of each face's patch.
+/// Divides a surface into patches: faces connected through edges of two faces that are no sharper than an angle.
+/// Returns the smallest face of each face's patch.
 std::vector<Index> patches(const PolygonMesh& surface, double degrees) {
-  std::vector<Index> root(surface.num_faces());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](Index f) {
-    while (root[f] != f) f = root[f] = root[root[f]];
-    return f;
-  };
+  DisjointSets sets(surface.num_faces());
   struct Side {
     Index low, high, face;
     bool forward;
@@ -70,11 +66,11 @@ std::vector<Index> patches(const PolygonMesh& surface, double degrees) {
     const Side &a = sides[first], &b = sides[first + 1];
     const double sign = a.forward != b.forward ? 1 : -1;  // faces may disagree about the outside
     if (sign * normals[a.face].dot(normals[b.face]) < least) continue;
-    const Index p = find(a.face), q = find(b.face);
-    root[std::max(p, q)] = std::min(p, q);
+    sets.join(a.face, b.face);
   }
-  for (std::size_t f = 0; f < root.size(); ++f) root[f] = find(static_cast<Index>(f));
-  return root;
+  std::vector<Index> patch(surface.num_faces());
+  for (std::size_t f = 0; f < patch.size(); ++f) patch[f] = sets.of(static_cast<Index>(f));
+  return patch;
 }
 
 }  // namespace

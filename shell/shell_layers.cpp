@@ -264,7 +264,8 @@ VolumeFaceGroups shell_groups(const ShellLayers& layers) {
     return wall;
   });
   if (layers.inside > 0) add_sheet(0, [inner = add_group("inner")](std::size_t) { return inner; });
-  if (layers.outside > 0) add_sheet(layers.num_sheets() - 1, [outer = add_group("outer")](std::size_t) { return outer; });
+  if (layers.outside > 0)
+    add_sheet(layers.num_sheets() - 1, [outer = add_group("outer")](std::size_t) { return outer; });
   Index rim = kNoIndex;
   const SurfaceTopology& topology = layers.topology;
   for (std::size_t h = 0; h < topology.twins.size(); ++h) {

@@ -40,8 +40,8 @@ SurfaceFaults find_faults(const PolygonMesh& surface, const std::function<bool()
 /// coordinates; empty if there are none.
 std::string to_text(const SurfaceFaults& faults, const PolygonMesh& surface, const SurfaceNames& names = {});
 
-/// Returns "vertex 4 at (1, 2, 0.5)" for each of the first `kMostNamedPlaces` vertices, and the number of all of them if
-/// there are more.
+/// Returns "vertex 4 at (1, 2, 0.5)" for each of the first `kMostNamedPlaces` vertices, and the number of all of them
+/// if there are more.
 std::string text_of_vertices(std::span<const Index> vertices, std::span<const Vec3> positions,
                              std::span<const Index> names = {});
 

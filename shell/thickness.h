@@ -36,8 +36,8 @@ std::vector<Vec3> thinnest_shell(const ShellLayers& layers, const ShellCheck& ch
                                  std::span<const double> thickness, const std::function<bool()>& cancelled = {},
                                  const std::function<std::string(std::span<const Index>)>& names = {});
 
-/// Turns the directions of columns that stay in planes (`layers.planes`) into these. A column is released from its planes
-/// if no direction in them sees the front of all faces around its vertex at 6 degrees or more.
+/// Turns the directions of columns that stay in planes (`layers.planes`) into these. A column is released from its
+/// planes if no direction in them sees the front of all faces around its vertex at 6 degrees or more.
 void turn_into_planes(ShellLayers& layers, std::span<Vec3> directions);
 
 /// Returns the largest distance of a shell's vertices from the planes in which their columns stay.

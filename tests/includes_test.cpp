@@ -172,14 +172,15 @@ std::vector<std::string> cycles(const std::vector<Source>& sources) {
   return wrong;
 }
 
-/// Includes of files that are not there by this name: each is to be named from the root of the project, and those of the
-/// library as they are installed.
+/// Includes of files that are not there by this name: each is to be named from the root of the project, and those of
+/// the library as they are installed.
 std::vector<std::string> unknown_files(const std::vector<Source>& sources) {
   constexpr std::string_view kMadeByCMake = "subvol/version_macros.h";
   std::vector<std::string> wrong;
   for (const Source& source : sources)
     for (const std::string& include : source.includes)
-      if (include != kMadeByCMake && std::none_of(sources.begin(), sources.end(), [&](const Source& other) { return other.path == include; }))
+      if (include != kMadeByCMake &&
+          std::none_of(sources.begin(), sources.end(), [&](const Source& other) { return other.path == include; }))
         wrong.push_back(source.path + " includes " + include);
   return wrong;
 }

@@ -139,8 +139,8 @@ class Batch {
     return !jobs_.empty() || (!interrupted() && (next_ < pending_.size() || is_patient()));
   }
 
-  /// True for a while after all else is done, if other processes have claimed models: they may be what a killed batch has
-  /// left, and end soon.
+  /// True for a while after all else is done, if other processes have claimed models: they may be what a killed batch
+  /// has left, and end soon.
   bool is_patient() {
     if (elsewhere_.empty()) return false;
     if (!patience_end_) patience_end_ = Clock::now() + after(options_.grace_seconds);

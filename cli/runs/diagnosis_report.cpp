@@ -183,7 +183,8 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
        << formatted(", diagonal %.6g, volume %.6g\n", diagnosis.diagonal, diagnosis.volume);
   std::string reasons;
   for (const SurfaceFinding& finding : diagnosis.findings) {
-    text << formatted("%-20s", to_string(finding.fault).c_str()) << subvol::to_text(finding, diagnosis.diagonal) << '\n';
+    text << formatted("%-20s", to_string(finding.fault).c_str()) << subvol::to_text(finding, diagnosis.diagonal)
+         << '\n';
     for (std::size_t i = 1; i < finding.places.size(); ++i) text << place_line(finding.places[i]);
     if (prevents_filling(finding.fault)) reasons += (reasons.empty() ? "" : ", ") + to_string(finding.fault);
   }

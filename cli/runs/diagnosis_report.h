@@ -19,11 +19,11 @@ struct FileSurface {
 
 FileSurface file_surface(const PolygonMesh& polygons);
 
-/// Loads a surface, the sheets of a mesh with several regions, or those of a segmentation (`surface_of_labels`), ready to be filled. With RegionRule::merge, all
-/// labels are one region. The cancel callback is `interrupted`.
+/// Loads a surface, the sheets of a mesh with several regions, or those of a segmentation (`surface_of_labels`), ready
+/// to be filled. With RegionRule::merge, all labels are one region. An interrupt ends the repair (`interrupted`).
 SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings);
 
-/// The regions of a surface as text and as an entry of a report: numbers, names and volumes.
+/// Return the numbers, names and volumes of a surface's regions, as text and as an entry of a report.
 std::string to_text(const RegionSurface& regions);
 Json regions_json(const RegionSurface& regions);
 

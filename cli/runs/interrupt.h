@@ -3,8 +3,8 @@
 
 namespace subvol::cli {
 
-/// Makes a Ctrl-C or SIGTERM end the program at once with status kInterrupted: as long as there is no result that is worth
-/// saving, and while results are written. The files that are being written are deleted. May be called again.
+/// Makes a Ctrl-C or SIGTERM end the program at once with status kInterrupted: as long as there is no result that is
+/// worth saving, and while results are written. The files that are being written are deleted. May be called again.
 void end_on_interrupt();
 /// Makes the first Ctrl-C or SIGTERM set a flag. The next one, or one that arrives while the program waits for the
 /// reader of a pipe, ends the program at once with status kInterrupted and deletes the files that were being written.

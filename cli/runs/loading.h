@@ -21,7 +21,7 @@ void require_known_file(const std::filesystem::path& path);
 /// True if a path has the extension of a surface and the file has faces. InputError: as `is_point_cloud_file`.
 bool is_surface_file(const std::filesystem::path& path);
 
-/// What a file holds: linear cells, curved cells, or a surface.
+/// Holds what was read from a file: linear cells, curved cells, or a surface.
 using LoadedMesh = std::variant<VolumeMesh, HighOrderFile, PolygonMesh>;
 
 /// Reads a file of cells or of a surface, once.
@@ -52,7 +52,7 @@ TaggedPolygons tagged_polygons(const VolumeMesh& mesh);
 /// `load_polygons` with the tags of a volume mesh; a surface file has none.
 TaggedPolygons load_tagged_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);
 
-/// What --references says if cells are to have none: all are one region.
+/// Value of --references with which cells are read without references, as one region.
 inline constexpr const char* kNoReferences = "none";
 
 /// Loads a volume mesh that is valid except for inverted cells and unused vertices (or, unchecked, is just readable).
@@ -60,8 +60,8 @@ inline constexpr const char* kNoReferences = "none";
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
 
-/// Returns the cells of one region, which is given by its name or its number. UsageError: there is none; the message lists
-/// the regions.
+/// Returns the cells of one region, which is given by its name or its number. UsageError: there is none; the message
+/// lists the regions.
 VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region);
 
 /// `read_curved`; InputError also if the whole mesh is at one point. warnings: may be null.

@@ -43,12 +43,13 @@ struct ShellSurface {
 
 /// Leaves patches out of a surface and mends the rest.
 ///
-/// A patch is given by the name or the number of a group of faces, or as X,Y,Z: then it is the face closest to that point
-/// and all faces that are connected with it through edges of at most `kPatchDegrees`.
-/// UsageError: there is no such group; the message lists the groups. InputError: no face is left; as `mend_surface`.
+/// A patch is given by the name or the number of a group of faces, or as X,Y,Z: then it is the face closest to that
+/// point and all faces that are connected with it through edges of at most `kPatchDegrees`. UsageError: there is no
+/// such group; the message lists the groups. InputError: no face is left; as `mend_surface`.
 ShellSurface prepared_surface(const TaggedPolygons& given, const ShellSurfaceOptions& options);
 
-/// Sets tags, planes, numbers and thicknesses of the given vertices; creases of `options.tags` are added to the surface's.
+/// Sets tags, planes, numbers and thicknesses of the given vertices; creases of `options.tags` are added to the
+/// surface's.
 void take_surface(const ShellSurface& surface, ShellOptions& options);
 
 /// A sentence about the repair, for warnings; nothing if the surface is as it was given.
@@ -70,8 +71,9 @@ struct LayerPlan {
 /// Returns layers of a given first height. Without a growth, it follows from the number of layers; without a number of
 /// layers, it follows from the growth, which is then adapted so that both lengths hold.
 ///
-/// UsageError: neither is given, or both are and do not fit the lengths within 1 %. InputError: as `growth_of_layers` and
-/// `number_of_layers`.
-LayerPlan planned_layers(double thickness, double first_height, std::optional<int> layers, std::optional<double> growth);
+/// UsageError: neither is given, or both are and do not fit the lengths within 1 %. InputError: as `growth_of_layers`
+/// and `number_of_layers`.
+LayerPlan planned_layers(double thickness, double first_height, std::optional<int> layers,
+                         std::optional<double> growth);
 
 }  // namespace subvol::cli

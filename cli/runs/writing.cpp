@@ -225,7 +225,8 @@ void write_output(const Output& output, const HighOrderFile& file, const Writing
 
 void write_output(const Output& output, const PolygonMesh& surface, const WritingOptions& options) {
   if (output.part == Part::boundary && output.extension == ".xdmf")
-    throw UsageError(output.path.string() + ": faces with the numbers of cells' nodes, but there is only a surface; take "
+    throw UsageError(output.path.string() +
+                     ": faces with the numbers of cells' nodes, but there is only a surface; take "
                      ".vtu or .vtk");
   if (output.part == Part::boundary) return write_boundary_file(output, surface);
   if (output.is_volume()) throw UsageError(output.path.string() + ": this format holds cells, not surfaces");

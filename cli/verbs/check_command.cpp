@@ -156,7 +156,9 @@ void add_check_command(CLI::App& app, Action& action) {
       app.add_subcommand("check", "Say what is true of a volume mesh (defects, quality, certificate, distance), or "
                                   "what is in the way of filling a surface");
   const auto arguments = std::make_shared<CheckArguments>();
-  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats() + "; or surface: " + surface_formats())->required()->type_name("FILE");
+  verb->add_option("MESH", arguments->mesh, "Mesh to check: " + cell_formats() + "; or surface: " + surface_formats())
+      ->required()
+      ->type_name("FILE");
   verb->add_option("--target", arguments->target,
                    "Measure the distance to this surface, or of these points: " + target_formats())
       ->type_name("SURFACE");

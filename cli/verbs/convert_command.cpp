@@ -119,10 +119,11 @@ void add_convert_command(CLI::App& app, Action& action) {
       ->capture_default_str();
   add_map_tolerance(*verb, arguments->writing);
   add_references_option(*verb, arguments->run);
-  add_output_options(*verb, arguments->run,
-                     "Where to, the extension choosing the format: " + output_formats() +
-                         "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
-                         "their groups; may be given several times");
+  add_output_options(
+      *verb, arguments->run,
+      "Where to, the extension choosing the format: " + output_formats() +
+          "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
+          "their groups; may be given several times");
   verb->get_option("--output")->required();
   add_writing_options(*verb, arguments->writing);
   verb->footer(

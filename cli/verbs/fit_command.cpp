@@ -286,10 +286,11 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
       ->type_name("catmull-clark|averaging")
       ->capture_default_str();
   verb.add_flag("--cage-only", fit.cage_only, "Keep the template as control cage: only its vertices move");
-  verb.add_option("--crease-angle", arguments.crease_angle,
-                  "Keep edges of the target sharper than this sharp: edges of the mesh that follow them become creases\n"
-                  "and are drawn to them. auto: without a template, 40 if the target is a designed part and no scan;\n"
-                  "with one, only the creases that its file tags")
+  verb.add_option(
+          "--crease-angle", arguments.crease_angle,
+          "Keep edges of the target sharper than this sharp: edges of the mesh that follow them become creases\n"
+          "and are drawn to them. auto: without a template, 40 if the target is a designed part and no scan;\n"
+          "with one, only the creases that its file tags")
       ->check(number_in(0.0, 180.0) | CLI::IsMember({kAutomaticAngle, kNoAngle}))
       ->type_name("DEGREES|auto|none")
       ->capture_default_str();
@@ -314,8 +315,8 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
       ->needs(order)
       ->group(group);
-  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--keep-groups", "--lambda-far",
-                            "--quality", "--quality-floor"})
+  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--keep-groups",
+                            "--lambda-far", "--quality", "--quality-floor"})
     order->excludes(verb.get_option(other));
 }
 
@@ -344,8 +345,14 @@ void refuse_automatic_options(const CLI::App& verb) {
 }
 
 AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
-  AutomaticFitArguments result{arguments.run, arguments.writing, {}, arguments.fit.tolerance_percent,
-                               arguments.max_tolerance_percent, arguments.quality_floor, arguments.target, arguments.size};
+  AutomaticFitArguments result{arguments.run,
+                               arguments.writing,
+                               {},
+                               arguments.fit.tolerance_percent,
+                               arguments.max_tolerance_percent,
+                               arguments.quality_floor,
+                               arguments.target,
+                               arguments.size};
   AutomaticFitOptions& fit = result.fit;
   fit.cells = arguments.cells;
   fit.regions = region_rule(arguments.regions);

@@ -99,7 +99,8 @@ Json report_json(const char* command, Json options, Json input, const FitReport&
   return json;
 }
 
-/// Returns what the boundary of a result is compared with: of a target with the regions of the template, the outer surface.
+/// Returns what the boundary of a result is compared with: of a target with the regions of the template, the outer
+/// surface.
 Target boundary_target(const Target& target, const VolumeMesh& template_mesh) {
   if (const auto* surface = std::get_if<TriangleMesh>(&target))
     if (const std::optional<RegionSurface> regions = regions_as_in(*surface, template_mesh))

@@ -60,8 +60,8 @@ class LongRun {
     return work(teller.work());
   }
 
-  /// True if a stage comes before anything that a run that is interrupted would write: the template of an automatic fit,
-  /// and what a shell needs before its first valid state.
+  /// True if a stage comes before anything that a run that is interrupted would write: the template of an automatic
+  /// fit, and what a shell needs before its first valid state.
   static bool precedes_result(std::string_view stage);
 
   double seconds() const { return seconds_since(start_); }

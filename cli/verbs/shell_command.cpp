@@ -324,9 +324,10 @@ void add_shell_options(CLI::App& verb, ShellArguments& arguments) {
                   "Thickness of the layer at the surface, as a length or 2%: the growth follows from --layers, or the\n"
                   "layers from --growth")
       ->type_name("H");
-  verb.add_option("--skip", arguments.skipped,
-                  "Patch of SURFACE without layers: a group's name or number, or a point X,Y,Z on a patch between sharp\n"
-                  "edges; may be given several times. Layers end in its plane if it is flat")
+  verb.add_option(
+          "--skip", arguments.skipped,
+          "Patch of SURFACE without layers: a group's name or number, or a point X,Y,Z on a patch between sharp\n"
+          "edges; may be given several times. Layers end in its plane if it is flat")
       ->allow_extra_args(false)
       ->type_name("PATCH");
   verb.add_option("--repair", arguments.repair,

@@ -139,8 +139,8 @@ void add_template_auto(CLI::App& group, Action& action) {
   CLI::App* verb = group.add_subcommand("auto", "Make a template from a surface: a carved grid with its topology");
   const auto arguments = std::make_shared<AutoArguments>();
   verb->add_option("TARGET", arguments->target,
-                   "Surface that bounds a solid: " + surface_formats() + "; a volume mesh, for its boundary; or a segmentation: " +
-                       label_grid_formats())
+                   "Surface that bounds a solid: " + surface_formats() +
+                       "; a volume mesh, for its boundary; or a segmentation: " + label_grid_formats())
       ->required()
       ->type_name("FILE");
   verb->add_option("--cells", arguments->options.cells, "About how many cells; more where the topology needs them")

@@ -50,11 +50,13 @@ class ClosestPointEnergy final : public SurfaceTerm {
                      std::size_t num_samples, double tangential_weight, int points_per_triangle,
                      SurfacePull pull = SurfacePull::along_normals);
 
-  /// Makes the part of an energy that belongs to some of its sample triangles; all others stay where they are. The whole
-  /// must be assigned: a point of the target belongs to the part if it corresponds to one of these triangles there.
+  /// Makes the part of an energy that belongs to some of its sample triangles; all others stay where they are. The
+  /// whole must be assigned: a point of the target belongs to the part if it corresponds to one of these triangles
+  /// there.
   ///
   /// triangles    of the whole, ascending.
-  /// numbers      number in the part of each sample of the whole; kNoIndex for those outside. Corners of `triangles` and
+  /// numbers      number in the part of each sample of the whole; kNoIndex for those outside. Corners of `triangles`
+  /// and
   ///              ends of creases must be inside.
   /// is_free      one entry per sample of the part: 1 if it moves; all its triangles must belong to the part.
   ClosestPointEnergy(const ClosestPointEnergy& whole, std::span<const Index> triangles, std::span<const Index> numbers,
@@ -75,7 +77,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
 
   /// Lets only parts of the same group correspond: patches of the fitted surface, and the regions of the target between
   /// sharp edges that they are to reproduce.
-  /// of_triangle, of_target  group of each sample triangle and of each of the target's triangles, >= 0; parts of a group
+  /// of_triangle, of_target  group of each sample triangle and of each of the target's triangles, >= 0; parts of a
+  /// group
   ///                         that the other surface lacks correspond to all of it. InputError: other numbers of them,
   ///                         or a cloud.
   void set_groups(std::vector<Index> of_triangle, std::span<const Index> of_target);

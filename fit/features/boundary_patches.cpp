@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/boundary_patches.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/grouped_closest_point.h"
@@ -29,33 +30,6 @@ constexpr double kVoteOffset = 0.3;
 /// Place of the points that angles are measured at, from the middle of an edge to the center of a face: that of the
 /// centers of the faces' children.
 constexpr double kAngleOffset = 0.5;
-
-Index root(std::vector<Index>& parent, Index i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
-void unite(std::vector<Index>& parent, Index a, Index b) {
-  const Index x = root(parent, a), y = root(parent, b);
-  parent[std::max(x, y)] = std::min(x, y);
-}
-
-/// Numbers the sets by their first members.
-std::size_t number_sets(std::vector<Index>& parent, std::vector<Index>& number) {
-  Index count = 0;
-  number.resize(parent.size());
-  for (std::size_t i = 0; i < parent.size(); ++i) {
-    const Index first = root(parent, static_cast<Index>(i));
-    number[i] = static_cast<std::size_t>(first) == i ? count++ : number[first];
-  }
-  return static_cast<std::size_t>(count);
-}
-
-std::vector<Index> one_each(std::size_t n) {
-  std::vector<Index> numbers(n);
-  std::iota(numbers.begin(), numbers.end(), 0);
-  return numbers;
-}
 
 /// Marks the edges of paths, by edge of the topology.
 std::vector<std::uint8_t> path_edges(const MeshTopology& topology, std::span<const CreasePath> paths) {
@@ -161,13 +135,13 @@ Index patch_nearest_to(const Vec3& point, const MeshTopology& topology, const Vo
   return nearest;
 }
 
-/// Patches and regions as one union-find structure: patches first.
+/// Joins patches and regions that belong to each other. Numbers of regions follow those of patches.
 class Matching {
  public:
   Matching(std::size_t patches, std::size_t regions)
-      : patches_(static_cast<Index>(patches)), parent_(one_each(patches + regions)), matched_(parent_.size(), 0) {}
+      : patches_(static_cast<Index>(patches)), sets_(patches + regions), matched_(sets_.size(), 0) {}
   void match(Index patch, Index region) {
-    unite(parent_, patch, patches_ + region);
+    sets_.join(patch, patches_ + region);
     matched_[patch] = matched_[patches_ + region] = 1;
   }
   bool has_patch(Index patch) const { return matched_[patch] != 0; }
@@ -175,7 +149,7 @@ class Matching {
   PatchGroups groups() {
     PatchGroups result;
     std::vector<Index> number;
-    result.count = number_sets(parent_, number);
+    result.count = sets_.number(number);
     result.of_patch.assign(number.begin(), number.begin() + patches_);
     result.of_region.assign(number.begin() + patches_, number.end());
     return result;
@@ -183,7 +157,7 @@ class Matching {
 
  private:
   Index patches_;
-  std::vector<Index> parent_;
+  DisjointSets sets_;
   std::vector<std::uint8_t> matched_;
 };
 
@@ -232,11 +206,11 @@ std::vector<Index> edges_of_path(const MeshTopology& topology, std::span<const I
 BoundaryPatches boundary_patches(const MeshTopology& topology, std::span<const CreasePath> paths) {
   const std::vector<std::uint8_t> on_path = path_edges(topology, paths);
   const auto pairs = faces_at_edges(topology);
-  std::vector<Index> parent = one_each(topology.boundary_faces().size());
+  DisjointSets sets(topology.boundary_faces().size());
   for (std::size_t e = 0; e < pairs.size(); ++e)
-    if (!on_path[e] && pairs[e][1] != kNoIndex) unite(parent, pairs[e][0], pairs[e][1]);
+    if (!on_path[e] && pairs[e][1] != kNoIndex) sets.join(pairs[e][0], pairs[e][1]);
   BoundaryPatches patches;
-  patches.count = number_sets(parent, patches.of_face);
+  patches.count = sets.number(patches.of_face);
   return patches;
 }
 

@@ -49,8 +49,9 @@ struct PatchGroups {
 PatchGroups patch_groups(const MeshTopology& topology, const BoundaryPatches& patches, std::span<const Vec3> positions,
                          const TriangleMesh& target, const SignedFeatures& features);
 
-/// Does the same for any faces of a mesh and any triangles of the target, of which only those with the same key belong to
-/// each other: keys are those of the pairs of regions that a sheet lies between. Patches and regions have one key each.
+/// Does the same for any faces of a mesh and any triangles of the target, of which only those with the same key belong
+/// to each other: keys are those of the pairs of regions that a sheet lies between. Patches and regions have one key
+/// each.
 ///
 /// faces       of the mesh, by `MeshTopology`.  patch_of_face, key_of_face  one entry for each of them.
 /// regions     region of each triangle, in [0, num_regions).  keys  of each triangle.  All keys are numbered from 0 on.

@@ -29,7 +29,8 @@ RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets)
   if (on_sheets) marks = mark_interfaces(topology, find_interfaces(mesh, topology));
   for (std::size_t e = 0; e < topology.num_edges(); ++e)
     if (const auto edge = static_cast<Index>(e); topology.is_boundary_edge(edge) || marks.has_edge(edge))
-      edges_.push_back({topology.edge(edge), on_sheets ? (marks.is_curve(edge) ? 1 : 2) : topology.num_edge_cells(edge)});
+      edges_.push_back(
+          {topology.edge(edge), on_sheets ? (marks.is_curve(edge) ? 1 : 2) : topology.num_edge_cells(edge)});
   for (const Edge& edge : edges_)
     for (Index v : edge.ends) ++offsets_[v + 1];
   for (std::size_t v = 0; v + 1 < offsets_.size(); ++v) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/sheet_layout.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/features/boundary_patches.h"
 #include "subvol/mesh/interfaces.h"
@@ -17,32 +18,6 @@
 namespace subvol {
 
 namespace {
-
-/// Numbers sets of 0 .. count - 1 that are joined one by one, by their first members.
-class Patches {
- public:
-  explicit Patches(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
-  void join(Index a, Index b) {
-    const Index x = root(a), y = root(b);
-    parent_[std::max(x, y)] = std::min(x, y);
-  }
-  std::size_t number(std::vector<Index>& numbers) {
-    Index count = 0;
-    numbers.resize(parent_.size());
-    for (std::size_t i = 0; i < parent_.size(); ++i) {
-      const Index first = root(static_cast<Index>(i));
-      numbers[i] = static_cast<std::size_t>(first) == i ? count++ : numbers[first];
-    }
-    return static_cast<std::size_t>(count);
-  }
-
- private:
-  Index root(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  std::vector<Index> parent_;
-};
 
 /// The faces of a mesh's sheets, and the pair of regions on either side of each; kOutside at the boundary.
 struct SheetFaces {
@@ -77,7 +52,7 @@ std::size_t divide(const MeshTopology& topology, const SheetFaces& sheets, std::
     for (std::size_t k = 0; k < face.size(); ++k)
       at_edge[topology.find_edge(face[k], face[(k + 1) % face.size()])].push_back(static_cast<Index>(i));
   }
-  Patches patches(sheets.faces.size());
+  DisjointSets patches(sheets.faces.size());
   for (std::size_t e = 0; e < at_edge.size(); ++e)
     if (!is_path[e] && at_edge[e].size() == 2 && sheets.pairs[at_edge[e][0]] == sheets.pairs[at_edge[e][1]])
       patches.join(at_edge[e][0], at_edge[e][1]);
@@ -104,7 +79,7 @@ SheetCurves sheet_curves(const RegionSurface& target, std::optional<double> angl
       on_curves.insert({a, b});
     }
   }
-  Patches patches(target.mesh.triangles.size());
+  DisjointSets patches(target.mesh.triangles.size());
   const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(target.mesh.triangles, target.mesh.positions.size());
   for_each_edge(sides, [&](std::span<const SurfaceHalfEdge> edge) {
     if (edge.size() == 2 && !on_curves.contains({edge[0].low, edge[0].high}) &&

@@ -30,13 +30,13 @@ struct SheetLayout {
   VolumeMesh tagged_mesh;               ///< the mesh with tags on the edges of the paths
   FollowedCreases creases;              ///< of that mesh
   std::vector<CreaseSegment> segments;  ///< edges of the paths, and the curves they follow
-  std::vector<Index> patch_of_face;     ///< of each face, by `MeshTopology`: faces of sheets between curves; else kNoIndex
+  std::vector<Index> patch_of_face;  ///< of each face, by `MeshTopology`: faces of sheets between curves; else kNoIndex
   std::size_t num_patches = 0;
   std::vector<Index> group_of_patch, group_of_triangle;  ///< what belongs to each other (`ClosestPointEnergy`)
 };
 
-/// Routes the curves (`route_features`) and divides the sheets of the mesh along them. Parts of sheets correspond only to
-/// parts of the target between the same two regions.
+/// Routes the curves (`route_features`) and divides the sheets of the mesh along them. Parts of sheets correspond only
+/// to parts of the target between the same two regions.
 ///
 /// mesh     hexes with references, near the target and in its coordinates; its interfaces lie between the same pairs of
 ///          regions. Its tags are dropped.

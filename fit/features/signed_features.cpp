@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/signed_features.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 
 #include <Eigen/Geometry>
@@ -89,26 +90,14 @@ std::vector<std::array<Index, 2>> sorted_curve_edges(const FeatureCurves& curves
   return edges;
 }
 
-Index root(std::vector<Index>& parent, Index t) {
-  while (parent[t] != t) t = parent[t] = parent[parent[t]];
-  return t;
-}
-
 void find_regions(const TriangleMesh& mesh, std::span<const Side> sides, SignedFeatures& features) {
-  std::vector<Index> parent(mesh.triangles.size());
-  for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = static_cast<Index>(t);
+  DisjointSets sets(mesh.triangles.size());
   const auto cuts = sorted_curve_edges(features.curves);
   for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
     if (sides[i].ends != sides[i + 1].ends || std::binary_search(cuts.begin(), cuts.end(), sides[i].ends)) continue;
-    const Index a = root(parent, sides[i].triangle), b = root(parent, sides[i + 1].triangle);
-    parent[std::max(a, b)] = std::min(a, b);
+    sets.join(sides[i].triangle, sides[i + 1].triangle);
   }
-  features.regions.resize(parent.size());
-  for (std::size_t t = 0; t < parent.size(); ++t) {
-    const Index first = root(parent, static_cast<Index>(t));
-    features.regions[t] =
-        static_cast<std::size_t>(first) == t ? static_cast<Index>(features.num_regions++) : features.regions[first];
-  }
+  features.num_regions = sets.number(features.regions);
 }
 
 /// Length-weighted mean; the plain one if all segments are points.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/flat_faces.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/fit/geometry/grouped_closest_point.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/quality/quality.h"
@@ -190,14 +191,9 @@ std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target)
   const InterfaceMarks marks = mark_interfaces(topology, interfaces);
   std::vector<char> is_sharp = marks.curves;
   for (const CreaseEdge& crease : cage.tags.creases) is_sharp[topology.find_edge(crease.v0, crease.v1)] = 1;
-  std::vector<Index> patch(interfaces.faces.size());
-  std::iota(patch.begin(), patch.end(), 0);
-  const auto find = [&](Index i) {
-    while (patch[i] != i) i = patch[i] = patch[patch[i]];
-    return i;
-  };
+  DisjointSets patches(interfaces.faces.size());
   std::vector<Index> first_face(topology.num_edges(), kNoIndex);
-  for (std::size_t i = 0; i < patch.size(); ++i) {
+  for (std::size_t i = 0; i < patches.size(); ++i) {
     const auto face = topology.face(interfaces.faces[i]);
     for (std::size_t k = 0; k < face.size(); ++k) {
       const Index e = topology.find_edge(face[k], face[(k + 1) % face.size()]);
@@ -205,20 +201,20 @@ std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target)
       if (first_face[e] == kNoIndex)
         first_face[e] = static_cast<Index>(i);
       else
-        patch[find(static_cast<Index>(i))] = find(first_face[e]);
+        patches.join(static_cast<Index>(i), first_face[e]);
     }
   }
   constexpr Index kUnknown = -2;
-  std::vector<Index> facet_of_patch(patch.size(), kUnknown);
-  for (std::size_t i = 0; i < patch.size(); ++i) {
+  std::vector<Index> facet_of_patch(patches.size(), kUnknown);
+  for (std::size_t i = 0; i < patches.size(); ++i) {
     const Index f = interfaces.faces[i];
     const Index facet = facet_of_face(topology.face(f), groups[f], cage, closest, facets);
-    Index& common = facet_of_patch[find(static_cast<Index>(i))];
+    Index& common = facet_of_patch[patches.of(static_cast<Index>(i))];
     common = common == kUnknown || common == facet ? facet : kNoIndex;
   }
   std::vector<std::vector<Index>> wanted(cage.num_vertices());
-  for (std::size_t i = 0; i < patch.size(); ++i) {
-    const Index facet = facet_of_patch[find(static_cast<Index>(i))];
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    const Index facet = facet_of_patch[patches.of(static_cast<Index>(i))];
     if (facet == kNoIndex) continue;
     for (const Index v : topology.face(interfaces.faces[i]))
       if (std::find(wanted[v].begin(), wanted[v].end(), facet) == wanted[v].end()) wanted[v].push_back(facet);

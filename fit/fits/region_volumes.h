@@ -7,14 +7,14 @@
 
 namespace subvol {
 
-/// Moves the sheets of a mesh, its boundary and its interfaces, a little so that every region gets a given volume: straight
-/// cells between points on a curved surface have less volume inside it and more outside.
+/// Moves the sheets of a mesh, its boundary and its interfaces, a little so that every region gets a given volume:
+/// straight cells between points on a curved surface have less volume inside it and more outside.
 ///
 ///   d_v = P_v sum_r mu_r g_r(v) / a_v,   V_r(x + d) = V_r wanted to first order
 ///
-/// g_r(v): gradient of the volume of region r;  a_v: third of the area around v;  P_v: projector that keeps v in the planes
-/// of faces around it which are flat up to rounding. Each sheet thus moves along its normals, by the difference of its two
-/// regions' factors. This is repeated until all volumes are right up to 1e-6.
+/// g_r(v): gradient of the volume of region r;  a_v: third of the area around v;  P_v: projector that keeps v in the
+/// planes of faces around it which are flat up to rounding. Each sheet thus moves along its normals, by the difference
+/// of its two regions' factors. This is repeated until all volumes are right up to 1e-6.
 ///
 /// wanted   volumes, ascending by reference (`region_volumes`), > 0.
 /// returns  false, with the mesh as it was, if a cell would lose its certificate, or a cell that is poorer than

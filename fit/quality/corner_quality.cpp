@@ -47,7 +47,8 @@ CornerQuality measure_corner_quality(const VolumeMesh& mesh) {
     double least = 1;
     for (const auto& [corner, i, j, k] : corners_of(mesh.kinds[c])) {
       const Vec3& x = mesh.positions[cell[corner]];
-      const Vec3 u = (mesh.positions[cell[i]] - x).stableNormalized(), v = (mesh.positions[cell[j]] - x).stableNormalized(),
+      const Vec3 u = (mesh.positions[cell[i]] - x).stableNormalized(),
+                 v = (mesh.positions[cell[j]] - x).stableNormalized(),
                  w = (mesh.positions[cell[k]] - x).stableNormalized();
       least = std::min(least, factor_of(mesh.kinds[c]) * u.cross(v).dot(w));
     }

@@ -25,8 +25,8 @@ class AndersonMemory {
   void clear();
   /// Adds a state; all three have the same size in every call.
   void add(std::span<const Vec3> x, std::span<const Vec3> f, std::span<const Vec3> g);
-  /// Writes the accelerated step. Returns false, with `step` unchanged, if fewer than two states are known or the system
-  /// is singular.
+  /// Writes the accelerated step. Returns false, with `step` unchanged, if fewer than two states are known or the
+  /// system is singular.
   bool find_step(std::vector<Vec3>& step) const;
 
  private:

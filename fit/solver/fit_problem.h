@@ -38,8 +38,8 @@ struct FitProblem {
   SparseMap samples, samples_transposed;  ///< N, N^T
   std::optional<PointTables> tables;      ///< N as tables for products with N and N^T; none: `samples` is used
   std::vector<Vec3> fixed_samples;        ///< z0, one per sample; empty: no sample is fixed
-  /// For each degree of freedom the projector on the directions in which it may move, for example in a plane; empty: all
-  /// move freely. Newton's method alone keeps to them.
+  /// For each degree of freedom the projector on the directions in which it may move, for example in a plane; empty:
+  /// all move freely. Newton's method alone keeps to them.
   std::vector<Mat3> projectors;
   std::unique_ptr<VolumeTerm> volume;
   std::unique_ptr<SurfaceTerm> surface;   ///< null: no surface term; N then has no rows

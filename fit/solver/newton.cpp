@@ -43,8 +43,8 @@ class NewtonRun {
   Search search_line(bool may_stiffen, IterationRecord& record);
   /// Takes the step that was found.
   void take_step(IterationRecord& record);
-  /// Takes the step that follows from the last ones by Anderson acceleration instead, if no cell stands in its way and E,
-  /// with correspondences found anew, is not above that of the step that was found. Returns false if it does not.
+  /// Takes the step that follows from the last ones by Anderson acceleration instead, if no cell stands in its way and
+  /// E, with correspondences found anew, is not above that of the step that was found. Returns false if it does not.
   bool take_accelerated_step(IterationRecord& record);
   /// Records the step. Returns true if E has stopped decreasing or the caller wants to stop.
   bool is_done(const IterationRecord& record);
@@ -216,8 +216,8 @@ MinimizerResult NewtonRun::run() {
       uncertified_ = problem_.volume->uncertified(y_);
       if (options_.keep) options_.keep(x_, result_);
     }
-    const bool is_old = iteration < 2 || restarts || iteration % options_.hessian_life == 0 || is_stiffened_ || is_refined ||
-                        t_ < kShortStep;
+    const bool is_old = iteration < 2 || restarts || iteration % options_.hessian_life == 0 || is_stiffened_ ||
+                        is_refined || t_ < kShortStep;
     energy_ = linearized_.linearize(problem_, y_, z_, !is_old, is_assigned_);
     is_assigned_ = false;
     is_refined = false;

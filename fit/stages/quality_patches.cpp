@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/stages/quality_patches.h"
+#include "subvol/base/disjoint_sets.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -32,25 +33,6 @@ std::vector<Index> marked_ones(const std::vector<std::uint8_t>& marks) {
   return result;
 }
 
-/// Sets of degrees of freedom that are united step by step.
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), Index{0}); }
-  Index find(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  /// The smaller number becomes the name of both sets.
-  void unite(Index a, Index b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<Index> parent_;
-};
-
 }  // namespace
 
 std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProblem& problem,
@@ -81,7 +63,7 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
   const std::vector<Index> active = marked_ones(is_active);
   if (active.size() > most_cells) return {};
 
-  UnionFind sets(problem.nodes.num_cols);
+  DisjointSets sets(problem.nodes.num_cols);
   std::vector<Index> set_of_cell;
   for (const Index c : active) {
     Index first = kNoIndex;
@@ -89,7 +71,7 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
       for (const Index j : problem.nodes.row_columns(v)) {
         if (!is_free[j]) continue;
         if (first == kNoIndex) first = j;
-        sets.unite(first, j);
+        sets.join(first, j);
       }
     set_of_cell.push_back(first);
   }
@@ -99,12 +81,12 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
       for (const Index j : problem.samples.row_columns(sample)) {
         if (!is_free[j]) continue;
         if (free_of_triangle[t] == kNoIndex) free_of_triangle[t] = j;
-        sets.unite(free_of_triangle[t], j);
+        sets.join(free_of_triangle[t], j);
       }
   std::vector<QualityPatch> patches;
   std::vector<Index> patch_of_set(problem.nodes.num_cols, kNoIndex);
   for (const Index j : free) {
-    Index& patch = patch_of_set[sets.find(j)];
+    Index& patch = patch_of_set[sets.of(j)];
     if (patch == kNoIndex) {
       patch = static_cast<Index>(patches.size());
       patches.emplace_back();
@@ -112,14 +94,14 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
     patches[patch].unknowns.push_back(j);
   }
   for (std::size_t i = 0; i < active.size(); ++i) {
-    QualityPatch& patch = patches[patch_of_set[sets.find(set_of_cell[i])]];
+    QualityPatch& patch = patches[patch_of_set[sets.of(set_of_cell[i])]];
     patch.cells.push_back(active[i]);
     const auto vertices = mesh.cell(active[i]);
     patch.vertices.insert(patch.vertices.end(), vertices.begin(), vertices.end());
   }
   for (std::size_t t = 0; t < triangles.size(); ++t)
     if (const Index j = free_of_triangle[t]; j != kNoIndex)
-      patches[patch_of_set[sets.find(j)]].triangles.push_back(static_cast<Index>(t));
+      patches[patch_of_set[sets.of(j)]].triangles.push_back(static_cast<Index>(t));
   for (QualityPatch& patch : patches) {
     std::sort(patch.vertices.begin(), patch.vertices.end());
     patch.vertices.erase(std::unique(patch.vertices.begin(), patch.vertices.end()), patch.vertices.end());

@@ -22,8 +22,8 @@ constexpr double kMargin = 0.15;
 constexpr double kCoarseMargin = 0.05;
 constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;
 
-/// A distance that is too large by a tenth weighs as much as cells that miss the goal by a fifth: distances end at their
-/// bar, quality as high as possible.
+/// A distance that is too large by a tenth weighs as much as cells that miss the goal by a fifth: distances end at
+/// their bar, quality as high as possible.
 constexpr double kExcessWeight = 2;
 
 /// Width of the strip of surface that counts as much as a crease, in edges.

@@ -59,8 +59,8 @@ QualitySchedule smooth_quality_schedule();
 QualitySchedule coarse_quality_schedule(double goal);
 QualitySchedule fine_quality_schedule(double goal);
 
-/// A schedule for a mesh whose surface is where it should be: a lift in which only poor cells exert a force, so that the
-/// surface moves as little as possible.
+/// A schedule for a mesh whose surface is where it should be: a lift in which only poor cells exert a force, so that
+/// the surface moves as little as possible.
 QualitySchedule late_quality_schedule(double goal);
 
 /// Share of the pull along the target's tangents and creases.
@@ -68,7 +68,7 @@ inline constexpr double kQualityTangentialWeight = 0.02;
 
 /// The boundary of a mesh as it is compared with the target: sample triangles on its faces.
 struct QualityBoundary {
-  SparseMap samples;                              ///< degrees of freedom -> samples; no rows: the surface does not matter
+  SparseMap samples;  ///< degrees of freedom -> samples; no rows: the surface does not matter
   std::vector<Vec3> fixed;                        ///< what is added to the samples if vertices are fixed; else empty
   std::vector<std::array<Index, 3>> triangles;    ///< of samples
   std::vector<Index> triangle_faces;              ///< face of the mesh of each triangle, by `MeshTopology`
@@ -95,8 +95,8 @@ class QualityStages {
   struct State {
     QualityEnergy::State cells;
     double distance = 0;   ///< largest distance at the samples, as a share of the diagonal; 0 if none is aimed at
-    /// Least share of the goal that a cell reaches, at most 1, less a multiple of the share by which the distance is too
-    /// large. 1: all aims are reached.
+    /// Least share of the goal that a cell reaches, at most 1, less a multiple of the share by which the distance is
+    /// too large. 1: all aims are reached.
     double merit = -1e300;
     std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending
   };

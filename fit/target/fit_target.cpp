@@ -156,7 +156,8 @@ std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& 
   if (interfaces.empty()) return {};
   std::vector<Index> groups(topology.num_faces(), kNoIndex);
   for (const Index f : topology.boundary_faces()) groups[f] = 0;
-  for (std::size_t i = 0; i < interfaces.faces.size(); ++i) groups[interfaces.faces[i]] = 1 + interfaces.pair_of_face[i];
+  for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
+    groups[interfaces.faces[i]] = 1 + interfaces.pair_of_face[i];
   return groups;
 }
 

@@ -45,17 +45,18 @@ struct FitTarget {
   /// The interfaces between the regions of a mesh, as they are to stay: fans of their faces (`interface_surface`).
   TriangleMesh interfaces;
   std::vector<Index> group_of_interface_triangle;  ///< as in group_of_triangle
-  /// Group of each triangle of `surface`, which consists of the target's triangles and those of the interfaces: 0 for the
-  /// target, 1 + the place of its pair of regions in `Interfaces::pairs` for an interface. Empty without interfaces.
+  /// Group of each triangle of `surface`, which consists of the target's triangles and those of the interfaces: 0 for
+  /// the target, 1 + the place of its pair of regions in `Interfaces::pairs` for an interface. Empty without
+  /// interfaces.
   std::vector<Index> group_of_triangle;
-  /// Of a target with regions: the number of each triangle of `surface` in the `RegionSurface`; else empty.
+  /// Number of each triangle of `surface` in the `RegionSurface`; empty if the target has no regions.
   std::vector<Index> region_triangle;
 
   /// InputError: as for `Normalisation`.
   explicit FitTarget(const TriangleMesh& target);
   explicit FitTarget(const PointCloud& target, PointWeights weights = PointWeights::equal);
-  /// The outer surface of regions, and their interfaces. A mesh that is to reproduce it must have interfaces between the
-  /// same pairs of regions.
+  /// Makes the outer surface of regions and their interfaces the target. A mesh that is to reproduce it must have
+  /// interfaces between the same pairs of regions.
   explicit FitTarget(const RegionSurface& target);
 
   /// Makes the interfaces of a mesh, in normalized coordinates, part of the target; does nothing if there are none, or
@@ -76,7 +77,7 @@ struct FitTarget {
   /// Returns the symmetric distances between the interfaces and those of a mesh with the same pairs of regions: the
   /// largest of all pairs.
   SurfaceDistance interface_distance(const VolumeMesh& fitted) const;
-  /// The same for triangles on the interfaces of a mesh, with groups as in `group_of_triangle`.
+  /// Returns the same distances for triangles on the interfaces of a mesh, whose groups are as in `group_of_triangle`.
   SurfaceDistance interface_distance(const TriangleMesh& fitted, std::span<const Index> groups) const;
 
   /// Measures the distance of a template's boundary to the target and describes the state of the target, with area and
@@ -88,8 +89,8 @@ struct FitTarget {
   SurfaceDistance measure(const TriangleMesh& fitted, bool extremes) const;
 };
 
-/// Returns the group of each face of a mesh, as `FitTarget::group_of_triangle` has them, by `MeshTopology`; kNoIndex for
-/// faces inside a region. Empty if the mesh has no interfaces.
+/// Returns the group of each face of a mesh, as `FitTarget::group_of_triangle` has them, by `MeshTopology`; kNoIndex
+/// for faces inside a region. Empty if the mesh has no interfaces.
 std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& topology);
 
 /// Returns the groups of triangles on these faces; empty if there are no groups.

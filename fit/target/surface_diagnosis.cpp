@@ -6,6 +6,7 @@
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/thinnest_place.h"
 #include "subvol/fit/geometry/triangle_meeting.h"
+#include "subvol/surface/corner_fans.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
 
@@ -185,28 +186,14 @@ void Diagnostician::add_rim(const std::vector<std::size_t>& loop) {
 
 /// Vertices with several fans of triangles, other than the ends of edges at which the surface touches itself.
 void Diagnostician::find_vertex_contacts() {
-  const std::size_t n = mesh_.triangles.size();
   std::vector<char> passed(mesh_.positions.size(), 0);
   for (const auto* edges : {&parts_.touching, &parts_.crowded, &parts_.rims})
     for (const std::size_t first : *edges) passed[parts_.sides[first].low] = passed[parts_.sides[first].high] = 1;
-  std::vector<Index> root(3 * n);
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](Index c) {
-    while (root[c] != c) c = root[c] = root[root[c]];
-    return c;
-  };
-  const auto corner = [&](Index t, Index v) {
-    const auto& c = mesh_.triangles[t];
-    return static_cast<Index>(3 * t + (c[0] == v ? 0 : c[1] == v ? 1 : 2));
-  };
-  for (const auto& [i, j] : parts_.joined)
-    for (const Index v : {parts_.sides[i].low, parts_.sides[i].high}) {
-      const Index a = find(corner(parts_.sides[i].triangle, v)), b = find(corner(parts_.sides[j].triangle, v));
-      root[std::max(a, b)] = std::min(a, b);
-    }
+  CornerFans fans(mesh_.triangles);
+  for (const auto& [i, j] : parts_.joined) fans.join(parts_.sides[i], parts_.sides[j]);
   std::vector<Index> first_fan(mesh_.positions.size(), kNoIndex);
-  for (std::size_t c = 0; c < root.size(); ++c) {
-    const Index v = mesh_.triangles[c / 3][c % 3], fan = find(static_cast<Index>(c));
+  for (std::size_t c = 0; c < fans.num_corners(); ++c) {
+    const Index v = mesh_.triangles[c / 3][c % 3], fan = fans.of(c);
     if (passed[v]) continue;
     if (first_fan[v] == kNoIndex) {
       first_fan[v] = fan;

@@ -33,14 +33,14 @@ struct SurfaceRepair {
 ///
 /// surface    in any state; a surface that needs no repair is returned bit by bit.
 /// cancelled  asked now and then, from the calling thread; if it returns true, the surface is returned as it was given.
-/// InputError: as `diagnose`; sheets that divide the inside into several regions, if something crosses or an edge has only
-/// one triangle; parts that cross and cannot be united, with the place.
-/// Cost: that of `diagnose`, and again if parts are united.
+/// InputError: as `diagnose`; sheets that divide the inside into several regions, if something crosses or an edge has
+/// only one triangle; parts that cross and cannot be united, with the place. Cost: that of `diagnose`, and again if
+/// parts are united.
 SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {},
                              RegionRule rule = RegionRule::automatic);
 
-/// Returns why grids with up to 20 times a number of cells do not have the topology of a surface's solid: that they have
-/// not, and each cause that a diagnosis finds, with its place.
+/// Returns why grids with up to 20 times a number of cells do not have the topology of a surface's solid: that they
+/// have not, and each cause that a diagnosis finds, with its place.
 std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted);
 
 }  // namespace subvol

@@ -163,8 +163,8 @@ LabelGrid read_numpy(const std::string& bytes, const FileText& file) {
       for (int k = 0; k < grid.counts[2]; ++k)
         ordered[static_cast<std::size_t>(i) +
                 static_cast<std::size_t>(grid.counts[0]) *
-                    (static_cast<std::size_t>(j) + static_cast<std::size_t>(grid.counts[1]) * static_cast<std::size_t>(k))] =
-            grid.labels[from++];
+                    (static_cast<std::size_t>(j) +
+                     static_cast<std::size_t>(grid.counts[1]) * static_cast<std::size_t>(k))] = grid.labels[from++];
   grid.labels = std::move(ordered);
   return grid;
 }
@@ -271,16 +271,18 @@ LabelGrid read_nrrd(const std::string& bytes, const FileText& file) {
 
 LabelGrid read_nifti(const std::string& bytes, const FileText& file) {
   // Places in the header of NIfTI-1.
-  constexpr std::size_t kHeader = 348, kDim = 40, kType = 70, kPixdim = 76, kOffset = 108, kSlope = 112, kIntercept = 116,
-                        kQform = 252, kSform = 254, kQuaternion = 256, kQoffset = 268, kRows = 280, kMagic = 344;
+  constexpr std::size_t kHeader = 348, kDim = 40, kType = 70, kPixdim = 76, kOffset = 108, kSlope = 112,
+                        kIntercept = 116, kQform = 252, kSform = 254, kQuaternion = 256, kQoffset = 268, kRows = 280,
+                        kMagic = 344;
   if (bytes.size() < kHeader + 4) file.fail("it is shorter than a NIfTI-1 header");
   std::endian order = std::endian::little;
   if (decode(bytes.data(), kInt32, order) != kHeader) order = std::endian::big;
   if (decode(bytes.data(), kInt32, order) != kHeader || bytes.compare(kMagic, 3, "n+1") != 0)
     file.fail("it does not start as a NIfTI-1 file with its volume does");
   const auto number = [&](std::size_t at, ValueType type) { return decode(bytes.data() + at, type, order); };
-  static const std::map<int, ValueType> kTypes{{2, kUInt8},    {4, kInt16},    {8, kInt32},    {16, kFloat32}, {64, kFloat64},
-                                               {256, kInt8},   {512, kUInt16}, {768, kUInt32}, {1024, kInt64}, {1280, kUInt64}};
+  static const std::map<int, ValueType> kTypes{{2, kUInt8},    {4, kInt16},    {8, kInt32},    {16, kFloat32},
+                                               {64, kFloat64}, {256, kInt8},   {512, kUInt16}, {768, kUInt32},
+                                               {1024, kInt64}, {1280, kUInt64}};
   const auto type = kTypes.find(static_cast<int>(number(kType, kInt16)));
   if (type == kTypes.end()) file.fail("its numbers are of a type that holds no labels");
   const double dimensions = number(kDim, kInt16);
@@ -290,7 +292,8 @@ LabelGrid read_nifti(const std::string& bytes, const FileText& file) {
   LabelGrid grid;
   take_counts(grid, sizes, file);
   const double slope = number(kSlope, kFloat32), intercept = number(kIntercept, kFloat32);
-  if ((slope != 0 && slope != 1) || (slope == 1 && intercept != 0)) file.fail("its numbers are scaled, expected labels");
+  if ((slope != 0 && slope != 1) || (slope == 1 && intercept != 0))
+    file.fail("its numbers are scaled, expected labels");
   std::array<double, 4> pixdim;
   for (std::size_t d = 0; d < 4; ++d) pixdim[d] = number(kPixdim + 4 * d, kFloat32);
   if (number(kSform, kInt16) > 0) {
@@ -311,7 +314,8 @@ LabelGrid read_nifti(const std::string& bytes, const FileText& file) {
   }
   require_sound_axes(grid, file);
   const double offset = number(kOffset, kFloat32);
-  if (!(offset >= kHeader && offset <= static_cast<double>(bytes.size()))) file.fail("its volume starts beyond its end");
+  if (!(offset >= kHeader && offset <= static_cast<double>(bytes.size())))
+    file.fail("its volume starts beyond its end");
   take_labels(grid, std::string_view(bytes).substr(static_cast<std::size_t>(offset)), type->second, order, file);
   return grid;
 }

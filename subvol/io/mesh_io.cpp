@@ -26,7 +26,8 @@ bool is_warning(const MeshDefect& defect) {
   return defect.kind == MeshDefect::Kind::inverted_cell || defect.kind == MeshDefect::Kind::unused_vertex;
 }
 
-/// Drops tags off the boundary and off interfaces between regions: other programs also mark edges between subdomains. Returns the number of dropped tags.
+/// Drops tags off the boundary and off interfaces between regions: other programs also mark edges between subdomains.
+/// Returns the number of dropped tags.
 std::size_t drop_inner_tags(VolumeMesh& mesh) {
   const MeshTopology topology(mesh);
   const InterfaceMarks interfaces = mark_interfaces(topology, find_interfaces(mesh, topology));

@@ -450,7 +450,9 @@ class ExodusWriter {
   void attribute(const char* name, int value) { require(nc_put_att_int(id_, NC_GLOBAL, name, NC_INT, 1, &value)); }
   void end_declarations() { require(nc_enddef(id_)); }
 
-  void put(int variable, const std::vector<double>& values) { require(nc_put_var_double(id_, variable, values.data())); }
+  void put(int variable, const std::vector<double>& values) {
+    require(nc_put_var_double(id_, variable, values.data()));
+  }
   void put(int variable, const std::vector<int>& values) { require(nc_put_var_int(id_, variable, values.data())); }
   void put(int variable, const std::vector<char>& text) { require(nc_put_var_text(id_, variable, text.data())); }
 
@@ -467,7 +469,8 @@ class ExodusWriter {
  private:
   void require(int status) const {
     if (status == NC_ENOMEM) throw std::bad_alloc();
-    if (status != NC_NOERR) throw InputError(std::string("Exodus: netCDF cannot hold the mesh: ") + nc_strerror(status));
+    if (status != NC_NOERR)
+      throw InputError(std::string("Exodus: netCDF cannot hold the mesh: ") + nc_strerror(status));
   }
   int id_ = -1;
 };

@@ -119,7 +119,8 @@ class InpParser {
     throw InputError(file_ + ":" + std::to_string(line_) + ": " + what);
   }
 
-  // --- Lines ----------------------------------------------------------------------------------------------------------
+  // --- Lines
+  // ----------------------------------------------------------------------------------------------------------
 
   void read_file_of(const std::string& file, std::string_view bytes, int depth) {
     file_ = file;
@@ -209,7 +210,8 @@ class InpParser {
     if (++num_parts_ > 1) fail("a second *PART: expected a file of one part");
   }
 
-  // --- Nodes and elements ---------------------------------------------------------------------------------------------
+  // --- Nodes and elements
+  // ---------------------------------------------------------------------------------------------
 
   void open_nodes() {
     if (const std::string system = parameter("SYSTEM"); !system.empty() && upper_case(system) != "R")
@@ -293,7 +295,8 @@ class InpParser {
     element_open_ = element_nodes_.size() < end;
   }
 
-  // --- Sets -----------------------------------------------------------------------------------------------------------
+  // --- Sets
+  // -----------------------------------------------------------------------------------------------------------
 
   /// Returns the place of a set, which may still have to be defined.
   std::size_t named_set(const std::string& name) {
@@ -409,7 +412,8 @@ class InpParser {
                       is_element ? kNoSet : named_set(fields[0]), static_cast<int>(*number), surface_, line_});
   }
 
-  // --- Building the mesh ----------------------------------------------------------------------------------------------
+  // --- Building the mesh
+  // ----------------------------------------------------------------------------------------------
 
   /// Without cells, shells are a surface, whose groups are the sets of *ELEMENT.
   void build_shells() {
@@ -449,7 +453,8 @@ class InpParser {
   }
   Index node_of(std::int64_t number) const {
     const auto found = nodes_.find(number);
-    if (found == nodes_.end()) fail("an element names node " + std::to_string(number) + ", which the file does not have");
+    if (found == nodes_.end())
+      fail("an element names node " + std::to_string(number) + ", which the file does not have");
     return found->second;
   }
 

@@ -99,8 +99,8 @@ bool has_exodus();
 /// Returns the cells as linear ones; nodes keep their numbers. InputError: a cell of order 2 or more.
 VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh);
 
-/// Returns the cells by their corners, without groups and references. The vertices are the nodes that are corners, in the
-/// order of the nodes.
+/// Returns the cells by their corners, without groups and references. The vertices are the nodes that are corners, in
+/// the order of the nodes.
 ///
 /// keeps_unused  true: nodes of no cell become vertices, too, as do all others that are no corners.
 /// number        receives the vertex of each node, or kNoIndex.

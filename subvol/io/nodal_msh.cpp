@@ -28,25 +28,29 @@ struct MshType {
 };
 
 constexpr MshType kMshTypes[] = {
-    {1, Shape::line, 1, 2},      {2, Shape::triangle, 1, 3},   {3, Shape::quad, 1, 4},       {4, Shape::tet, 1, 4},
-    {5, Shape::hex, 1, 8},       {6, Shape::prism, 1, 6},      {7, Shape::pyramid, 1, 5},    {8, Shape::line, 2, 3},
-    {9, Shape::triangle, 2, 6},  {10, Shape::quad, 2, 9},      {11, Shape::tet, 2, 10},      {12, Shape::hex, 2, 27},
-    {13, Shape::prism, 2, 18},   {14, Shape::pyramid, 2, 14},  {15, Shape::point, 1, 1},     {16, Shape::quad, 2, 8},
-    {17, Shape::hex, 2, 20},     {18, Shape::prism, 2, 15},    {19, Shape::pyramid, 2, 13},  {20, Shape::triangle, 3, 9},
-    {21, Shape::triangle, 3, 10}, {22, Shape::triangle, 4, 12}, {23, Shape::triangle, 4, 15},
-    {24, Shape::triangle, 5, 15}, {25, Shape::triangle, 5, 21}, {26, Shape::line, 3, 4},     {27, Shape::line, 4, 5},
-    {28, Shape::line, 5, 6},     {29, Shape::tet, 3, 20},      {30, Shape::tet, 4, 35},      {31, Shape::tet, 5, 56},
-    {36, Shape::quad, 3, 16},    {37, Shape::quad, 4, 25},     {38, Shape::quad, 5, 36},     {39, Shape::quad, 3, 12},
-    {40, Shape::quad, 4, 16},    {41, Shape::quad, 5, 20},     {42, Shape::triangle, 6, 28},
-    {43, Shape::triangle, 7, 36}, {44, Shape::triangle, 8, 45}, {45, Shape::triangle, 9, 55},
-    {46, Shape::triangle, 10, 66}, {47, Shape::quad, 6, 49},   {48, Shape::quad, 7, 64},     {49, Shape::quad, 8, 81},
-    {50, Shape::quad, 9, 100},   {51, Shape::quad, 10, 121},   {62, Shape::line, 6, 7},      {63, Shape::line, 7, 8},
-    {64, Shape::line, 8, 9},     {65, Shape::line, 9, 10},     {66, Shape::line, 10, 11},    {71, Shape::tet, 6, 84},
-    {72, Shape::tet, 7, 120},    {73, Shape::tet, 8, 165},     {74, Shape::tet, 9, 220},     {75, Shape::tet, 10, 286},
-    {84, Shape::line, 1, 1},     {90, Shape::prism, 3, 40},    {91, Shape::prism, 4, 75},    {92, Shape::hex, 3, 64},
-    {93, Shape::hex, 4, 125},    {94, Shape::hex, 5, 216},     {95, Shape::hex, 6, 343},     {96, Shape::hex, 7, 512},
-    {97, Shape::hex, 8, 729},    {98, Shape::hex, 9, 1000},    {118, Shape::pyramid, 3, 30},
-    {119, Shape::pyramid, 4, 55},
+    {1, Shape::line, 1, 2},       {2, Shape::triangle, 1, 3},   {3, Shape::quad, 1, 4},
+    {4, Shape::tet, 1, 4},        {5, Shape::hex, 1, 8},        {6, Shape::prism, 1, 6},
+    {7, Shape::pyramid, 1, 5},    {8, Shape::line, 2, 3},       {9, Shape::triangle, 2, 6},
+    {10, Shape::quad, 2, 9},      {11, Shape::tet, 2, 10},      {12, Shape::hex, 2, 27},
+    {13, Shape::prism, 2, 18},    {14, Shape::pyramid, 2, 14},  {15, Shape::point, 1, 1},
+    {16, Shape::quad, 2, 8},      {17, Shape::hex, 2, 20},      {18, Shape::prism, 2, 15},
+    {19, Shape::pyramid, 2, 13},  {20, Shape::triangle, 3, 9},  {21, Shape::triangle, 3, 10},
+    {22, Shape::triangle, 4, 12}, {23, Shape::triangle, 4, 15}, {24, Shape::triangle, 5, 15},
+    {25, Shape::triangle, 5, 21}, {26, Shape::line, 3, 4},      {27, Shape::line, 4, 5},
+    {28, Shape::line, 5, 6},      {29, Shape::tet, 3, 20},      {30, Shape::tet, 4, 35},
+    {31, Shape::tet, 5, 56},      {36, Shape::quad, 3, 16},     {37, Shape::quad, 4, 25},
+    {38, Shape::quad, 5, 36},     {39, Shape::quad, 3, 12},     {40, Shape::quad, 4, 16},
+    {41, Shape::quad, 5, 20},     {42, Shape::triangle, 6, 28}, {43, Shape::triangle, 7, 36},
+    {44, Shape::triangle, 8, 45}, {45, Shape::triangle, 9, 55}, {46, Shape::triangle, 10, 66},
+    {47, Shape::quad, 6, 49},     {48, Shape::quad, 7, 64},     {49, Shape::quad, 8, 81},
+    {50, Shape::quad, 9, 100},    {51, Shape::quad, 10, 121},   {62, Shape::line, 6, 7},
+    {63, Shape::line, 7, 8},      {64, Shape::line, 8, 9},      {65, Shape::line, 9, 10},
+    {66, Shape::line, 10, 11},    {71, Shape::tet, 6, 84},      {72, Shape::tet, 7, 120},
+    {73, Shape::tet, 8, 165},     {74, Shape::tet, 9, 220},     {75, Shape::tet, 10, 286},
+    {84, Shape::line, 1, 1},      {90, Shape::prism, 3, 40},    {91, Shape::prism, 4, 75},
+    {92, Shape::hex, 3, 64},      {93, Shape::hex, 4, 125},     {94, Shape::hex, 5, 216},
+    {95, Shape::hex, 6, 343},     {96, Shape::hex, 7, 512},     {97, Shape::hex, 8, 729},
+    {98, Shape::hex, 9, 1000},    {118, Shape::pyramid, 3, 30}, {119, Shape::pyramid, 4, 55},
 };
 
 int dimension(Shape shape) {
@@ -262,7 +266,8 @@ class MshParser {
     if (found == std::end(kMshTypes)) scan_.fail("elements of Gmsh's type " + std::to_string(type) + " are not read");
     if (found->shape == Shape::pyramid) scan_.fail(std::string("a pyramid: ") + kNoPyramids);
     if (found->shape == Shape::prism && found->order > 2)
-      scan_.fail("a prism of order " + std::to_string(found->order) + ", which Gmsh does not evaluate; expected order 1 "
+      scan_.fail("a prism of order " + std::to_string(found->order) +
+                 ", which Gmsh does not evaluate; expected order 1 "
                  "or 2");
     return *found;
   }
@@ -326,7 +331,8 @@ class MshParser {
     end_section("$Elements");
   }
 
-  // --- Building the mesh ----------------------------------------------------------------------------------------------
+  // --- Building the mesh
+  // ----------------------------------------------------------------------------------------------
 
   void build() {
     const auto is_cell = [](const Element& element) { return dimension(element.type->shape) == 3; };
@@ -362,8 +368,9 @@ class MshParser {
       mesh_.references.clear();
     name_regions();
     if (num_more_groups_ > 0)
-      mesh_.warnings.push_back(std::to_string(num_more_groups_) +
-                               " physical groups of volumes are not used: each volume has a physical group before them");
+      mesh_.warnings.push_back(
+          std::to_string(num_more_groups_) +
+          " physical groups of volumes are not used: each volume has a physical group before them");
     if (num_skipped_ > 0)
       mesh_.warnings.push_back(std::to_string(num_skipped_) +
                                " elements of lower dimension that are no face of a physical group are skipped");

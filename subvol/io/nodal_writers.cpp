@@ -17,7 +17,8 @@ namespace subvol {
 
 namespace {
 
-/// The text of a number that is closest to it, of at most so many characters. form: makes a format's text of a plain one.
+/// The text of a number that is closest to it, of at most so many characters. form: makes a format's text of a plain
+/// one.
 template <class Form>
 std::string number_within(double value, std::size_t width, const Form& form) {
   std::string exact;
@@ -34,7 +35,8 @@ std::string number_within(double value, std::size_t width, const Form& form) {
 /// CalculiX reads twenty characters of a number, and refuses longer ones.
 void append_inp_position(std::string& text, const Vec3& p) {
   constexpr std::size_t kWidth = 20;
-  for (int k = 0; k < 3; ++k) text += ", " + number_within(p[k], kWidth, [](const std::string& plain) { return plain; });
+  for (int k = 0; k < 3; ++k)
+    text += ", " + number_within(p[k], kWidth, [](const std::string& plain) { return plain; });
 }
 
 // --- Abaqus and CalculiX --------------------------------------------------------------------------------------------

@@ -45,13 +45,13 @@ std::vector<std::size_t> exodus_order(const NodalMesh& mesh);
 
 /// Returns the cells as XDMF 3 with all arrays in the text: one grid "mesh" with the cell data "reference", which
 /// meshio, dolfinx and ParaView read. Order 2 has all nodes of the grid (Hexahedron_27). Several kinds of cells make a
-/// mixed topology, which dolfinx does not read. Groups of faces are not in it. InputError: orders other than 1 and 2, or
-/// both of them.
+/// mixed topology, which dolfinx does not read. Groups of faces are not in it. InputError: orders other than 1 and 2,
+/// or both of them.
 std::string xdmf_text(const NodalMesh& mesh);
 
-/// Returns the faces of the boundary and of groups as XDMF: a grid "groups" of triangles and quads with the nodes of the
-/// cells, all nodes of the mesh, and the cell data "group": the number of the face's first group (below 1: the first free
-/// number), 0 for none. dolfinx reads it as tags of facets. InputError: as above.
+/// Returns the faces of the boundary and of groups as XDMF: a grid "groups" of triangles and quads with the nodes of
+/// the cells, all nodes of the mesh, and the cell data "group": the number of the face's first group (below 1: the
+/// first free number), 0 for none. dolfinx reads it as tags of facets. InputError: as above.
 std::string xdmf_faces_text(const NodalMesh& mesh);
 
 /// Returns linear cells as a NodalMesh.

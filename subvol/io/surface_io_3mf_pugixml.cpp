@@ -69,7 +69,8 @@ class ThreeMfParser {
       for (const pugi::xml_node relation : document_.document_element().children()) {
         std::string target = relation.attribute("Target").value();
         if (target.starts_with("/")) target.erase(0, 1);
-        if (std::string_view(relation.attribute("Type").value()).ends_with(kModel) && archive_.has(target)) return target;
+        if (std::string_view(relation.attribute("Type").value()).ends_with(kModel) && archive_.has(target))
+          return target;
       }
     }
     for (const auto& [path, entry] : archive_.entries())

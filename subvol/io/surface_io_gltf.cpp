@@ -63,10 +63,10 @@ class GltfParser {
     const std::string folder = std::filesystem::path(name_).parent_path().string();
     const auto size = static_cast<unsigned>(bytes.size());
     const bool is_binary = bytes.starts_with("glTF");
-    const bool read = is_binary
-                          ? reader.LoadBinaryFromMemory(&model_, &errors, &warnings,
-                                                        reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
-                          : reader.LoadASCIIFromString(&model_, &errors, &warnings, bytes.data(), size, folder);
+    const bool read =
+        is_binary ? reader.LoadBinaryFromMemory(&model_, &errors, &warnings,
+                                                reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
+                  : reader.LoadASCIIFromString(&model_, &errors, &warnings, bytes.data(), size, folder);
     if (read) return;
     std::replace(errors.begin(), errors.end(), '\n', ' ');
     fail("no glTF 2.0 file that can be read: " + errors.substr(0, errors.find_last_not_of(' ') + 1));
@@ -181,7 +181,8 @@ class GltfParser {
     T value;
     std::memcpy(&value, bytes, sizeof value);
     if constexpr (std::is_integral_v<T>)
-      if (normalized) return std::max(static_cast<double>(value) / static_cast<double>(std::numeric_limits<T>::max()), -1.0);
+      if (normalized)
+        return std::max(static_cast<double>(value) / static_cast<double>(std::numeric_limits<T>::max()), -1.0);
     return static_cast<double>(value);
   }
 

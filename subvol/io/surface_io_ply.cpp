@@ -192,8 +192,8 @@ class PlyParser {
     left_out_.add("properties of " + (is_known ? element.name : "element " + in_quotes(element.name)));
   }
 
-  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label. In the property
-  /// that subvol writes, 0 is no group.
+  /// Labels > 0 are the numbers of the groups; if one is not, groups are named after property and label. In the
+  /// property that subvol writes, 0 is no group.
   void add_groups() {
     if (colors_) mesh_.face_groups = colors_->take(left_out_, "colours of faces");
     if (labels_.empty() || labels_.size() != mesh_.num_faces()) return;

@@ -32,8 +32,8 @@ OffCounts read_off_counts(TextScanner& scan) {
   return {vertices, faces};
 }
 
-/// Returns the name of the color in the rest of a line of OFF: "#ff0000" for three or four numbers, whole ones up to 255
-/// or real ones up to 1, and "color 7" for a place in a color map. Returns an empty text if there is no color.
+/// Returns the name of the color in the rest of a line of OFF: "#ff0000" for three or four numbers, whole ones up to
+/// 255 or real ones up to 1, and "color 7" for a place in a color map. Returns an empty text if there is no color.
 std::string color_in_rest_of_line(TextScanner& scan) {
   const auto rest = scan.line();
   if (!rest) return {};

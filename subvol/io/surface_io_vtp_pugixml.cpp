@@ -40,7 +40,8 @@ class VtpParser {
  private:
   void read_piece(const pugi::xml_node& piece) {
     const std::size_t first = mesh_.positions.size(), num_points = file_.append_points(piece, mesh_.positions);
-    const std::size_t before = VtkXmlFile::claimed(piece, "NumberOfVerts") + VtkXmlFile::claimed(piece, "NumberOfLines");
+    const std::size_t before =
+        VtkXmlFile::claimed(piece, "NumberOfVerts") + VtkXmlFile::claimed(piece, "NumberOfLines");
     if (before > 0) left_out_.add("vertices and lines", before);
     cells_.clear();
     add_faces(piece.child("Polys"), VtkXmlFile::claimed(piece, "NumberOfPolys"), before, first, num_points, false);
@@ -89,7 +90,8 @@ class VtpParser {
   void read_cell_data(const pugi::xml_node& piece) {
     std::vector<CellNumbers> arrays;
     for (const pugi::xml_node node : piece.child("CellData").children("DataArray")) {
-      CellNumbers numbers{node.attribute("Name").value(), std::string_view(node.attribute("type").value()).starts_with("Float"), {}};
+      CellNumbers numbers{
+          node.attribute("Name").value(), std::string_view(node.attribute("type").value()).starts_with("Float"), {}};
       if (node.attribute("NumberOfComponents").as_int(1) != 1) continue;
       if (chosen_ && numbers.name != *chosen_) continue;
       for (const double value : file_.values(node)) {

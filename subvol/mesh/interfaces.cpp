@@ -80,7 +80,8 @@ void add_interface_groups(VolumeMesh& mesh) {
     mesh.face_groups.groups.push_back(
         {region_label(mesh, a) + "|" + region_label(mesh, b), free_number(mesh.face_groups.groups), 2});
   for (std::size_t i = 0; i < interfaces.faces.size(); ++i)
-    mesh.face_groups.faces.push_back({face_key(topology.face(interfaces.faces[i])), first + interfaces.pair_of_face[i]});
+    mesh.face_groups.faces.push_back(
+        {face_key(topology.face(interfaces.faces[i])), first + interfaces.pair_of_face[i]});
   normalise(mesh.face_groups);
 }
 

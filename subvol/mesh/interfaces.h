@@ -27,8 +27,8 @@ Interfaces find_interfaces(const VolumeMesh& mesh, const MeshTopology& topology)
 /// reference; unused entries are kNoIndex.
 std::array<Index, 4> oriented_face(const VolumeMesh& mesh, const MeshTopology& topology, Index face);
 
-/// Marks the edges and vertices of interfaces with 1. One entry per edge and vertex of the topology; empty: there are no
-/// interfaces.
+/// Marks the edges and vertices of interfaces with 1. One entry per edge and vertex of the topology; empty: there are
+/// no interfaces.
 struct InterfaceMarks {
   std::vector<char> edges, vertices;
   /// 1 for edges of *feature curves*, where more than two faces of the boundary and of interfaces meet.
@@ -42,8 +42,8 @@ InterfaceMarks mark_interfaces(const MeshTopology& topology, const Interfaces& i
 /// Returns the references that occur, ascending; {0} for a mesh without references.
 std::vector<int> region_references(const VolumeMesh& mesh);
 
-/// Puts the faces of each interface into a group of their own, named by its two regions: "core|shell", "region 1|region 3".
-/// Groups that the mesh has are kept. Cost: linear but for a sort of the faces.
+/// Puts the faces of each interface into a group of their own, named by its two regions: "core|shell", "region 1|region
+/// 3". Groups that the mesh has are kept. Cost: linear but for a sort of the faces.
 void add_interface_groups(VolumeMesh& mesh);
 
 /// Returns the name of a region for people: that of its group in `VolumeMesh::regions`, or "region 3".

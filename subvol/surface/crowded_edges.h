@@ -14,7 +14,8 @@ class PlaceList {
   void add(const std::string& place);
   bool empty() const { return count_ == 0; }
   std::size_t count() const { return count_; }
-  /// Returns "2 WHAT: PLACE; PLACE" and a note on the numbering of vertices; one, many: WHAT for one place and for more.
+  /// Returns "2 WHAT: PLACE; PLACE" and a note on the numbering of vertices; one, many: WHAT for one place and for
+  /// more.
   std::string text(const std::string& one, const std::string& many) const;
 
  private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/region_surface.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/format.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -17,23 +18,6 @@
 namespace subvol {
 
 namespace {
-
-/// Sets of numbers that are joined one by one; each is known by its least member.
-class JoinedSets {
- public:
-  explicit JoinedSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
-  Index of(Index i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(Index a, Index b) {
-    const Index x = of(a), y = of(b);
-    parent_[std::max(x, y)] = std::min(x, y);
-  }
-
- private:
-  std::vector<Index> parent_;
-};
 
 /// Returns six times the signed volume between a triangle and the origin.
 double volume_below(const TriangleMesh& mesh, const std::array<Index, 3>& t, const Vec3& origin) {
@@ -104,7 +88,11 @@ EdgeFan sorted_around(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge>
 class RegionFinder {
  public:
   RegionFinder(TriangleMesh mesh, std::vector<char> has_copy, RegionRule rule)
-      : mesh_(std::move(mesh)), has_copy_(std::move(has_copy)), rule_(rule), cells_(2 * mesh_.triangles.size()), parts_(mesh_.triangles.size()) {}
+      : mesh_(std::move(mesh)),
+        has_copy_(std::move(has_copy)),
+        rule_(rule),
+        cells_(2 * mesh_.triangles.size()),
+        parts_(mesh_.triangles.size()) {}
 
   std::optional<RegionSurface> run() {
     if (mesh_.triangles.empty() || !join_around_edges()) return std::nullopt;
@@ -305,10 +293,10 @@ class RegionFinder {
     orient_sheets(surface);
     name_regions(surface);
     if (nested_ > 0)
-      surface.notes.push_back(formatted("%zu closed part%s not face inward though inside another, and bound%s a region; "
-                                        "--regions merge makes voids of %s",
-                                        nested_, nested_ == 1 ? " does" : "s do", nested_ == 1 ? "s" : "",
-                                        nested_ == 1 ? "it" : "them"));
+      surface.notes.push_back(
+          formatted("%zu closed part%s not face inward though inside another, and bound%s a region; "
+                    "--regions merge makes voids of %s",
+                    nested_, nested_ == 1 ? " does" : "s do", nested_ == 1 ? "s" : "", nested_ == 1 ? "it" : "them"));
     if (loose > 0)
       surface.notes.push_back(formatted("%zu triangles divide nothing and were left out", loose));
     return surface;
@@ -345,7 +333,7 @@ class RegionFinder {
   TriangleMesh mesh_;
   std::vector<char> has_copy_;
   RegionRule rule_;
-  JoinedSets cells_, parts_;
+  DisjointSets cells_, parts_;
   std::vector<Index> curve_triangles_;
   std::vector<Cell> cells_of_parts_;
   std::vector<Part> parts_with_cells_;
@@ -415,7 +403,8 @@ RegionSurface surface_of_regions(const VolumeMesh& mesh) {
   const std::vector<int> references = region_references(mesh);
   const bool keeps = references.front() > kOutside;
   const auto number_of = [&](int reference) {
-    return keeps ? reference : 1 + static_cast<int>(std::ranges::lower_bound(references, reference) - references.begin());
+    return keeps ? reference
+                 : 1 + static_cast<int>(std::ranges::lower_bound(references, reference) - references.begin());
   };
   RegionSurface surface;
   for (const int reference : references) {

@@ -44,16 +44,16 @@ enum class RegionRule {
 };
 const char* to_string(RegionRule rule);
 
-/// Finds the regions that a surface divides space into: the connected components of what is left of space, as far as they
-/// are enclosed and are no voids.
+/// Finds the regions that a surface divides space into: the connected components of what is left of space, as far as
+/// they are enclosed and are no voids.
 ///
 /// Around each edge, the triangles are sorted by angle, so that neighbors there bound the same component. Parts of the
 /// surface that no edge connects lie in the smallest component that contains them by winding number.
 ///
 /// With RegionRule::automatic, the inside of a closed part P, which lies in another one, is a void if P faces inward as
 /// a whole (more than half of its volume, by signed sum, is negative, seen from the part that all others lie in), and a
-/// region otherwise: if it faces outward, if its triangles disagree about the outside, or if each of them is there twice,
-/// for the solids on either side.
+/// region otherwise: if it faces outward, if its triangles disagree about the outside, or if each of them is there
+/// twice, for the solids on either side.
 ///
 /// Regions are numbered from 1 on by their first triangles. A region gets the name of a group of triangles if they all
 /// bound it, and are half or more of its boundary by area.
@@ -71,8 +71,8 @@ RegionSurface surface_of_regions(const VolumeMesh& mesh);
 /// Returns the closed boundary of a region, oriented outward, without groups; vertices are numbered as in the surface.
 TriangleMesh boundary_of_region(const RegionSurface& surface, int region);
 
-/// Returns the triangles between regions and the outside, oriented outward, with their groups, and without vertices that
-/// they do not name.
+/// Returns the triangles between regions and the outside, oriented outward, with their groups, and without vertices
+/// that they do not name.
 TriangleMesh outer_surface(const RegionSurface& surface);
 
 /// Returns the triangles between two regions, with the groups and without vertices that they do not name.
@@ -86,8 +86,8 @@ std::vector<std::array<int, 2>> region_pairs(const RegionSurface& surface);
 /// meet, as pairs of vertices, ascending.
 std::vector<std::array<Index, 2>> curve_edges(const RegionSurface& surface);
 
-/// Sets the volumes from the triangles, and turns these as `sides` says. sides: {a, b} for a region or kOutside on either
-/// side of each triangle, those behind it first; different from each other.
+/// Sets the volumes from the triangles, and turns these as `sides` says. sides: {a, b} for a region or kOutside on
+/// either side of each triangle, those behind it first; different from each other.
 void orient_sheets(RegionSurface& surface);
 
 }  // namespace subvol

@@ -2,6 +2,7 @@
 #include "subvol/surface/solid_topology.h"
 
 #include "subvol/base/error.h"
+#include "subvol/surface/corner_fans.h"
 #include "subvol/surface/crowded_edges.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/welded_surface.h"
@@ -161,27 +162,13 @@ void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
 std::vector<int> euler_numbers(const TriangleMesh& mesh, std::span<const int> component, int count,
                                std::span<const Index> names) {
   std::vector<int> euler(static_cast<std::size_t>(count), 0);
-  // Corners at one vertex that share an edge belong to one fan.
-  std::vector<Index> group(3 * mesh.triangles.size());
-  std::iota(group.begin(), group.end(), 0);
-  const auto root = [&](Index c) {
-    while (group[c] != c) c = group[c] = group[group[c]];
-    return c;
-  };
-  const auto corner = [&](Index t, Index v) {
-    const auto& corners = mesh.triangles[t];
-    return static_cast<Index>(3 * t + (corners[0] == v ? 0 : corners[1] == v ? 1 : 2));
-  };
+  CornerFans fans(mesh.triangles);
   for (const auto& [first, second] : edges_of(mesh, names)) {
     --euler[component[first.triangle]];
-    if (!second) continue;
-    for (Index v : {first.low, first.high}) {
-      const Index a = root(corner(first.triangle, v)), b = root(corner(second->triangle, v));
-      group[std::max(a, b)] = std::min(a, b);
-    }
+    if (second) fans.join(first, *second);
   }
-  for (std::size_t c = 0; c < group.size(); ++c)
-    if (group[c] == static_cast<Index>(c)) ++euler[component[c / 3]];
+  for (std::size_t c = 0; c < fans.num_corners(); ++c)
+    if (fans.of(c) == static_cast<Index>(c)) ++euler[component[c / 3]];
   for (int c : component) ++euler[c];
   return euler;
 }

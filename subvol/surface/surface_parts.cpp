@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/surface/surface_parts.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/surface/part_nesting.h"
 
 #include <algorithm>
@@ -32,26 +33,11 @@ void sort_edges(SurfaceParts& parts) {
 
 /// Sets part and is_closed.
 void find_parts(SurfaceParts& parts) {
-  std::vector<Index> root(parts.surface.mesh.triangles.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](Index t) {
-    while (root[t] != t) t = root[t] = root[root[t]];
-    return t;
-  };
-  for (const auto& [i, j] : parts.joined) {
-    const Index a = find(parts.sides[i].triangle), b = find(parts.sides[j].triangle);
-    root[std::max(a, b)] = std::min(a, b);
-  }
-  parts.part.assign(root.size(), 0);
-  for (std::size_t t = 0; t < root.size(); ++t) {
-    const auto r = static_cast<std::size_t>(find(static_cast<Index>(t)));
-    if (r == t) {
-      parts.part[t] = static_cast<int>(parts.is_closed.size());
-      parts.is_closed.push_back(1);
-    } else {
-      parts.part[t] = parts.part[r];
-    }
-  }
+  DisjointSets sets(parts.surface.mesh.triangles.size());
+  for (const auto& [i, j] : parts.joined) sets.join(parts.sides[i].triangle, parts.sides[j].triangle);
+  std::vector<Index> numbers;
+  parts.is_closed.assign(sets.number(numbers), 1);
+  parts.part.assign(numbers.begin(), numbers.end());
   for (const std::size_t side : parts.rims) parts.is_closed[parts.part[parts.sides[side].triangle]] = 0;
   for (const std::size_t first : parts.crowded)
     for (const SurfaceHalfEdge& side : parts.edge(first)) parts.is_closed[parts.part[side.triangle]] = 0;

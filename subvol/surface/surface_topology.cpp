@@ -86,9 +86,10 @@ void pair_corners(SurfaceTopology& surface, std::size_t num_vertices, std::span<
   }
   if (!crowded.empty()) throw InputError((kind == SurfaceKind::closed ? "boundary: " : "surface: ") + crowded.text());
   if (!turned.empty())
-    throw InputError(turned.text(prefix(kind) + "edge has two faces that run the same way along it: their normals disagree",
-                                 prefix(kind) + "edges have two faces that run the same way along them: their normals "
-                                                "disagree"));
+    throw InputError(
+        turned.text(prefix(kind) + "edge has two faces that run the same way along it: their normals disagree",
+                    prefix(kind) + "edges have two faces that run the same way along them: their normals "
+                                   "disagree"));
   if (!unpaired.empty())
     throw InputError(unpaired.text(prefix(kind) + "edge lies at one face instead of between two",
                                    prefix(kind) + "edges lie at one face instead of between two"));

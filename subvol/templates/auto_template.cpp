@@ -210,8 +210,8 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
     const double share = count_of(*solid) / cells_;
     if (!range.holds(share)) return;
     ++num_right;
-    const double score =
-        voxel_score(*solid, fractions, volumes, &stop_) + kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
+    const double score = voxel_score(*solid, fractions, volumes, &stop_) +
+                         kCountWeight * std::max(0.0, std::abs(std::log(share)) - kFreeCount);
     if (stop_.is_stopped() || (!best.kept.empty() && score >= best.score)) return;
     best.score = score;
     best.share = share;

@@ -20,8 +20,8 @@ namespace {
 
 constexpr int kRim = 2;  ///< layers of empty voxels around the grid
 
-/// A face between two voxels, its normal pointing from `pair[0]` to `pair[1]`; labels are places in the list of regions,
-/// 0: outside.
+/// A face between two voxels, its normal pointing from `pair[0]` to `pair[1]`; labels are places in the list of
+/// regions, 0: outside.
 struct Face {
   std::array<Index, 4> corners;
   std::array<int, 2> pair;
@@ -81,7 +81,8 @@ std::size_t LabelSheets::drop_specks(VoxelLabels& labels) const {
     for (std::size_t c = 0; c < component.size(); ++c) {
       if (component[c] < 0 || size[component[c]] >= options_.least_voxels) continue;
       for (const Index offset : labels.face_offsets())
-        if (const int other = labels.label(static_cast<Index>(c) + offset); other != label) ++votes[component[c]][other];
+        if (const int other = labels.label(static_cast<Index>(c) + offset); other != label)
+          ++votes[component[c]][other];
     }
     for (const auto& vote : votes) dropped += !vote.empty();
     for (std::size_t c = 0; c < component.size(); ++c) {
@@ -183,7 +184,8 @@ void LabelSheets::find_neighbors() {
   for (std::size_t first = 0, last; first < sides.size(); first = last) {
     const auto& [low, high, pair] = sides[first];
     bool same = true;
-    for (last = first; last < sides.size() && std::get<0>(sides[last]) == low && std::get<1>(sides[last]) == high; ++last)
+    for (last = first; last < sides.size() && std::get<0>(sides[last]) == low && std::get<1>(sides[last]) == high;
+         ++last)
       same = same && std::get<2>(sides[last]) == pair;
     (same && last - first == 2 ? smooth : curves).push_back({low, high});
   }
@@ -241,8 +243,8 @@ std::vector<double> LabelSheets::volumes() const {
   return result;
 }
 
-/// Moves each sheet along its normals: of all moves that give the regions their volumes to first order, the one with the
-/// least integral of its square.
+/// Moves each sheet along its normals: of all moves that give the regions their volumes to first order, the one with
+/// the least integral of its square.
 void LabelSheets::restore_volumes() {
   constexpr int kRounds = 8;
   constexpr double kEnough = 1e-5, kMostStep = 0.3;  // relative; voxels
@@ -262,23 +264,26 @@ void LabelSheets::restore_volumes() {
     }
     if (worst < kEnough) return;
     std::vector<double> area(static_cast<std::size_t>(count), 0.0);
-    for (const Face& face : faces_) area[static_cast<std::size_t>(sheet_of_pair[face.pair])] += area_vector(face, positions_).norm();
+    for (const Face& face : faces_)
+      area[static_cast<std::size_t>(sheet_of_pair[face.pair])] += area_vector(face, positions_).norm();
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n, n);  // M A M^T, M: signs of the sheets in the regions
     for (const auto& [pair, number] : sheet_of_pair)
       for (const int a : pair)
         for (const int b : pair)
-          if (a != kOutside && b != kOutside) matrix(a - 1, b - 1) += (a == b ? 1 : -1) * area[static_cast<std::size_t>(number)];
+          if (a != kOutside && b != kOutside)
+            matrix(a - 1, b - 1) += (a == b ? 1 : -1) * area[static_cast<std::size_t>(number)];
     const Eigen::VectorXd y = matrix.completeOrthogonalDecomposition().solve(missing);
     // Normals of each sheet at each vertex, one after the other: at a curve, each sheet asks for its own move.
     std::vector<std::pair<std::pair<Index, Index>, Vec3>> normals;  // vertex, sheet
     for (const Face& face : faces_)
-      for (const Index v : face.corners) normals.push_back({{v, sheet_of_pair[face.pair]}, area_vector(face, positions_)});
+      for (const Index v : face.corners)
+        normals.push_back({{v, sheet_of_pair[face.pair]}, area_vector(face, positions_)});
     std::stable_sort(normals.begin(), normals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     std::vector<double> step(static_cast<std::size_t>(count), 0.0);
     for (const auto& [pair, number] : sheet_of_pair)
       step[static_cast<std::size_t>(number)] =
-          std::clamp((pair[0] == kOutside ? 0 : y[pair[0] - 1]) - (pair[1] == kOutside ? 0 : y[pair[1] - 1]), -kMostStep,
-                     kMostStep);
+          std::clamp((pair[0] == kOutside ? 0 : y[pair[0] - 1]) - (pair[1] == kOutside ? 0 : y[pair[1] - 1]),
+                     -kMostStep, kMostStep);
     for (std::size_t first = 0, last; first < normals.size();) {
       const Index v = normals[first].first.first;
       Mat3 sum = 1e-3 * Mat3::Identity();
@@ -303,7 +308,9 @@ RegionSurface LabelSheets::result() const {
   for (const int value : values_) surface.regions.push_back({"", value, 3});
   for (const Vec3& p : positions_) surface.mesh.positions.push_back(grid_.origin + grid_.edges * p);
   const bool is_mirrored = grid_.edges.determinant() < 0;
-  const auto value_of = [&](int label) { return label == kOutside ? kOutside : values_[static_cast<std::size_t>(label - 1)]; };
+  const auto value_of = [&](int label) {
+    return label == kOutside ? kOutside : values_[static_cast<std::size_t>(label - 1)];
+  };
   for (const Face& face : faces_) {
     const auto& [a, b, c, d] = face.corners;
     for (std::array<Index, 3> triangle : {std::array{a, b, c}, std::array{a, c, d}}) {

@@ -16,12 +16,14 @@ struct LabelSurfaceOptions {
 /// Returns the surfaces between the regions of a segmentation, with the staircase of its voxels smoothed.
 ///
 /// First the labels of single voxels are changed where regions touch along an edge or at a corner alone, so that each
-/// region's boundary is a manifold, and specks are removed. The faces between voxels of different labels are the sheets.
-/// Their vertices are averaged over neighbors on the sheet, and along the curve where three sheets or more meet, forth and
-/// back (Taubin, "A signal processing approach to fair surface design", 1995), at most a voxel away from where they were.
-/// Then each sheet moves along its normals until every region has the volume of its voxels, up to about 0.01 %.
+/// region's boundary is a manifold, and specks are removed. The faces between voxels of different labels are the
+/// sheets. Their vertices are averaged over neighbors on the sheet, and along the curve where three sheets or more
+/// meet, forth and back (Taubin, "A signal processing approach to fair surface design", 1995), at most a voxel away
+/// from where they were. Then each sheet moves along its normals until every region has the volume of its voxels, up to
+/// about 0.01 %.
 ///
-/// returns  regions numbered by their labels; only one if the segmentation has no other. Faces at the border of the grid
+/// returns  regions numbered by their labels; only one if the segmentation has no other. Faces at the border of the
+/// grid
 ///          are part of the outer surface.
 /// InputError: no voxel has a label above 0; a region vanishes when specks are removed.
 /// Serial. Cost: about a second for a million voxels and a hundred thousand faces.

@@ -32,8 +32,8 @@ namespace subvol {
 /// touches itself along an edge or at a vertex); a vertex at which no step keeps all cells valid.
 VolumeMesh pillow(const VolumeMesh& mesh, std::span<const Index> cells = {});
 
-/// Puts a layer of cells inside the boundary of each region: inside the mesh's boundary there, and on both sides of each
-/// interface. Interfaces keep their vertices.
+/// Puts a layer of cells inside the boundary of each region: inside the mesh's boundary there, and on both sides of
+/// each interface. Interfaces keep their vertices.
 ///
 /// takes  asked for each connected part of a region's boundary, by the corners of its faces, four for each and
 ///        kNoIndex for those that a triangle lacks; returns false for parts that get no layer. Empty: all get one.

@@ -142,7 +142,8 @@ std::optional<Candidate> RegionSearch::labelled(VoxelGrid grid, double cells, bo
   errors.rethrow();
   fractions[0].assign(grid.num_cells(), 1.0);
   for (int r = 1; r <= num_regions; ++r)
-    for (std::size_t c = 0; c < grid.num_cells(); ++c) fractions[0][c] = std::max(0.0, fractions[0][c] - fractions[r][c]);
+    for (std::size_t c = 0; c < grid.num_cells(); ++c)
+      fractions[0][c] = std::max(0.0, fractions[0][c] - fractions[r][c]);
   const std::vector<double> volumes = cell_volumes(grid);
   const double unit = std::abs(grid.edges.determinant());
   const double cell_length = std::cbrt(volume_ / cells);
@@ -230,7 +231,8 @@ std::optional<Candidate> RegionSearch::best_through(const AxisPlanes& planes, do
         at.insert(at.begin(), at.front() - size);
         at.push_back(at.back() + size);
       }
-    std::optional<Candidate> found = labelled(grid_through(planes.frame, std::move(lines)), cells, aligned > kAllPlanes);
+    std::optional<Candidate> found =
+        labelled(grid_through(planes.frame, std::move(lines)), cells, aligned > kAllPlanes);
     if (!found) {
       step(false, kFiner);
       continue;
@@ -277,7 +279,8 @@ RegionTemplate RegionSearch::finished(const Candidate& candidate, std::size_t ce
   for (const int label : candidate.labels) kept.push_back(label != kOutside);
   result.mesh = voxel_mesh(candidate.grid, kept);
   for (const int label : candidate.labels)
-    if (label != kOutside) result.mesh.references.push_back(surface_.regions[static_cast<std::size_t>(label - 1)].number);
+    if (label != kOutside)
+      result.mesh.references.push_back(surface_.regions[static_cast<std::size_t>(label - 1)].number);
   result.mesh.regions = surface_.regions;
   std::erase_if(result.mesh.regions, [](const Group& region) { return region.name.empty(); });
   result.cells_asked = cells;

@@ -36,15 +36,15 @@ struct RegionTemplateResult {
   bool cancelled = false;
 };
 
-/// Makes a template for several regions: a carved grid in which each region has the topology that it has in the surface,
-/// and in which the same regions have faces in common.
+/// Makes a template for several regions: a carved grid in which each region has the topology that it has in the
+/// surface, and in which the same regions have faces in common.
 ///
 /// Each cell of a grid is given to the region that has most of it; layers thinner than a cell are given more weight
-/// until they are whole. Cells are then exchanged one by one until every region's boundary is a manifold, and after that
-/// as long as it improves the likeness and keeps the topology (`VoxelLabels::is_simple`). Of the grids whose regions have
-/// the right Betti numbers, and whose pairs of neighbors are those of the surface, the one with the fewest interfaces of
-/// wrong topology is taken, and of these the one that is most like the surface. Grids pass through large planes of the
-/// surface if there are any (`lines_through_planes`).
+/// until they are whole. Cells are then exchanged one by one until every region's boundary is a manifold, and after
+/// that as long as it improves the likeness and keeps the topology (`VoxelLabels::is_simple`). Of the grids whose
+/// regions have the right Betti numbers, and whose pairs of neighbors are those of the surface, the one with the fewest
+/// interfaces of wrong topology is taken, and of these the one that is most like the surface. Grids pass through large
+/// planes of the surface if there are any (`lines_through_planes`).
 ///
 /// If no grid with the requested count works, counts up to 9 times as large are tried.
 /// InputError: options out of range; as `topology_of`. Deterministic; serial but for the shares of regions.

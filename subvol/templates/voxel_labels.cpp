@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/voxel_labels.h"
+#include "subvol/base/disjoint_sets.h"
 
 #include <algorithm>
 #include <numeric>
@@ -83,24 +84,16 @@ std::map<std::array<int, 2>, SheetTopology> topology_of_sheets(std::span<const s
     std::sort(vertices.begin(), vertices.end());
     std::sort(edges.begin(), edges.end());
     const auto num_vertices = std::unique(vertices.begin(), vertices.end()) - vertices.begin();
-    std::vector<std::size_t> parent(list.size());
-    std::iota(parent.begin(), parent.end(), std::size_t{0});
-    const auto root = [&](std::size_t i) {
-      while (parent[i] != i) i = parent[i] = parent[parent[i]];
-      return i;
-    };
-    int num_edges = 0, joins = 0;
+    DisjointSets parts(list.size());
+    int num_edges = 0;
     for (std::size_t e = 0; e < edges.size(); ++e) {
       const bool same = e > 0 && std::get<0>(edges[e]) == std::get<0>(edges[e - 1]) &&
                         std::get<1>(edges[e]) == std::get<1>(edges[e - 1]);
       num_edges += !same;
-      if (!same) continue;
-      const std::size_t a = root(std::get<2>(edges[e])), b = root(std::get<2>(edges[e - 1]));
-      if (a == b) continue;
-      parent[std::max(a, b)] = std::min(a, b);
-      ++joins;
+      if (same) parts.join(static_cast<Index>(std::get<2>(edges[e])), static_cast<Index>(std::get<2>(edges[e - 1])));
     }
-    result[key] = {static_cast<int>(list.size()) - joins,
+    std::vector<Index> part_of_face;
+    result[key] = {static_cast<int>(parts.number(part_of_face)),
                    static_cast<int>(num_vertices) - num_edges + static_cast<int>(list.size())};
   }
   return result;

@@ -28,7 +28,8 @@ struct RegionTopology {
   std::map<std::array<int, 2>, SheetTopology> sheets;
 };
 
-/// Finds the topology of a surface's regions, in the order of `RegionSurface::regions`. InputError: as `solid_boundary`.
+/// Finds the topology of a surface's regions, in the order of `RegionSurface::regions`. InputError: as
+/// `solid_boundary`.
 RegionTopology topology_of(const RegionSurface& surface);
 
 /// Returns the topology of each sheet. faces: corners of each, 3 or 4; kNoIndex for those that a triangle lacks.
@@ -79,8 +80,8 @@ class VoxelLabels {
 /// Share of each region in each cell, by region from 1 on and cell; entry 0 is that of the outside.
 using LabelFractions = std::vector<std::vector<double>>;
 
-/// Changes the labels of single cells, each time the one that improves most, until all points are good: the number of good
-/// points counts, and then by how much `share` rises. Returns false if that is not reached.
+/// Changes the labels of single cells, each time the one that improves most, until all points are good: the number of
+/// good points counts, and then by how much `share` rises. Returns false if that is not reached.
 ///
 /// share    of a label in a cell, in [0, 1].
 /// changes  number of changes so far, by cell: no more than four.

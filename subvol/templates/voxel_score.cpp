@@ -20,7 +20,8 @@ double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, s
                    SearchStop* stop) {
   const auto anywhere = [](Index) { return true; };
   const std::vector<int> cover = voxel_steps(solid, [&](Index c) { return solid.filled(c); }, anywhere, nullptr, stop);
-  const std::vector<int> stray = voxel_steps(solid, [&](Index c) { return fractions[c] > kMostlyInShape; }, anywhere, nullptr, stop);
+  const std::vector<int> stray = voxel_steps(
+      solid, [&](Index c) { return fractions[c] > kMostlyInShape; }, anywhere, nullptr, stop);
   double volume = 0, wrong = 0, mean_cover = 0;
   int max_cover = 0, max_stray = 0;
   for (std::size_t c = 0; c < fractions.size(); ++c) {

@@ -93,7 +93,8 @@ TEST_CASE("an input that cannot be read is told as what it is, by every verb", "
       const Run run = place.run(verb);
       CAPTURE(verb, run.err);
       CHECK(run.status == 3);
-      CHECK(run.err.find("unknown extension '" + std::filesystem::path(name).extension().string() + "'") != std::string::npos);
+      CHECK(run.err.find("unknown extension '" + std::filesystem::path(name).extension().string() + "'") !=
+            std::string::npos);
       CHECK(run.err.find(".mesh (Medit") != std::string::npos);
     }
   }
@@ -122,7 +123,8 @@ TEST_CASE("what was read and is in none of the outputs is told once, by every ve
   REQUIRE(!mesh.tags.creases.empty());
   mesh.references.assign(mesh.num_cells(), 3);
   subvol::write_volume_mesh(place / "a.mesh", mesh);
-  const std::string told = "in none of the outputs: ", references = std::to_string(mesh.num_cells()) + " references of cells",
+  const std::string told = "in none of the outputs: ",
+                    references = std::to_string(mesh.num_cells()) + " references of cells",
                     creases = std::to_string(mesh.tags.creases.size()) + " creases";
   for (const std::string verb : {"convert a.mesh", "subdivide a.mesh", "template split a.mesh --into tets"}) {
     const auto run = [&](const std::string& outputs) { return place.run(verb + " --force" + outputs).err; };

@@ -45,7 +45,8 @@ TEST_CASE("A surface with sheets inside is filled region by region, with the tar
     CHECK(region["volume"].get<double>() == Approx(0.2).epsilon(1e-9));
     CHECK(region["not_certified"] == 0);
   }
-  for (const auto& interface : report["regions"]["interfaces"]) CHECK(interface["target_area"].get<double>() == Approx(1));
+  for (const auto& interface : report["regions"]["interfaces"])
+    CHECK(interface["target_area"].get<double>() == Approx(1));
   CHECK(report["warnings"].empty());
   const VolumeMesh mesh = read_volume_mesh(place / "a.mesh");
   CHECK(region_references(mesh) == std::vector<int>{1, 2, 3, 4, 5});

@@ -22,7 +22,8 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 /// A box of quads, 2 x 1 x 1, whose six sides are groups; each side is one face.
 const char* const kBox =
     "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 0 1 1\n"
-    "g bottom\nf 1 4 3 2\ng top\nf 5 6 7 8\ng left\nf 1 5 8 4\ng right\nf 2 3 7 6\ng front\nf 1 2 6 5\ng back\nf 4 8 7 3\n";
+    "g bottom\nf 1 4 3 2\ng top\nf 5 6 7 8\ng left\nf 1 5 8 4\ng right\nf 2 3 7 6\ng front\nf 1 2 6 5\ng back\nf 4 8 7 "
+    "3\n";
 
 std::map<std::string, std::size_t> faces_by_group(const nlohmann::json& report) {
   std::map<std::string, std::size_t> found;
@@ -37,7 +38,8 @@ TEST_CASE("Shells of real parts that need a repair say what was done", "[cli][sl
   if (!data) return;
   const Workplace place;
   for (const char* name : {"reported/50-angle_block.stl", "reported/50-z-axis-top.stl"}) {
-    const std::string words = "shell " + (*data / name).string() + " --thickness 1% --straight --force -o a.vtu --report r.json";
+    const std::string words =
+        "shell " + (*data / name).string() + " --thickness 1% --straight --force -o a.vtu --report r.json";
     const Run run = place.run(words);
     CAPTURE(name, run.err);
     REQUIRE(run.status == 0);
@@ -57,7 +59,8 @@ TEST_CASE("Layers end in the plane of an oblique cut, and grow on no cap that is
   if (!data) return;
   const Workplace place;
   const std::string reported = (*data / "reported").string() + "/";
-  const Run oblique = place.run("shell " + reported + "23-oblique.off --thickness 0.08 --layers 4 -o a.mesh --report r.json");
+  const Run oblique =
+      place.run("shell " + reported + "23-oblique.off --thickness 0.08 --layers 4 -o a.mesh --report r.json");
   CAPTURE(oblique.err);
   REQUIRE(oblique.status == 0);
   const auto border = place.json("r.json")["border"];

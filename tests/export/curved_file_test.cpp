@@ -75,14 +75,16 @@ std::string position(const Vec3& u, const char* separator) {
 /// Numbers of nodes do not begin at 1 and are not in order: 1000 - i.
 std::string inp(const std::vector<Vec3>& nodes, const char* type) {
   std::string text = "** a comment\n*Node\n", element = "7";
-  for (std::size_t i = 0; i < nodes.size(); ++i) text += std::to_string(1000 - i) + ", " + position(nodes[i], ", ") + "\n";
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    text += std::to_string(1000 - i) + ", " + position(nodes[i], ", ") + "\n";
   for (std::size_t i = 0; i < nodes.size(); ++i) element += (i == 9 ? ",\n" : ", ") + std::to_string(1000 - i);
   return text + "*Element, type=" + type + "\n" + element + "\n";
 }
 
 std::string bdf(const std::vector<Vec3>& nodes, const char* card) {
   std::string text = "BEGIN BULK\n", element = std::string(card) + ",7,3";
-  for (std::size_t i = 0; i < nodes.size(); ++i) text += "GRID," + std::to_string(1000 - i) + ",," + position(nodes[i], ",") + "\n";
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    text += "GRID," + std::to_string(1000 - i) + ",," + position(nodes[i], ",") + "\n";
   for (std::size_t i = 0; i < nodes.size(); ++i)
     element += ((i + 2) % 8 == 0 ? "\n," : ",") + std::to_string(1000 - i);
   return text + element + "\nENDDATA\n";

@@ -49,7 +49,8 @@ AutomaticFitResult fitted(const RegionSurface& surface, const AutomaticFitOption
 
 TEST_CASE("Slabs and a box in a box are filled exactly, with their interfaces in groups", "[regions]") {
   for (const TriangleMesh& target :
-       {test::slabs_surface(5), together(box_surface({0, 0, 0}, {1, 1, 1}), box_surface({0.25, 0.25, 0.25}, {0.75, 0.75, 0.75}))}) {
+       {test::slabs_surface(5),
+        together(box_surface({0, 0, 0}, {1, 1, 1}), box_surface({0.25, 0.25, 0.25}, {0.75, 0.75, 0.75}))}) {
     const auto surface = find_regions(target);
     REQUIRE(surface);
     AutomaticFitOptions options;
@@ -89,7 +90,8 @@ TEST_CASE("Nested balls with a thin skin keep their volumes", "[regions][slow]")
   fitted(*surface, options, 0.4, 0.1);
 }
 
-TEST_CASE("A segmented phantom is filled with all of its regions, half a voxel or less from the truth", "[regions][slow]") {
+TEST_CASE("A segmented phantom is filled with all of its regions, half a voxel or less from the truth",
+          "[regions][slow]") {
   const test::Phantom phantom{64};
   const LabelGrid grid = phantom.grid();
   std::vector<double> voxels(5, 0.0);

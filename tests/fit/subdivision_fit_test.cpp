@@ -239,7 +239,7 @@ TEST_CASE("A time limit ends the fit with a result") {
 }
 
 TEST_CASE("A fit says when the steps allowed were not enough, and when its start was inverted", "[slow]") {
-  const samples::Sample sample = samples::ball_sample();
+  const samples::Sample sample = samples::torus_sample();
   FitOptions options = quick(1);
   options.max_iterations = 1;  // converged takes two
   const FitReport short_of_steps = fit_subdivision_volume(sample.target, sample.template_mesh, options).report;
@@ -249,7 +249,8 @@ TEST_CASE("A fit says when the steps allowed were not enough, and when its start
   options.tolerance_percent = 50;  // met all the same
   CHECK(fit_subdivision_volume(sample.target, sample.template_mesh, options).report.stop_reason ==
         StopReason::converged);
-  const FitReport inverted = fit_subdivision_volume(sample.target, hex_inverted_inside(), quick(1)).report;
+  const FitReport inverted =
+      fit_subdivision_volume(samples::ball_sample().target, hex_inverted_inside(), quick(1)).report;
   CHECK(inverted.stop_reason == StopReason::stalled);
 }
 
@@ -320,7 +321,8 @@ TEST_CASE("A template that is next to nothing beside its target, or far beyond i
   for (Vec3& p : far.positions) p[0] += 1e9;
   CHECK_THROWS_WITH(fit_subdivision_volume(sample.target, far, quick()),
                     Catch::Contains("times the target's diagonal away"));
-  for (std::size_t v = 0; v < scaled.num_vertices(); ++v) scaled.positions[v] = 1e-20 * sample.template_mesh.positions[v];
+  for (std::size_t v = 0; v < scaled.num_vertices(); ++v)
+    scaled.positions[v] = 1e-20 * sample.template_mesh.positions[v];
   scaled.positions.push_back(Vec3(1, 0, 0));  // of no cell: it makes none larger
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, scaled, quick()), InputError);
   CHECK_THROWS_AS(fit_high_order(sample.target, scaled, {.order = 2}), InputError);

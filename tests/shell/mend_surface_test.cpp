@@ -28,8 +28,9 @@ TriangleMesh two_cubes(const Vec3& way) {
   const TriangleMesh other = mesh;
   std::vector<Index> number;
   for (const Vec3& p : other.positions) {
-    const auto same = std::find_if(mesh.positions.begin(), mesh.positions.begin() + static_cast<long>(other.positions.size()),
-                                   [&](const Vec3& q) { return (q - (p + way)).norm() < 1e-12; });
+    const auto same =
+        std::find_if(mesh.positions.begin(), mesh.positions.begin() + static_cast<long>(other.positions.size()),
+                     [&](const Vec3& q) { return (q - (p + way)).norm() < 1e-12; });
     number.push_back(static_cast<Index>(same - mesh.positions.begin()));
     if (number.back() < static_cast<Index>(other.positions.size())) continue;
     number.back() = static_cast<Index>(mesh.positions.size());
@@ -92,9 +93,10 @@ TEST_CASE("Solids that share a vertex or an edge get one each, a little apart", 
   for (const Vec3& way : {Vec3(2, 2, 2), Vec3(2, 2, 0)}) {
     const PolygonMesh given = as_polygons(two_cubes(way));
     const bool share_vertex = way.z() > 0;
-    CHECK_THROWS_WITH(make_shell(given, {.thickness = 0.05}),
-                      Catch::Contains(share_vertex ? "1 vertex has more than one fan of faces: surfaces touch there: vertex"
-                                                   : "2 edges have more than two faces"));
+    CHECK_THROWS_WITH(
+        make_shell(given, {.thickness = 0.05}),
+        Catch::Contains(share_vertex ? "1 vertex has more than one fan of faces: surfaces touch there: vertex"
+                                     : "2 edges have more than two faces"));
     const MendedSurface mended = mend_surface(given, {}, 1e-2);
     check_mended(mended, 1e-2);
     CHECK(mended.split_vertices == (share_vertex ? 1 : 3));
@@ -157,7 +159,8 @@ TEST_CASE("Messages name vertices by the numbers that the caller gives, and thei
   faults.meeting = {{0, 1}};
   faults.hidden = {0, 1};
   CHECK(to_text(faults, surface, {vertices, faces}) ==
-        "the surface meets itself at 1 pair of faces: faces 200 and 201 at (0.0833333, 0.125, 0); no direction sees all faces "
+        "the surface meets itself at 1 pair of faces: faces 200 and 201 at (0.0833333, 0.125, 0); no direction sees "
+        "all faces "
         "around from their front at 2 vertices: vertex 100 at (0, 0, 0), vertex 101 at (0.166667, 0, 0)");
 }
 

@@ -426,7 +426,8 @@ TEST_CASE("Surfaces and options that no shell can be made of are refused with th
   PolygonMesh crossing{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0.5, 0.5, -1}, {0.5, 0.5, 1}, {3, 3, 0}}, {0}, {}};
   add_face(crossing, {0, 1, 2});
   add_face(crossing, {3, 4, 5});
-  CHECK_THROWS_WITH(make_shell(crossing, {.thickness = 0.1}), Catch::Contains("meets itself at 1 pair of faces: faces 0 and 1 at ("));
+  CHECK_THROWS_WITH(make_shell(crossing, {.thickness = 0.1}),
+                    Catch::Contains("meets itself at 1 pair of faces: faces 0 and 1 at ("));
 
   PolygonMesh flat{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}}, {0}, {}};
   add_face(flat, {0, 1, 2});

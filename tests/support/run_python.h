@@ -15,8 +15,8 @@
 
 namespace subvol::test {
 
-/// Runs tests/SCRIPT MESH QUERIES under the first Python that has what it needs. Returns the exit status; kSkippedStatus
-/// if none has.
+/// Runs tests/SCRIPT MESH QUERIES under the first Python that has what it needs. Returns the exit status;
+/// kSkippedStatus if none has.
 inline int run_python(const std::string& script, const std::filesystem::path& mesh,
                       const std::filesystem::path& queries) {
   constexpr int kNoSuchProgram = 127;  // as shells say

@@ -81,8 +81,11 @@ TEST_CASE("Segmentations are read from NRRD and NIfTI with the place of their vo
   const test::TemporaryFolder files;
   const std::string header = "NRRD0004\n# a comment\ntype: uchar\ndimension: 3\nsizes: 2 3 4\n";
   for (const auto& [name, text] :
-       {std::pair("raw.nrrd", header + "encoding: raw\nspace directions: (2,0,0) (0,0,3) (0,-1,0)\nspace origin: (5,6,7)\n\n" + counted()),
-        {"gz.nrrd", header + "encoding: gzip\nspace directions: (2,0,0) (0,0,3) (0,-1,0)\nspace origin: (5,6,7)\n\n" + gzipped(counted())}}) {
+       {std::pair("raw.nrrd",
+                  header + "encoding: raw\nspace directions: (2,0,0) (0,0,3) (0,-1,0)\nspace origin: (5,6,7)\n\n" +
+                      counted()),
+        {"gz.nrrd", header + "encoding: gzip\nspace directions: (2,0,0) (0,0,3) (0,-1,0)\nspace origin: (5,6,7)\n\n" +
+                        gzipped(counted())}}) {
     const LabelGrid grid = read_label_grid(files.file(name, text));
     CHECK(grid.origin == Vec3(5, 6, 7));
     CHECK(grid.edges.col(1) == Vec3(0, 0, 3));

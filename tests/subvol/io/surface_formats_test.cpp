@@ -154,7 +154,8 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
 }
 
 TEST_CASE("surface formats: polygons and strips of a .vtp, and labels of its cells", "[io]") {
-  const std::string text = R"(<VTKFile type="PolyData" version="0.1"><PolyData><Piece NumberOfPoints="5" NumberOfVerts="1"
+  const std::string text =
+      R"(<VTKFile type="PolyData" version="0.1"><PolyData><Piece NumberOfPoints="5" NumberOfVerts="1"
 NumberOfPolys="1" NumberOfStrips="1"><Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">
 0 0 0 1 0 0 0 1 0 1 1 0 2 1 0</DataArray></Points><Polys><DataArray type="Int64" Name="connectivity" format="ascii">
 0 1 2</DataArray><DataArray type="Int64" Name="offsets" format="ascii">3</DataArray></Polys><Strips>

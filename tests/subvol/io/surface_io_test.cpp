@@ -272,7 +272,8 @@ TEST_CASE("what a surface file holds beside its polygons is counted in one warni
              Contains("1 colours of vertices, 1 texture coordinates, 1 lines, 1 uses of materials"));
   CHECK_THAT(told("a.stl", binary_stl("b")), Contains("4 facets' attributes"));
   CHECK_THAT(told("a.stl", binary_stl("b", 4, "more")), Contains("4 facets' attributes"));
-  CHECK_THAT(told("a.ply", kTextPly), Contains("1 properties of vertex, 1 properties of face, 1 properties of element 'edge'"));
+  CHECK_THAT(told("a.ply", kTextPly),
+             Contains("1 properties of vertex, 1 properties of face, 1 properties of element 'edge'"));
 }
 
 TEST_CASE("a soup keeps its separate vertices") {

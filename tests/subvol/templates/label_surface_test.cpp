@@ -20,7 +20,8 @@ TEST_CASE("The sheets of a phantom are smooth, near the truth, and keep the volu
   CHECK(surface.notes.size() == 1);
   for (int r = 0; r < 4; ++r) {
     CHECK(surface.regions[static_cast<std::size_t>(r)].number == r + 1);
-    CHECK(surface.volumes[static_cast<std::size_t>(r)] == Approx(voxels[static_cast<std::size_t>(r + 1)]).epsilon(2e-3));
+    CHECK(surface.volumes[static_cast<std::size_t>(r)] ==
+          Approx(voxels[static_cast<std::size_t>(r + 1)]).epsilon(2e-3));
     const SolidBoundary solid = solid_boundary(boundary_of_region(surface, r + 1));
     CHECK(solid.flipped_triangles == 0);
     CHECK(solid.topology == BettiNumbers{1, 0, r == 0 ? 1 : r == 1 ? 2 : 0});

@@ -48,9 +48,10 @@ TEST_CASE("Slabs get a grid through their planes, each cell in its slab", "[regi
 TEST_CASE("A ball in a box, thin shells and neighbors get templates of the right topology that can be pillowed",
           "[regions][templates][slow]") {
   const TriangleMesh cube = box_surface({-1, -1, -1}, {1, 1, 1}, 8);
-  const TriangleMesh shells =
-      together(together(ball_surface({0, 0, 0}, 1, 16), ball_surface({0, 0, 0}, 0.92, 16)), ball_surface({0, 0, 0}, 0.4, 8));
-  const TriangleMesh two = together(together(cube, ball_surface({-0.4, 0, 0}, 0.3, 8)), ball_surface({0.4, 0, 0}, 0.3, 8));
+  const TriangleMesh shells = together(together(ball_surface({0, 0, 0}, 1, 16), ball_surface({0, 0, 0}, 0.92, 16)),
+                                       ball_surface({0, 0, 0}, 0.4, 8));
+  const TriangleMesh two =
+      together(together(cube, ball_surface({-0.4, 0, 0}, 0.3, 8)), ball_surface({0.4, 0, 0}, 0.3, 8));
   for (const TriangleMesh& target : {together(cube, ball_surface({0, 0, 0}, 0.6, 12)), shells, two}) {
     const auto surface = find_regions(target);
     REQUIRE(surface);
