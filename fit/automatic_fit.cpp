@@ -10,7 +10,9 @@
 #include "subvol/fit/features/edge_layout.h"
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/features/flat_facets.h"
+#include "subvol/fit/features/polyline.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/local_cells.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/closest_point.h"
@@ -37,6 +39,8 @@ namespace {
 
 constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
+constexpr double kMostGrowth = 1.5;          // of the number of cells by cutting some of them
+constexpr int kMostRefinements = 2;          // cells of size 1 / 9 are the smallest
 
 /// The state of the sharp edges of a target.
 struct Edges {
@@ -75,6 +79,15 @@ std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_ed
   return attempts;
 }
 
+/// What a trial was made from, and where it is not as good as aimed at.
+struct TrialStart {
+  Attempt::Kind kind = Attempt::Kind::smooth;
+  SizedMesh grid;            ///< if edges are followed; else without cells, with the sizes of the trial's mesh
+  std::vector<Vec3> fitted;  ///< positions of the grid's vertices near the target
+  std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
+  std::vector<Index> lost;   ///< curves without a path
+};
+
 /// Returns the share of the curves' length that paths follow.
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
   double all = 0, routed = 0;
@@ -109,7 +122,11 @@ class AutomaticFit {
   bool run_attempt(const Attempt& attempt);
   bool run_smooth(const Attempt& attempt);
   bool run_edges(const Attempt& attempt);
-  bool route_and_fit(const VolumeMesh& grid, std::span<const Vec3> fitted, AutomaticFitTrial trial);
+  bool run_refined();
+  void lay_out(RoutingOptions routing);
+  bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
+  bool route_and_fit(AutomaticFitTrial trial);
+  std::vector<Fault> faults_of_best() const;
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
@@ -117,6 +134,7 @@ class AutomaticFit {
   void begin_part(double portion, double forecast) {
     runner_.work().begin_portion(portion, share_at_end_, forecast);
   }
+  std::vector<Vec3> wanted_lengths() const;
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
@@ -138,6 +156,8 @@ class AutomaticFit {
   FlatFacets facets_;                 ///< of `target_.mesh`, if edges are followed
   FeatureSizes features_;             ///< of the target, in normalized coordinates
   VolumeMesh mesh_;
+  std::vector<double> sizes_;         ///< of its cells (`SizedMesh`)
+  TrialStart start_, best_start_;     ///< of the present trial, and of the best one
   std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
   std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
@@ -214,14 +234,25 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
   }
 }
 
+/// Returns the wanted lengths of the present mesh's cells: its boundary has the target's area.
+std::vector<Vec3> AutomaticFit::wanted_lengths() const {
+  const MeshTopology topology(mesh_);
+  const auto size = [&](std::size_t cell) { return sizes_.empty() ? 1 : sizes_[cell]; };
+  double squares = 0;
+  for (const Index f : topology.boundary_faces()) squares += std::pow(size(topology.face_cells(f)[0]), 2);
+  const double h = std::sqrt(target_.surface.area() / squares);
+  std::vector<Vec3> lengths;
+  for (std::size_t c = 0; c < mesh_.num_cells(); ++c) lengths.push_back(Vec3::Constant(h * size(c)));
+  return lengths;
+}
+
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
 bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
   constexpr int kIntervals = 2;
   constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
   const std::size_t faces = MeshTopology(mesh_).boundary_faces().size();
-  const double h = std::sqrt(target_.surface.area() / static_cast<double>(faces));
-  const std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
+  const std::vector<Vec3> lengths = wanted_lengths();
   BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
@@ -243,7 +274,10 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   record.level = level;
   record.cells = mesh_.num_cells();
   const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
-  least_share_ = stages.state().cells.least_share;
+  const QualityStages::State& state = stages.state();
+  least_share_ = state.cells.least_share;
+  start_.far = state.far_cells;
+  start_.poor = state.cells.poor;
   return going;
 }
 
@@ -282,8 +316,14 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   const bool going = trial.self_intersections.has_value();
   if (!add_trial(std::move(trial), mesh_, quality, distance_of_edges(), options_, result_)) return going;
   result_.missed_edges.clear();
-  if (layout_)
-    result_.missed_edges = missed_edges(layout_->routing.unfollowed, edges_.features.curves, target_.normalisation);
+  start_.lost.clear();
+  if (layout_) {
+    const std::vector<UnfollowedCurve>& unfollowed = layout_->routing.unfollowed;
+    result_.missed_edges = missed_edges(unfollowed, edges_.features.curves, target_.normalisation);
+    for (const UnfollowedCurve& curve : unfollowed)
+      if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.curve);
+  }
+  best_start_ = start_;
   return going;
 }
 
@@ -292,6 +332,8 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
   std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
   if (!made) return !no_template_.empty();
   mesh_ = std::move(*made);
+  sizes_.clear();
+  start_ = {};
   AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
   bool going = true;
   for (int level = 0; going && level <= attempt.levels; ++level) {
@@ -321,13 +363,32 @@ std::vector<double> AutomaticFit::faults_of_cells() const {
   return faults;
 }
 
+/// Brings a grid near the target and lays out the edges on it. Returns false if the fit must end.
+bool AutomaticFit::fit_smoothly(SizedMesh grid, Attempt::Kind kind) {
+  layout_.reset();
+  mesh_ = grid.mesh;
+  sizes_ = grid.sizes;
+  start_ = {.kind = kind, .grid = std::move(grid)};
+  if (!fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) return false;
+  start_.fitted = mesh_.positions;
+  lay_out({});
+  return true;
+}
+
+/// Routes the edges on the grid that was brought near the target.
+void AutomaticFit::lay_out(RoutingOptions routing) {
+  routing.sizes = vertex_sizes(start_.grid.mesh, start_.grid.sizes);
+  layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
+  mesh_ = layout_->tagged_mesh;
+  sizes_ = padded_sizes(mesh_, start_.grid.sizes);
+}
+
 /// Fits the present layout, then others while edges have to be given up. Returns false if the fit must end.
-bool AutomaticFit::route_and_fit(const VolumeMesh& grid, std::span<const Vec3> fitted, AutomaticFitTrial trial) {
+bool AutomaticFit::route_and_fit(AutomaticFitTrial trial) {
   constexpr int kMostRoutings = 5;
   RoutingOptions routing;
   for (int round = 0; round < kMostRoutings; ++round) {
-    if (round > 0) layout_ = edge_layout(grid, fitted, edges_.mesh, edges_.features, routing);
-    mesh_ = layout_->tagged_mesh;
+    if (round > 0) lay_out(routing);
     QualitySchedule schedule = single_quality_schedule(options_.quality);
     schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
     bool going = fit_level(0, schedule, ", edges");
@@ -351,15 +412,12 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
         make_template({.cells = count, .through_planes = attempt.kind == Attempt::Kind::aligned});
     if (!made) return !no_template_.empty();
     if (attempt.kind == Attempt::Kind::aligned) aligned_share_ = made->aligned_share;
-    const VolumeMesh grid = std::move(made->mesh);
-    layout_.reset();
-    mesh_ = grid;
-    if (!fit_level(0, smooth_quality_schedule(), ", smooth", kSmoothPortion)) {
-      if (result_.trials.empty()) judge({.template_cells = grid.num_cells()});
+    const AutomaticFitTrial described{.template_cells = made->mesh.num_cells(),
+                                      .through_planes = attempt.kind == Attempt::Kind::aligned};
+    if (!fit_smoothly({std::move(made->mesh), {}}, attempt.kind)) {
+      if (result_.trials.empty()) judge(described);
       return false;
     }
-    const std::vector<Vec3> fitted = mesh_.positions;
-    layout_ = edge_layout(grid, fitted, edges_.mesh, edges_.features, {});
     const std::size_t padded = layout_->patched.mesh.num_cells();
     if (padded > attempt.template_cells && options_.cells && trial < kTries && count > kLeastTemplateCells) {
       asked *= kLess * static_cast<double>(attempt.template_cells) / static_cast<double>(padded);
@@ -369,10 +427,58 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
       skipped_.push_back(attempt);
       return true;
     }
-    return route_and_fit(grid, fitted,
-                         {.template_cells = grid.num_cells(),
-                          .through_planes = attempt.kind == Attempt::Kind::aligned});
+    return route_and_fit(described);
   }
+}
+
+/// Returns the cells at which the best trial is not as good as aimed at: of its grid if it follows edges, of its mesh if
+/// not. First the poor ones, the worst first, then those too far from the target, then those at edges without a path, the
+/// longest first, then those at small features.
+std::vector<Fault> AutomaticFit::faults_of_best() const {
+  std::vector<Fault> faults;
+  const std::vector<double> least = measure_quality(result_.mesh).cell_minima;
+  std::vector<Index> poor = best_start_.poor;
+  std::ranges::stable_sort(poor, std::less{}, [&](Index c) { return least[c]; });
+  for (const Index c : poor)
+    if (least[c] < kEnoughQuality * options_.quality) faults.push_back({c});
+  for (const Index c : best_start_.far) faults.push_back({c});
+  if (best_start_.kind == Attempt::Kind::smooth) return faults;
+  const VolumeMesh& grid = best_start_.grid.mesh;
+  for (Fault& fault : faults) fault = cells_at(grid, best_start_.fitted, result_.mesh, fault);
+  const BoundaryCells cells(grid, best_start_.fitted);
+  const std::vector<FeatureCurve>& curves = edges_.features.curves.curves;
+  std::vector<Index> lost = best_start_.lost;
+  std::ranges::stable_sort(lost, std::greater{}, [&](Index c) { return curves[c].length(); });
+  const double spacing = std::sqrt(target_.surface.area() / static_cast<double>(grid.num_cells()));
+  for (const Index c : lost) faults.push_back(cells.near(sampled_polyline(curves[c].points, spacing)));
+  const TriangleMesh surface = refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh)));
+  faults.push_back(
+      cells.near(missed_feature_points(features_, ClosestPoint(surface), kAutomaticFeatureShare)));
+  return faults;
+}
+
+/// Cuts the cells at which the best trial is not as good as aimed at, and fits the result. Returns false if the fit must
+/// end.
+bool AutomaticFit::run_refined() {
+  const AutomaticFitTrial best = result_.trials[result_.chosen];
+  const bool is_smooth = best_start_.kind == Attempt::Kind::smooth;
+  const VolumeMesh& base = is_smooth ? result_.mesh : best_start_.grid.mesh;
+  const double most_cells =
+      options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(best.cells);
+  const double room = most_cells * static_cast<double>(base.num_cells()) / static_cast<double>(best.cells);
+  std::optional<SizedMesh> refined =
+      refined_at_faults(base, best_start_.grid.sizes, faults_of_best(), static_cast<std::size_t>(room));
+  if (!refined) return true;
+  AutomaticFitTrial trial{.template_cells = best.template_cells, .through_planes = best.through_planes,
+                          .refined_cells = refined->mesh.num_cells(), .level = best.level};
+  if (!is_smooth) return fit_smoothly(std::move(*refined), best_start_.kind) && route_and_fit(trial);
+  layout_.reset();
+  mesh_ = std::move(refined->mesh);
+  sizes_ = refined->sizes;
+  start_ = {.grid = {{}, std::move(refined->sizes)}};
+  QualitySchedule schedule = fine_quality_schedule(options_.quality);
+  schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+  return fit_level(trial.level, schedule, ", refined") && judge(trial);
 }
 
 /// Returns false if the fit must end. InputError: there is no template, and there was none before.
@@ -419,6 +525,12 @@ AutomaticFitResult AutomaticFit::run() {
     if (!going || !result_.trials.empty()) break;
     attempt.is_last_count = true;
     going = run_attempt(attempt);
+  }
+  for (int round = 0; going && !is_good() && round < kMostRefinements; ++round) {
+    const std::size_t before = result_.chosen;
+    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+    going = run_refined();
+    if (result_.chosen == before) break;
   }
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));

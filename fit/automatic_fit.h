@@ -64,6 +64,7 @@ struct MissedEdge {
 struct AutomaticFitTrial {
   std::size_t template_cells = 0, cells = 0;
   bool through_planes = false;     ///< the template's grid lines pass through planes of the target
+  std::size_t refined_cells = 0;   ///< of the grid or mesh after some of its cells were cut; 0: none was
   std::size_t pads = 0;            ///< layers of cells under patches between sharp edges
   std::size_t curves = 0, followed_curves = 0;  ///< of the target's sharp edges
   double within_share = 1;         ///< share of their length within `kSharpPercent` of edges of the mesh
@@ -110,7 +111,11 @@ struct AutomaticFitResult {
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
 ///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
-///         + 1 unless the boundary is found not to meet itself + 10 if cells are uncertified
+///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
+///
+/// If no trial is good, cells of the best one are cut in 27 where it is too far from the target, where cells are poor and
+/// where edges or small features are missed (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to
+/// the number of cells allowed, or half as many again if the number is free.
 ///
 /// A target with several regions (`find_regions`) is filled as `fit_regions` says.
 ///

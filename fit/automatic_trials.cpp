@@ -11,10 +11,7 @@ namespace subvol {
 
 namespace {
 
-constexpr double kGoodMerit = 0.1;           // no other template is tried below it ...
-/// ... nor if the quality is what keeps the merit above it, and reaches this share of the goal: larger templates have
-/// the same angles at sharp edges and irregular vertices.
-constexpr double kEnoughQuality = 0.85;
+constexpr double kGoodMerit = 0.1;           // no other template is tried below it
 constexpr double kQualityWeight = 5;         // of the share of the quality in the merit
 
 }  // namespace
@@ -37,7 +34,8 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
 }
 
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
-  constexpr double kEdgeWeight = 3, kMeets = 1, kUncertified = 10, kMostMiss = 3;
+  constexpr double kEdgeWeight = 3, kMostMiss = 3;
+  constexpr double kNotValid = 10;  // so much that a valid trial wins, however many edges an invalid one follows
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
   const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
@@ -45,7 +43,7 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
          kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
-         (trial.self_intersections == std::size_t{0} ? 0 : kMeets) + (trial.uncertified > 0 ? kUncertified : 0);
+         (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
 }
 
 bool is_good_enough(const AutomaticFitTrial& trial) {

@@ -24,6 +24,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"level", trial.level},
                       {"cells", trial.cells},
                       {"through_planes", trial.through_planes},
+                      {"refined_cells", trial.refined_cells},
                       {"pads", trial.pads},
                       {"sharp_edges", trial.curves},
                       {"followed_edges", trial.followed_curves},

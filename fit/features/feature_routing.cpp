@@ -90,13 +90,14 @@ class Router {
   Router(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options)
       : features_(features),
         curves_(features.curves.curves),
-        graph_(mesh, options.on_sheets),
+        graph_(mesh, options.on_sheets, options.sizes),
         h_(graph_.edge_length()),
         reasons_(curves_.size()),
         joinable_(curves_.size(), 1),
         courses_(curves_.size()),
         base_{std::vector<std::uint8_t>(mesh.num_vertices(), 0), std::vector<std::uint8_t>(graph_.edges().size(), 0)},
         best_(curves_.size()) {
+    for (const FeatureCurve& curve : curves_) curve_h_.push_back(h_ * graph_.mean_size(sampled_polyline(curve.points, h_ / 2)));
     take(options);
     for (std::size_t c = 0; c < curves_.size(); ++c) trees_.push_back(polyline_tree(curves_[c].points));
     place_corners();
@@ -134,7 +135,7 @@ class Router {
         reasons_[c] = NotFollowed::excluded;
       else if (features_.angles[c] < kLeastAngle)
         reasons_[c] = NotFollowed::too_acute;
-      else if (curves_[c].length() < kLeastLength * h_)
+      else if (curves_[c].length() < kLeastLength * curve_h_[c])
         reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }
@@ -143,6 +144,7 @@ class Router {
     along_curves_.resize(curves_.size(), 0);
   }
 
+  double vertex_h(Index v) const { return h_ * graph_.size(v); }
   bool is_eligible(Index c) const { return !reasons_[c]; }
   bool is_corner(Index v) const { return std::ranges::binary_search(features_.curves.corners, v); }
   Index corner_at(Index c, int end) const {
@@ -177,7 +179,7 @@ class Router {
       of_three += graph_.edges()[e].cells == 3;
     }
     const int wrong = std::max(0, needs.convex - of_one) + std::max(0, needs.curves - needs.convex - of_three);
-    const double distance = (graph_.position(v) - needs.position).norm() / h_;
+    const double distance = (graph_.position(v) - needs.position).norm() / vertex_h(v);
     const bool few = std::ssize(graph_.edges_at(v)) < needs.curves;
     return distance * distance + kWrongEdgePenalty * wrong + (few ? kFewEdgesPenalty : 0) +
            (distance > kFollowDistance ? kFarPenalty : 0);
@@ -187,7 +189,8 @@ class Router {
     std::vector<std::tuple<double, Index, Index>> pairs;  // cost, corner, vertex
     for (const auto& [corner, needs] : corner_needs())
       for (Index v : graph_.vertices_near(needs.position, kCornerReach * h_))
-        pairs.push_back({corner_cost(needs, v), corner, v});
+        if ((graph_.position(v) - needs.position).norm() <= kCornerReach * vertex_h(v))
+          pairs.push_back({corner_cost(needs, v), corner, v});
     std::sort(pairs.begin(), pairs.end());
     for (const auto& [cost, corner, v] : pairs) {
       if (base_.vertices[v] || vertex_of_corner_.contains(corner)) continue;
@@ -208,17 +211,17 @@ class Router {
     std::vector<Vec3> points;
     for (Index v : path) points.push_back(graph_.position(v));
     if (polyline_length(points) > kMostStretch * curves_[c].length()) return std::nullopt;
-    const double spacing = h_ / 4;
+    const double spacing = curve_h_[c] / 4;
     const double gap = std::max(farthest(sampled_polyline(points, spacing), trees_[c]),
                                 farthest(sampled_polyline(curves_[c].points, spacing), polyline_tree(points))) /
-                       h_;
+                       curve_h_[c];
     if (!(gap <= most)) return std::nullopt;
     return Found{std::move(path), gap};
   }
 
   FollowingCost cost_along(Index c, std::span<const Vec3> points) const {
-    return {points, on_sheets_ ? sheet_factors(along_curves_[c]) : edge_factors(features_.angles[c]), kSoftness * h_,
-            kSearchReach * h_};
+    return {points, on_sheets_ ? sheet_factors(along_curves_[c]) : edge_factors(features_.angles[c]),
+            kSoftness * curve_h_[c], kSearchReach * curve_h_[c]};
   }
 
   Course straight_course(Index c) const {
@@ -261,7 +264,7 @@ class Router {
 
   /// Returns the place along a curve that is about as near to a vertex as any.
   double place_nearest_to_vertex(Index c) const {
-    const std::vector<Vec3> samples = sampled_polyline(curves_[c].points, h_ / 8);
+    const std::vector<Vec3> samples = sampled_polyline(curves_[c].points, curve_h_[c] / 8);
     double distance = kInfinity, place = 0, along = 0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (i > 0) along += (samples[i] - samples[i - 1]).norm();
@@ -285,13 +288,13 @@ class Router {
   }
 
   /// Returns a vertex for each anchor: none of them twice, none occupied but fixed ones. Empty if there is none.
-  std::vector<Index> anchor_vertices(const Course& course, const Occupied& occupied) const {
+  std::vector<Index> anchor_vertices(const Course& course, double h, const Occupied& occupied) const {
     std::vector<Index> chosen;
     for (const Anchor& anchor : course.anchors) chosen.push_back(anchor.fixed);
     for (std::size_t i = 0; i < chosen.size(); ++i) {
       double distance = kInfinity;
       if (course.anchors[i].fixed != kNoIndex) continue;
-      for (Index v : graph_.vertices_near(course.anchors[i].point, kCornerReach * h_)) {
+      for (Index v : graph_.vertices_near(course.anchors[i].point, kCornerReach * h)) {
         if (occupied.vertices[v] || std::ranges::find(chosen, v) != chosen.end()) continue;
         const double d = (graph_.position(v) - course.anchors[i].point).norm();
         if (d < distance) distance = d, chosen[i] = v;
@@ -301,8 +304,9 @@ class Router {
     return chosen;
   }
 
-  std::vector<Index> path_on(Course& course, bool closed, const Occupied& occupied) const {
-    const std::vector<Index> anchors = anchor_vertices(course, occupied);
+  std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied) const {
+    const bool closed = curves_[c].closed();
+    const std::vector<Index> anchors = anchor_vertices(course, curve_h_[c], occupied);
     if (anchors.empty()) return {};
     Occupied taken = occupied;
     for (Index v : anchors) taken.vertices[v] = 1;
@@ -326,7 +330,7 @@ class Router {
   std::optional<Found> find(Index c, const Occupied& occupied) {
     if (!(h_ > 0) || lacks_corner(c)) return std::nullopt;
     for (Course& course : courses(c))
-      if (auto found = judged(path_on(course, curves_[c].closed(), occupied), c, kFollowDistance)) return found;
+      if (auto found = judged(path_on(course, c, occupied), c, kFollowDistance)) return found;
     return std::nullopt;
   }
 
@@ -459,10 +463,10 @@ class Router {
     const ArcLength arc(curve.points);
     const Vec3 middle = arc.at(arc.length() / 2);
     if (!is_eligible(c)) return {c, *reasons_[c], middle};
-    for (int end = 0; end < 2 && lacks_corner(c) && curve.length() >= h_; ++end)
+    for (int end = 0; end < 2 && lacks_corner(c) && curve.length() >= curve_h_[c]; ++end)
       if (vertex_of(corner_at(c, end)) == kNoIndex)
         return {c, NotFollowed::no_vertex_at_corner, end == 0 ? curve.points.front() : curve.points.back()};
-    if (curve.length() < h_) return {c, NotFollowed::shorter_than_cell, middle};
+    if (curve.length() < curve_h_[c]) return {c, NotFollowed::shorter_than_cell, middle};
     if (!std::ranges::binary_search(alone_, c)) return {c, NotFollowed::no_path_nearby, middle};
     for (int end = 0; end < 2; ++end)
       if (is_crowded(corner_at(c, end)))
@@ -506,6 +510,7 @@ class Router {
   const std::vector<FeatureCurve>& curves_;
   RoutingGraph graph_;
   double h_;
+  std::vector<double> curve_h_;  ///< h near each curve
   std::vector<std::optional<NotFollowed>> reasons_;  ///< why a curve is not even tried
   std::vector<std::uint8_t> joinable_;
   bool on_sheets_ = false;

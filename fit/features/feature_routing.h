@@ -37,6 +37,8 @@ struct RoutingOptions {
   /// One entry per curve, not zero for those whose paths run along feature curves of the sheets, which no other path
   /// uses; empty: none. Only with `on_sheets`.
   std::vector<std::uint8_t> along_sheet_curves;
+  /// One entry per vertex: the length of its edges beside that of others, > 0, where a mesh is refined. Empty: all 1.
+  std::vector<double> sizes;
 };
 
 struct FeatureRouting {
@@ -55,7 +57,8 @@ struct FeatureRouting {
 ///                    + 3 if the vertex has fewer edges than the corner has curves
 ///                    + 4 if distance > 1.1 h,                                              distance < 1.6 h
 ///
-/// h is the mean length of the boundary's edges. Curves shorter than h / 2, or with an angle below 19 degrees, are left
+/// h is the mean length of the boundary's edges, of edges of size 1 if sizes are given; it is multiplied by the size at
+/// a vertex, or by the mean size of the vertices near a curve. Curves shorter than h / 2, or with an angle below 19 degrees, are left
 /// alone, and so are corners without other curves. The path between two of them minimizes
 ///
 ///   integral of (d^2 + (0.12 h)^2) f ds,   d: distance to the curve,
@@ -70,7 +73,7 @@ struct FeatureRouting {
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.
-/// Deterministic, serial. InputError: options of another size; features without one angle per curve; a position on the
+/// Deterministic, serial. InputError: options of another size, a size that is not positive; features without one angle per curve; a position on the
 /// boundary that is not finite. Without curves, everything is empty. Cost: some shortest-path searches near each curve
 /// in each round.
 ///

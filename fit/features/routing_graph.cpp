@@ -22,8 +22,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets)
-    : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0) {
+RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets, std::vector<double> sizes)
+    : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0), sizes_(std::move(sizes)) {
+  if (!sizes_.empty() && sizes_.size() != mesh.num_vertices())
+    throw InputError("route_features: sizes need one entry for each of the " + std::to_string(mesh.num_vertices()) +
+                     " vertices");
+  if (!std::ranges::all_of(sizes_, [](double s) { return s > 0 && s < kInfinity; }))
+    throw InputError("route_features: sizes must be positive and finite");
   const MeshTopology topology(mesh);
   InterfaceMarks marks;
   if (on_sheets) marks = mark_interfaces(topology, find_interfaces(mesh, topology));
@@ -47,7 +52,9 @@ RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets)
       throw InputError("route_features: the position of vertex " + std::to_string(v) + " is not finite");
     sites.push_back(position(v));
   }
-  for (const Edge& edge : edges_) edge_length_ += (position(edge.ends[1]) - position(edge.ends[0])).norm();
+  for (const Edge& edge : edges_)
+    edge_length_ += (position(edge.ends[1]) - position(edge.ends[0])).norm() * 2 /
+                    (size(edge.ends[0]) + size(edge.ends[1]));
   if (!edges_.empty()) edge_length_ /= static_cast<double>(edges_.size());
   if (!sites.empty()) tree_ = SiteTree(sites);
 }
@@ -57,6 +64,13 @@ Index RoutingGraph::edge_between(Index v, Index w) const {
     if (other_end(e, v) == w) return e;
   assert(false);
   return kNoIndex;
+}
+
+double RoutingGraph::mean_size(std::span<const Vec3> points) const {
+  if (sizes_.empty()) return 1;
+  double sum = 0;
+  for (const Vec3& p : points) sum += size(nearest_vertex(p));
+  return sum / static_cast<double>(points.size());
 }
 
 std::vector<Index> RoutingGraph::vertices_near(const Vec3& point, double distance) const {

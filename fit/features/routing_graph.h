@@ -23,7 +23,8 @@ class RoutingGraph {
 
   /// mesh  must outlive the graph; finite positions of its boundary vertices, else InputError.
   /// on_sheets  also the edges of interfaces between regions.
-  explicit RoutingGraph(const VolumeMesh& mesh, bool on_sheets = false);
+  /// sizes  as `RoutingOptions::sizes`.
+  explicit RoutingGraph(const VolumeMesh& mesh, bool on_sheets = false, std::vector<double> sizes = {});
 
   std::span<const Edge> edges() const { return edges_; }
   std::span<const Index> edges_at(Index vertex) const {
@@ -37,8 +38,11 @@ class RoutingGraph {
   Index edge_between(Index v, Index w) const;
   const Vec3& position(Index vertex) const { return mesh_->positions[vertex]; }
   std::size_t num_vertices() const { return mesh_->num_vertices(); }
-  /// h: mean length of the edges; 0 without edges.
+  /// h: mean length of the edges, each divided by the mean size of its ends; 0 without edges.
   double edge_length() const { return edge_length_; }
+  double size(Index vertex) const { return sizes_.empty() ? 1 : sizes_[vertex]; }
+  /// Returns the mean size of the vertices that are nearest to some points; at least one point.
+  double mean_size(std::span<const Vec3> points) const;
 
   /// Returns the boundary vertices within a distance of a point, ascending.
   std::vector<Index> vertices_near(const Vec3& point, double distance) const;
@@ -51,6 +55,7 @@ class RoutingGraph {
   std::vector<std::size_t> offsets_;  ///< where each vertex begins in around_
   std::vector<Index> around_, vertices_;
   double edge_length_ = 0;
+  std::vector<double> sizes_;
   SiteTree tree_;
 };
 

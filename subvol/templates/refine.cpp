@@ -359,14 +359,15 @@ void cut_creases(const FeatureTags& tags, const PlaceNumbers& numbers, FeatureTa
 
 }  // namespace
 
-VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
+LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> marked, WarpedParts warped) {
   if (marked.size() != mesh.num_vertices())
     throw InputError("refine: marked must have one entry per vertex, " + std::to_string(mesh.num_vertices()));
   require_sound(mesh, "refine");
   std::vector<char> marks(marked.begin(), marked.end());
   grow_marks(mesh, marks);
 
-  VolumeMesh result;
+  LocalRefinement refinement;
+  VolumeMesh& result = refinement.mesh;
   result.positions = mesh.positions;
   PlaceNumbers number(mesh, result);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
@@ -382,8 +383,9 @@ VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
       result.add_cell(CellKind::hex, corners);
     }
     for (std::size_t p = first; p < result.num_cells(); ++p) {
+      refinement.parents.push_back(static_cast<Index>(c));
       if (!mesh.references.empty()) result.references.push_back(mesh.references[c]);
-      if (!parts.empty() && !corners_positive(result, p))
+      if (warped == WarpedParts::refused && !parts.empty() && !corners_positive(result, p))
         throw InputError("refine: cell " + std::to_string(c) + " is too warped: a part of it would be inverted");
     }
   }
@@ -391,7 +393,11 @@ VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
   result.regions = mesh.regions;
   if (!mesh.face_groups.empty())
     result.face_groups = inherited_groups(mesh.face_groups, MeshTopology(result), number.supports());
-  return result;
+  return refinement;
+}
+
+VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
+  return refine_locally(mesh, marked, WarpedParts::refused).mesh;
 }
 
 std::vector<char> vertices_of(const VolumeMesh& mesh, std::span<const char> chosen) {

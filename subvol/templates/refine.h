@@ -33,6 +33,18 @@ namespace subvol {
 /// meshes" (1996); they are built here from strips swept from face to face.
 VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked);
 
+/// What is done if a part of a warped cell would have a corner Jacobian <= 0.
+enum class WarpedParts { refused, kept };
+
+/// A refined mesh, and where its cells come from.
+struct LocalRefinement {
+  VolumeMesh mesh;
+  std::vector<Index> parents;  ///< for each cell, the cell that it is a part of, or was
+};
+
+/// As `refine_at`, with the parents of the cells. Parts that are inverted are no error if they are to be kept.
+LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> marked, WarpedParts warped);
+
 /// Marks all vertices of the chosen cells, as `refine_at` expects them: those cells are cut into 27. chosen: one entry
 /// per cell.
 std::vector<char> vertices_of(const VolumeMesh& mesh, std::span<const char> chosen);

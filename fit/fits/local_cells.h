@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/geometry/site_tree.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace subvol {
+
+/// A mesh of which some cells are smaller than the others on purpose.
+struct SizedMesh {
+  VolumeMesh mesh;
+  std::vector<double> sizes;  ///< for each cell, the length of its edges beside that of cells of size 1; empty: all 1
+};
+
+/// Cells at which a fit is not as good as aimed at, for one reason: ascending.
+using Fault = std::vector<Index>;
+
+/// Cuts the cells of faults in 27 (`refine_locally`), of as many of the faults as there is room for.
+///
+/// mesh    hexes; parts of warped ones may be inverted in the result.
+/// sizes   of its cells, or empty; those of the result are smaller by the third root of the number of parts.
+/// faults  the most important first.  most_cells  that the result may have.
+/// returns nothing if there is no room for one, or no fault has a cell.
+/// Cost: up to a dozen refinements.
+std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
+                                           std::span<const Fault> faults, std::size_t most_cells);
+
+/// Finds cells at the boundary of a mesh by points.
+class BoundaryCells {
+ public:
+  /// mesh  must outlive this.  positions  of its vertices, in the coordinates of the points.
+  BoundaryCells(const VolumeMesh& mesh, std::span<const Vec3> positions);
+
+  /// Returns the cells around the boundary vertices that are nearest to some points, ascending.
+  std::vector<Index> near(std::span<const Vec3> points) const;
+
+ private:
+  std::vector<Index> vertices_;
+  std::vector<std::vector<Index>> cells_of_vertex_;
+  SiteTree tree_;
+};
+
+/// Returns the cells whose centers are nearest to those of other cells, ascending.
+/// positions  of the mesh's vertices, in the coordinates of the other mesh.
+std::vector<Index> cells_at(const VolumeMesh& mesh, std::span<const Vec3> positions, const VolumeMesh& other,
+                            std::span<const Index> cells_of_other);
+
+/// Returns the mean size of the cells at each vertex; empty if the sizes are.
+std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double> sizes);
+
+/// Returns the sizes of a mesh that was padded: cells beyond the given ones have that of a cell behind them. Empty if the
+/// sizes are.
+std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes);
+
+}  // namespace subvol

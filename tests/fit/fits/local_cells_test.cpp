@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/fits/local_cells.h"
+
+#include "subvol/mesh/mesh_topology.h"
+#include "tests/support/mesh_checks.h"
+#include "tests/support/sample_meshes.h"
+
+#include <catch2/catch.hpp>
+
+using namespace subvol;
+
+TEST_CASE("Cells of faults are cut in 27, and sizes say so", "[local_cells]") {
+  const VolumeMesh grid = test::lattice(5, 5, 5);
+  const auto refined = refined_at_faults(grid, {}, std::vector<Fault>{{62}}, 1000);
+  REQUIRE(refined);
+  test::check_mesh_is(refined->mesh, 1, 125);
+  // 27 parts of the cell in the middle, 22 at its faces, 11 at its edges, 4 at its corners; 98 cells stay whole.
+  CHECK(refined->mesh.num_cells() == 27 + 6 * 22 + 12 * 11 + 8 * 4 + 98);
+  REQUIRE(refined->sizes.size() == refined->mesh.num_cells());
+  CHECK(std::ranges::count_if(refined->sizes, [](double s) { return s == Approx(1.0 / 3); }) == 27);
+  CHECK(std::ranges::count(refined->sizes, 1) == 98);
+  double volume = 0;  // a size is the length of a part: the parts of a cell fill it
+  for (const double size : refined->sizes) volume += size * size * size;
+  CHECK(volume == Approx(125));
+
+  const std::size_t small = std::ranges::min_element(refined->sizes) - refined->sizes.begin();
+  const auto twice = refined_at_faults(refined->mesh, refined->sizes, std::vector<Fault>{{static_cast<Index>(small)}}, 5000);
+  REQUIRE(twice);
+  CHECK(std::ranges::min(twice->sizes) < 0.2);
+}
+
+TEST_CASE("Faults that have no room are left out, the least important first", "[local_cells]") {
+  const VolumeMesh grid = test::lattice(7, 3, 3);
+  const std::vector<Fault> faults{{0}, {6}};
+  const std::size_t of_both = refined_at_faults(grid, {}, faults, 10000)->mesh.num_cells();
+  const std::size_t of_first = refined_at_faults(grid, {}, std::span(faults).first(1), 10000)->mesh.num_cells();
+  CHECK(of_first < of_both);
+  CHECK(refined_at_faults(grid, {}, faults, of_both - 1)->mesh.num_cells() == of_first);
+  CHECK(!refined_at_faults(grid, {}, faults, of_first - 1));
+  CHECK(!refined_at_faults(grid, {}, {}, 10000));
+  CHECK(!refined_at_faults(grid, {}, std::vector<Fault>{{}, {}}, 10000));
+}
+
+TEST_CASE("Cells are found by points near the boundary and by cells of another mesh", "[local_cells]") {
+  const VolumeMesh grid = test::lattice(4, 4, 4), other = test::lattice(2, 1, 1);
+  const BoundaryCells cells(grid, grid.positions);
+  CHECK(cells.near(std::vector<Vec3>{}).empty());
+  const Vec3 corner = grid.positions[grid.cell(0)[0]];
+  CHECK(cells.near(std::vector<Vec3>{corner, corner}).size() == 1);
+  const Vec3 on_face = (grid.positions[grid.cell(5)[0]].array() * Vec3(1, 1, 0).array()).matrix();
+  CHECK(cells.near(std::vector<Vec3>{on_face}).size() == 4);
+  CHECK(cells_at(grid, grid.positions, other, std::vector<Index>{0, 0, 1}).size() == 2);
+}
+
+TEST_CASE("Cells of pads are as large as those behind them", "[local_cells]") {
+  const VolumeMesh grid = test::lattice(3, 1, 1);
+  CHECK(padded_sizes(grid, {}).empty());
+  CHECK(vertex_sizes(grid, {}).empty());
+  CHECK(padded_sizes(grid, std::vector<double>{0.5, 1}) == std::vector<double>{0.5, 1, 1});
+  CHECK(padded_sizes(grid, std::vector<double>{1, 0.5}) == std::vector<double>{1, 0.5, 0.5});
+  const std::vector<double> sizes = vertex_sizes(grid, std::vector<double>{1, 0.5, 1});
+  CHECK(*std::ranges::min_element(sizes) == 0.75);
+}
