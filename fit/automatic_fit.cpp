@@ -28,6 +28,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -134,7 +135,9 @@ class AutomaticFit {
   void begin_part(double portion, double forecast) {
     runner_.work().begin_portion(portion, share_at_end_, forecast);
   }
-  std::vector<Vec3> wanted_lengths() const;
+  double sum_of_squared_sizes(const MeshTopology& topology) const;
+  std::vector<Vec3> wanted_lengths(const MeshTopology& topology) const;
+  std::vector<double> crease_factors(const MeshTopology& topology, const SparseMap& samples) const;
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
@@ -234,16 +237,34 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
   }
 }
 
-/// Returns the wanted lengths of the present mesh's cells: its boundary has the target's area.
-std::vector<Vec3> AutomaticFit::wanted_lengths() const {
-  const MeshTopology topology(mesh_);
-  const auto size = [&](std::size_t cell) { return sizes_.empty() ? 1 : sizes_[cell]; };
+/// Returns the sum of the squared sizes of the present mesh's boundary faces.
+double AutomaticFit::sum_of_squared_sizes(const MeshTopology& topology) const {
+  const auto& faces = topology.boundary_faces();
+  if (sizes_.empty()) return static_cast<double>(faces.size());
   double squares = 0;
-  for (const Index f : topology.boundary_faces()) squares += std::pow(size(topology.face_cells(f)[0]), 2);
-  const double h = std::sqrt(target_.surface.area() / squares);
-  std::vector<Vec3> lengths;
-  for (std::size_t c = 0; c < mesh_.num_cells(); ++c) lengths.push_back(Vec3::Constant(h * size(c)));
+  for (const Index f : faces) squares += std::pow(sizes_[topology.face_cells(f)[0]], 2);
+  return squares;
+}
+
+/// Returns the wanted lengths of the present mesh's cells: its boundary has the target's area.
+std::vector<Vec3> AutomaticFit::wanted_lengths(const MeshTopology& topology) const {
+  const double h = std::sqrt(target_.surface.area() / sum_of_squared_sizes(topology));
+  std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
+  for (std::size_t c = 0; c < sizes_.size(); ++c) lengths[c] *= sizes_[c];
   return lengths;
+}
+
+/// Returns how often links of creases count at each sample. The energies of `QualityStages` are those of distances in
+/// units of the cells: a face counts as often as another one, whatever its size, and so must an edge.
+/// samples  vertices -> samples.
+std::vector<double> AutomaticFit::crease_factors(const MeshTopology& topology, const SparseMap& samples) const {
+  const double mean =
+      std::sqrt(sum_of_squared_sizes(topology) / static_cast<double>(topology.boundary_faces().size()));
+  std::vector<Vec3> sizes;
+  for (const double size : vertex_sizes(mesh_, sizes_)) sizes.push_back(Vec3::Constant(size));
+  std::vector<double> factors;
+  for (const Vec3& size : samples.apply(sizes)) factors.push_back(std::pow(mean / size.x(), 3));
+  return factors;
 }
 
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
@@ -251,12 +272,13 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   begin_part(portion, schedule.expected_steps());
   constexpr int kIntervals = 2;
   constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
-  const std::size_t faces = MeshTopology(mesh_).boundary_faces().size();
-  const std::vector<Vec3> lengths = wanted_lengths();
-  BoundarySamples samples =
+  const MeshTopology topology(mesh_);
+  const std::size_t faces = topology.boundary_faces().size();
+  const std::vector<Vec3> lengths = wanted_lengths(topology);
+  const BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
-  QualityBoundary boundary{.samples = std::move(samples.positions), .triangles = samples.triangles,
+  QualityBoundary boundary{.samples = samples.positions, .triangles = samples.triangles,
                            .triangle_faces = samples.triangle_faces};
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
@@ -264,7 +286,10 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
     boundary.group_of_triangle = layout_->group_of_triangle;
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
-        return layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
+        CreaseEnergy energy =
+            layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
+        if (!sizes_.empty()) energy.weigh(crease_factors(topology, samples.positions));
+        return energy;
       };
   }
   QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
@@ -387,6 +412,7 @@ void AutomaticFit::lay_out(RoutingOptions routing) {
 bool AutomaticFit::route_and_fit(AutomaticFitTrial trial) {
   constexpr int kMostRoutings = 5;
   RoutingOptions routing;
+  double least_merit = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kMostRoutings; ++round) {
     if (round > 0) lay_out(routing);
     QualitySchedule schedule = single_quality_schedule(options_.quality);
@@ -395,6 +421,9 @@ bool AutomaticFit::route_and_fit(AutomaticFitTrial trial) {
     trial.pads = layout_->pads.pads.size();
     if (going || result_.trials.empty()) going = judge(trial) && going;
     if (!going) return false;
+    const double merit = result_.trials.back().merit;
+    if (merit >= least_merit) break;  // what was given up has not helped
+    least_merit = merit;
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults_of_cells(), routing)) break;
   }
   return true;

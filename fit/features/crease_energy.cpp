@@ -53,12 +53,25 @@ CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std:
   result.links_.clear();
   result.link_numbers_.clear();
   result.offsets_.assign(is_free.size() + 1, 0);
+  const std::size_t num_samples = is_free.size();
   result.is_free_ = std::move(is_free);
   for (CreaseSegment& segment : result.segments_)
     for (Index& end : segment.ends) end = numbers[end];
+  if (!factors_.empty()) {
+    result.factors_.assign(num_samples, 1);
+    for (const CreaseSegment& segment : segments_)
+      for (const Index end : segment.ends) result.factors_[numbers[end]] = factors_[end];
+  }
   for (Curve& curve : result.curves_)
     for (Index& end : curve.ends) end = numbers[end];
   return result;
+}
+
+void CreaseEnergy::weigh(std::vector<double> factors) {
+  if (factors.size() + 1 != offsets_.size() || !std::ranges::all_of(factors, [](double f) { return f > 0; }))
+    throw InputError("CreaseEnergy: one positive factor is needed for each of the " +
+                     std::to_string(offsets_.size() - 1) + " samples");
+  factors_ = std::move(factors);
 }
 
 /// Displacements along the curve count with tau only, those at the ends of an open curve fully.

@@ -12,10 +12,7 @@ namespace subvol {
 
 namespace {
 
-SizedMesh refined_at(const VolumeMesh& mesh, std::span<const double> sizes, std::span<const Fault> faults) {
-  std::vector<char> chosen(mesh.num_cells(), 0);
-  for (const Fault& fault : faults)
-    for (const Index c : fault) chosen[c] = 1;
+SizedMesh refined_at(const VolumeMesh& mesh, std::span<const double> sizes, std::span<const char> chosen) {
   LocalRefinement refinement = refine_locally(mesh, vertices_of(mesh, chosen), WarpedParts::kept);
   std::vector<int> parts(mesh.num_cells(), 0);
   for (const Index parent : refinement.parents) ++parts[parent];
@@ -23,6 +20,19 @@ SizedMesh refined_at(const VolumeMesh& mesh, std::span<const double> sizes, std:
   for (const Index parent : refinement.parents)
     result.sizes.push_back((sizes.empty() ? 1 : sizes[parent]) / std::cbrt(parts[parent]));
   return result;
+}
+
+/// Marks the cells of the faults, in their order, each unless more than so many cells would be marked then. Returns their
+/// number.
+std::size_t choose(std::span<const Fault> faults, double most, std::vector<char>& chosen) {
+  std::size_t count = 0;
+  for (const Fault& fault : faults) {
+    const auto added = static_cast<std::size_t>(std::ranges::count_if(fault, [&](Index c) { return !chosen[c]; }));
+    if (static_cast<double>(count + added) > most) continue;
+    for (const Index c : fault) chosen[c] = 1;
+    count += added;
+  }
+  return count;
 }
 
 std::vector<Index> ascending(std::vector<Index> cells) {
@@ -42,11 +52,15 @@ Vec3 center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t
 
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
                                            std::span<const Fault> faults, std::size_t most_cells) {
-  while (!faults.empty()) {
-    SizedMesh refined = refined_at(mesh, sizes, faults);
-    if (refined.mesh.num_cells() == mesh.num_cells()) return std::nullopt;
+  // A row of cells that is cut adds about a hundred cells for each of its own, a block of them 26.
+  constexpr double kLeastAdded = 26, kLess = 0.7;
+  const double room = static_cast<double>(most_cells) - static_cast<double>(mesh.num_cells());
+  for (double most = room / kLeastAdded; most >= 1; most *= kLess) {
+    std::vector<char> chosen(mesh.num_cells(), 0);
+    most = std::min(most, static_cast<double>(choose(faults, most, chosen)));
+    if (most < 1) break;
+    SizedMesh refined = refined_at(mesh, sizes, chosen);
     if (refined.mesh.num_cells() <= most_cells) return refined;
-    faults = faults.first(faults.size() / 2);
   }
   return std::nullopt;
 }

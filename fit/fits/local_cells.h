@@ -20,13 +20,13 @@ struct SizedMesh {
 /// Cells at which a fit is not as good as aimed at, for one reason: ascending.
 using Fault = std::vector<Index>;
 
-/// Cuts the cells of faults in 27 (`refine_locally`), of as many of the faults as there is room for.
+/// Cuts the cells of faults in 27 (`refine_locally`): of the faults in their order, each that there is room for.
 ///
 /// mesh    hexes; parts of warped ones may be inverted in the result.
 /// sizes   of its cells, or empty; those of the result are smaller by the third root of the number of parts.
 /// faults  the most important first.  most_cells  that the result may have.
 /// returns nothing if there is no room for one, or no fault has a cell.
-/// Cost: up to a dozen refinements.
+/// Cost: up to two dozen refinements.
 std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<const double> sizes,
                                            std::span<const Fault> faults, std::size_t most_cells);
 
