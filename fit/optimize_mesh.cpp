@@ -203,7 +203,9 @@ std::vector<std::array<Index, 2>> MeshOptimizer::tagged_edges() const {
 void MeshOptimizer::find_features() {
   if (options_.fixed_boundary) return;
   creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_, tagged_edges());
-  creases_.keep_interfaces(mesh_, options_.crease_angle_degrees, own_boundary_);
+  creases_.keep_interfaces(mesh_, options_.crease_angle_degrees,
+                             own_boundary_ ? FollowedCreases::InnerCurves::themselves_with_rims
+                                           : FollowedCreases::InnerCurves::themselves);
   sample_boundary();
   target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
 }

@@ -19,6 +19,7 @@
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/staged_fit.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/fit/target/region_matching.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
@@ -160,11 +161,13 @@ void SubdivisionFit::look_over_template() {
   keep_interfaces();
 }
 
-/// The interfaces between the template's regions keep their shape, sharp edges included.
+/// The interfaces between the template's regions get the shape of the target's, or keep their own, sharp edges included.
 void SubdivisionFit::keep_interfaces() {
   target_.keep_interfaces(template_);
   if (target_.has_interfaces())
-    template_creases_.keep_interfaces(template_, options_.crease_angle_degrees.value_or(kUsualCreaseAngle), false);
+    template_creases_.keep_interfaces(template_, options_.crease_angle_degrees.value_or(kUsualCreaseAngle),
+                                      target_.region_triangle.empty() ? FollowedCreases::InnerCurves::themselves
+                                                                      : FollowedCreases::InnerCurves::nothing);
   else if (region_references(template_).size() > 1)
     result_.report.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
 }
@@ -621,6 +624,8 @@ FitResult SubdivisionFit::run() {
 
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options) {
+  if (const std::optional<RegionSurface> regions = regions_as_in(target, template_mesh))
+    return SubdivisionFit(FitTarget(*regions), template_mesh, options).run();
   return SubdivisionFit(FitTarget(target), template_mesh, options).run();
 }
 

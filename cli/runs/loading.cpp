@@ -10,6 +10,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/fit/target/region_matching.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
@@ -102,6 +103,15 @@ Target load_target(const std::filesystem::path& path, std::vector<std::string>& 
   require_known_file(path);
   if (is_surface_or_points(path) && is_point_cloud_file(path)) return read_point_cloud(path, &warnings);
   return load_surface(path, warnings);
+}
+
+std::optional<RegionSurface> regions_of_target(const Target& target, const VolumeMesh& mesh) {
+  const auto* surface = std::get_if<TriangleMesh>(&target);
+  return surface ? regions_as_in(*surface, mesh) : std::nullopt;
+}
+
+Target outer_target(const Target& target, const std::optional<RegionSurface>& regions) {
+  return regions ? Target(outer_surface(*regions)) : target;
 }
 
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {

@@ -6,9 +6,11 @@
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/point_cloud.h"
+#include "subvol/surface/region_surface.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -38,6 +40,10 @@ inline bool is_cloud(const Target& target) { return std::holds_alternative<Point
 
 /// Loads points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
+/// Returns the regions of a surface if a mesh has the same ones (`regions_as_in`).
+std::optional<RegionSurface> regions_of_target(const Target& target, const VolumeMesh& mesh);
+/// Returns what the boundary of a result is compared with: the outer surface of the regions, or else the target.
+Target outer_target(const Target& target, const std::optional<RegionSurface>& regions);
 /// Load a surface or the boundary of a volume mesh, as triangles or as polygons; points are refused.
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);

@@ -98,6 +98,8 @@ class FitRun : public LongRun {
 
   const FitArguments& arguments_;
   Target target_;
+  std::optional<RegionSurface> regions_;  ///< of the target, if the template has the same
+  Target outer_;                          ///< what the boundary is compared with: the outer surface of regions
   VolumeMesh template_mesh_;
   std::optional<TemplateChoice> choice_;  ///< if the template was made
   std::optional<Checkpointing> checkpointing_;
@@ -127,6 +129,8 @@ void FitRun::load_template() {
     untangle_template(arguments_.template_mesh.path, arguments_.run,
                       {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
   choice_ = std::move(loaded.choice);
+  regions_ = regions_of_target(target_, template_mesh_);
+  outer_ = outer_target(target_, regions_);
   if (!choice_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
   tell_warnings();
   if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
@@ -156,8 +160,8 @@ void FitRun::fit() {
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
-  groups_ = carry_groups(target_, result_.mesh);
-  carry_groups(target_, result_.cage);
+  groups_ = carry_groups(outer_, result_.mesh);
+  carry_groups(outer_, result_.cage);
   add_warnings(groups_.warnings);
 }
 
@@ -192,7 +196,7 @@ void FitRun::check() {
         mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target, {.progress = progress}); });
         limit_distance_ = surface_distance(triangles_of(limit_), target);
       },
-      target_);
+      outer_);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
   if (arguments_.surface == "limit")
@@ -213,8 +217,8 @@ Json FitRun::report() const {
   json.update(fit_json(report));
   json.update(check_json(mesh_check_));
   if (mesh_check_.regions) {
-    const RegionReport start = measure_regions(template_mesh_, nullptr);
-    json["regions"] = regions_json(*mesh_check_.regions, &start);
+    const RegionReport wanted = regions_ ? measure_regions(*regions_) : measure_regions(template_mesh_, nullptr);
+    json["regions"] = regions_json(*mesh_check_.regions, &wanted, regions_ ? "target" : "start");
   }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);

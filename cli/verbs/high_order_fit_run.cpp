@@ -19,7 +19,6 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/fit_report.h"
-#include "subvol/fit/target/region_matching.h"
 #include "subvol/templates/voxel_grid.h"
 
 #include <algorithm>
@@ -99,15 +98,6 @@ Json report_json(const char* command, Json options, Json input, const FitReport&
   return json;
 }
 
-/// Returns what the boundary of a result is compared with: of a target with the regions of the template, the outer
-/// surface.
-Target boundary_target(const Target& target, const VolumeMesh& template_mesh) {
-  if (const auto* surface = std::get_if<TriangleMesh>(&target))
-    if (const std::optional<RegionSurface> regions = regions_as_in(*surface, template_mesh))
-      return outer_surface(*regions);
-  return target;
-}
-
 int status(const FitReport& report, bool valid) {
   if (report.stop_reason == StopReason::cancelled) return kInterrupted;
   if (!valid) return kFailed;
@@ -185,7 +175,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   writing.options = options_used(arguments, options_of_result(verb));
   HighOrderFile file{std::move(result.mesh), template_mesh.references, template_mesh.face_groups,
                      template_mesh.regions};
-  const Target outer = boundary_target(target, template_mesh);
+  const Target outer = outer_target(target, regions_of_target(target, template_mesh));
   const GroupsFound groups = carry_groups(outer, file);
   warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
   tell_warnings();

@@ -43,7 +43,8 @@ FollowedCreases::FollowedCreases(FeatureCurves curves, std::vector<CreasePath> p
   find_curves_of_creases(mesh);
 }
 
-void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, bool with_rims) {
+void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, InnerCurves drawn_to) {
+  const bool with_rims = drawn_to == InnerCurves::themselves_with_rims;
   const MeshTopology topology(mesh);
   const InterfaceMarks marks = mark_interfaces(topology, find_interfaces(mesh, topology));
   if (marks.edges.empty()) return;
@@ -80,6 +81,7 @@ void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, bo
       if (is_corner && found.corner_edges[static_cast<std::size_t>(at - found.corners.begin())] > 1)
         tags.corners.push_back({end});
     }
+    if (drawn_to == InnerCurves::nothing) continue;
     paths_.push_back({static_cast<Index>(curves_.curves.size()), curve.vertices});
     curves_.curves.push_back(curve);
   }

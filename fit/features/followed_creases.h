@@ -35,11 +35,17 @@ class FollowedCreases {
   /// With paths that are known: tags the mesh along them, with no other tags.
   FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh);
 
-  /// Adds the sharp edges of the interfaces between a mesh's regions, which follow themselves as they are, and tags the
-  /// mesh with them: edges sharper than the angle, creases of its tags, and inner feature curves. Also adds tags that
-  /// keep interfaces from folding at their corners (`unfolding_tags`).
-  /// with_rims  also the feature curves where interfaces end at the boundary, if these are to stay where they are.
-  void keep_interfaces(VolumeMesh& mesh, double angle_degrees, bool with_rims);
+  /// What the sharp edges of interfaces are drawn to.
+  enum class InnerCurves {
+    nothing,          ///< the sheets alone draw them: the target has interfaces of its own
+    themselves,       ///< the edges as they are
+    themselves_with_rims  ///< likewise, and the curves where interfaces end at the boundary, if that stays where it is
+  };
+
+  /// Tags a mesh with the sharp edges of the interfaces between its regions: edges sharper than the angle, creases of
+  /// its tags, and inner feature curves. Also adds tags that keep interfaces from folding at their corners
+  /// (`unfolding_tags`).
+  void keep_interfaces(VolumeMesh& mesh, double angle_degrees, InnerCurves drawn_to);
 
   const FeatureCurves& curves() const { return curves_; }
   /// True if most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.

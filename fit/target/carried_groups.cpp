@@ -14,8 +14,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <string>
+#include <utility>
 
 namespace subvol {
 
@@ -181,6 +183,37 @@ std::vector<Index> largest_shares(std::vector<Share> shares, const std::vector<G
   return best;
 }
 
+/// Gives a group that no face lies mostly on the face that is nearest to the middle of its largest triangle, if that is no
+/// farther than the face is wide and the face's own group has another one. Large groups come first.
+/// reach  width of each face.
+void keep_small_groups(const TriangleMesh& target, const CurvedBoundary& boundary, const std::vector<double>& reach,
+                       std::vector<Index>& group_of_face) {
+  std::vector<std::size_t> faces(target.face_groups.groups.size(), 0);
+  for (const Index group : group_of_face)
+    if (group != kNoIndex) ++faces[group];
+  std::vector<std::pair<double, std::size_t>> largest(faces.size(), {0, 0});  // area and number of a triangle
+  for (std::size_t t = 0; t < target.triangles.size(); ++t) {
+    const Index group = target.face_groups.of_face[t];
+    if (group == kNoIndex || faces[group] > 0) continue;
+    largest[group] = std::max(largest[group], {area_vector(target, target.triangles[t]).norm(), t});
+  }
+  std::ranges::sort(largest, std::greater{});
+  std::erase_if(largest, [](const auto& triangle) { return triangle.first == 0; });
+  if (largest.empty()) return;
+  const ClosestPoint tree(boundary.triangles);
+  for (const auto& [area, t] : largest) {
+    Vec3 middle = Vec3::Zero();
+    for (const Index v : target.triangles[t]) middle += target.positions[v] / 3;
+    const ClosestPoint::Hit hit = tree.closest(middle);
+    if (hit.triangle == kNoIndex) continue;
+    const Index face = boundary.faces[hit.triangle], own = group_of_face[face];
+    if (hit.distance > reach[face] || (own != kNoIndex && faces[own] < 2)) continue;
+    if (own != kNoIndex) --faces[own];
+    group_of_face[face] = target.face_groups.of_face[t];
+    ++faces[group_of_face[face]];
+  }
+}
+
 }  // namespace
 
 std::vector<Index> carried_groups(const TriangleMesh& target, const CurvedBoundary& boundary, std::size_t num_faces) {
@@ -195,7 +228,9 @@ std::vector<Index> carried_groups(const TriangleMesh& target, const CurvedBounda
   std::vector<Share> shares;
   for (std::size_t i = 0; i < triangles.size(); ++i)
     if (triangles[i] != kNoIndex) shares.push_back({samples.faces[i], groups[triangles[i]], samples.areas[i]});
-  return largest_shares(std::move(shares), target.face_groups.groups, num_faces);
+  std::vector<Index> best = largest_shares(std::move(shares), target.face_groups.groups, num_faces);
+  keep_small_groups(surface.surface, boundary, reach, best);
+  return best;
 }
 
 CurvedBoundary linear_boundary(const VolumeMesh& mesh, const MeshTopology& topology) {

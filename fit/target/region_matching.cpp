@@ -12,12 +12,25 @@
 
 namespace subvol {
 
+namespace {
+
+/// Returns so many regions of a target, if that is the number that a rule finds. Whatever the mesh fills is no void, so
+/// closed parts that face inward may be regions, too.
+std::optional<RegionSurface> find_so_many_regions(const TriangleMesh& target, std::size_t count) {
+  for (const RegionRule rule : {RegionRule::automatic, RegionRule::keep})
+    if (std::optional<RegionSurface> regions = find_regions(target, rule); regions && regions->regions.size() == count)
+      return regions;
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh) {
   constexpr double kInside = 0.5;
   const std::vector<int> references = region_references(mesh);
   if (references.size() < 2) return std::nullopt;
-  std::optional<RegionSurface> regions = find_regions(target);
-  if (!regions || regions->regions.size() != references.size()) return std::nullopt;
+  std::optional<RegionSurface> regions = find_so_many_regions(target, references.size());
+  if (!regions) return std::nullopt;
   std::vector<Vec3> centers;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     Vec3 sum = Vec3::Zero();

@@ -11,6 +11,7 @@
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/region_surface.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
@@ -132,6 +133,23 @@ TEST_CASE("a fit of a template with regions keeps flat interfaces flat and volum
   CHECK(volume_change(result.mesh, mesh) <= kMostVolumeChange);
   options.correspondence = Correspondence::voronoi;
   CHECK_THROWS_AS(fit_subdivision_volume(own_boundary(mesh), mesh, options), InputError);
+}
+
+TEST_CASE("a fit of a template with regions draws interfaces to those of the target", "[regions]") {
+  // The inner cube of the target is larger than that of the template, and not in the middle.
+  VolumeMesh wanted = cube_in_cube();
+  for (Vec3& p : wanted.positions)
+    for (double& x : p) x = x == 1 ? 0.8 : x == 2 ? 1.9 : x;
+  const TriangleMesh target = surface_of_regions(wanted).mesh;
+  FitOptions options;
+  options.levels = 2;
+  options.crease_angle_degrees = 40;
+  const FitResult result = fit_subdivision_volume(target, cube_in_cube(), options);
+  CHECK(certify(result.mesh).all_certified());
+  const std::vector<double> now = region_volumes(result.mesh), aim = region_volumes(wanted);
+  REQUIRE(now.size() == 2);
+  for (std::size_t r = 0; r < 2; ++r) CHECK(now[r] == Approx(aim[r]).epsilon(kMostVolumeChange));
+  CHECK(region_volumes(cube_in_cube())[1] != Approx(aim[1]).epsilon(0.05));
 }
 
 TEST_CASE("interfaces that bulge are fitted by their subdivision surface", "[regions][slow]") {

@@ -64,6 +64,33 @@ TEST_CASE("each boundary face gets the group of the side that it lies on, also o
   }
 }
 
+TEST_CASE("a group that is smaller than a face keeps one, unless it is far away or another group would lose its last") {
+  TriangleMesh target = box_with_sides({1, 1, 1});
+  // A triangle in the corner of a side becomes a group of its own: a tenth as wide as a face of the mesh.
+  const std::array<Index, 3> t = target.triangles[0];
+  const Vec3 a = target.positions[t[0]];
+  const auto first = static_cast<Index>(target.positions.size());
+  target.positions.push_back(a + 0.02 * (target.positions[t[1]] - a));
+  target.positions.push_back(a + 0.02 * (target.positions[t[2]] - a));
+  target.triangles[0] = {first, t[1], t[2]};
+  target.triangles.push_back({first, t[2], first + 1});
+  target.triangles.push_back({t[0], first, first + 1});
+  const Index side = target.face_groups.of_face[0];
+  target.face_groups.of_face.push_back(side);
+  target.face_groups.of_face.push_back(6);
+  target.face_groups.groups.push_back({"pin", 7, 2});
+  Carried carried = carry(target, box_mesh({1, 1, 1}, 3));
+  CHECK(carried.areas[6].faces == 1);
+  CHECK(carried.areas[side].faces == 8);
+  CHECK(warnings_of_groups(carried.areas).size() == 2);  // both areas differ
+  CHECK(carry(target, box_mesh({1, 1, 1}, 1)).areas[6].is_lost());  // the side has one face only
+
+  for (Index v : {t[0], first, static_cast<Index>(first + 1)})  // the same triangle, far away
+    target.positions.push_back(target.positions[v] + Vec3(0, 0, 5));
+  target.triangles.back() = {first + 2, first + 3, first + 4};
+  CHECK(carry(target, box_mesh({1, 1, 1}, 3)).areas[6].is_lost());
+}
+
 TEST_CASE("a target that is oriented inward or not at all gives the same groups") {
   TriangleMesh target = box_with_sides({1, 1, 1});
   const VolumeMesh mesh = box_mesh({1, 1, 1}, 3);
