@@ -128,6 +128,7 @@ class AutomaticFit {
   bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
   bool route_and_fit(AutomaticFitTrial trial);
   std::vector<Fault> faults_of_best() const;
+  std::vector<Index> cells_that_meet(const VolumeMesh& mesh) const;
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
@@ -141,6 +142,7 @@ class AutomaticFit {
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
+  std::vector<UnfollowedCurve> unfollowed_curves() const;
   bool judge(AutomaticFitTrial trial);
   void conclude();
   bool is_worth_trying(const Attempt& attempt) const {
@@ -222,17 +224,24 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
   return std::move(made.templates.front());
 }
 
-/// Makes a pillowed template of at most so many cells, if there is one; else as `make_template`.
+/// Makes a pillowed template of at most so many cells; if there is none, the smallest that was found. Returns nothing as
+/// `make_template`.
 std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cells) {
   constexpr int kTries = 3;
   constexpr double kLess = 0.97;
   double asked = kRoomForTemplates * static_cast<double>(cells);
+  std::optional<VolumeMesh> smallest;
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
     std::optional<AutoTemplate> made = make_template({.cells = count, .pillow = true});
-    if (!made) return std::nullopt;
+    if (!made) {
+      if (no_template_.empty() || !smallest) return std::nullopt;
+      no_template_.clear();
+      return smallest;
+    }
     const std::size_t got = made->mesh.num_cells();
-    if (got <= cells || count == kLeastTemplateCells || trial == kTries) return std::move(made->mesh);
+    if (!smallest || got < smallest->num_cells()) smallest = std::move(made->mesh);
+    if (got <= cells || count == kLeastTemplateCells || trial == kTries) return smallest;
     asked *= kLess * static_cast<double>(cells) / static_cast<double>(got);
   }
 }
@@ -326,6 +335,18 @@ std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
   return distance;
 }
 
+/// Returns the curves that the present mesh does not follow: all of them if it follows none.
+std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
+  if (layout_) return layout_->routing.unfollowed;
+  std::vector<UnfollowedCurve> all;
+  const std::vector<FeatureCurve>& curves = edges_.features.curves.curves;
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    const ArcLength arc(curves[c].points);
+    all.push_back({static_cast<Index>(c), NotFollowed::excluded, arc.at(arc.length() / 2)});
+  }
+  return all;
+}
+
 /// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
 /// fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
@@ -342,12 +363,10 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   if (!add_trial(std::move(trial), mesh_, quality, distance_of_edges(), options_, result_)) return going;
   result_.missed_edges.clear();
   start_.lost.clear();
-  if (layout_) {
-    const std::vector<UnfollowedCurve>& unfollowed = layout_->routing.unfollowed;
-    result_.missed_edges = missed_edges(unfollowed, edges_.features.curves, target_.normalisation);
-    for (const UnfollowedCurve& curve : unfollowed)
-      if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.curve);
-  }
+  const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
+  result_.missed_edges = missed_edges(unfollowed, edges_.features.curves, target_.normalisation);
+  for (const UnfollowedCurve& curve : unfollowed)
+    if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.curve);
   best_start_ = start_;
   return going;
 }
@@ -356,6 +375,8 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
 bool AutomaticFit::run_smooth(const Attempt& attempt) {
   std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
   if (!made) return !no_template_.empty();
+  const bool another_follows = options_.cells && attempt.levels > 0;
+  if (another_follows && made->num_cells() > attempt.template_cells) return true;
   mesh_ = std::move(*made);
   sizes_.clear();
   start_ = {};
@@ -374,17 +395,22 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
   return going;
 }
 
+/// Returns the cells at faces of a mesh's boundary that meet other ones, once for each pair of triangles.
+std::vector<Index> AutomaticFit::cells_that_meet(const VolumeMesh& mesh) const {
+  const MeshTopology topology(mesh);
+  std::vector<Index> face_of_triangle, cells;
+  const TriangleMesh surface = fan_triangles(boundary_surface(mesh, topology), &face_of_triangle);
+  for (const auto& pair : self_intersections(surface, [this] { return runner_.is_to_end(); }).pairs)
+    for (const Index t : pair) cells.push_back(topology.face_cells(topology.boundary_faces()[face_of_triangle[t]])[0]);
+  return cells;
+}
+
 /// Returns how poor each cell of the present mesh is, 0 for good ones.
 std::vector<double> AutomaticFit::faults_of_cells() const {
   constexpr double kAcceptable = 0.3, kMeets = 1;
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima) faults.push_back(std::max(0.0, kAcceptable - least));
-  const MeshTopology topology(mesh_);
-  std::vector<Index> face_of_triangle;
-  const TriangleMesh surface = fan_triangles(boundary_surface(mesh_, topology), &face_of_triangle);
-  for (const auto& pair : self_intersections(surface, [this] { return runner_.is_to_end(); }).pairs)
-    for (const Index t : pair)
-      faults[topology.face_cells(topology.boundary_faces()[face_of_triangle[t]])[0]] += kMeets;
+  for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
   return faults;
 }
 
@@ -461,10 +487,12 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
 }
 
 /// Returns the cells at which the best trial is not as good as aimed at: of its grid if it follows edges, of its mesh if
-/// not. First the poor ones, the worst first, then those too far from the target, then those at edges without a path, the
-/// longest first, then those at small features.
+/// not. First those whose faces meet others, then the poor ones, the worst first, then those too far from the target, then
+/// those at edges without a path, the longest first, then those at small features.
 std::vector<Fault> AutomaticFit::faults_of_best() const {
   std::vector<Fault> faults;
+  if (result_.trials[result_.chosen].self_intersections != std::size_t{0})
+    for (const Index c : cells_that_meet(result_.mesh)) faults.push_back({c});
   const std::vector<double> least = measure_quality(result_.mesh).cell_minima;
   std::vector<Index> poor = best_start_.poor;
   std::ranges::stable_sort(poor, std::less{}, [&](Index c) { return least[c]; });
@@ -561,6 +589,8 @@ AutomaticFitResult AutomaticFit::run() {
     going = run_refined();
     if (result_.chosen == before) break;
   }
+  if (going && !edges_.features.curves.empty() && !is_valid(result_.trials[result_.chosen]))
+    going = run_attempt({Attempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
   result_.report.seconds = {{"total", runner_.seconds()}};

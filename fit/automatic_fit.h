@@ -113,9 +113,11 @@ struct AutomaticFitResult {
 ///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
-/// If no trial is good, cells of the best one are cut in 27 where it is too far from the target, where cells are poor and
-/// where edges or small features are missed (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to
+/// If no trial is good, cells of the best one are cut in 27 where it meets itself, where it is too far from the target,
+/// where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to
 /// the number of cells allowed, or half as many again if the number is free.
+///
+/// If no trial is valid, a pillowed template is fitted without edges: a valid mesh with round edges is worth more.
 ///
 /// A target with several regions (`find_regions`) is filled as `fit_regions` says.
 ///

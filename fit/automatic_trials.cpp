@@ -46,6 +46,10 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
 }
 
+bool is_valid(const AutomaticFitTrial& trial) {
+  return trial.uncertified == 0 && trial.self_intersections == std::size_t{0};
+}
+
 bool is_good_enough(const AutomaticFitTrial& trial) {
   const double excused = trial.least_share >= kEnoughQuality ? kQualityWeight * (1 - trial.least_share) : 0;
   return trial.merit - excused < kGoodMerit;

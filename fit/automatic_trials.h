@@ -30,6 +30,9 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options);
 /// Returns how far a trial is from its aims: the formula in `fit_automatically`.
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options);
 
+/// Returns true if all cells are certified and the boundary is found not to meet itself.
+bool is_valid(const AutomaticFitTrial& trial);
+
 /// Returns true if no other template needs to be tried.
 bool is_good_enough(const AutomaticFitTrial& trial);
 
