@@ -38,10 +38,10 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kChildren = 8;         // hexes of a hex that is subdivided
-constexpr double kRoomForTemplates = 0.85;   // share of the cells allowed that a template is asked for first
-constexpr double kMostGrowth = 1.5;          // of the number of cells by cutting some of them
-constexpr int kMostRefinements = 2;          // cells of size 1 / 9 are the smallest
+constexpr std::size_t kChildren = 8;        // hexes of a hex that is subdivided
+constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
+constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting some of them
+constexpr int kMostRefinements = 2;         // cells of size 1 / 9 are the smallest
 
 /// The state of the sharp edges of a target.
 struct Edges {
@@ -52,9 +52,9 @@ struct Edges {
 /// One attempt: a template of at most so many cells, and the number of times it is subdivided.
 struct Attempt {
   enum class Kind {
-    smooth,    ///< a pillowed template
-    edges,     ///< a padded grid
-    aligned    ///< a padded grid through the target's planes
+    smooth,  ///< a pillowed template
+    edges,   ///< a padded grid
+    aligned  ///< a padded grid through the target's planes
   };
   Kind kind;
   std::size_t template_cells;
@@ -83,10 +83,10 @@ std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_ed
 /// What a trial was made from, and where it is not as good as aimed at.
 struct TrialStart {
   Attempt::Kind kind = Attempt::Kind::smooth;
-  SizedMesh grid;            ///< if edges are followed; else without cells, with the sizes of the trial's mesh
-  std::vector<Vec3> fitted;  ///< positions of the grid's vertices near the target
+  SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
+  std::vector<Vec3> fitted;      ///< positions of the grid's vertices near the target
   std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
-  std::vector<Index> lost;   ///< curves without a path
+  std::vector<Index> lost;       ///< curves without a path
 };
 
 /// Returns the share of the curves' length that paths follow.
@@ -133,9 +133,7 @@ class AutomaticFit {
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
   /// Begins a part of the attempt that takes this portion of what is left of it.
-  void begin_part(double portion, double forecast) {
-    runner_.work().begin_portion(portion, share_at_end_, forecast);
-  }
+  void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
   double sum_of_squared_sizes(const MeshTopology& topology) const;
   std::vector<Vec3> wanted_lengths(const MeshTopology& topology) const;
   std::vector<double> crease_factors(const MeshTopology& topology, const SparseMap& samples) const;
@@ -154,12 +152,12 @@ class AutomaticFit {
 
   AutomaticFitOptions options_;
   bool follows_sharp_edges_;
-  bool follows_edges_;                ///< sharp ones, or borders of groups
-  TriangleMesh original_;             ///< the target; if edges are followed, its triangles agree about what is inside
+  bool follows_edges_;     ///< sharp ones, or borders of groups
+  TriangleMesh original_;  ///< the target; if edges are followed, its triangles agree about what is inside
   FitTarget target_;
   Edges edges_;
-  FlatFacets facets_;                 ///< of `target_.mesh`, if edges are followed
-  FeatureSizes features_;             ///< of the target, in normalized coordinates
+  FlatFacets facets_;      ///< of `target_.mesh`, if edges are followed
+  FeatureSizes features_;  ///< of the target, in normalized coordinates
   VolumeMesh mesh_;
   std::vector<double> sizes_;         ///< of its cells (`SizedMesh`)
   TrialStart start_, best_start_;     ///< of the present trial, and of the best one
@@ -167,16 +165,14 @@ class AutomaticFit {
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
   std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
   AutomaticFitResult result_;
-  double share_at_end_ = 0;           ///< of the attempt in progress
-  double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
-  double least_share_ = 1;            ///< of the goal that the last level reached, at caps of the lower goal there
+  double share_at_end_ = 0;   ///< of the attempt in progress
+  double aligned_share_ = 0;  ///< of the target's area on planes of the last grid through planes
+  double least_share_ = 1;    ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
 
 /// Returns true if no other template needs to be tried.
-bool AutomaticFit::is_good() const {
-  return !result_.trials.empty() && is_good_enough(result_.trials[result_.chosen]);
-}
+bool AutomaticFit::is_good() const { return !result_.trials.empty() && is_good_enough(result_.trials[result_.chosen]); }
 
 void AutomaticFit::find_edges() {
   if (!follows_edges_) return;
@@ -192,8 +188,8 @@ void AutomaticFit::find_edges() {
 /// Finds the features that are so small that a distance within the tolerance may be too large there.
 void AutomaticFit::find_features() {
   target_.sample(0);
-  features_ = feature_sizes(target_.surface, *target_.tree,
-                            options_.max_tolerance_percent / 100 / kAutomaticFeatureShare);
+  features_ =
+      feature_sizes(target_.surface, *target_.tree, options_.max_tolerance_percent / 100 / kAutomaticFeatureShare);
 }
 
 /// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
@@ -224,8 +220,8 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
   return std::move(made.templates.front());
 }
 
-/// Makes a pillowed template of at most so many cells; if there is none, the smallest that was found. Returns nothing as
-/// `make_template`.
+/// Makes a pillowed template of at most so many cells; if there is none, the smallest that was found. Returns nothing
+/// as `make_template`.
 std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cells) {
   constexpr int kTries = 3;
   constexpr double kLess = 0.97;
@@ -267,8 +263,7 @@ std::vector<Vec3> AutomaticFit::wanted_lengths(const MeshTopology& topology) con
 /// units of the cells: a face counts as often as another one, whatever its size, and so must an edge.
 /// samples  vertices -> samples.
 std::vector<double> AutomaticFit::crease_factors(const MeshTopology& topology, const SparseMap& samples) const {
-  const double mean =
-      std::sqrt(sum_of_squared_sizes(topology) / static_cast<double>(topology.boundary_faces().size()));
+  const double mean = std::sqrt(sum_of_squared_sizes(topology) / static_cast<double>(topology.boundary_faces().size()));
   std::vector<Vec3> sizes;
   for (const double size : vertex_sizes(mesh_, sizes_)) sizes.push_back(Vec3::Constant(size));
   std::vector<double> factors;
@@ -287,8 +282,8 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   const BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
-  QualityBoundary boundary{.samples = samples.positions, .triangles = samples.triangles,
-                           .triangle_faces = samples.triangle_faces};
+  QualityBoundary boundary{
+      .samples = samples.positions, .triangles = samples.triangles, .triangle_faces = samples.triangle_faces};
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
     boundary.group_of_face = layout_->group_of_face;
@@ -486,9 +481,9 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
   }
 }
 
-/// Returns the cells at which the best trial is not as good as aimed at: of its grid if it follows edges, of its mesh if
-/// not. First those whose faces meet others, then the poor ones, the worst first, then those too far from the target, then
-/// those at edges without a path, the longest first, then those at small features.
+/// Returns the cells at which the best trial is not as good as aimed at: of its grid if it follows edges, of its mesh
+/// if not. First those whose faces meet others, then the poor ones, the worst first, then those too far from the
+/// target, then those at edges without a path, the longest first, then those at small features.
 std::vector<Fault> AutomaticFit::faults_of_best() const {
   std::vector<Fault> faults;
   if (result_.trials[result_.chosen].self_intersections != std::size_t{0})
@@ -509,13 +504,12 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
   const double spacing = std::sqrt(target_.surface.area() / static_cast<double>(grid.num_cells()));
   for (const Index c : lost) faults.push_back(cells.near(sampled_polyline(curves[c].points, spacing)));
   const TriangleMesh surface = refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh)));
-  faults.push_back(
-      cells.near(missed_feature_points(features_, ClosestPoint(surface), kAutomaticFeatureShare)));
+  faults.push_back(cells.near(missed_feature_points(features_, ClosestPoint(surface), kAutomaticFeatureShare)));
   return faults;
 }
 
-/// Cuts the cells at which the best trial is not as good as aimed at, and fits the result. Returns false if the fit must
-/// end.
+/// Cuts the cells at which the best trial is not as good as aimed at, and fits the result. Returns false if the fit
+/// must end.
 bool AutomaticFit::run_refined() {
   const AutomaticFitTrial best = result_.trials[result_.chosen];
   const bool is_smooth = best_start_.kind == Attempt::Kind::smooth;
@@ -526,8 +520,10 @@ bool AutomaticFit::run_refined() {
   std::optional<SizedMesh> refined =
       refined_at_faults(base, best_start_.grid.sizes, faults_of_best(), static_cast<std::size_t>(room));
   if (!refined) return true;
-  AutomaticFitTrial trial{.template_cells = best.template_cells, .through_planes = best.through_planes,
-                          .refined_cells = refined->mesh.num_cells(), .level = best.level};
+  AutomaticFitTrial trial{.template_cells = best.template_cells,
+                          .through_planes = best.through_planes,
+                          .refined_cells = refined->mesh.num_cells(),
+                          .level = best.level};
   if (!is_smooth) return fit_smoothly(std::move(*refined), best_start_.kind) && route_and_fit(trial);
   layout_.reset();
   mesh_ = std::move(refined->mesh);
@@ -550,21 +546,21 @@ bool AutomaticFit::run_attempt(const Attempt& attempt) {
 void AutomaticFit::conclude() {
   FitReport& report = result_.report;
   const AutomaticFitTrial& best = result_.trials[result_.chosen];
-  const std::string found =
-      formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%", best.least_scaled_jacobian,
-                best.mean_percent, best.max_percent);
+  const std::string found = formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%",
+                                      best.least_scaled_jacobian, best.mean_percent, best.max_percent);
   report.explanation = found;
   if (best.max_percent > options_.max_tolerance_percent || best.mean_percent > options_.mean_tolerance_percent ||
       best.least_share < 1)
-    report.warnings.push_back(formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ",
-                                        options_.quality, options_.mean_tolerance_percent,
-                                        options_.max_tolerance_percent) + found);
+    report.warnings.push_back(
+        formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ", options_.quality,
+                  options_.mean_tolerance_percent, options_.max_tolerance_percent) +
+        found);
   if (best.feature_miss && best.feature_miss->share > kAutomaticFeatureShare) {
     const FeatureMiss& miss = *best.feature_miss;
-    report.warnings.push_back(formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
-                                        "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
-                                        miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(),
-                                        miss.place.z()));
+    report.warnings.push_back(
+        formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
+                  "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
+                  miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
   }
   warn_of_missed_edges(result_.missed_edges, best.curves, "sharp edges", report);
 }
@@ -583,14 +579,17 @@ AutomaticFitResult AutomaticFit::run() {
     attempt.is_last_count = true;
     going = run_attempt(attempt);
   }
+  going = going && !result_.trials.empty();
   for (int round = 0; going && !is_good() && round < kMostRefinements; ++round) {
     const std::size_t before = result_.chosen;
     share_at_end_ += kAttemptPortion * (1 - share_at_end_);
     going = run_refined();
     if (result_.chosen == before) break;
   }
-  if (going && !edges_.features.curves.empty() && !is_valid(result_.trials[result_.chosen]))
+  if (going && !edges_.features.curves.empty() && !is_valid(result_.trials[result_.chosen])) {
+    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
     going = run_attempt({Attempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
+  }
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
   result_.report.seconds = {{"total", runner_.seconds()}};

@@ -45,47 +45,47 @@ struct AutomaticFitOptions {
   /// Borders between groups of the target's faces are followed like sharp edges, also where the surface is smooth.
   bool keeps_groups = false;
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
-  int max_iterations = 0;          ///< per stage; 0: as the schedule says
-  double time_limit_seconds = 0;   ///< 0: no limit
+  int max_iterations = 0;                            ///< per stage; 0: as the schedule says
+  double time_limit_seconds = 0;                     ///< 0: no limit
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
-  StageLog* log = nullptr;         ///< supplies the results of earlier minimizations and records new ones; null: no log
+  StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
 };
 
 /// A sharp edge of the target that no edges of the mesh follow.
 struct MissedEdge {
   NotFollowed reason;
-  Vec3 place;                      ///< a point of it, in the target's coordinates
-  double length_percent = 0;       ///< percent of the diagonal
+  Vec3 place;                 ///< a point of it, in the target's coordinates
+  double length_percent = 0;  ///< percent of the diagonal
 };
 
 /// One template that was fitted, and what came out.
 struct AutomaticFitTrial {
   std::size_t template_cells = 0, cells = 0;
-  bool through_planes = false;     ///< the template's grid lines pass through planes of the target
-  std::size_t refined_cells = 0;   ///< of the grid or mesh after some of its cells were cut; 0: none was
-  std::size_t pads = 0;            ///< layers of cells under patches between sharp edges
+  bool through_planes = false;                  ///< the template's grid lines pass through planes of the target
+  std::size_t refined_cells = 0;                ///< of the grid or mesh after some of its cells were cut; 0: none was
+  std::size_t pads = 0;                         ///< layers of cells under patches between sharp edges
   std::size_t curves = 0, followed_curves = 0;  ///< of the target's sharp edges
-  double within_share = 1;         ///< share of their length within `kSharpPercent` of edges of the mesh
-  int level = 0;                   ///< times the template was subdivided
-  double mean_percent = 0, max_percent = 0;  ///< distance, percent of the target's diagonal
-  std::optional<FeatureMiss> feature_miss;  ///< in the target's unit; empty: there are no small features
+  double within_share = 1;                      ///< share of their length within `kSharpPercent` of edges of the mesh
+  int level = 0;                                ///< times the template was subdivided
+  double mean_percent = 0, max_percent = 0;     ///< distance, percent of the target's diagonal
+  std::optional<FeatureMiss> feature_miss;      ///< in the target's unit; empty: there are no small features
   double least_scaled_jacobian = 0, mean_scaled_jacobian = 0;
-  double least_share = 0;          ///< least share of the quality that a cell reaches, less being asked at sharp edges
+  double least_share = 0;  ///< least share of the quality that a cell reaches, less being asked at sharp edges
   std::size_t uncertified = 0;
-  double volume_percent = 0;       ///< largest difference of a region's volume from the target's, if it has regions
+  double volume_percent = 0;  ///< largest difference of a region's volume from the target's, if it has regions
   std::optional<std::size_t> self_intersections;  ///< pairs of triangles; empty: the search was interrupted
-  double merit = 0;                ///< 0: all aims are reached; lower is better
+  double merit = 0;                               ///< 0: all aims are reached; lower is better
 };
 
 struct AutomaticFitResult {
-  VolumeMesh mesh;                 ///< hexes, with tags on the creases that follow edges of the target
+  VolumeMesh mesh;  ///< hexes, with tags on the creases that follow edges of the target
   FitReport report;
-  BettiNumbers topology;           ///< of the solid
+  BettiNumbers topology;                 ///< of the solid
   std::vector<MissedEdge> missed_edges;  ///< the longest first
   std::vector<AutomaticFitTrial> trials;
-  std::size_t chosen = 0;          ///< position in trials
+  std::size_t chosen = 0;  ///< position in trials
 };
 
 /// Fills the solid inside a surface with hexes that one can compute on: no template is given, and every vertex of the
@@ -114,8 +114,8 @@ struct AutomaticFitResult {
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
 /// If no trial is good, cells of the best one are cut in 27 where it meets itself, where it is too far from the target,
-/// where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the result is fitted: up to twice, and to
-/// the number of cells allowed, or half as many again if the number is free.
+/// where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the result is
+/// fitted: up to twice, and to the number of cells allowed, or half as many again if the number is free.
 ///
 /// If no trial is valid, a pillowed template is fitted without edges: a valid mesh with round edges is worth more.
 ///

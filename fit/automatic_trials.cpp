@@ -11,8 +11,8 @@ namespace subvol {
 
 namespace {
 
-constexpr double kGoodMerit = 0.1;           // no other template is tried below it
-constexpr double kQualityWeight = 5;         // of the share of the quality in the merit
+constexpr double kGoodMerit = 0.1;    // no other template is tried below it
+constexpr double kQualityWeight = 5;  // of the share of the quality in the merit
 
 }  // namespace
 
@@ -27,8 +27,7 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
-  if (options.cells)
-    in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
+  if (options.cells) in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
   options.quality = std::max(options.quality, kLeastQuality);
   return options;
 }
@@ -80,8 +79,8 @@ std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed
                                      const Normalisation& normalisation) {
   std::vector<MissedEdge> missed;
   for (const UnfollowedCurve& curve : unfollowed)
-    missed.push_back({curve.reason, normalisation.from_unit({curve.place})[0],
-                      100 * curves.curves[curve.curve].length()});
+    missed.push_back(
+        {curve.reason, normalisation.from_unit({curve.place})[0], 100 * curves.curves[curve.curve].length()});
   std::stable_sort(missed.begin(), missed.end(),
                    [](const MissedEdge& a, const MissedEdge& b) { return a.length_percent > b.length_percent; });
   return missed;
@@ -91,10 +90,11 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
                           FitReport& report) {
   if (missed.empty()) return;
   const MissedEdge& longest = missed.front();
-  report.warnings.push_back(formatted("%zu of %zu %s are not followed; the longest, %.3g %% of the diagonal, at (%.6g, "
-                                      "%.6g, %.6g): %s",
-                                      missed.size(), num_curves, name, longest.length_percent, longest.place.x(),
-                                      longest.place.y(), longest.place.z(), to_string(longest.reason).c_str()));
+  report.warnings.push_back(
+      formatted("%zu of %zu %s are not followed; the longest, %.3g %% of the diagonal, at (%.6g, "
+                "%.6g, %.6g): %s",
+                missed.size(), num_curves, name, longest.length_percent, longest.place.x(), longest.place.y(),
+                longest.place.z(), to_string(longest.reason).c_str()));
 }
 
 }  // namespace subvol

@@ -167,19 +167,19 @@ class MeshOptimizer {
   MeshTopology topology_;
   bool own_boundary_;
   FitTarget target_;
-  Interfaces interfaces_;            ///< between regions; fitted to themselves as they are at the start
+  Interfaces interfaces_;  ///< between regions; fitted to themselves as they are at the start
   InterfaceMarks marks_;
   Held held_ = Held::nothing;
-  std::vector<Index> face_groups_;   ///< `groups_of_sheets`; empty without interfaces
+  std::vector<Index> face_groups_;     ///< `groups_of_sheets`; empty without interfaces
   std::vector<double> start_volumes_;  ///< of the regions
   FollowedCreases creases_;
   BoundarySamples samples_;
   std::vector<Vec3> ideal_boxes_;
-  std::vector<double> weights_;     ///< per cell; empty: all equal
+  std::vector<double> weights_;        ///< per cell; empty: all equal
   std::vector<std::uint8_t> refined_;  ///< 1 for sample triangles at places that are too far off: they get more points
-  std::vector<double> relief_;      ///< per cell, the factor on its weight that is lowered beside places too far off
+  std::vector<double> relief_;         ///< per cell, the factor on its weight that is lowered beside places too far off
   std::vector<Index> uncertified_;
-  bool gains_ended_ = false;        ///< true if the rounds ended because they no longer gained
+  bool gains_ended_ = false;                   ///< true if the rounds ended because they no longer gained
   double mean_percent_ = 0, max_percent_ = 0;  ///< distances at the samples of the last stage
   FitReport report_;
   StageRunner runner_;
@@ -203,9 +203,9 @@ std::vector<std::array<Index, 2>> MeshOptimizer::tagged_edges() const {
 void MeshOptimizer::find_features() {
   if (options_.fixed_boundary) return;
   creases_ = FollowedCreases(target_.mesh, options_.crease_angle_degrees, mesh_, tagged_edges());
-  creases_.keep_interfaces(mesh_, options_.crease_angle_degrees,
-                             own_boundary_ ? FollowedCreases::InnerCurves::themselves_with_rims
-                                           : FollowedCreases::InnerCurves::themselves);
+  creases_.keep_interfaces(
+      mesh_, options_.crease_angle_degrees,
+      own_boundary_ ? FollowedCreases::InnerCurves::themselves_with_rims : FollowedCreases::InnerCurves::themselves);
   sample_boundary();
   target_.sample(samples_.points.size(), own_boundary_ ? 1 : kLeastTargetSamples);
 }
@@ -318,8 +318,7 @@ bool MeshOptimizer::untangle_cells(Boundary boundary, const char* name, const Un
 bool MeshOptimizer::untangle_all() {
   runner_.work().begin_part(kShareAfterUntangling, kExpectedUntanglingSteps);
   const std::vector<Vec3> start = mesh_.positions;
-  const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = 40,
-                              .patience = options_.fixed_boundary ? 6 : 2};
+  const UntangleOptions fixed{.tangential_weight = 0, .max_rounds = 40, .patience = options_.fixed_boundary ? 6 : 2};
   if (!untangle_cells(Boundary::fixed, "untangle, boundary fixed", fixed)) return false;
   if (uncertified_.empty() || options_.fixed_boundary) return true;
   std::vector<Index> stuck = uncertified_;
@@ -391,8 +390,8 @@ bool MeshOptimizer::improve() {
   for (int round = 0; round < kMaxRounds; ++round) {
     const std::vector<double> minima = measure_quality(mesh_, kPointsPerDirection).cell_minima;
     const Progress now{mean_of(minima), *std::min_element(minima.begin(), minima.end()), max_percent_};
-    const bool too_far = mean_percent_ > kMeanMargin * options_.mean_tolerance_percent ||
-                         (held_ != Held::nothing && changes_volumes());
+    const bool too_far =
+        mean_percent_ > kMeanMargin * options_.mean_tolerance_percent || (held_ != Held::nothing && changes_volumes());
     if (too_far && lambda > kLeastLambdaShare * options_.lambda) {
       lambda /= 2;
     } else if (!now.gains_on(before, kMaxMargin * options_.max_tolerance_percent)) {

@@ -104,25 +104,25 @@ class SubdivisionFit : StagedFit {
   FitReport& report() override { return result_.report; }
 
   FitOptions options_;
-  FitTarget target_;               ///< sampled for the current level
-  bool samples_all_ = true;        ///< false: only some of the target's samples are used
-  VolumeMesh template_;            ///< normalized, with its creases
-  VolumeMesh control_;             ///< the control mesh (for cage-only fits, its last refinement)
-  VolumeMesh cage_;                ///< the mesh whose vertices are the degrees of freedom
+  FitTarget target_;                            ///< sampled for the current level
+  bool samples_all_ = true;                     ///< false: only some of the target's samples are used
+  VolumeMesh template_;                         ///< normalized, with its creases
+  VolumeMesh control_;                          ///< the control mesh (for cage-only fits, its last refinement)
+  VolumeMesh cage_;                             ///< the mesh whose vertices are the degrees of freedom
   FollowedCreases template_creases_, creases_;  ///< creases of template_ and of level_.mesh
-  SparseMap from_unknowns_;        ///< maps the degrees of freedom to control_'s vertices
-  SparseMap previous_nodes_;       ///< maps them to the nodes of the last certified finite element mesh
+  SparseMap from_unknowns_;                     ///< maps the degrees of freedom to control_'s vertices
+  SparseMap previous_nodes_;                    ///< maps them to the nodes of the last certified finite element mesh
   std::vector<Vec3> unknowns_;
   int try_ = 0;                    ///< number of attempts begun, each with other ideal cells
   double own_box_share_ = 0;       ///< of the current attempt
   std::vector<Vec3> ideal_boxes_;  ///< of the current level's cells
   FitSchedule schedule_;
-  int number_ = 0;                 ///< level of the finite element mesh
+  int number_ = 0;  ///< level of the finite element mesh
   FitLevel level_;
   std::optional<BoundaryRefinement> limit_check_;  ///< refinement of level_.mesh, made when first needed
   FitResult result_;
-  std::size_t try_begin_ = 0;      ///< number of stages in the report when the attempt began
-  StageRange result_stages_;       ///< the stages that led to the state stored in result_
+  std::size_t try_begin_ = 0;  ///< number of stages in the report when the attempt began
+  StageRange result_stages_;   ///< the stages that led to the state stored in result_
   std::map<std::string, double> seconds_;
   MemoryBudget memory_;
   StageRunner runner_;
@@ -156,12 +156,13 @@ void SubdivisionFit::look_over_template() {
   const StartComparison start =
       target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
   report.note_start(start);
-  schedule_ = make_schedule(options_, start.mean_distance / target_.surface.length(),
-                            template_creases_.hold_the_surface());
+  schedule_ =
+      make_schedule(options_, start.mean_distance / target_.surface.length(), template_creases_.hold_the_surface());
   keep_interfaces();
 }
 
-/// The interfaces between the template's regions get the shape of the target's, or keep their own, sharp edges included.
+/// The interfaces between the template's regions get the shape of the target's, or keep their own, sharp edges
+/// included.
 void SubdivisionFit::keep_interfaces() {
   target_.keep_interfaces(template_);
   if (target_.has_interfaces())
@@ -174,8 +175,7 @@ void SubdivisionFit::keep_interfaces() {
 
 void SubdivisionFit::prepare_level() {
   const double begin = runner_.seconds();
-  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.num_details(),
-                          finest());
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.num_details(), finest());
   limit_check_.reset();
   creases_.refine(level_.parent_creases);
   sample_target();
@@ -219,10 +219,9 @@ std::string SubdivisionFit::stage_name(const Stage& stage) const {
 }
 
 std::unique_ptr<SurfaceTerm> SubdivisionFit::surface_term(const Stage& stage) const {
-  std::unique_ptr<SurfaceTerm> term =
-      make_surface_term(target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
-                        options_.correspondence, SurfacePull::along_normals, 0, {},
-                        {level_.sample_groups, target_.group_of_triangle});
+  std::unique_ptr<SurfaceTerm> term = make_surface_term(
+      target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
+      options_.correspondence, SurfacePull::along_normals, 0, {}, {level_.sample_groups, target_.group_of_triangle});
   if (!creases_.curves().empty())
     term->add_creases(creases_.energy(level_.crease_edges, level_.samples.num_rows(),
                                       kCreaseWidth * target_.surface.length(), stage.tangential_weight));
@@ -254,8 +253,7 @@ bool SubdivisionFit::start_level() {
   constexpr int kMaxRounds = 60;
   constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
   const SparseMap nodes = level_.nodes;
-  const std::vector<Index> failing_before =
-      certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
+  const std::vector<Index> failing_before = certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
   const auto feasible = [&](double t) {
     const SparseMap map = blend(level_.safe_nodes, nodes, t);
     const std::vector<Index> failing = certify(map.apply(unknowns_), level_.mesh).not_certified;
@@ -271,8 +269,10 @@ bool SubdivisionFit::start_level() {
     }
     // Cells that block the way need better shapes before they can follow.
     const bool slow = next - t < kSlowShare * (1 - t);
-    if (next > t) t = next;
-    else if (stage.lambda >= options_.lambda_far) break;
+    if (next > t)
+      t = next;
+    else if (stage.lambda >= options_.lambda_far)
+      break;
     if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
     level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
     if (t == 1) return true;
@@ -426,10 +426,14 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
   };
   const bool has_creases = !creases_.curves().empty();
   QualityStages stages(level_.mesh, ideal_boxes_, level_.nodes, {},
-                       {level_.samples, {}, level_.sample_triangles, level_.sample_faces, level_.interfaces,
-                        level_.face_groups, target_.group_of_triangle},
-                       target_.surface,
-                       has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+                       {level_.samples,
+                        {},
+                        level_.sample_triangles,
+                        level_.sample_faces,
+                        level_.interfaces,
+                        level_.face_groups,
+                        target_.group_of_triangle},
+                       target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
   stages.before_stage = [this] { keep_state(); };
   StageRecord record;
   record.name = formatted("level %d, quality", number_);

@@ -35,9 +35,9 @@ namespace {
 constexpr const char *kAutomaticAngle = "auto", *kNoAngle = "none";
 
 /// Options that ask for a subdivision volume.
-constexpr std::array kSubdivisionOptions{"--levels",     "--surface",      "--boundary", "--cage-only",
-                                         "--lambda-far", "--lambda-close", "--solver",   "--correspondence",
-                                         "--energy"};
+constexpr std::array kSubdivisionOptions{"--levels",    "--surface",        "--boundary",
+                                         "--cage-only", "--lambda-far",     "--lambda-close",
+                                         "--solver",    "--correspondence", "--energy"};
 
 struct FitArguments {
   RunOptions run;
@@ -47,7 +47,7 @@ struct FitArguments {
   TemplateSource template_mesh;
   std::string surface = "limit", boundary = "catmull-clark", solver = "newton", correspondence = "closest";
   std::string regions, point_weights = "equal", energy = "hencky", crease_angle = kAutomaticAngle;
-  std::optional<std::size_t> cells;              ///< of the result, if the template is made
+  std::optional<std::size_t> cells;  ///< of the result, if the template is made
   double quality = kUsualQuality;
   std::optional<double> quality_floor, max_tolerance_percent, size;
   int order = 0;  ///< order of curved elements; 0: a subdivision volume is fitted
@@ -83,8 +83,7 @@ std::optional<double> crease_angle(const FitArguments& arguments, std::optional<
 /// One run of `fit` that makes a subdivision volume, from its input files to its output files.
 class FitRun : public LongRun {
  public:
-  FitRun(const FitArguments& arguments, const CLI::App& verb)
-      : LongRun(arguments.run, verb), arguments_(arguments) {}
+  FitRun(const FitArguments& arguments, const CLI::App& verb) : LongRun(arguments.run, verb), arguments_(arguments) {}
   int run();
 
  private:
@@ -119,11 +118,11 @@ void FitRun::load() {
 }
 
 void FitRun::load_template() {
-  LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_,
-                                             {.crease_angle_degrees = arguments_.fit.crease_angle_degrees,
-                                              .time_limit_seconds =
-                                                  kTrialsShareOfTime * arguments_.fit.time_limit_seconds},
-                                             arguments_.run, warnings_);
+  LoadedTemplate loaded =
+      cli::load_template(arguments_.template_mesh, target_,
+                         {.crease_angle_degrees = arguments_.fit.crease_angle_degrees,
+                          .time_limit_seconds = kTrialsShareOfTime * arguments_.fit.time_limit_seconds},
+                         arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))
     untangle_template(arguments_.template_mesh.path, arguments_.run,
@@ -142,8 +141,8 @@ void FitRun::fit() {
   options.boundary = arguments_.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
   options.correspondence = correspondence(arguments_);
   options.solver = solver_kind(arguments_);
-  checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)},
-                                                    {"template", fingerprint(template_mesh_)}}));
+  checkpointing_.emplace(
+      run_, run_identity(verb_, {{"target", fingerprint(target_)}, {"template", fingerprint(template_mesh_)}}));
   options.log = checkpointing_->log();
   options.keep_states = has_animation(outputs_);
   options.memory_limit_bytes = static_cast<double>(run_.memory_limit);
@@ -155,8 +154,8 @@ void FitRun::fit() {
   result_ = followed([&](auto progress) {
     options.progress = progress;
     options.cancelled = interrupted;
-    return std::visit(
-        [&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); }, target_);
+    return std::visit([&](const auto& target) { return fit_subdivision_volume(target, template_mesh_, options); },
+                      target_);
   });
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
@@ -236,8 +235,8 @@ void FitRun::summarise() const {
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
             << to_text(mesh_check_)
             << (limit_distance_.one_sided ? "points to limit surface: mean " : "limit surface to target: mean ")
-            << limit_distance_.mean() * percent << " %, max "
-            << limit_distance_.max() * percent << " % of the diagonal\n";
+            << limit_distance_.mean() * percent << " %, max " << limit_distance_.max() * percent
+            << " % of the diagonal\n";
   if (report.creases) std::cerr << to_text(*report.creases);
   tell_outputs();
 }
@@ -464,10 +463,10 @@ void add_fit_command(CLI::App& app, Action& action) {
                        point_cloud_formats() + "; or, without a template, a segmentation: " + label_grid_formats())
       ->required()
       ->type_name("FILE");
-  CLI::Option* file = verb->add_option("--template", arguments->template_mesh.path,
-                                       "Coarse mesh to start from: " + volume_mesh_formats() +
-                                           " (default: made from the target)")
-                          ->type_name("MESH");
+  CLI::Option* file =
+      verb->add_option("--template", arguments->template_mesh.path,
+                       "Coarse mesh to start from: " + volume_mesh_formats() + " (default: made from the target)")
+          ->type_name("MESH");
   verb->add_option("--cells", arguments->cells,
                    "How many cells the result has at most; about so many with --levels, --order or a cage\n"
                    "(default: as many as it needs)")
@@ -501,9 +500,7 @@ void add_fit_command(CLI::App& app, Action& action) {
 
 Ctrl-C once ends the fit with the best result so far (exit status 130), twice ends the program.
 --config FILE.toml reads options from a file: key = value, keys being the long names above.)");
-  verb->callback([arguments, verb, &action] {
-    action = [arguments, verb] { return run_fit(*arguments, *verb); };
-  });
+  verb->callback([arguments, verb, &action] { action = [arguments, verb] { return run_fit(*arguments, *verb); }; });
 }
 
 }  // namespace subvol::cli

@@ -38,8 +38,7 @@ void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArg
                        const VolumeMesh& cells) {
   for (const Output& output : outputs) {
     require_for_curved_cells(output);
-    if (output.extension == ".msh")
-      msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
+    if (output.extension == ".msh") msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});
   }
 }
 
@@ -126,16 +125,14 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     require_resumable(arguments.run, run_identity(verb, {{"target", fingerprint(target)}}));
   }
   const Clock::time_point template_start = Clock::now();
-  LoadedTemplate loaded =
-      load_template(arguments.template_mesh, target,
-                    {.order = arguments.fit.order,
-                     .basis = arguments.fit.basis,
-                     .time_limit_seconds = kTrialsShareOfTime * arguments.fit.time_limit_seconds},
-                    arguments.run, warnings);
+  LoadedTemplate loaded = load_template(arguments.template_mesh, target,
+                                        {.order = arguments.fit.order,
+                                         .basis = arguments.fit.basis,
+                                         .time_limit_seconds = kTrialsShareOfTime * arguments.fit.time_limit_seconds},
+                                        arguments.run, warnings);
   const double template_seconds = seconds_since(template_start);
   VolumeMesh& template_mesh = loaded.mesh;
-  if (!loaded.choice)
-    warn_of_losses(marks_of(template_mesh), marks_of(template_mesh), outputs, warnings, true);
+  if (!loaded.choice) warn_of_losses(marks_of(template_mesh), marks_of(template_mesh), outputs, warnings, true);
   tell_warnings();
   if (loaded.choice && !arguments.run.quiet) std::cerr << to_text(*loaded.choice);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
@@ -161,8 +158,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   }
   const double untangle_seconds = seconds_since(untangle_start);
   const Clock::time_point fit_start = Clock::now();
-  HighOrderFitResult result = fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start),
-                                  target, template_mesh);
+  HighOrderFitResult result =
+      fit(arguments, checkpointing.log(), has_animation(outputs), seconds_since(start), target, template_mesh);
   const double fit_seconds = seconds_since(fit_start);
   FitReport& report = result.report;
   checkpointing.finish(warnings);

@@ -43,13 +43,13 @@ class CreaseEnergy {
   CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegment> segments, std::size_t num_samples, double width,
                double tangential_weight);
 
-  /// Returns the same energy over other samples, some of which are fixed. Segments between two of these are known to the
-  /// correspondences, but have none themselves.
-  /// numbers  new number of each sample that is an end of a segment.  is_free  of each new sample: 1 if it moves.
+  /// Returns the same energy over other samples, some of which are fixed. Segments between two of these are known to
+  /// the correspondences, but have none themselves. numbers  new number of each sample that is an end of a segment.
+  /// is_free  of each new sample: 1 if it moves.
   CreaseEnergy part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const;
 
-  /// From the next `assign` on, a link counts as many times as the mean of these factors at the ends of its segment. One
-  /// positive factor per sample, else InputError.
+  /// From the next `assign` on, a link counts as many times as the mean of these factors at the ends of its segment.
+  /// One positive factor per sample, else InputError.
   void weigh(std::vector<double> factors);
 
   /// Finds the correspondences for these samples and freezes them.
@@ -68,8 +68,8 @@ class CreaseEnergy {
 
  private:
   struct Curve {
-    std::vector<Vec3> points;     ///< vertices of T's polyline
-    ClosestPoint tree;            ///< tree over its segments
+    std::vector<Vec3> points;  ///< vertices of T's polyline
+    ClosestPoint tree;         ///< tree over its segments
     bool closed;
     std::vector<Index> segments;  ///< segments of S
     std::vector<Index> ends;      ///< samples at which exactly one of these segments ends: two if the curve is open

@@ -97,7 +97,8 @@ class Router {
         courses_(curves_.size()),
         base_{std::vector<std::uint8_t>(mesh.num_vertices(), 0), std::vector<std::uint8_t>(graph_.edges().size(), 0)},
         best_(curves_.size()) {
-    for (const FeatureCurve& curve : curves_) curve_h_.push_back(h_ * graph_.mean_size(sampled_polyline(curve.points, h_ / 2)));
+    for (const FeatureCurve& curve : curves_)
+      curve_h_.push_back(h_ * graph_.mean_size(sampled_polyline(curve.points, h_ / 2)));
     take(options);
     for (std::size_t c = 0; c < curves_.size(); ++c) trees_.push_back(polyline_tree(curves_[c].points));
     place_corners();
@@ -510,7 +511,7 @@ class Router {
   const std::vector<FeatureCurve>& curves_;
   RoutingGraph graph_;
   double h_;
-  std::vector<double> curve_h_;  ///< h near each curve
+  std::vector<double> curve_h_;                      ///< h near each curve
   std::vector<std::optional<NotFollowed>> reasons_;  ///< why a curve is not even tried
   std::vector<std::uint8_t> joinable_;
   bool on_sheets_ = false;

@@ -58,8 +58,8 @@ struct FeatureRouting {
 ///                    + 4 if distance > 1.1 h,                                              distance < 1.6 h
 ///
 /// h is the mean length of the boundary's edges, of edges of size 1 if sizes are given; it is multiplied by the size at
-/// a vertex, or by the mean size of the vertices near a curve. Curves shorter than h / 2, or with an angle below 19 degrees, are left
-/// alone, and so are corners without other curves. The path between two of them minimizes
+/// a vertex, or by the mean size of the vertices near a curve. Curves shorter than h / 2, or with an angle below 19
+/// degrees, are left alone, and so are corners without other curves. The path between two of them minimizes
 ///
 ///   integral of (d^2 + (0.12 h)^2) f ds,   d: distance to the curve,
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;
@@ -73,9 +73,9 @@ struct FeatureRouting {
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.
-/// Deterministic, serial. InputError: options of another size, a size that is not positive; features without one angle per curve; a position on the
-/// boundary that is not finite. Without curves, everything is empty. Cost: some shortest-path searches near each curve
-/// in each round.
+/// Deterministic, serial. InputError: options of another size, a size that is not positive; features without one angle
+/// per curve; a position on the boundary that is not finite. Without curves, everything is empty. Cost: some
+/// shortest-path searches near each curve in each round.
 ///
 /// Limits: curves that run closer than an edge to each other exclude each other. At corners of five or more curves,
 /// joins leave paths far from their curves: an icosahedron of 1,000 cells has 74 % of its edges within 0.1 %.

@@ -37,8 +37,8 @@ class FollowedCreases {
 
   /// What the sharp edges of interfaces are drawn to.
   enum class InnerCurves {
-    nothing,          ///< the sheets alone draw them: the target has interfaces of its own
-    themselves,       ///< the edges as they are
+    nothing,              ///< the sheets alone draw them: the target has interfaces of its own
+    themselves,           ///< the edges as they are
     themselves_with_rims  ///< likewise, and the curves where interfaces end at the boundary, if that stays where it is
   };
 

@@ -53,8 +53,8 @@ RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets, std::vector<d
     sites.push_back(position(v));
   }
   for (const Edge& edge : edges_)
-    edge_length_ += (position(edge.ends[1]) - position(edge.ends[0])).norm() * 2 /
-                    (size(edge.ends[0]) + size(edge.ends[1]));
+    edge_length_ +=
+        (position(edge.ends[1]) - position(edge.ends[0])).norm() * 2 / (size(edge.ends[0]) + size(edge.ends[1]));
   if (!edges_.empty()) edge_length_ /= static_cast<double>(edges_.size());
   if (!sites.empty()) tree_ = SiteTree(sites);
 }

@@ -22,8 +22,8 @@ SizedMesh refined_at(const VolumeMesh& mesh, std::span<const double> sizes, std:
   return result;
 }
 
-/// Marks the cells of the faults, in their order, each unless more than so many cells would be marked then. Returns their
-/// number.
+/// Marks the cells of the faults, in their order, each unless more than so many cells would be marked then. Returns
+/// their number.
 std::size_t choose(std::span<const Fault> faults, double most, std::vector<char>& chosen) {
   std::size_t count = 0;
   for (const Fault& fault : faults) {

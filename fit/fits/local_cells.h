@@ -53,8 +53,8 @@ std::vector<Index> cells_at(const VolumeMesh& mesh, std::span<const Vec3> positi
 /// Returns the mean size of the cells at each vertex; empty if the sizes are.
 std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double> sizes);
 
-/// Returns the sizes of a mesh that was padded: cells beyond the given ones have that of a cell behind them. Empty if the
-/// sizes are.
+/// Returns the sizes of a mesh that was padded: cells beyond the given ones have that of a cell behind them. Empty if
+/// the sizes are.
 std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes);
 
 }  // namespace subvol

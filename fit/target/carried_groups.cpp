@@ -56,8 +56,7 @@ Samples samples_of(const CurvedBoundary& boundary) {
     const Vec3 vector = area_vector(mesh, mesh.triangles[t]);
     const Vec3 sum = mesh.positions[a] + mesh.positions[b] + mesh.positions[c];
     samples.points.push_back(sum / 3);
-    for (const Index v : mesh.triangles[t])
-      samples.points.push_back(kFar * sum + (kNear - kFar) * mesh.positions[v]);
+    for (const Index v : mesh.triangles[t]) samples.points.push_back(kFar * sum + (kNear - kFar) * mesh.positions[v]);
     samples.normals.insert(samples.normals.end(), 4, vector.stableNormalized());
     samples.areas.insert(samples.areas.end(), 4, vector.norm() / 8);
     samples.faces.insert(samples.faces.end(), 4, boundary.faces[t]);
@@ -125,8 +124,7 @@ class TriangleFinder {
   void orient(const Samples& samples, const std::vector<ClosestPoint::Hit>& hits) {
     double sum = 0;
     for (std::size_t i = 0; i < hits.size(); ++i)
-      if (hits[i].triangle != kNoIndex)
-        sum += samples.areas[i] * normals_[hits[i].triangle].dot(samples.normals[i]);
+      if (hits[i].triangle != kNoIndex) sum += samples.areas[i] * normals_[hits[i].triangle].dot(samples.normals[i]);
     if (sum < 0)
       for (Vec3& normal : normals_) normal = -normal;
   }
@@ -176,16 +174,16 @@ std::vector<Index> largest_shares(std::vector<Share> shares, const std::vector<G
     for (; end < shares.size() && shares[end].face == shares[i].face && shares[end].group == shares[i].group; ++end)
       area += shares[end].area;
     const Index face = shares[i].face, group = shares[i].group;
-    const bool is_lower = group != kNoIndex &&
-                          (best[face] == kNoIndex || groups[group].number < groups[best[face]].number);
+    const bool is_lower =
+        group != kNoIndex && (best[face] == kNoIndex || groups[group].number < groups[best[face]].number);
     if (area > most[face] || (area == most[face] && is_lower)) most[face] = area, best[face] = group;
   }
   return best;
 }
 
-/// Gives a group that no face lies mostly on the face that is nearest to the middle of its largest triangle, if that is no
-/// farther than the face is wide and the face's own group has another one. Large groups come first.
-/// reach  width of each face.
+/// Gives a group that no face lies mostly on the face that is nearest to the middle of its largest triangle, if that is
+/// no farther than the face is wide and the face's own group has another one. Large groups come first. reach  width of
+/// each face.
 void keep_small_groups(const TriangleMesh& target, const CurvedBoundary& boundary, const std::vector<double>& reach,
                        std::vector<Index>& group_of_face) {
   std::vector<std::size_t> faces(target.face_groups.groups.size(), 0);

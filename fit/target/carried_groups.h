@@ -15,9 +15,9 @@ namespace subvol {
 ///
 /// Points are spread over each face. Each is in the group of the closest triangle whose normal is within 60 degrees of
 /// the face's, if there is one within a face's size of the closest triangle of all; else in the group of that one. The
-/// face gets the group with the largest share of its area; of equal shares, the one with the lowest number. A group that
-/// gets no face so takes the one nearest to its largest triangle, if that is within the face's width and is not the only
-/// one of another group: the name of a small pin is not lost, though its area is too large.
+/// face gets the group with the largest share of its area; of equal shares, the one with the lowest number. A group
+/// that gets no face so takes the one nearest to its largest triangle, if that is within the face's width and is not
+/// the only one of another group: the name of a small pin is not lost, though its area is too large.
 ///
 /// target     its groups; empty: the result is empty. Triangles may be oriented in any way: they are made to agree
 ///            (`solid_boundary`); if they bound no solid and disagree, normals count without their sign. InputError: as

@@ -14,8 +14,8 @@ namespace {
 
 /// Returns the radius of the ball at p on the side of n; `most` if it touches nothing that is about opposite to p.
 double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, double most) {
-  constexpr double kOpposite = -0.866;   // cosine of 150 degrees
-  constexpr double kTouching = 0.98;     // a ball is empty if the surface is farther than this share of its radius
+  constexpr double kOpposite = -0.866;  // cosine of 150 degrees
+  constexpr double kTouching = 0.98;    // a ball is empty if the surface is farther than this share of its radius
   constexpr int kMostRounds = 30;
   double radius = most, cosine = 1;
   for (int round = 0; round < kMostRounds; ++round) {
@@ -41,8 +41,8 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
   std::vector<double> sizes(samples.size());
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t i = 0; i < samples.size(); ++i)
-    sizes[i] = std::min(ball_radius(samples[i], normals[i], tree, most),
-                        ball_radius(samples[i], -normals[i], tree, most));
+    sizes[i] =
+        std::min(ball_radius(samples[i], normals[i], tree, most), ball_radius(samples[i], -normals[i], tree, most));
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (sizes[i] >= most) continue;
     features.points.push_back(samples[i]);

@@ -16,12 +16,12 @@ struct FeatureSizes {
   std::vector<double> sizes;  ///< radius at each point, in the surface's unit
 };
 
-/// Finds where two sides of a surface are close and opposite: the radius of the ball that touches the surface at a point
-/// from either side, and again about opposite to it (the medial ball). The radius of a hole or a pin; half the
+/// Finds where two sides of a surface are close and opposite: the radius of the ball that touches the surface at a
+/// point from either side, and again about opposite to it (the medial ball). The radius of a hole or a pin; half the
 /// thickness of a wall, and half the width of a slot or gap.
 ///
-/// A ball starts with the radius `most`, touches the surface at p with normal n, and shrinks while it contains a point q
-/// of the surface:
+/// A ball starts with the radius `most`, touches the surface at p with normal n, and shrinks while it contains a point
+/// q of the surface:
 ///
 ///   r <- |p - q|^2 / (2 n . (p - q))
 ///
@@ -36,7 +36,7 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
 
 /// The place where a fitted surface misses a feature by the largest share of its size.
 struct FeatureMiss {
-  double share = 0;     ///< distance / size
+  double share = 0;  ///< distance / size
   double distance = 0, size = 0;
   Vec3 place{0, 0, 0};  ///< a point of the feature
 };

@@ -54,7 +54,8 @@ void jitter_inside(VolumeMesh& mesh, double amount) {
   VolumeMesh moved = mesh;
   jitter(moved, amount);
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
-    if (!topology.is_boundary_vertex(static_cast<Index>(v)) && !marks.vertices[v]) mesh.positions[v] = moved.positions[v];
+    if (!topology.is_boundary_vertex(static_cast<Index>(v)) && !marks.vertices[v])
+      mesh.positions[v] = moved.positions[v];
 }
 
 double volume_change(const VolumeMesh& mesh, const VolumeMesh& start) {
@@ -64,9 +65,7 @@ double volume_change(const VolumeMesh& mesh, const VolumeMesh& start) {
   return largest;
 }
 
-TriangleMesh own_boundary(const VolumeMesh& mesh) {
-  return fan_triangles(boundary_surface(mesh, MeshTopology(mesh)));
-}
+TriangleMesh own_boundary(const VolumeMesh& mesh) { return fan_triangles(boundary_surface(mesh, MeshTopology(mesh))); }
 
 /// Returns the largest distance of the vertices of the inner cube from its planes.
 double distance_from_inner_cube(const VolumeMesh& mesh) {

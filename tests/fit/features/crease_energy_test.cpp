@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/features/crease_energy.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/features/crease_distance.h"
-#include "subvol/fit/features/crease_energy.h"
 #include "subvol/fit/target/target_surface.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "tests/support/sample_meshes.h"

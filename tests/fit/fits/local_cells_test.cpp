@@ -24,7 +24,8 @@ TEST_CASE("Cells of faults are cut in 27, and sizes say so", "[local_cells]") {
   CHECK(volume == Approx(125));
 
   const std::size_t small = std::ranges::min_element(refined->sizes) - refined->sizes.begin();
-  const auto twice = refined_at_faults(refined->mesh, refined->sizes, std::vector<Fault>{{static_cast<Index>(small)}}, 5000);
+  const auto twice =
+      refined_at_faults(refined->mesh, refined->sizes, std::vector<Fault>{{static_cast<Index>(small)}}, 5000);
   REQUIRE(twice);
   CHECK(std::ranges::min(twice->sizes) < 0.2);
 }

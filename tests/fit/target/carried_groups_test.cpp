@@ -82,7 +82,7 @@ TEST_CASE("a group that is smaller than a face keeps one, unless it is far away 
   Carried carried = carry(target, box_mesh({1, 1, 1}, 3));
   CHECK(carried.areas[6].faces == 1);
   CHECK(carried.areas[side].faces == 8);
-  CHECK(warnings_of_groups(carried.areas).size() == 2);  // both areas differ
+  CHECK(warnings_of_groups(carried.areas).size() == 2);             // both areas differ
   CHECK(carry(target, box_mesh({1, 1, 1}, 1)).areas[6].is_lost());  // the side has one face only
 
   for (Index v : {t[0], first, static_cast<Index>(first + 1)})  // the same triangle, far away
