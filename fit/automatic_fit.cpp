@@ -524,7 +524,11 @@ bool AutomaticFit::run_refined() {
                           .through_planes = best.through_planes,
                           .refined_cells = refined->mesh.num_cells(),
                           .level = best.level};
-  if (!is_smooth) return fit_smoothly(std::move(*refined), best_start_.kind) && route_and_fit(trial);
+  if (!is_smooth) {
+    if (!fit_smoothly(std::move(*refined), best_start_.kind)) return false;
+    if (options_.cells && mesh_.num_cells() > *options_.cells) return true;  // its pads took more room than before
+    return route_and_fit(trial);
+  }
   layout_.reset();
   mesh_ = std::move(refined->mesh);
   sizes_ = refined->sizes;
