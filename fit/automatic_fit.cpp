@@ -80,7 +80,7 @@ std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_ed
   return attempts;
 }
 
-/// What a trial was made from, and where it is not as good as aimed at.
+/// Tells what a trial was made from, and where it is not as good as aimed at.
 struct TrialStart {
   Attempt::Kind kind = Attempt::Kind::smooth;
   SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
@@ -134,9 +134,6 @@ class AutomaticFit {
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
   /// Begins a part of the attempt that takes this portion of what is left of it.
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
-  double sum_of_squared_sizes(const MeshTopology& topology) const;
-  std::vector<Vec3> wanted_lengths(const MeshTopology& topology) const;
-  std::vector<double> crease_factors(const MeshTopology& topology, const SparseMap& samples) const;
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
@@ -242,35 +239,6 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
   }
 }
 
-/// Returns the sum of the squared sizes of the present mesh's boundary faces.
-double AutomaticFit::sum_of_squared_sizes(const MeshTopology& topology) const {
-  const auto& faces = topology.boundary_faces();
-  if (sizes_.empty()) return static_cast<double>(faces.size());
-  double squares = 0;
-  for (const Index f : faces) squares += std::pow(sizes_[topology.face_cells(f)[0]], 2);
-  return squares;
-}
-
-/// Returns the wanted lengths of the present mesh's cells: its boundary has the target's area.
-std::vector<Vec3> AutomaticFit::wanted_lengths(const MeshTopology& topology) const {
-  const double h = std::sqrt(target_.surface.area() / sum_of_squared_sizes(topology));
-  std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
-  for (std::size_t c = 0; c < sizes_.size(); ++c) lengths[c] *= sizes_[c];
-  return lengths;
-}
-
-/// Returns how often links of creases count at each sample. The energies of `QualityStages` are those of distances in
-/// units of the cells: a face counts as often as another one, whatever its size, and so must an edge.
-/// samples  vertices -> samples.
-std::vector<double> AutomaticFit::crease_factors(const MeshTopology& topology, const SparseMap& samples) const {
-  const double mean = std::sqrt(sum_of_squared_sizes(topology) / static_cast<double>(topology.boundary_faces().size()));
-  std::vector<Vec3> sizes;
-  for (const double size : vertex_sizes(mesh_, sizes_)) sizes.push_back(Vec3::Constant(size));
-  std::vector<double> factors;
-  for (const Vec3& size : samples.apply(sizes)) factors.push_back(std::pow(mean / size.x(), 3));
-  return factors;
-}
-
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
 bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
@@ -278,7 +246,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
   const MeshTopology topology(mesh_);
   const std::size_t faces = topology.boundary_faces().size();
-  const std::vector<Vec3> lengths = wanted_lengths(topology);
+  const std::vector<Vec3> lengths = wanted_lengths(topology, sizes_, mesh_.num_cells(), target_.surface.area());
   const BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
   target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
@@ -292,7 +260,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
       creases = [&](double width) {
         CreaseEnergy energy =
             layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
-        if (!sizes_.empty()) energy.weigh(crease_factors(topology, samples.positions));
+        if (!sizes_.empty()) energy.weigh(crease_factors(mesh_, topology, sizes_, samples.positions));
         return energy;
       };
   }

@@ -21,7 +21,7 @@ namespace subvol {
 ///
 /// y_k, b_k   points of T's curves and the length that each represents;  s(y): closest point of S's curve
 /// x_q, c_q   points of S's curves with their lengths;  t(x): closest point of T's curve
-/// width      a crease counts as much as a strip of the surface of this width
+/// width      a crease counts as much as a strip of the surface of this width; times the factor there (`weigh`), if any
 ///
 /// The ends of an open curve also correspond to each other, with M = I and the length of S's last segment, so that
 /// creases end where T's do.

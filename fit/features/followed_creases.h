@@ -35,7 +35,7 @@ class FollowedCreases {
   /// With paths that are known: tags the mesh along them, with no other tags.
   FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh);
 
-  /// What the sharp edges of interfaces are drawn to.
+  /// Says what the sharp edges of interfaces are drawn to.
   enum class InnerCurves {
     nothing,              ///< the sheets alone draw them: the target has interfaces of its own
     themselves,           ///< the edges as they are

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/local_cells.h"
 
-#include "subvol/mesh/mesh_topology.h"
 #include "subvol/templates/refine.h"
 
 #include <algorithm>
@@ -40,6 +39,14 @@ std::vector<Index> ascending(std::vector<Index> cells) {
   const auto repeated = std::ranges::unique(cells);
   cells.erase(repeated.begin(), repeated.end());
   return cells;
+}
+
+double sum_of_squared_sizes(const MeshTopology& topology, std::span<const double> sizes) {
+  const auto& faces = topology.boundary_faces();
+  if (sizes.empty()) return static_cast<double>(faces.size());
+  double squares = 0;
+  for (const Index f : faces) squares += std::pow(sizes[topology.face_cells(f)[0]], 2);
+  return squares;
 }
 
 Vec3 center(const VolumeMesh& mesh, std::span<const Vec3> positions, std::size_t c) {
@@ -126,6 +133,25 @@ std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const doubl
     all.push_back(size);
   }
   return all;
+}
+
+std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const double> sizes, std::size_t num_cells,
+                                 double area) {
+  const double h = std::sqrt(area / sum_of_squared_sizes(topology, sizes));
+  std::vector<Vec3> lengths(num_cells, Vec3::Constant(h));
+  for (std::size_t c = 0; c < sizes.size(); ++c) lengths[c] *= sizes[c];
+  return lengths;
+}
+
+std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const double> sizes,
+                                   const SparseMap& samples) {
+  const double mean =
+      std::sqrt(sum_of_squared_sizes(topology, sizes) / static_cast<double>(topology.boundary_faces().size()));
+  std::vector<Vec3> at_vertices;
+  for (const double size : vertex_sizes(mesh, sizes)) at_vertices.push_back(Vec3::Constant(size));
+  std::vector<double> factors;
+  for (const Vec3& size : samples.apply(at_vertices)) factors.push_back(std::pow(mean / size.x(), 3));
+  return factors;
 }
 
 }  // namespace subvol

@@ -2,7 +2,9 @@
 #pragma once
 
 #include "subvol/fit/geometry/site_tree.h"
+#include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/subdivision/sparse_map.h"
 
 #include <cstddef>
 #include <optional>
@@ -33,7 +35,7 @@ std::optional<SizedMesh> refined_at_faults(const VolumeMesh& mesh, std::span<con
 /// Finds cells at the boundary of a mesh by points.
 class BoundaryCells {
  public:
-  /// mesh  must outlive this.  positions  of its vertices, in the coordinates of the points.
+  /// positions  of the mesh's vertices, in the coordinates of the points.
   BoundaryCells(const VolumeMesh& mesh, std::span<const Vec3> positions);
 
   /// Returns the cells around the boundary vertices that are nearest to some points, ascending.
@@ -56,5 +58,16 @@ std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double>
 /// Returns the sizes of a mesh that was padded: cells beyond the given ones have that of a cell behind them. Empty if
 /// the sizes are.
 std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes);
+
+/// Returns the lengths of edges that cells are to have (`QualityStages`): in proportion to their sizes, and such that
+/// the boundary faces together have an area. sizes: of the cells, or empty.
+std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const double> sizes, std::size_t num_cells,
+                                 double area);
+
+/// Returns how many times links of creases count at each sample (`CreaseEnergy::weigh`). `QualityStages` measure
+/// distances in units of the cells: a face counts as much as another one, whatever its size, and so must an edge.
+/// sizes    of the cells, not empty.  samples  vertices -> samples.
+std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const double> sizes,
+                                   const SparseMap& samples);
 
 }  // namespace subvol

@@ -33,7 +33,7 @@ namespace subvol {
 /// meshes" (1996); they are built here from strips swept from face to face.
 VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked);
 
-/// What is done if a part of a warped cell would have a corner Jacobian <= 0.
+/// Says whether a part of a warped cell that has a corner Jacobian <= 0 is an error.
 enum class WarpedParts { refused, kept };
 
 /// A refined mesh, and where its cells come from.
