@@ -26,12 +26,19 @@ add_library(subvol_defaults INTERFACE)
 # Headers that are no part of the library are named from the root of the project.
 target_include_directories(subvol_defaults INTERFACE "${PROJECT_SOURCE_DIR}")
 # Options are set by designated initialisers; what is left out has its default.
-target_compile_options(subvol_defaults INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-missing-field-initializers)
+target_compile_options(subvol_defaults INTERFACE -Wall -Wextra -Wpedantic -Wno-missing-field-initializers)
+if(NOT SUBVOL_UNITY)  # in a unit of several files, names of one hide those of another
+  target_compile_options(subvol_defaults INTERFACE -Wshadow)
+endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # GCC 12 sees std::sort of a few elements run past the end of a small array, and its own AVX-512 headers read what
   # they have not set, and a string put before another overlap it.
   target_compile_options(subvol_defaults INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized
     -Wno-uninitialized -Wno-restrict)
+endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # How wide vectors are passed depends on the processor; none of ours leaves the library.
+  target_compile_options(subvol_defaults INTERFACE -Wno-psabi)
 endif()
 # No code of ours reads errno after a square root or traps on floating-point exceptions; with either, loops over lanes
 # do not vectorise. Neither changes a value.

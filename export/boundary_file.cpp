@@ -22,7 +22,7 @@ void require_boundary(const PolygonMesh& boundary, const BoundaryOrigin& origin)
 
 std::uint8_t type_of(std::size_t corners) { return corners == 3 ? 5 : corners == 4 ? 9 : 7; }
 
-std::size_t corners_of(const PolygonMesh& mesh, std::size_t f) {
+std::size_t num_corners_of(const PolygonMesh& mesh, std::size_t f) {
   return mesh.face_offsets[f + 1] - mesh.face_offsets[f];
 }
 
@@ -104,7 +104,7 @@ std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin&
   require_boundary(boundary, origin);
   const std::vector<Group> groups = positive_groups(boundary.face_groups.groups);
   std::vector<std::uint8_t> types;
-  for (std::size_t f = 0; f < boundary.num_faces(); ++f) types.push_back(type_of(corners_of(boundary, f)));
+  for (std::size_t f = 0; f < boundary.num_faces(); ++f) types.push_back(type_of(num_corners_of(boundary, f)));
   const std::vector<std::int64_t> corners(boundary.face_vertices.begin(), boundary.face_vertices.end());
   const std::vector<std::int64_t> ends(boundary.face_offsets.begin() + 1, boundary.face_offsets.end());
   std::string text =
@@ -146,7 +146,7 @@ std::string boundary_vtk_text(const PolygonMesh& boundary, const BoundaryOrigin&
   }
   text += "CELLS " + n + " " + std::to_string(boundary.num_faces() + boundary.face_vertices.size()) + "\n";
   for (std::size_t f = 0; f < boundary.num_faces(); ++f) {
-    append_number(text, corners_of(boundary, f));
+    append_number(text, num_corners_of(boundary, f));
     for (std::size_t k = boundary.face_offsets[f]; k < boundary.face_offsets[f + 1]; ++k) {
       text += ' ';
       append_number(text, boundary.face_vertices[k]);
@@ -155,7 +155,7 @@ std::string boundary_vtk_text(const PolygonMesh& boundary, const BoundaryOrigin&
   }
   text += "CELL_TYPES " + n + "\n";
   for (std::size_t f = 0; f < boundary.num_faces(); ++f)
-    text += std::to_string(type_of(corners_of(boundary, f))) + "\n";
+    text += std::to_string(type_of(num_corners_of(boundary, f))) + "\n";
   text += "CELL_DATA " + n + "\nSCALARS group int 1\nLOOKUP_TABLE default\n";
   append_lines(text, numbers_of_faces(boundary, groups));
   if (!origin.cells.empty()) {

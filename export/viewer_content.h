@@ -68,6 +68,7 @@ struct ViewerSurface {
 struct ViewerContent {
   std::string title{};
   std::vector<ViewerMesh> meshes{};       ///< at least one; if there are two, a slider compares them: before, after
+  bool is_timeline = false;               ///< the meshes are moments of one course: a slider goes through them
   std::size_t shown = 0;                  ///< the mesh to begin with
   std::string field{};                    ///< the field to begin with; empty: the first one
   std::optional<ViewerSurface> limit{};   ///< the limit surface of a mesh

@@ -15,7 +15,7 @@ namespace subvol {
 namespace {
 
 /// Text as JSON that may stand inside an element of HTML.
-std::string quoted(const std::string& text) {
+std::string script_string(const std::string& text) {
   const std::string json = nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
   std::string result;
   for (const char c : json) {
@@ -52,10 +52,11 @@ class Writer {
 
   std::string run() {
     const auto flag = [](bool value) { return value ? "true" : "false"; };
-    text_ = "{\"title\":" + quoted(content_.title) +
+    text_ = "{\"title\":" + script_string(content_.title) +
             ",\"origin\":" + nlohmann::json({origin_.x(), origin_.y(), origin_.z()}).dump();
     text_ += ",\"shown\":" + std::to_string(content_.shown);
-    if (!content_.field.empty()) text_ += ",\"field\":" + quoted(content_.field);
+    if (content_.is_timeline) text_ += ",\"is_timeline\":true";
+    if (!content_.field.empty()) text_ += ",\"field\":" + script_string(content_.field);
     if (content_.limit) {
       text_ += ",\"limit_of\":" + std::to_string(content_.limit_of) + ",\"shows_limit\":" + flag(content_.shows_limit) +
                ",\"limit\":";
@@ -109,7 +110,7 @@ class Writer {
   }
 
   void add(const ViewerMesh& mesh) {
-    text_ += "{\"name\":" + quoted(mesh.name) + ",\"intervals\":" + std::to_string(mesh.intervals) +
+    text_ += "{\"name\":" + script_string(mesh.name) + ",\"intervals\":" + std::to_string(mesh.intervals) +
              ",\"num_vertices\":" + std::to_string(mesh.num_vertices) +
              ",\"num_cells\":" + std::to_string(mesh.kinds.size()) + ",\"num_edges\":" + std::to_string(mesh.num_edges);
     const bool is_uniform =
@@ -138,12 +139,12 @@ class Writer {
 
   void add(const ViewerField& field) {
     constexpr const char* kMaps[] = {"quality", "scale", "regions"};
-    text_ += "{\"name\":" + quoted(field.name) + ",\"label\":" + quoted(field.label) + ",\"map\":\"" +
+    text_ += "{\"name\":" + script_string(field.name) + ",\"label\":" + script_string(field.label) + ",\"map\":\"" +
              kMaps[static_cast<int>(field.colors)] + "\",\"on\":\"" + (field.is_on_points ? "points" : "cells") +
              "\",\"worst\":\"" + (field.is_high_worst ? "high" : "low") + "\",\"names\":{";
     for (const auto& [number, name] : field.region_names) {
       if (text_.back() != '{') text_ += ',';
-      text_ += '"' + std::to_string(number) + "\":" + quoted(name);
+      text_ += '"' + std::to_string(number) + "\":" + script_string(name);
     }
     text_ += '}';
     add("values", std::span<const float>(field.values), 1);

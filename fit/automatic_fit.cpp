@@ -38,7 +38,6 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kChildren = 8;        // hexes of a hex that is subdivided
 constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
 constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting some of them
 constexpr int kMostRefinements = 2;         // cells of size 1 / 9 are the smallest
@@ -162,6 +161,7 @@ class AutomaticFit {
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
   std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
   AutomaticFitResult result_;
+  std::vector<FitState> states_;  ///< of the present mesh, if they are kept
   double share_at_end_ = 0;   ///< of the attempt in progress
   double aligned_share_ = 0;  ///< of the target's area on planes of the last grid through planes
   double least_share_ = 1;    ///< of the goal that the last level reached, at caps of the lower goal there
@@ -266,6 +266,10 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   }
   QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
   if (layout_) stages.energy().set_caps(layout_->caps.edges, layout_->caps.vertices);
+  if (options_.keep_states) {
+    states_ = {{"start", mesh_.positions}};
+    stages.after_stage = [this](const std::string& name, const std::vector<Vec3>& x) { states_.push_back({name, x}); };
+  }
   StageRecord record;
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
@@ -324,6 +328,7 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
   if (!add_trial(std::move(trial), mesh_, quality, distance_of_edges(), options_, result_)) return going;
+  result_.states = states_;
   result_.missed_edges.clear();
   start_.lost.clear();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
@@ -564,6 +569,8 @@ AutomaticFitResult AutomaticFit::run() {
   }
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
+  for (FitState& state : result_.states)
+    state.positions = target_.normalisation.from_unit(std::move(state.positions));
   result_.report.seconds = {{"total", runner_.seconds()}};
   return std::move(result_);
 }

@@ -6,6 +6,7 @@
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/fit/target/feature_size.h"
+#include "subvol/mesh/fit_state.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/region_surface.h"
 #include "subvol/surface/solid_topology.h"
@@ -30,6 +31,8 @@ inline constexpr double kAutomaticVolumePercent = 0.1;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp
 /// edges, and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
+/// Number of hexes that a hex is subdivided into.
+inline constexpr std::size_t kChildren = 8;
 inline constexpr std::array<std::size_t, 3> kAutomaticEdgeCells{3000, 10000, 30000};
 
 struct AutomaticFitOptions {
@@ -51,6 +54,7 @@ struct AutomaticFitOptions {
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
   StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
+  bool keep_states = false; ///< fills AutomaticFitResult::states, but not if the target has several regions
 };
 
 /// A sharp edge of the target that no edges of the mesh follow.
@@ -86,6 +90,7 @@ struct AutomaticFitResult {
   std::vector<MissedEdge> missed_edges;  ///< the longest first
   std::vector<AutomaticFitTrial> trials;
   std::size_t chosen = 0;  ///< position in trials
+  std::vector<FitState> states;  ///< of the chosen trial's last mesh, from its start; without the result
 };
 
 /// Fills the solid inside a surface with hexes that one can compute on: no template is given, and every vertex of the

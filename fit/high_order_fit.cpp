@@ -63,7 +63,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   return options;
 }
 
-VolumeMesh checked(VolumeMesh mesh) {
+VolumeMesh checked_template(VolumeMesh mesh) {
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
   return mesh;
@@ -151,7 +151,7 @@ HighOrderFit::HighOrderFit(FitTarget target, const VolumeMesh& template_mesh, co
     : StagedFit(options.keep_states),
       options_(checked(options)),
       target_(std::move(target)),
-      template_(checked(template_mesh)),
+      template_(checked_template(template_mesh)),
       mesh_(ElementSpace(template_, options.basis, 1), template_),
       memory_(options.memory_limit_bytes, kMemoryOfNode),
       runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,

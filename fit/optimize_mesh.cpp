@@ -89,7 +89,7 @@ OptimizeOptions checked(const OptimizeOptions& options, bool has_target) {
   return options;
 }
 
-VolumeMesh checked(VolumeMesh mesh) {
+VolumeMesh checked_mesh(VolumeMesh mesh) {
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex && defect.kind != MeshDefect::Kind::inverted_cell)
       throw InputError("mesh: " + defect.message);
@@ -107,7 +107,7 @@ class MeshOptimizer {
  public:
   MeshOptimizer(const VolumeMesh& mesh, const TriangleMesh* target, const OptimizeOptions& options)
       : options_(checked(options, target)),
-        mesh_(checked(mesh)),
+        mesh_(checked_mesh(mesh)),
         topology_(mesh_),
         own_boundary_(!target),
         target_(target ? *target : fan_triangles(boundary_surface(mesh_, topology_))),

@@ -33,7 +33,6 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kChildren = 8;  // hexes of a hex that is subdivided
 
 /// The faces of all sheets of a mesh as one surface, on its vertices.
 TriangleMesh sheet_triangles(const VolumeMesh& mesh) {

@@ -449,11 +449,11 @@ bool SubdivisionFit::run_quality_stages(const QualitySchedule& schedule) {
 /// Returns false if the fit must end.
 bool SubdivisionFit::raise_quality() {
   // A cage has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free.
-  struct Attempt {
+  struct Lift {
     double more_surface;
     bool only_lift;
   };
-  constexpr std::array<Attempt, 4> kAttempts{{{10, true}, {100, true}, {1000, true}, {100, false}}};
+  constexpr std::array<Lift, 4> kLifts{{{10, true}, {100, true}, {1000, true}, {100, false}}};
   constexpr double kMaxMargin = 0.8;  // samples miss the farthest places
   const StageRecord* last = result_.report.last_kept_stage();
   if (options_.quality == 0 || (last && last->ended == MinimizerStop::infeasible_start)) return true;
@@ -461,7 +461,7 @@ bool SubdivisionFit::raise_quality() {
   if (!before) return false;
   if (before->least_jacobian >= options_.quality) return true;
   runner_.work().begin_part(1, late_quality_schedule(options_.quality).expected_steps());
-  for (const Attempt& attempt : kAttempts) {
+  for (const Lift& attempt : kLifts) {
     QualitySchedule schedule =
         attempt.only_lift ? late_quality_schedule(options_.quality) : fine_quality_schedule(options_.quality);
     schedule.most_distance = (attempt.only_lift ? 1 : kMaxMargin) * before->largest();

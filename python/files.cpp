@@ -99,7 +99,7 @@ void write_fit(Writing& writing, const Fitted& fit) {
   const cli::Output output = writing.output(parts);
   if (output.part == cli::Part::animation)
     return fit.curved ? cli::write_animation(output, fit.curved->mesh, fit.states, writing.options)
-                      : cli::write_animation(output, *fit.cage, fit.states, writing.options);
+                      : cli::write_animation(output, *fit.cage, *fit.mesh, fit.states, writing.options);
   if (fit.curved) {
     cli::write_output(output, *fit.curved, writing.options);
     return writing.judge(output, fit.curved->mesh);

@@ -82,7 +82,7 @@ class Filling {
   TriangleMesh target_;
 };
 
-constexpr const char* kHelp =
+constexpr const char* kFillHelp =
     R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, keep_groups=False, tolerance=0.02, max_tolerance=0.5,
     max_iterations=0, time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
 --
@@ -107,7 +107,7 @@ void add_fill(py::module_& module) {
   Type type(module, "FillResult", "What `fill` returns.");
   type.def_property_readonly("mesh", [](const Filled& filled) { return filled.mesh; }, "The mesh, a VolumeMesh.");
   module.def("fill", [](const py::object& target, const py::kwargs& given) { return Filling(target, given).run(); },
-             py::arg("target"), kHelp);
+             py::arg("target"), kFillHelp);
 }
 
 }  // namespace subvol::python

@@ -154,7 +154,7 @@ class Optimization {
   std::vector<std::string> warnings_;
 };
 
-constexpr const char* kHelp =
+constexpr const char* kOptimizeHelp =
     R"(optimize(mesh, *, target=None, fixed_boundary=False, sizes='local', crease_angle=40.0, tolerance=0.05,
     max_tolerance=0.5, quality=0.65, lambda_=None, order=None, basis='legendre', max_iterations=0, time_limit=0.0,
     checkpoint=None, every=60.0, resume=None, chord=0.005, progress=None, threads=None)
@@ -184,7 +184,7 @@ void add_optimize(py::module_& module) {
   type.def_property_readonly("mesh", &mesh_of<Optimized>, "The mesh, a VolumeMesh; or curved cells, a HighOrderMesh.");
   module.def("optimize", [](const py::object& mesh, const py::kwargs& given) {
     return Optimization(mesh, given).run();
-  }, py::arg("mesh"), kHelp);
+  }, py::arg("mesh"), kOptimizeHelp);
 }
 
 }  // namespace subvol::python

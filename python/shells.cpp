@@ -192,7 +192,7 @@ auto by_side(std::vector<double> ShellResult::* values) {
   };
 }
 
-constexpr const char* kHelp =
+constexpr const char* kShellHelp =
     R"(shell(surface, thickness, *, layers=1, growth=1.0, side='outward', free_surface=False, straight=False,
     crease_angle=None, first_height=None, skip=None, repair='0.02%', order=1, basis='legendre', max_iterations=0, time_limit=0.0, chord=0.005, progress=None,
     threads=None)
@@ -243,7 +243,7 @@ void add_shell(py::module_& module) {
                              "Distance of each column's end from the whole surface: (2, n). A view.");
   module.def("shell", [](const py::object& surface, const py::object& thickness, const py::kwargs& given) {
     return Growing(surface, thickness, given).run();
-  }, py::arg("surface"), py::arg("thickness"), kHelp);
+  }, py::arg("surface"), py::arg("thickness"), kShellHelp);
 }
 
 }  // namespace subvol::python

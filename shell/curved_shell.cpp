@@ -18,7 +18,6 @@ namespace subvol {
 namespace {
 
 constexpr int kLeastIntervals = 4;
-constexpr int kDefaultIterations = 60;
 /// Share of the work that is done when the straight shell is there.
 constexpr double kStraightShare = 0.97;
 
@@ -161,8 +160,8 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
   record.order = options.order;
   record.cells = mesh.space.num_cells();
   runner.work() = WorkShare(kStraightShare);
-  runner.work().begin_part(1, kDefaultIterations);
-  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultIterations}, std::move(record), unknowns, report)) {
+  runner.work().begin_part(1, kDefaultShellIterations);
+  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultShellIterations}, std::move(record), unknowns, report)) {
     report.stop_reason = stop_reason(report.stages.back().ended);
     report.explanation = report.stages.back().stop;
   }

@@ -6,6 +6,7 @@
 #include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/corner_fans.h"
+#include "subvol/surface/triangle_geometry.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Geometry>
@@ -120,10 +121,6 @@ struct Rating {
   }
 };
 
-Vec3 area_vector(const TriangleMesh& mesh, const Corners& t) {
-  return (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
-}
-
 Rating rating_of(const Patch& patch, double distance) {
   constexpr double kEdgeOn = 0.1;  // cosine between a direction and a normal: 6 degrees
   TriangleMesh alive{patch.mesh.positions, {}};
@@ -131,7 +128,7 @@ Rating rating_of(const Patch& patch, double distance) {
   for (const Corners& t : patch.mesh.triangles) {
     if (t == kNone) continue;
     alive.triangles.push_back(t);
-    const Vec3 normal = area_vector(patch.mesh, t).stableNormalized();
+    const Vec3 normal = doubled_area_vector(patch.mesh, t).stableNormalized();
     for (const Index v : t) normals[v].push_back(normal);
   }
   const SelfIntersections found = self_intersections(alive);
@@ -303,7 +300,7 @@ std::vector<Change> LocalMender::changes(const Patch& patch, const std::vector<I
     Vec3 normal = Vec3::Zero(), mean = Vec3::Zero();
     std::vector<Vec3> ways;
     for (const Corners& t : patch.mesh.triangles)
-      if (t != kNone && has(t, v)) normal += area_vector(patch.mesh, t);
+      if (t != kNone && has(t, v)) normal += doubled_area_vector(patch.mesh, t);
     const std::set<Index> neighbors = patch.neighbors(v);
     if (neighbors.empty()) continue;
     for (const Index w : neighbors) mean += (x[w] - x[v]) / static_cast<double>(neighbors.size());

@@ -25,7 +25,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kMaxRounds = 12;
-constexpr int kDefaultIterations = 60;
 
 void check_options(const PolygonMesh& surface, const ShellOptions& options) {
   const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
@@ -274,7 +273,7 @@ MinimizerStop ShellMaker::solve(int round) {
   const double before = seconds();
   int iteration = 0;
   MinimizerOptions minimizer;
-  minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultIterations;
+  minimizer.max_iterations = options_.max_iterations > 0 ? options_.max_iterations : kDefaultShellIterations;
   minimizer.ended = [&] {
     return (options_.cancelled && options_.cancelled()) ||
            (options_.time_limit_seconds > 0 && seconds() > options_.time_limit_seconds);

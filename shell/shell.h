@@ -13,6 +13,9 @@
 
 namespace subvol {
 
+/// Largest number of steps of a solve, if the options state none.
+inline constexpr int kDefaultShellIterations = 60;
+
 enum class ShellSide { outward, inward, both };
 
 struct ShellOptions {

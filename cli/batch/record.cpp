@@ -14,10 +14,10 @@ namespace subvol::cli {
 namespace {
 
 /// Entries of a report that a record repeats: the path in the report, and the name in the record.
-struct Figure {
+struct ReportFigure {
   const char *part, *entry, *name;
 };
-constexpr Figure kFigures[] = {
+constexpr ReportFigure kReportFigures[] = {
     {"quality", "cells", "cells"},
     {"quality", "min_scaled_jacobian", "min_scaled_jacobian"},
     {"quality", "mean_scaled_jacobian", "mean_scaled_jacobian"},
@@ -34,7 +34,7 @@ constexpr Figure kFigures[] = {
 
 constexpr std::string_view kBeginning = "{\"id\":\"";
 
-const Json* find(const Json& report, const Figure& figure) {
+const Json* find(const Json& report, const ReportFigure& figure) {
   const Json* part = &report;
   if (figure.part != nullptr) {
     if (!report.contains(figure.part) || !report[figure.part].is_object()) return nullptr;
@@ -141,7 +141,7 @@ std::string record_line(const BatchModel& model, const WorkKey& key, const Verdi
   for (const std::string& word : model.options) record["options"].push_back(as_utf8(word));
   double peak = static_cast<double>(end.peak_memory_bytes);
   if (const Json& report = remains.report; report.is_object()) {
-    for (const Figure& figure : kFigures)
+    for (const ReportFigure& figure : kReportFigures)
       if (const Json* value = find(report, figure)) record[figure.name] = *value;
     if (record.contains("cells") && record.contains("certified_cells"))
       record["certified"] = record["cells"] == record["certified_cells"];

@@ -14,8 +14,6 @@
 namespace subvol::cli {
 namespace {
 
-Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
-
 }  // namespace
 
 std::vector<Index> not_certified_cells(const MeshCheck& check) {

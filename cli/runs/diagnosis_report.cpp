@@ -18,8 +18,6 @@
 namespace subvol::cli {
 namespace {
 
-Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
-
 Json numbers_json(const std::array<Index, 2>& numbers) {
   Json json = Json::array();
   for (const Index n : numbers)

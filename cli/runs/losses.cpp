@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/losses.h"
 
-#include "subvol/io/file_formats.h"
 #include "subvol/io/left_out.h"
 
 #include <algorithm>
@@ -11,13 +10,13 @@ namespace subvol::cli {
 namespace {
 
 bool holds_references(const Output& output) {
-  return output.part != Part::boundary && format_of_extension(output.extension)->regions_written != Held::none;
+  return output.part != Part::boundary && output.format().regions_written != Held::none;
 }
 bool holds_groups(const Output& output) {
   return output.part == Part::boundary ||
-         (output.part != Part::cutaway && format_of_extension(output.extension)->groups_written != Held::none);
+         (output.part != Part::cutaway && output.format().groups_written != Held::none);
 }
-bool holds_tags(const Output& output) { return format_of_extension(output.extension)->holds_features; }
+bool holds_tags(const Output& output) { return output.format().holds_features; }
 
 }  // namespace
 

@@ -4,7 +4,7 @@
 #include "cli/runs/exit_status.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
-#include "subvol/io/file_formats.h"
+#include "subvol/export/viewer_page.h"
 
 #include <algorithm>
 #include <array>
@@ -46,12 +46,18 @@ Output parse_output(const std::string& text) {
   output.extension = output.path.extension().string();
   std::transform(output.extension.begin(), output.extension.end(), output.extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (output.part == Part::animation && output.is_page()) {
+    if (!has_viewer())
+      throw UsageError("-o " + text + ": this program was built without the viewer (docs/viewer.md)");
+    return output;
+  }
   const FileFormat* format = format_of_extension(output.extension);
   if (!format || format->written.empty()) {
     throw UsageError("-o " + text + ": the extension must be one of " + output_formats());
   }
   if ((output.part == Part::cutaway || output.part == Part::animation) && !output.is_scene())
-    throw UsageError("-o " + text + ": this part is a scene; the extension must be .glb or .gltf");
+    throw UsageError("-o " + text + ": this part is a scene; the extension must be .glb or .gltf" +
+                     (output.part == Part::animation ? ", or .html for a page" : ""));
   if (output.part == Part::boundary && output.extension != ".vtu" && output.extension != ".vtk" &&
       output.extension != ".xdmf")
     throw UsageError("-o " + text + ": faces as cells; the extension must be .vtu, .vtk or .xdmf");
@@ -89,14 +95,13 @@ void require_free(const fs::path& file, bool force) {
   if (!is_open && (!exists || fs::is_regular_file(file, ignored))) require_writable_folder(target);
 }
 
-bool Output::is_volume() const {
-  const FileFormat* format = format_of_extension(extension);
-  return format && format->holds_cells;
+const FileFormat& Output::format() const {
+  static constexpr FileFormat page{.extension = ".html", .name = "page"};
+  const FileFormat* known = format_of_extension(extension);
+  return known ? *known : page;
 }
-bool Output::is_scene() const {
-  const FileFormat* format = format_of_extension(extension);
-  return format && format->is_scene;
-}
+bool Output::is_volume() const { return format().holds_cells; }
+bool Output::is_scene() const { return format().is_scene; }
 
 bool holds_polynomial_cells(const Output& output) {
   return output.is_volume() && output.extension != ".mesh" && output.extension != ".vtk";

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
+#include "subvol/io/file_formats.h"
 
 #include <filesystem>
 #include <functional>
@@ -15,7 +16,7 @@ enum class Part {
   result,    ///< the finest mesh, or its surface
   cage,      ///< the control mesh
   cutaway,   ///< a scene that shows the cells inside
-  animation, ///< a scene of the surface in the course of the fit
+  animation, ///< the course of the fit: a scene of the surface, or a page in which the mesh can be turned
   boundary   ///< the faces of the boundary as cells, with their groups
 };
 
@@ -25,8 +26,11 @@ struct Output {
   std::filesystem::path path;
   std::string extension;        ///< lower case, with its dot
   bool is_new = false;          ///< no such file existed before the work
+  /// Returns its format; of a page, one that holds nothing.
+  const FileFormat& format() const;
   bool is_volume() const;       ///< true for a format that holds cells
   bool is_scene() const;        ///< true for a format that holds scenes
+  bool is_page() const { return extension == ".html"; }
 };
 
 /// True if curved cells are written to it as polynomials (.vtu, .msh, .inp, .bdf, .e, .mfem, .xdmf).

@@ -4,6 +4,7 @@
 #include "cli/runs/page_parts.h"
 #include "cli/runs/report_plots.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/export/color_map.h"
 #include "subvol/export/vtu_arrays.h"
 
@@ -13,13 +14,6 @@
 
 namespace subvol::cli {
 namespace {
-
-template <class... Values>
-std::string format(const char* form, Values... values) {
-  char text[200];
-  std::snprintf(text, sizeof text, form, values...);
-  return text;
-}
 
 /// A JSON value as text for people.
 std::string words(const Json& value) {
@@ -62,7 +56,7 @@ std::string colour_scale(const ReportPicture& picture) {
   for (int i = 0; i <= kStops; ++i) {
     const LinearColor color = quality_color(std::max(1e-9, double(i) / kStops));
     text += ",rgb(";
-    for (int k = 0; k < 3; ++k) text += format(k ? ",%d" : "%d", int(std::lround(255 * std::pow(color[k], 1 / 2.2))));
+    for (int k = 0; k < 3; ++k) text += formatted(k ? ",%d" : "%d", int(std::lround(255 * std::pow(color[k], 1 / 2.2))));
     text += ')';
   }
   return text + ")\"></i>" + escaped(picture.high) + "</span>";
@@ -150,7 +144,7 @@ std::string missed_edges(const Json& report) {
     rows += row({words(edges[i].at("length_percent")), place(edges[i].at("at")), words(edges[i].at("why"))});
   if (rows.empty()) return "";
   std::string text = table({"length, % of diagonal", "place", "why"}, rows);
-  if (edges.size() > kMostRows) text += format("<p>... and %zu more</p>\n", edges.size() - kMostRows);
+  if (edges.size() > kMostRows) text += formatted("<p>... and %zu more</p>\n", edges.size() - kMostRows);
   return text;
 }
 

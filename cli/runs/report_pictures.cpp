@@ -23,7 +23,7 @@
 namespace subvol::cli {
 namespace {
 
-constexpr int kWidth = 720, kHeight = 540;
+constexpr int kPictureWidth = 720, kPictureHeight = 540;
 /// Edges are drawn on boundaries of at most this many faces: on finer ones they would hide everything else.
 constexpr std::size_t kMostWiredFaces = 6000;
 
@@ -206,7 +206,7 @@ class Painter {
 
   void add(const std::string& title, const RasterSurface& surface, std::string low, std::string high) {
     pictures_.push_back(
-        {title, png_bytes(rasterize(surface, view_, kWidth, kHeight)), std::move(low), std::move(high)});
+        {title, png_bytes(rasterize(surface, view_, kPictureWidth, kPictureHeight)), std::move(low), std::move(high)});
   }
 
   void add(const std::string& title, const Shown& what, std::vector<LinearColor> colors, std::string low = {},

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/report_plots.h"
 
+#include "subvol/base/format.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,16 +14,9 @@ namespace {
 
 constexpr double kWidth = 640, kHeight = 240, kLeft = 48, kBottom = 20, kTop = 10;
 
-template <class... Values>
-std::string format(const char* form, Values... values) {
-  char text[200];
-  std::snprintf(text, sizeof text, form, values...);
-  return text;
-}
-
 std::string open_svg(const char* title) {
-  return format("<svg viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"%s\">", kWidth, kHeight, title) +
-         format("<path class=\"axis\" d=\"M%g %gV%gH%g\"/>", kLeft, kTop, kHeight - kBottom, kWidth);
+  return formatted("<svg viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"%s\">", kWidth, kHeight, title) +
+         formatted("<path class=\"axis\" d=\"M%g %gV%gH%g\"/>", kLeft, kTop, kHeight - kBottom, kWidth);
 }
 
 }  // namespace
@@ -67,18 +62,18 @@ std::string energy_plot(const Json& stages) {
   std::string svg = open_svg("energies by step");
   const int every = std::max(1, static_cast<int>((top - bottom) / 6));
   for (int decade = static_cast<int>(bottom); decade <= static_cast<int>(top); decade += every)
-    svg += format("<path class=\"axis\" d=\"M%g %.1fH%g\"/><text x=\"4\" y=\"%.1f\">1e%d</text>", kLeft,
+    svg += formatted("<path class=\"axis\" d=\"M%g %.1fH%g\"/><text x=\"4\" y=\"%.1f\">1e%d</text>", kLeft,
                   y(std::pow(10.0, decade)), kWidth, y(std::pow(10.0, decade)) + 4, decade);
   for (const std::size_t end : ends)
     if (end < num_steps)
-      svg += format("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kTop, kHeight - kBottom);
+      svg += formatted("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kTop, kHeight - kBottom);
   for (std::size_t k = kTerms.size(); k-- > 0;) {
-    svg += format("<polyline class=\"%s\" points=\"", kTerms[k]);
-    for (std::size_t i = 0; i < num_steps; ++i) svg += format("%.1f,%.1f ", x(double(i)), y(energies[k][i]));
+    svg += formatted("<polyline class=\"%s\" points=\"", kTerms[k]);
+    for (std::size_t i = 0; i < num_steps; ++i) svg += formatted("%.1f,%.1f ", x(double(i)), y(energies[k][i]));
     svg += "\"/>";
   }
   return svg +
-         format("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5, num_steps);
+         formatted("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5, num_steps);
 }
 
 std::string histogram_plot(const Json& counts) {
@@ -92,13 +87,13 @@ std::string histogram_plot(const Json& counts) {
     if (!(values[i] > 0)) continue;
     const double height = std::max(1.0, (kHeight - kBottom - kTop) * values[i] / most);
     svg +=
-        format("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
+        formatted("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
                kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
   }
   for (int i = 0; i <= 4; ++i)
-    svg += format("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4,
+    svg += formatted("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4,
                   kHeight - 5, i == 4 ? "end" : "middle", -1 + 0.5 * i);
-  return svg + format("<text x=\"4\" y=\"%g\">%.0f</text></svg>", kTop + 10, most);
+  return svg + formatted("<text x=\"4\" y=\"%g\">%.0f</text></svg>", kTop + 10, most);
 }
 
 }  // namespace subvol::cli

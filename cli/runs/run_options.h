@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/base/types.h"
+
 #include <nlohmann/json.hpp>
 
 #include <cstddef>
@@ -11,6 +13,8 @@ namespace subvol::cli {
 
 /// Keeps the order of entries as written: reports list them in the order that people expect.
 using Json = nlohmann::ordered_json;
+
+inline Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
 
 /// Options that several verbs share.
 struct RunOptions {

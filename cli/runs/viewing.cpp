@@ -182,6 +182,15 @@ ViewerContent mesh_content(const std::string& title, const ShownMesh& mesh, cons
   return content;
 }
 
+ViewerContent timeline_content(const std::string& title, std::span<const Moment> moments,
+                               const ViewingOptions& options) {
+  ViewerContent content{.title = as_utf8(title), .is_timeline = moments.size() > 1, .shown = moments.size() - 1};
+  for (const Moment& moment : moments)
+    content.meshes.push_back(measured_viewer_mesh(moment.name, moment.mesh, options));
+  if (options.target) content.target = viewer_surface(*options.target);
+  return content;
+}
+
 std::optional<ViewerContent> report_content(const Json& report, const ReportMeshes& meshes,
                                             std::vector<std::string>& notes, const WorkProgress& progress) {
   ViewerContent content{.title = "subvol " + report.value("command", std::string())};

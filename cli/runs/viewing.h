@@ -35,6 +35,16 @@ ViewerContent mesh_content(const std::string& title, const ShownMesh& mesh, cons
                            std::vector<std::string>& warnings, const std::filesystem::path& path = {},
                            const WorkProgress& progress = {});
 
+/// A mesh in the course of a fit.
+struct Moment {
+  std::string name;
+  ShownMesh mesh;
+};
+
+/// What a page shows of the course of a fit, which begins with the last moment. moments: at least one.
+ViewerContent timeline_content(const std::string& title, std::span<const Moment> moments,
+                               const ViewingOptions& options);
+
 /// What a page shows of a report: before and after, the target, the limit surface. Nothing if there is no mesh.
 std::optional<ViewerContent> report_content(const Json& report, const ReportMeshes& meshes,
                                             std::vector<std::string>& notes, const WorkProgress& progress = {});

@@ -3,6 +3,7 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/loading.h"
+#include "cli/runs/viewing.h"
 #include "subvol/base/atomic_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
@@ -14,12 +15,14 @@
 #include "subvol/export/read_back.h"
 #include "subvol/export/surface_writer.h"
 #include "subvol/export/usd_writer.h"
+#include "subvol/export/viewer_page.h"
 #include "subvol/export/volume_writer.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/subdivision/repeated_subdivision.h"
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>
@@ -140,6 +143,10 @@ HighOrderFileOptions file_options(const HighOrderFile& file, std::span<const dou
           .map_tolerance_percent = options.map_tolerance_percent};
 }
 
+void write_timeline(const Output& output, std::span<const Moment> moments) {
+  write_file_atomically(output.path, viewer_page(timeline_content(output.path.stem().string(), moments, {})));
+}
+
 }  // namespace
 
 std::string parse_cut(const std::string& text, CutPlane& cut) {
@@ -238,14 +245,37 @@ void write_polygons(const Output& output, const TessellatedSurface& limit, const
   write_polygons(output, polygons_of(limit), {}, options);
 }
 
-void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
-                     const WritingOptions& options) {
-  write_scene(output.path, animation_scene(cage, states, scene_options(output, options)));
+void write_animation(const Output& output, const VolumeMesh& cage, const VolumeMesh& result,
+                     std::span<const FitState> states, const WritingOptions& options) {
+  if (!output.is_page()) return write_scene(output.path, animation_scene(cage, states, scene_options(output, options)));
+  constexpr std::size_t kMostCells = 500'000;  // of all moments together: a page of 15 MB
+  const std::size_t most = std::min(result.num_cells(), kMostCells / (states.size() + 1));
+  int levels = 0;
+  for (std::size_t cells = cage.cell_vertices.size(); cells <= most && cage.num_cells() < result.num_cells(); cells *= 8)
+    ++levels;
+  const auto moment = [&](const std::string& name, const std::vector<Vec3>& positions) {
+    VolumeMesh mesh = cage;
+    mesh.positions = positions;
+    return Moment{name, subdivide_repeatedly(mesh, levels)};
+  };
+  std::vector<Moment> moments;
+  for (const FitState& state : states) moments.push_back(moment(state.name, state.positions));
+  moments.push_back(moment("result", cage.positions));
+  write_timeline(output, moments);
 }
 
 void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
                      const WritingOptions& options) {
-  write_scene(output.path, animation_scene(mesh, states, scene_options(output, options)));
+  if (!output.is_page()) return write_scene(output.path, animation_scene(mesh, states, scene_options(output, options)));
+  std::vector<Moment> moments;
+  const auto add = [&](const std::string& name, const std::vector<Vec3>& coefficients) {
+    HighOrderMesh moved = mesh;
+    moved.coefficients = coefficients;
+    moments.push_back({name, HighOrderFile{.mesh = std::move(moved)}});
+  };
+  for (const FitState& state : states) add(state.name, state.positions);
+  add("result", mesh.coefficients);
+  write_timeline(output, moments);
 }
 
 bool has_animation(std::span<const Output> outputs) {

@@ -66,9 +66,11 @@ void require_for_curved_cells(const Output& output);
 /// Writes a limit surface's quads as .obj or .usda.
 void write_polygons(const Output& output, const TessellatedSurface& limit, const WritingOptions& options);
 
-/// Writes the course of a fit: a scene of its surface, starting with the template.
-void write_animation(const Output& output, const VolumeMesh& cage, std::span<const FitState> states,
-                     const WritingOptions& options);
+/// Writes the course of a fit, starting with the template: a scene of its surface, or a page with its cells.
+///
+/// result  a refinement of the cage, or the cage itself. A page shows coarser refinements if there are many cells.
+void write_animation(const Output& output, const VolumeMesh& cage, const VolumeMesh& result,
+                     std::span<const FitState> states, const WritingOptions& options);
 void write_animation(const Output& output, const HighOrderMesh& mesh, std::span<const FitState> states,
                      const WritingOptions& options);
 bool has_animation(std::span<const Output> outputs);

@@ -88,6 +88,7 @@ void AutomaticFitRun::fit() {
   if (arguments_.size) options.cells = cells_of_size(solid_boundary(surface()).volume, *arguments_.size);
   checkpointing_.emplace(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
   options.log = checkpointing_->log();
+  options.keep_states = has_animation(outputs_);
   result_ = followed([&](auto progress) {
     options.progress = progress;
     options.cancelled = interrupted;
@@ -104,7 +105,12 @@ void AutomaticFitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
-  write_each([&](const Output& output) { write_output(output, result_.mesh, writing); });
+  write_each([&](const Output& output) {
+    if (output.part == Part::animation)
+      write_animation(output, result_.mesh, result_.mesh, result_.states, writing);
+    else
+      write_output(output, result_.mesh, writing);
+  });
 }
 
 void AutomaticFitRun::check() {
@@ -141,7 +147,7 @@ void AutomaticFitRun::summarise() const {
 }
 
 int AutomaticFitRun::run() {
-  prepare({Part::cutaway, Part::boundary});
+  prepare({Part::cutaway, Part::animation, Part::boundary});
   timed("read", &AutomaticFitRun::load);
   timed("fit", &AutomaticFitRun::fit);
   if (result_.mesh.num_cells() == 0)  // nothing has been fitted yet

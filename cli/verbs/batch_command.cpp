@@ -142,7 +142,7 @@ int run_batch_verb(BatchArguments& arguments, ParserVerbs& parser_verbs) {
 
 // --- batch report -------------------------------------------------------------------------------------------------------
 
-struct ReportArguments {
+struct BatchReportArguments {
   std::vector<std::string> folders, before;
   std::string output;
   bool json = false, no_pictures = false, force = false, quiet = false;
@@ -198,7 +198,7 @@ std::vector<ShownModel> shown_models(const BatchSummary& summary, const std::vec
   return shown;
 }
 
-int run_batch_report(const ReportArguments& arguments) {
+int run_batch_report(const BatchReportArguments& arguments) {
   if (arguments.output.empty() && !arguments.json) throw UsageError("batch report: give -o PAGE.html or --json");
   if (!arguments.output.empty()) {
     if (fs::path(arguments.output).extension() != ".html")
@@ -263,7 +263,7 @@ int run_batch_merge(const MergeArguments& arguments) {
 
 void add_report(CLI::App& group, Action& action) {
   CLI::App* verb = group.add_subcommand("report", "Show the results of a batch as a page");
-  const auto arguments = std::make_shared<ReportArguments>();
+  const auto arguments = std::make_shared<BatchReportArguments>();
   verb->add_option("FOLDER", arguments->folders, "Folder of a batch, or of each of its shards")->required();
   verb->add_option("-o,--output", arguments->output, "The page: one file that needs nothing else")
       ->type_name("FILE.html");
@@ -277,7 +277,7 @@ void add_report(CLI::App& group, Action& action) {
   verb->callback([arguments, &action] { action = [arguments] { return run_batch_report(*arguments); }; });
 }
 
-void add_merge(CLI::App& group, Action& action) {
+void add_batch_merge(CLI::App& group, Action& action) {
   CLI::App* verb = group.add_subcommand("merge", "Write the last record of each model, ordered by id");
   const auto arguments = std::make_shared<MergeArguments>();
   verb->add_option("FOLDER", arguments->folders, "Folder of a batch, or of each of its shards")->required();
@@ -368,7 +368,7 @@ void add_batch_command(CLI::App& app, Action& action) {
   verb->add_flag("--print", arguments->options.print_records, "Print the record of each model at the end");
   verb->add_flag("--quiet", arguments->options.quiet, "Say nothing but errors");
   add_report(*verb, action);
-  add_merge(*verb, action);
+  add_batch_merge(*verb, action);
   verb->footer(kFooter);
   const auto verbs = std::make_shared<ParserVerbs>(app);
   verb->callback([arguments, verbs, verb, &action] {

@@ -10,7 +10,7 @@
 namespace subvol::cli {
 namespace {
 
-constexpr const char* kFooter = R"(Examples:
+constexpr const char* kProgramFooter = R"(Examples:
   subvol fit bone.off --template bone.mesh -o bone.glb -o cage:bone_cage.mesh --report bone.json
   subvol optimize tangled.mesh -o valid.mesh
   subvol shell bone.off --thickness 2% --layers 2 --side both -o bone_shell.vtu -o bone_shell.glb
@@ -28,7 +28,7 @@ Exit status: 0 done; 1 failed or not valid; 2 usage; 3 input rejected; 4 not con
 }  // namespace
 
 void describe_program(CLI::App& app, Action& action) {
-  app.footer(kFooter);
+  app.footer(kProgramFooter);
   app.set_version_flag("--version", std::string("subvol ") + version() + "\nwith " SUBVOL_DEPENDENCIES);
   app.require_subcommand(1);
   app.fallthrough();  // --config may stand after the verb

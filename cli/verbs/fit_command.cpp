@@ -172,7 +172,7 @@ void FitRun::write() {
     write_each(
         [&](const Output& output) {
           if (output.part == Part::animation)
-            write_animation(output, result_.cage, result_.states, writing);
+            write_animation(output, result_.cage, result_.mesh, result_.states, writing);
           else
             write_output(output, result_.cage, result_.mesh, &limit_, writing);
         },
@@ -336,7 +336,7 @@ bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
     if (verb.count(option) > 0) return false;
   const std::vector<std::string>& outputs = arguments.run.outputs;
   return std::none_of(outputs.begin(), outputs.end(), [](const std::string& output) {
-    return output.starts_with("cage:") || output.starts_with("animation:");
+    return output.starts_with("cage:") || (output.starts_with("animation:") && !output.ends_with(".html"));
   });
 }
 
@@ -486,7 +486,7 @@ void add_fit_command(CLI::App& app, Action& action) {
   add_high_order_options(*verb, *arguments);
   add_output_options(*verb, arguments->run,
                      "Finest mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb\n"
+                         "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb or .html\n"
                          "for the fit as it went; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);

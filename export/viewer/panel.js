@@ -20,6 +20,8 @@ const KEYS = [
   ["f", "filter on or off"],
   ["n, Shift + n", "next and previous of the worst cells"],
   ["m", "measure: click two points"],
+  ["t", "play the moments of a timeline"],
+  [", and .", "previous and next moment"],
   ["g", "target on or off"],
   ["l", "limit surface or cells"],
   ["s", "save a picture"],
@@ -104,9 +106,16 @@ export class Panel {
     this.facts = make("dl", { class: "facts" });
     this.cell = section("Cell", true, this.facts, parts.around);
     this.shown = choice("Mesh", [], (shown) => set({ shown: Number(shown) }));
+    this.moment = slider(
+      "Moment",
+      { min: 0, max: 1, step: 1 },
+      (shown) => set({ shown }),
+      (shown) => viewer.models[shown]?.name ?? ""
+    );
+    this.play = button("Play", "Show the moments one after another (t)", () => viewer.play(!viewer.is_playing));
     this.ends = make("div", { class: "ends" }, make("span"), make("span"));
     this.sections = {
-      shown: make("div", { class: "first" }, this.shown),
+      shown: make("div", { class: "first" }, this.shown, this.moment, this.play),
       color: section(
         "Color and filter",
         true,
@@ -165,11 +174,7 @@ export class Panel {
     const { viewer, parts, sections } = this,
       { state, field, model } = viewer,
       { info } = model;
-    const shown = viewer.models.map((one, i) => [String(i), one.name]);
-    if (viewer.models.length > 1) shown.push([String(viewer.models.length), "Both, with a slider"]);
-    fill_once(this.shown, shown);
-    this.shown.show(String(state.shown));
-    sections.shown.hidden = viewer.models.length < 2;
+    this.show_choice_of_meshes();
 
     fill_once(parts.field, [...info.fields.map(({ name, label }) => [name, label]), ["", "nothing"]]);
     parts.field.show(state.field);
@@ -209,6 +214,26 @@ export class Panel {
     this.show_worst(field);
     this.show_cell();
     parts.around.show(state.around);
+  }
+
+  /// Meshes of a timeline have a slider; of others, one is chosen, or two are compared.
+  show_choice_of_meshes() {
+    const { viewer } = this,
+      { models, state } = viewer,
+      is_timeline = viewer.data.is_timeline;
+    this.sections.shown.hidden = models.length < 2;
+    this.shown.hidden = is_timeline;
+    this.moment.hidden = this.play.hidden = !is_timeline;
+    if (is_timeline) {
+      this.moment.limit(models.length - 1);
+      this.moment.show(state.shown);
+      this.play.textContent = viewer.is_playing ? "Stop" : "Play";
+      return;
+    }
+    const shown = models.map((one, i) => [String(i), one.name]);
+    if (models.length === 2) shown.push(["2", "Both, with a slider"]);
+    fill_once(this.shown, shown);
+    this.shown.show(String(state.shown));
   }
 
   show_scale(field, state) {

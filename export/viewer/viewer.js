@@ -20,6 +20,7 @@ const WORST = 20;
 const MOST_MARKS = 500; // of inverted cells, unless they are asked for: more hide the mesh
 const SLOW_MS = 60; // a frame that takes longer is drawn without edges while the view moves
 const REST_MS = 180; // after this time without a move, it is drawn whole
+const MOMENT_MS = 700; // of one mesh of a timeline that is played
 const MEASURE_COLOR = "#0b6bcb";
 
 /// What is shown at first.
@@ -73,7 +74,7 @@ export class Viewer {
     return this.models[Math.max(0, Math.min(this.models.length - 1, this.state.shown))];
   }
   get is_comparing() {
-    return this.state.shown === this.models.length && this.models.length > 1;
+    return this.state.shown === 2 && this.models.length === 2;
   }
   get field() {
     return this.model.info.fields.find((field) => field.name === this.state.field);
@@ -149,6 +150,27 @@ export class Viewer {
       // the half that hides the section is cut off
       state.cut.flipped = new Vector3(...state.cut.normal).dot(this.camera.axis(2)) < 0;
     await this.update();
+  }
+
+  /// Shows the next mesh of a timeline; step -1: the one before.
+  async step(step) {
+    const count = this.models.length;
+    if (this.data.is_timeline) await this.set({ shown: Math.max(0, Math.min(count - 1, this.state.shown + step)) });
+  }
+
+  /// Shows the meshes of a timeline one after another, from the first one if the last is shown; false: stops.
+  async play(on) {
+    if (on === Boolean(this.is_playing) || !this.data.is_timeline) return;
+    this.is_playing = on;
+    const last = this.models.length - 1;
+    if (on && this.state.shown >= last) await this.set({ shown: 0 });
+    else this.on.changed();
+    while (this.is_playing && this.state.shown < last) {
+      await new Promise((resume) => setTimeout(resume, MOMENT_MS));
+      if (this.is_playing) await this.step(1);
+    }
+    this.is_playing = false;
+    this.on.changed();
   }
 
   /// The plane of the cut: {normal, offset}; what lies beyond it along the normal is cut off.

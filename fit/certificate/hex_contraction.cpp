@@ -11,8 +11,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
-
 /// Number of columns contracted at a time if lanes run along the result's direction.
 constexpr int kSome = 5;
 

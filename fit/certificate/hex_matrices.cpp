@@ -9,8 +9,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
-
 /// Bisects a line of n coefficients, `stride` vectors apart.
 template <int n, class Vector>
 void halve_line(Vector* low, Vector* high, int stride) {

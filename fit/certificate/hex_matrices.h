@@ -5,10 +5,14 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <type_traits>
 
 namespace subvol {
+
+/// Largest relative error of rounding to single precision.
+inline constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
 
 /// Bernstein coefficients X_b of a map on [0, 1]^3: degree num_u - 1 along u, kWide - 1 along v and num_w - 1 along w.
 ///

@@ -20,7 +20,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRoundoff = std::numeric_limits<double>::epsilon() / 2;
 
 /// One cell: its functions, and its coefficients with signs applied, relative to its first vertex.
@@ -32,11 +31,11 @@ struct Cell {
 };
 
 /// det J from the shape functions, and a bound on its rounding error.
-struct Evaluated {
+struct EvaluatedMap {
   double value, margin;
 };
 
-Evaluated evaluate(const Cell& cell, const Vec3& point) {
+EvaluatedMap evaluate(const Cell& cell, const Vec3& point) {
   cell.shapes->set_point(point);
   Mat3 jacobian = Mat3::Zero();
   Vec3 gradient, total = Vec3::Zero();
@@ -57,11 +56,11 @@ Evaluated evaluate(const Cell& cell, const Vec3& point) {
 /// Search for the sign of det J over one cell. The box with the lowest corner comes next if that is low; otherwise the
 /// box kept last, which shares most work with its halves. A box is bisected in one direction at a time.
 template <class Boxes>
-class Search {
+class BoxSearch {
  public:
   using Box = typename Boxes::Box;
 
-  Search(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
+  BoxSearch(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
       : boxes_(boxes), cell_(cell), options_(options),
         max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, Boxes::kMaxDepth)) {
     result_.lower_bound = kInfinity;
@@ -147,7 +146,7 @@ class Search {
 
   /// Returns det J there. The model alone cannot refute a cell; the cell's own functions can.
   double try_witness(const Vec3& point) {
-    const Evaluated exact = evaluate(cell_, point);
+    const EvaluatedMap exact = evaluate(cell_, point);
     if (exact.value < result_.witness_determinant) {
       result_.witness = point;
       result_.witness_determinant = exact.value;
@@ -172,13 +171,6 @@ class Search {
   std::size_t num_kept_ = 0;
   CellCertificate result_;
 };
-
-void check_options(const CertificateOptions& options) {
-  if (options.max_depth < 0 || options.max_depth > 50)
-    throw InputError("certificate: max_depth is " + std::to_string(options.max_depth) + ", expected 0 to 50");
-  if (options.max_boxes < 1)
-    throw InputError("certificate: max_boxes is " + std::to_string(options.max_boxes) + ", expected 1 or more");
-}
 
 }  // namespace
 
@@ -225,7 +217,7 @@ CellCertificate HighOrderCertifier::certify(std::span<const Vec3> coefficients, 
   const auto search = [&](auto& all) {
     auto& boxes = all.try_emplace(order, space_->basis(), order).first->second;
     boxes.set_cell(cell.modes, cell.coefficients);
-    return Search(boxes, cell, options_).run();
+    return BoxSearch(boxes, cell, options_).run();
   };
   return kind == CellKind::hex     ? search(buffers_->hexes)
          : kind == CellKind::prism ? search(buffers_->prisms)

@@ -14,7 +14,6 @@ namespace subvol {
 
 namespace {
 
-constexpr long double kPi = std::numbers::pi_v<long double>, kSqrt2 = std::numbers::sqrt2_v<long double>;
 
 /// P_0 .. P_count at t.
 std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
@@ -24,13 +23,13 @@ std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
 }
 
 long double mode_value(Basis basis, int i, long double x) {
-  if (basis == Basis::fourier) return kSqrt2 * std::sin(i * kPi * x) / (i * kPi);
+  if (basis == Basis::fourier) return std::numbers::sqrt2_v<long double> * std::sin(i * std::numbers::pi_v<long double> * x) / (i * std::numbers::pi_v<long double>);
   const auto p = legendre(i + 1, 1 - 2 * x);
   return (p[i - 1] - p[i + 1]) / (2 * std::sqrt(2 * i + 1.0L));
 }
 
 long double mode_slope(Basis basis, int i, long double x) {
-  if (basis == Basis::fourier) return kSqrt2 * std::cos(i * kPi * x);
+  if (basis == Basis::fourier) return std::numbers::sqrt2_v<long double> * std::cos(i * std::numbers::pi_v<long double> * x);
   return std::sqrt(2 * i + 1.0L) * legendre(i, 1 - 2 * x)[i];
 }
 

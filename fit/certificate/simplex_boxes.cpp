@@ -14,36 +14,34 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kLanes = SimplexTables::kLanes;
-using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+constexpr std::size_t kQuad = SimplexTables::kLanes;
+using Quad = double __attribute__((vector_size(kQuad * sizeof(double))));
 
-Lanes load_lanes(const double* from) {
-  Lanes result;
+Quad load_lanes(const double* from) {
+  Quad result;
   std::memcpy(&result, from, sizeof result);
   return result;
 }
-void store_lanes(const Lanes& value, double* to) { std::memcpy(to, &value, sizeof value); }
+void store_lanes(const Quad& value, double* to) { std::memcpy(to, &value, sizeof value); }
 
 /// Turns rows into columns.
-void transpose(Lanes (&x)[kLanes]) {
-  const Lanes a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
-  const Lanes b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
-  const Lanes c = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
-  const Lanes d = __builtin_shufflevector(x[2], x[3], 1, 5, 3, 7);
+void transpose(Quad (&x)[kQuad]) {
+  const Quad a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
+  const Quad b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
+  const Quad c = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
+  const Quad d = __builtin_shufflevector(x[2], x[3], 1, 5, 3, 7);
   x[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
   x[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   x[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   x[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
-
 /// Model errors up to this share of the mean edges count as small as long as nothing is known about det J. At high
 /// orders, low degrees cost more in boxes than they save (measured).
 double small_error(int order) { return order <= 4 ? 0.08 : 0.004; }
 /// No bound is expected beyond this relative model error, because of the shifts of `determinant_bound` (see
 /// `HexBoxes`).
-constexpr double kHopelessError = 1;
+constexpr double kHopelessSimplexError = 1;
 /// New models need not reduce the error by more than this factor: the next ones will.
 constexpr double kFall = 0.05;
 
@@ -53,7 +51,7 @@ constexpr double kFall = 0.05;
 SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
     : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order, kWide - 1)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1),
-      lanes_(rounded_up(3 * num_layers_, kLanes)), small_error_(small_error(order)),
+      lanes_(rounded_up(3 * num_layers_, kQuad)), small_error_(small_error(order)),
       whole_models_(simplex_.num_tiers()) {
   layer_terms_.resize(num_layers_);
 }
@@ -146,7 +144,7 @@ int SimplexBoxes::choose_tier(const Box& box, const SimplexModels::Part& part, d
   for (int tier = least_tier; tier <= last; ++tier)
     if (errors[tier] <= wanted) return tier;
   const bool parts_follow = box.halvings + simplex_.halvings_between() <= simplex_.most_halvings();
-  return parts_follow && !(errors[last] <= kHopelessError) ? -1 : last;
+  return parts_follow && !(errors[last] <= kHopelessSimplexError) ? -1 : last;
 }
 
 void SimplexBoxes::take_models(Box& box, double wanted, int least_tier) {
@@ -213,16 +211,16 @@ void SimplexBoxes::store_sums(std::span<const Weighted> models, std::size_t firs
       for (int n = 0; n < kWide; ++n)
         for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[i][row][n];
     } else {
-      Lanes low[kLanes] = {}, high[kLanes] = {};
+      Quad low[kQuad] = {}, high[kQuad] = {};
       for (int row = 0; row < 3; ++row) {
         low[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 0, 1, 2, 3);
         high[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 4, 5, 6, 7);
       }
       transpose(low);
       transpose(high);
-      for (std::size_t n = 0; n < kLanes; ++n) {
-        store_lanes(low[n], out + n * kLanes);
-        store_lanes(high[n], out + (kLanes + n) * kLanes);
+      for (std::size_t n = 0; n < kQuad; ++n) {
+        store_lanes(low[n], out + n * kQuad);
+        store_lanes(high[n], out + (kQuad + n) * kQuad);
       }
     }
   }
@@ -295,12 +293,12 @@ void SimplexBoxes::halve_control(const SimplexHalving& halving, AlignedDoubles& 
                                  AlignedDoubles& high) const {
   for (const SimplexHalving::Round& round : halving.rounds) {
     for (const auto& [n, other] : round.means)
-      for (std::size_t lane = 0; lane < lanes_; lane += kLanes) {
+      for (std::size_t lane = 0; lane < lanes_; lane += kQuad) {
         double* x = low.data() + n * lanes_ + lane;
         store_lanes(0.5 * (load_lanes(x) + load_lanes(low.data() + other * lanes_ + lane)), x);
       }
     for (const auto& [from, to] : round.copies)
-      for (std::size_t lane = 0; lane < lanes_; lane += kLanes)
+      for (std::size_t lane = 0; lane < lanes_; lane += kQuad)
         store_lanes(load_lanes(low.data() + from * lanes_ + lane), high.data() + to * lanes_ + lane);
   }
 }
@@ -325,13 +323,13 @@ ControlMatrices& TetBoxes::matrices(const Box& box) {
   const SimplexTables& t = tables(box);
   matrices_.resize(t.lower.size());
   const double* x = box.control.data();
-  const Lanes degree = Lanes{} + t.index.degree();
-  for (std::size_t first = 0; first < t.raised[0].size(); first += kLanes) {
-    Lanes columns[3][kLanes];
-    for (std::size_t n = 0; n < kLanes; ++n) {
-      const Lanes origin = load_lanes(x + t.raised[0][first + n] * kLanes);
+  const Quad degree = Quad{} + t.index.degree();
+  for (std::size_t first = 0; first < t.raised[0].size(); first += kQuad) {
+    Quad columns[3][kQuad];
+    for (std::size_t n = 0; n < kQuad; ++n) {
+      const Quad origin = load_lanes(x + t.raised[0][first + n] * kQuad);
       for (int d = 0; d < 3; ++d)
-        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kLanes) - origin);
+        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kQuad) - origin);
     }
     for (int d = 0; d < 3; ++d) {
       transpose(columns[d]);
@@ -386,7 +384,7 @@ Mat3 SimplexBoxes::modelling_error(const Box& box) const {
 bool SimplexBoxes::is_hopeless(const Box& box) const {
   if (box.tier < 0) return true;
   const double shifts = by_mean_edges(modelling_error(box));
-  return shifts > kHopelessError && std::isfinite(shifts);
+  return shifts > kHopelessSimplexError && std::isfinite(shifts);
 }
 
 Mat3 SimplexBoxes::remainder(const Box& box) const {

@@ -10,7 +10,6 @@ namespace subvol {
 
 namespace {
 
-constexpr long double kPi = std::numbers::pi_v<long double>, kSqrt2 = std::numbers::sqrt2_v<long double>;
 
 /// sin(z) / z and its derivative, z >= 0.
 void sinc(long double z, long double& value, long double& slope) {
@@ -32,9 +31,9 @@ void sinc(long double z, long double& value, long double& slope) {
 /// psi_i and its derivative for x in [0, 1/2].
 void kernel_below_half(Basis basis, int i, long double x, long double& value, long double& slope) {
   if (basis == Basis::fourier) {  // sqrt2 sinc(i pi x) / (1 - x)
-    sinc(i * kPi * x, value, slope);
-    slope = kSqrt2 * (slope * i * kPi + value / (1 - x)) / (1 - x);
-    value *= kSqrt2 / (1 - x);
+    sinc(i * std::numbers::pi_v<long double> * x, value, slope);
+    slope = std::numbers::sqrt2_v<long double> * (slope * i * std::numbers::pi_v<long double> + value / (1 - x)) / (1 - x);
+    value *= std::numbers::sqrt2_v<long double> / (1 - x);
     return;
   }
   // psi_i = 2 sqrt(2i+1) / (i (i+1)) P_i'(1 - 2x); P_{n+1}' = P_{n-1}' + (2n+1) P_n, and likewise for P''.

@@ -10,7 +10,6 @@ namespace subvol {
 
 namespace {
 
-std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
 
 }  // namespace
 

@@ -7,6 +7,9 @@
 
 namespace subvol {
 
+/// Returns the least multiple of `unit` that is n or more.
+inline std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
+
 /// Neighbors among the Bernstein coefficients of one degree over a triangle or tetrahedron.
 class SimplexTables {
  public:

@@ -5,6 +5,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/grouped_closest_point.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -180,11 +181,6 @@ void match_lone_patches(const Votes& votes, Matching& matching) {
 double angle_between_planes(const Vec3& n0, const Vec3& n1, const Vec3& from_0_to_1) {
   const double turn = std::atan2(n0.cross(n1).norm(), n0.dot(n1)) * 180 / std::numbers::pi;
   return from_0_to_1.dot(n0 - n1) > 0 ? 180 + turn : 180 - turn;
-}
-
-Vec3 unit_normal(const TriangleMesh& mesh, Index triangle) {
-  const auto& [a, b, c] = mesh.triangles[triangle];
-  return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
 }
 
 }  // namespace

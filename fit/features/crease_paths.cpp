@@ -23,7 +23,6 @@ namespace {
 constexpr double kLengthShare = 0.05, kCornerShare = 1.0, kFollowShare = 0.75, kLeastLength = 0.25;
 /// Number of vertices that are tried for an end at which a feature runs out.
 constexpr std::size_t kNumTried = 4;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct BoundaryGraph {
   std::vector<std::array<Index, 2>> edges;

@@ -2,6 +2,7 @@
 #include "subvol/fit/features/feature_curves.h"
 
 #include "subvol/base/error.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -15,10 +16,6 @@
 namespace subvol {
 
 namespace {
-
-double angle_degrees_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
-}
 
 struct Side {
   Index low, high, triangle;

@@ -20,7 +20,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Found on twelve CAD parts, as all constants here without another reason. Lengths are in units of h.
 /// Corners farther from a vertex get none: the smooth fit rounds them off by about half an edge.
@@ -45,7 +44,7 @@ constexpr int kRounds = 8;
 constexpr double kLeastAngle = 19;
 /// Shorter curves are left alone, in units of h: no path is as short, and their corners would take vertices that other
 /// curves need.
-constexpr double kLeastLength = 0.5;
+constexpr double kLeastRoutedLength = 0.5;
 /// Convex edges below this angle, in degrees, want one cell; up to 180, one or two do equally well.
 constexpr double kSharpAngle = 125;
 
@@ -136,7 +135,7 @@ class Router {
         reasons_[c] = NotFollowed::excluded;
       else if (features_.angles[c] < kLeastAngle)
         reasons_[c] = NotFollowed::too_acute;
-      else if (curves_[c].length() < kLeastLength * curve_h_[c])
+      else if (curves_[c].length() < kLeastRoutedLength * curve_h_[c])
         reasons_[c] = NotFollowed::shorter_than_cell;
       if (!options.not_joined.empty() && options.not_joined[c]) joinable_[c] = 0;
     }

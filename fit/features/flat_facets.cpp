@@ -2,6 +2,7 @@
 #include "subvol/fit/features/flat_facets.h"
 
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -15,12 +16,6 @@
 namespace subvol {
 
 namespace {
-
-/// Twice the area of a triangle times its normal.
-Vec3 area_vector(const TriangleMesh& mesh, std::size_t t) {
-  const auto& [a, b, c] = mesh.triangles[t];
-  return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
-}
 
 /// The triangles across the edges of each triangle.
 std::vector<std::vector<Index>> neighbors_of(const TriangleMesh& mesh) {
@@ -51,7 +46,7 @@ class FacetGrower {
 
   FlatFacets run() {
     std::vector<double> areas;
-    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) areas.push_back(area_vector(mesh_, t).norm());
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) areas.push_back(doubled_area_vector(mesh_, mesh_.triangles[t]).norm());
     std::vector<std::size_t> order(areas.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return areas[a] > areas[b]; });
@@ -63,14 +58,14 @@ class FacetGrower {
  private:
   bool is_in_plane(std::size_t t, const FacetPlane& plane) const {
     const auto& corners = mesh_.triangles[t];
-    return area_vector(mesh_, t).dot(plane.normal) > 0 && std::all_of(corners.begin(), corners.end(), [&](Index v) {
+    return doubled_area_vector(mesh_, mesh_.triangles[t]).dot(plane.normal) > 0 && std::all_of(corners.begin(), corners.end(), [&](Index v) {
              return std::abs(plane.normal.dot(mesh_.positions[v]) - plane.offset) <= tolerance_;
            });
   }
 
   void grow(Index seed) {
     const auto facet = static_cast<Index>(facets_.planes.size());
-    const Vec3 normal = area_vector(mesh_, static_cast<std::size_t>(seed)).normalized();
+    const Vec3 normal = doubled_area_vector(mesh_, mesh_.triangles[seed]).normalized();
     const FacetPlane plane{normal, normal.dot(mesh_.positions[mesh_.triangles[seed][0]])};
     std::vector<Index> members{seed};
     facets_.of_triangle[seed] = facet;
@@ -87,7 +82,7 @@ class FacetGrower {
     Vec3 normal = Vec3::Zero(), centre = Vec3::Zero();
     double area = 0;
     for (const Index t : members) {
-      const Vec3 vector = area_vector(mesh_, static_cast<std::size_t>(t));
+      const Vec3 vector = doubled_area_vector(mesh_, mesh_.triangles[t]);
       const auto& [a, b, c] = mesh_.triangles[t];
       normal += vector;
       area += vector.norm();

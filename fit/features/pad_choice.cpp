@@ -3,6 +3,7 @@
 #include "subvol/fit/features/patch_fans.h"
 
 #include "subvol/base/error.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -30,10 +31,6 @@ constexpr double kBorderWeight = 0.5;
 /// Distance, as a share of the target's diagonal, at which the directions of curves at a corner are measured: short
 /// enough to see the corner, long enough not to see the triangles of a rounding.
 constexpr double kDirectionReach = 0.01;
-
-double angle_degrees_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
-}
 
 /// Sets of patches on which no pad may end between.
 class PatchSets {
@@ -168,7 +165,6 @@ class PadScores {
 };
 
 double diagonal_of(const FeatureCurves& curves) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Vec3 low = Vec3::Constant(kInfinity), high = -low;
   for (const FeatureCurve& curve : curves.curves)
     for (const Vec3& p : curve.points) low = low.cwiseMin(p), high = high.cwiseMax(p);

@@ -18,7 +18,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

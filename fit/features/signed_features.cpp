@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -18,8 +19,8 @@ namespace subvol {
 
 namespace {
 
-/// One side of one triangle.
-struct Side {
+/// One side of one triangle, with its direction.
+struct OrientedSide {
   std::array<Index, 2> ends;  ///< the smaller number first
   Index triangle;
   bool rising;  ///< the triangle runs from ends[0] to ends[1]
@@ -33,32 +34,27 @@ void require_triangles(const TriangleMesh& mesh) {
                          " of " + std::to_string(mesh.positions.size()));
 }
 
-std::vector<Side> sorted_sides(const TriangleMesh& mesh) {
-  std::vector<Side> sides;
+std::vector<OrientedSide> sorted_sides(const TriangleMesh& mesh) {
+  std::vector<OrientedSide> sides;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (int i = 0; i < 3; ++i) {
       const Index v = mesh.triangles[t][i], w = mesh.triangles[t][(i + 1) % 3];
       sides.push_back({{std::min(v, w), std::max(v, w)}, static_cast<Index>(t), v < w});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+  std::sort(sides.begin(), sides.end(), [](const OrientedSide& a, const OrientedSide& b) {
     return std::tie(a.ends, a.triangle, a.rising) < std::tie(b.ends, b.triangle, b.rising);
   });
   return sides;
 }
 
-std::span<const Side> sides_at(std::span<const Side> sides, Index v, Index w) {
+std::span<const OrientedSide> sides_at(std::span<const OrientedSide> sides, Index v, Index w) {
   const std::array<Index, 2> ends = {std::min(v, w), std::max(v, w)};
-  const auto found = std::ranges::equal_range(sides, ends, {}, &Side::ends);
+  const auto found = std::ranges::equal_range(sides, ends, {}, &OrientedSide::ends);
   return {found.begin(), found.end()};
 }
 
-Vec3 unit_normal(const TriangleMesh& mesh, Index triangle) {
-  const auto& [a, b, c] = mesh.triangles[triangle];
-  return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]).normalized();
-}
-
-double interior_angle(const TriangleMesh& mesh, std::span<const Side> pair) {
-  const Side &left = pair[0].rising ? pair[0] : pair[1], &right = pair[0].rising ? pair[1] : pair[0];
+double interior_angle(const TriangleMesh& mesh, std::span<const OrientedSide> pair) {
+  const OrientedSide &left = pair[0].rising ? pair[0] : pair[1], &right = pair[0].rising ? pair[1] : pair[0];
   const Vec3 along = mesh.positions[left.ends[1]] - mesh.positions[left.ends[0]];
   const Vec3 n0 = unit_normal(mesh, left.triangle), n1 = unit_normal(mesh, right.triangle);
   const Vec3 axis = n0.cross(n1);
@@ -66,11 +62,11 @@ double interior_angle(const TriangleMesh& mesh, std::span<const Side> pair) {
   return axis.dot(along) >= 0 ? 180 - turn : 180 + turn;
 }
 
-std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const Side> sides, const FeatureCurve& curve) {
+std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const OrientedSide> sides, const FeatureCurve& curve) {
   std::vector<double> angles;
   for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
     const Index v = curve.vertices[i], w = curve.vertices[i + 1];
-    const std::span<const Side> pair = sides_at(sides, v, w);
+    const std::span<const OrientedSide> pair = sides_at(sides, v, w);
     if (pair.size() != 2 || pair[0].rising == pair[1].rising)
       throw InputError("signed_features: a curve runs along vertices " + std::to_string(v) + " and " +
                        std::to_string(w) + ", which is no edge of two consistently oriented triangles");
@@ -90,7 +86,7 @@ std::vector<std::array<Index, 2>> sorted_curve_edges(const FeatureCurves& curves
   return edges;
 }
 
-void find_regions(const TriangleMesh& mesh, std::span<const Side> sides, SignedFeatures& features) {
+void find_regions(const TriangleMesh& mesh, std::span<const OrientedSide> sides, SignedFeatures& features) {
   DisjointSets sets(mesh.triangles.size());
   const auto cuts = sorted_curve_edges(features.curves);
   for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
@@ -116,7 +112,7 @@ double mean_of(const FeatureCurve& curve, std::span<const double> angles) {
 
 SignedFeatures signed_features(const TriangleMesh& target, FeatureCurves curves) {
   require_triangles(target);
-  const std::vector<Side> sides = sorted_sides(target);
+  const std::vector<OrientedSide> sides = sorted_sides(target);
   SignedFeatures features;
   features.curves = std::move(curves);
   for (const FeatureCurve& curve : features.curves.curves) {

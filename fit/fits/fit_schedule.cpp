@@ -11,7 +11,6 @@ namespace {
 /// Initial distance (in V/A) below which the template's own cells indicate the shape of the fitted cells (measured on
 /// real templates).
 constexpr double kCloseDistance = 0.4;
-constexpr double kCoarseLambda = 0.05;
 /// Lambda if creases are drawn to the target from the start: stiffer cells swell beside the creases, and the folds that
 /// this makes do not disappear later.
 constexpr double kHeldLambda = 0.01;
@@ -22,7 +21,6 @@ constexpr int kHessianLife = 4;
 /// Accelerated steps decrease E by more, so these stages end at larger decreases than others: E is then what it is at
 /// the end of many more plain steps.
 constexpr double kAcceleratedDecrease = 5e-3;
-constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
 
 Stage rough_stage(double lambda, double tangential_weight) {
   Stage stage{lambda, tangential_weight};

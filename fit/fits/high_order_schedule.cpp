@@ -7,8 +7,7 @@ namespace subvol {
 
 namespace {
 
-constexpr double kCoarseLambda = 0.05, kStiffLambda = 1;
-constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;
+constexpr double kStiffLambda = 1;
 constexpr int kMaxIterations = 40;
 /// Stiff stages only lead the way: after this many steps, the next stage makes faster progress.
 constexpr int kStiffIterations = 10;

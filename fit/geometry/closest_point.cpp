@@ -13,7 +13,6 @@ namespace subvol {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kFewTriangles = 1000;  // for so few, one thread is faster than several
 
 Vec3 closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {

@@ -2,6 +2,7 @@
 #include "subvol/fit/geometry/normal_deviation.h"
 
 #include "subvol/fit/geometry/closest_point.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -36,12 +37,6 @@ struct Angles {
   }
 };
 
-/// Twice the area of a triangle times its normal.
-Vec3 area_vector(const TriangleMesh& mesh, std::size_t t) {
-  const auto& [a, b, c] = mesh.triangles[t];
-  return (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
-}
-
 double degrees_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), std::abs(a.dot(b))) * 180 / std::numbers::pi;
 }
@@ -52,7 +47,7 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh&
                                  const ClosestPoint& target_tree, int num_samples) {
   const ClosestPoint order(fitted);  // neighbors in its order are neighbors in space
   double total = 0;
-  for (std::size_t t = 0; t < fitted.triangles.size(); ++t) total += area_vector(fitted, t).norm();
+  for (std::size_t t = 0; t < fitted.triangles.size(); ++t) total += doubled_area_vector(fitted, fitted.triangles[t]).norm();
   constexpr std::size_t kRun = 32;   // sums and hints stay within a run, whatever thread takes it
   std::vector<Angles> runs((fitted.triangles.size() + kRun - 1) / kRun);
 #pragma omp parallel for schedule(dynamic)
@@ -60,7 +55,7 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh&
     Index hint = kNoIndex;
     for (std::size_t place = run * kRun; place < std::min((run + 1) * kRun, fitted.triangles.size()); ++place) {
       const auto t = static_cast<std::size_t>(order.order()[place]);
-      const Vec3 vector = area_vector(fitted, t);
+      const Vec3 vector = doubled_area_vector(fitted, fitted.triangles[t]);
       const double share = total > 0 ? vector.norm() / total : 0;
       if (!(share > 0)) continue;
       const auto& [ia, ib, ic] = fitted.triangles[t];
@@ -69,7 +64,7 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh&
       const auto compare = [&](double u, double v) {
         const ClosestPoint::Hit hit = target_tree.closest(a + u / m * (b - a) + v / m * (c - a), hint);
         hint = hit.triangle;
-        const Vec3 other = area_vector(target, static_cast<std::size_t>(hit.triangle));
+        const Vec3 other = doubled_area_vector(target, target.triangles[hit.triangle]);
         if (other.squaredNorm() > 0) runs[run].add(degrees_between(vector, other), share / (m * m));
       };
       for (int i = 0; i < m; ++i)

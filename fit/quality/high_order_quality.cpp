@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kChunk = 512;  // points per table, so that tables of high orders stay small
 
 /// Summary of a cell's samples.
-struct Sampled {
+struct SampledCell {
   double least = 1, mean = 0;
   std::size_t count = 0;
 };
@@ -34,7 +34,7 @@ double scaled_jacobian(const Mat3& jacobian, const Mat3& ideal_inverse) {
 }
 
 void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<const Index> cells, int n,
-                    const CellReference& reference, std::vector<Sampled>& samples) {
+                    const CellReference& reference, std::vector<SampledCell>& samples) {
   const CellKind kind = mesh.space.pattern_kind(pattern);
   const Quadrature rule = make_quadrature(kind, QuadratureRule::trapezoidal, n);
   const std::vector<Vec3>& points = rule.points;
@@ -46,7 +46,7 @@ void sample_pattern(const HighOrderMesh& mesh, std::size_t pattern, std::span<co
     const auto sample = [&](Index c, std::vector<Mat3>& jacobians) {
       jacobians.resize(size);
       table.jacobians(mesh, c, jacobians);
-      Sampled& sampled = samples[c];
+      SampledCell& sampled = samples[c];
       for (std::size_t q = 0; q < size; ++q) {
         const double value =
             scaled_jacobian(jacobians[q], reference ? Mat3(reference(c, points[begin + q]).inverse()) : inverse);
@@ -79,7 +79,7 @@ QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_directi
   if (samples_per_direction != 0 && samples_per_direction < 2)
     throw InputError("quality: samples_per_direction is " + std::to_string(samples_per_direction) +
                      ", expected 2 or more, or 0");
-  std::vector<Sampled> samples(mesh.space.num_cells());
+  std::vector<SampledCell> samples(mesh.space.num_cells());
   const auto cells = cells_by_pattern(mesh.space);
   for (std::size_t pattern = 0; pattern < cells.size(); ++pattern) {
     const int dense = std::max(5, 2 * mesh.space.pattern_order(pattern) + 3);

@@ -200,6 +200,7 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   const Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_, damping_};
   const bool going = runner_->run(*problem_, settings, std::move(record), x, *report_, step_work_);
   damping_ = damping_after(damping_, report_->stages.back().iterations);
+  if (after_stage) after_stage(name, x);
   return going;
 }
 
@@ -296,6 +297,7 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
   record.raises_quality = true;
   record.stop = formatted("%zu of %zu patches reached their goal", reached, patches.size());
   record.seconds = runner_->seconds() - begin;
+  if (after_stage) after_stage(record.name, x);
   report_->stages.push_back(std::move(record));
   return going;
 }

@@ -110,6 +110,9 @@ class QualityStages {
 
   /// Called before each minimization; x then holds the state that it starts from. Empty: nothing is called.
   std::function<void()> before_stage;
+  /// Called with the name and the result of each minimization of the whole mesh, and after the lift of patches. May be
+  /// empty.
+  std::function<void(const std::string& name, const std::vector<Vec3>& x)> after_stage;
 
   const State& state() const { return state_; }
   QualityEnergy& energy() { return *energy_; }

@@ -8,6 +8,7 @@
 #include "subvol/fit/target/soup_topology.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/solid_topology.h"
+#include "subvol/surface/triangle_geometry.h"
 
 #include <Eigen/Geometry>
 
@@ -27,16 +28,10 @@ namespace {
 /// by some 30; sides of a sharp edge that matter here are further apart.
 constexpr double kAgrees = 0.5;
 
-/// Twice the area of a triangle times its normal.
-Vec3 area_vector(const TriangleMesh& mesh, const std::array<Index, 3>& t) {
-  const Vec3& a = mesh.positions[t[0]];
-  return (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a);
-}
-
 std::vector<Vec3> normals_of(const TriangleMesh& mesh) {
   std::vector<Vec3> normals;
   normals.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles) normals.push_back(area_vector(mesh, t).stableNormalized());
+  for (const auto& t : mesh.triangles) normals.push_back(doubled_area_vector(mesh, t).stableNormalized());
   return normals;
 }
 
@@ -53,7 +48,7 @@ Samples samples_of(const CurvedBoundary& boundary) {
   const TriangleMesh& mesh = boundary.triangles;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
-    const Vec3 vector = area_vector(mesh, mesh.triangles[t]);
+    const Vec3 vector = doubled_area_vector(mesh, mesh.triangles[t]);
     const Vec3 sum = mesh.positions[a] + mesh.positions[b] + mesh.positions[c];
     samples.points.push_back(sum / 3);
     for (const Index v : mesh.triangles[t]) samples.points.push_back(kFar * sum + (kNear - kFar) * mesh.positions[v]);
@@ -193,7 +188,7 @@ void keep_small_groups(const TriangleMesh& target, const CurvedBoundary& boundar
   for (std::size_t t = 0; t < target.triangles.size(); ++t) {
     const Index group = target.face_groups.of_face[t];
     if (group == kNoIndex || faces[group] > 0) continue;
-    largest[group] = std::max(largest[group], {area_vector(target, target.triangles[t]).norm(), t});
+    largest[group] = std::max(largest[group], {doubled_area_vector(target, target.triangles[t]).norm(), t});
   }
   std::ranges::sort(largest, std::greater{});
   std::erase_if(largest, [](const auto& triangle) { return triangle.first == 0; });
@@ -266,7 +261,7 @@ std::vector<CarriedGroup> areas_of_groups(const TriangleMesh& target, const Curv
   for (std::size_t t = 0; t < target.triangles.size(); ++t) {
     const Index group = target.face_groups.of_face[t];
     if (group == kNoIndex) continue;
-    all[group].target_area += area_vector(target, target.triangles[t]).norm() / 2;
+    all[group].target_area += doubled_area_vector(target, target.triangles[t]).norm() / 2;
     has_triangles[group] = 1;
   }
   for (const Index group : carried)
@@ -274,7 +269,7 @@ std::vector<CarriedGroup> areas_of_groups(const TriangleMesh& target, const Curv
   const TriangleMesh& mesh = boundary.triangles;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (const Index group = carried[boundary.faces[t]]; group != kNoIndex)
-      all[group].area += area_vector(mesh, mesh.triangles[t]).norm() / 2;
+      all[group].area += doubled_area_vector(mesh, mesh.triangles[t]).norm() / 2;
   std::vector<CarriedGroup> found;
   for (std::size_t g = 0; g < all.size(); ++g)
     if (has_triangles[g]) found.push_back(std::move(all[g]));

@@ -11,7 +11,7 @@ namespace subvol {
 std::string formatted(const char* form, ...) {
   static const locale_t plain = newlocale(LC_ALL_MASK, "C", nullptr);
   const locale_t before = uselocale(plain);  // affects this thread only
-  char text[160];
+  char text[240];
   std::va_list values;
   va_start(values, form);
   std::vsnprintf(text, sizeof text, form, values);

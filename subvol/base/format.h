@@ -5,7 +5,7 @@
 
 namespace subvol {
 
-/// Formats like printf into a string, with a decimal point in any locale. Text beyond 159 characters is cut off.
+/// Formats like printf into a string, with a decimal point in any locale. Text beyond 239 characters is cut off.
 [[gnu::format(printf, 1, 2)]] std::string formatted(const char* form, ...);
 
 }  // namespace subvol

@@ -67,6 +67,13 @@ std::string read_file(const std::filesystem::path& path) {
   return bytes;
 }
 
+std::string trimmed(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\r";
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  return std::string(text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin));
+}
+
 TextScanner::TextScanner(std::string name, std::string_view bytes, Comments comments)
     : name_(std::move(name)), bytes_(bytes), comments_(comments) {
   require_no_utf16(name_, bytes_);

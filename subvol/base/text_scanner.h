@@ -15,6 +15,9 @@ namespace subvol {
 /// device or pipe), or cannot be read.
 std::string read_file(const std::filesystem::path& path);
 
+/// Returns a text without the blanks, tabs and carriage returns at its ends.
+std::string trimmed(std::string_view text);
+
 /// Reads the words and numbers of a text file in memory, one after the other, and knows their lines for messages.
 ///
 /// Words are separated by blanks, tabs and line ends. Lines end with LF, CR LF or CR; if the first line of a file ends

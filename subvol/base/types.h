@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <limits>
 
 namespace subvol {
 
@@ -16,5 +17,7 @@ inline constexpr Index kNoIndex = -1;
 /// Positions in the mesh's own length unit; 24 bytes, no padding, so arrays of them are flat arrays of doubles.
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace subvol

@@ -11,6 +11,9 @@ namespace subvol {
 /// A point of the regular grid of a cell: canonical coordinates times the order.
 using LatticePoint = Eigen::Vector3i;
 
+/// Returns a point as a key of ordered maps.
+inline std::array<int, 3> key_of(const LatticePoint& at) { return {at[0], at[1], at[2]}; }
+
 /// Order in which the points of a cell's grid are listed.
 enum class NodeOrdering {
   vtk,   ///< Lagrange cells 71, 72, 73, as numbered in .vtu files from version 2.1 on

@@ -46,7 +46,7 @@ constexpr VtkAttribute kSkippedAttributes[] = {
     {"color_scalars", 0, true}, {"lookup_table", 4, true},
 };
 
-constexpr int kPyramid = 14;
+constexpr int kVtkPyramid = 14;
 
 class VtkParser {
  public:
@@ -381,10 +381,10 @@ class VtkParser {
     const std::size_t num_points = mesh_.positions.size();
     for (std::size_t c = 0; c < num_cells_; ++c) {
       const auto fail = [&](const std::string& what) {
-        const bool is_pyramid = types_[c] == kPyramid;
+        const bool is_pyramid = types_[c] == kVtkPyramid;
         scan_.fail("cell " + std::to_string(c) +
                        (is_pyramid ? " is a pyramid, of " +
-                                         std::to_string(std::count(types_.begin(), types_.end(), kPyramid)) + ": " +
+                                         std::to_string(std::count(types_.begin(), types_.end(), kVtkPyramid)) + ": " +
                                          kNoPyramids
                                    : ' ' + what),
                    what.starts_with("has VTK") || is_pyramid ? types_line_ : cells_line_);

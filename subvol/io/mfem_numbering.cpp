@@ -41,8 +41,6 @@ struct Place {
   int i = 0, j = 0;  ///< steps along the edge, or from the face's first corner to its second and its last
 };
 
-std::array<int, 3> key_of(const LatticePoint& at) { return {at[0], at[1], at[2]}; }
-
 /// The places of the grid points in the order of VTK, which begins with the corners.
 std::vector<Place> places_of(CellKind kind, int order) {
   const auto lattice = cell_lattice(kind, order, NodeOrdering::vtk);

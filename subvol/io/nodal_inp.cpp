@@ -38,13 +38,6 @@ std::string upper_case(std::string_view text) {
   return upper;
 }
 
-std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  return std::string(text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin));
-}
-
 /// The fields between commas, without blanks around them; an empty last field is dropped.
 std::vector<std::string> fields_of(std::string_view line) {
   std::vector<std::string> fields;

@@ -36,8 +36,6 @@ const NodalFormat* nodal_format(const fs::path& path) {
   return found == std::end(kNodalFormats) ? nullptr : found;
 }
 
-std::array<int, 3> key_of(const LatticePoint& at) { return {at[0], at[1], at[2]}; }
-
 /// True if the straight-sided cell is left-handed at every corner.
 bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
   const CellTopology& topology = cell_topology(mesh.kinds[c]);

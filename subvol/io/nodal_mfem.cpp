@@ -15,7 +15,7 @@ namespace subvol {
 namespace {
 
 /// MFEM's numbers of shapes.
-constexpr int kTriangle = 2, kSquare = 3, kTet = 4, kCube = 5, kPrism = 6, kPyramid = 7;
+constexpr int kTriangle = 2, kSquare = 3, kTet = 4, kCube = 5, kPrism = 6, kPyramidShape = 7;
 constexpr int kCornersOfShape[] = {1, 2, 3, 4, 4, 8, 6, 5};
 
 /// How the nodes of a curved mesh are stored.
@@ -80,8 +80,8 @@ class MfemParser {
   };
   Entry read_entry() {
     const std::int64_t attribute = scan_.integer("an attribute"), shape = scan_.integer("a shape");
-    if (shape < 0 || shape > kPyramid) scan_.fail("expected a shape from 0 to 7");
-    if (shape == kPyramid) scan_.fail(std::string("a pyramid: ") + kNoPyramids);
+    if (shape < 0 || shape > kPyramidShape) scan_.fail("expected a shape from 0 to 7");
+    if (shape == kPyramidShape) scan_.fail(std::string("a pyramid: ") + kNoPyramids);
     constexpr std::int64_t kMost = std::numeric_limits<int>::max();
     if (attribute < -kMost || attribute > kMost) scan_.fail("expected an attribute of 32 bits");
     Entry entry{static_cast<int>(attribute), static_cast<int>(shape), {}};

@@ -14,13 +14,6 @@ namespace subvol {
 
 namespace {
 
-std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  return std::string(text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin));
-}
-
 /// Replaces tabs by blanks up to the next column of eight.
 std::string without_tabs(std::string_view line) {
   std::string result;

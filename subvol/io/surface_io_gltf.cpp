@@ -18,7 +18,6 @@ namespace subvol {
 
 namespace {
 
-namespace gltf = tinygltf;
 using Transform = Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>;
 
 class GltfParser {
@@ -55,8 +54,8 @@ class GltfParser {
   }
 
   void load(std::string_view bytes) {
-    gltf::TinyGLTF reader;
-    reader.SetImageLoader([](gltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
+    tinygltf::TinyGLTF reader;
+    reader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
                              void*) { return true; },
                           nullptr);  // pictures do not matter
     std::string errors, warnings;
@@ -73,12 +72,12 @@ class GltfParser {
   }
 
   bool is_child(int node) const {
-    return std::any_of(model_.nodes.begin(), model_.nodes.end(), [&](const gltf::Node& other) {
+    return std::any_of(model_.nodes.begin(), model_.nodes.end(), [&](const tinygltf::Node& other) {
       return std::find(other.children.begin(), other.children.end(), node) != other.children.end();
     });
   }
 
-  static Transform transform_of(const gltf::Node& node) {
+  static Transform transform_of(const tinygltf::Node& node) {
     Transform transform = Transform::Identity();
     if (node.matrix.size() == 16) {
       transform.matrix() = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
@@ -94,7 +93,7 @@ class GltfParser {
 
   void add_node(int place, const Transform& above, int depth) {
     constexpr int kMostDepth = 64;
-    const gltf::Node& node = at(model_.nodes, place, "node");
+    const tinygltf::Node& node = at(model_.nodes, place, "node");
     if (depth > kMostDepth || ++num_nodes_ > model_.nodes.size()) fail("nodes are children of themselves");
     const Transform transform = above * transform_of(node);
     if (!transform.matrix().allFinite()) fail("node " + std::to_string(place) + ": a transform that is not finite");
@@ -102,8 +101,8 @@ class GltfParser {
     for (const int child : node.children) add_node(child, transform, depth + 1);
   }
 
-  void add_mesh(const gltf::Mesh& mesh, const gltf::Node& node, const Transform& transform) {
-    for (const gltf::Primitive& primitive : mesh.primitives) {
+  void add_mesh(const tinygltf::Mesh& mesh, const tinygltf::Node& node, const Transform& transform) {
+    for (const tinygltf::Primitive& primitive : mesh.primitives) {
       const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
       if (mode != TINYGLTF_MODE_TRIANGLES && mode != TINYGLTF_MODE_TRIANGLE_STRIP && mode != TINYGLTF_MODE_TRIANGLE_FAN)
         continue;  // points and lines, such as wireframes
@@ -153,13 +152,13 @@ class GltfParser {
 
   /// The numbers of an accessor, `components` for each entry; normalized ones from -1 or 0 to 1.
   std::vector<double> numbers(int place, int components, const char* what) const {
-    const gltf::Accessor& accessor = at(model_.accessors, place, "accessor");
+    const tinygltf::Accessor& accessor = at(model_.accessors, place, "accessor");
     if (accessor.sparse.isSparse) fail(std::string(what) + ": sparse accessors are not read");
-    if (gltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)) != components)
+    if (tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type)) != components)
       fail(std::string(what) + ": expected " + std::to_string(components) + " numbers for each entry");
-    const gltf::BufferView& view = at(model_.bufferViews, accessor.bufferView, "buffer view");
+    const tinygltf::BufferView& view = at(model_.bufferViews, accessor.bufferView, "buffer view");
     const std::vector<unsigned char>& bytes = at(model_.buffers, view.buffer, "buffer").data;
-    const int size = gltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
+    const int size = tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
     const int stride = accessor.ByteStride(view);
     const std::size_t entry = static_cast<std::size_t>(std::max(size, 0) * components);
     if (size <= 0 || stride < static_cast<int>(entry)) fail(std::string(what) + ": unknown type of numbers");
@@ -186,7 +185,7 @@ class GltfParser {
     return static_cast<double>(value);
   }
 
-  double decode(const unsigned char* bytes, const gltf::Accessor& accessor, const char* what) const {
+  double decode(const unsigned char* bytes, const tinygltf::Accessor& accessor, const char* what) const {
     switch (accessor.componentType) {
       case TINYGLTF_COMPONENT_TYPE_FLOAT: return as_number<float>(bytes, false);
       case TINYGLTF_COMPONENT_TYPE_DOUBLE: return as_number<double>(bytes, false);
@@ -223,7 +222,7 @@ class GltfParser {
   }
 
   std::string name_;
-  gltf::Model model_;
+  tinygltf::Model model_;
   TriangleWelder welder_;
   LeftOut left_out_;
   std::vector<std::string> materials_, objects_;

@@ -41,7 +41,7 @@ struct Property {
   ValueType count_type = kUInt8, type = kFloat32;
 };
 
-struct Element {
+struct PlyElement {
   std::string name;
   std::size_t count = 0;
   std::vector<Property> properties;
@@ -67,7 +67,7 @@ class PlyParser {
 
   ParsedSurface parse() {
     read_header();
-    for (const Element& element : elements_) read_element(element);
+    for (const PlyElement& element : elements_) read_element(element);
     for (const Index v : mesh_.face_vertices)
       if (static_cast<std::size_t>(v) >= mesh_.positions.size())
         throw InputError(name_ + ": a face names vertex " + std::to_string(v) + " of " +
@@ -82,7 +82,7 @@ class PlyParser {
   bool has_faces() {
     read_header();
     return std::any_of(elements_.begin(), elements_.end(),
-                       [](const Element& element) { return element.name == "face" && element.count > 0; });
+                       [](const PlyElement& element) { return element.name == "face" && element.count > 0; });
   }
 
   /// Returns the values of the attribute that `parse` found, one per vertex; none if there is no such property.
@@ -155,13 +155,13 @@ class PlyParser {
   /// Chooses the properties of faces that become groups: the one whose name tells most of a material or a region, else
   /// a color. Counts all properties that are not used.
   void choose_face_properties() {
-    for (Element& element : elements_) {
+    for (PlyElement& element : elements_) {
       if (element.name == "face") choose_groups(element);
       for (const Property& property : element.properties) note(element, property);
     }
   }
 
-  static void choose_groups(Element& face) {
+  static void choose_groups(PlyElement& face) {
     Property* label = nullptr;
     for (Property& p : face.properties) {
       const auto rank = reference_name_rank(p.name);
@@ -184,7 +184,7 @@ class PlyParser {
   }
 
   /// Counts a property that is not used. Normals do not count: faces define them.
-  void note(const Element& element, const Property& property) {
+  void note(const PlyElement& element, const Property& property) {
     const std::string& name = property.name;
     const bool is_normal = name == "nx" || name == "ny" || name == "nz";
     if (element.count == 0 || property.use != Property::Use::none || is_normal) return;
@@ -234,7 +234,7 @@ class PlyParser {
     return element == "face" && is_list && corners ? Property::Use::corners : Property::Use::none;
   }
 
-  void read_element(const Element& element) {
+  void read_element(const PlyElement& element) {
     const bool vertices = element.name == "vertex", faces = element.name == "face";
     if (vertices && !(element.has(Property::Use::x) && element.has(Property::Use::y) && element.has(Property::Use::z)))
       fail("vertices without x, y and z");
@@ -318,7 +318,7 @@ class PlyParser {
   TextScanner scan_;
   bool text_ = true;
   std::endian order_ = std::endian::little;
-  std::vector<Element> elements_;
+  std::vector<PlyElement> elements_;
   LeftOut left_out_;
   PolygonMesh mesh_;
   std::string attribute_;

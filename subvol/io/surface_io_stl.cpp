@@ -121,14 +121,6 @@ void parse_facet(TextScanner& scan, TriangleWelder& welder) {
   expect(scan, "endfacet");
 }
 
-/// Returns the text without blanks at its ends.
-std::string trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == text.npos) return {};
-  return std::string(text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin));
-}
-
 /// Each solid is a group; a single solid, whose name often only names the program that wrote it, is none.
 PolygonMesh parse_text(const std::string& name, std::string_view bytes) {
   TextScanner scan(name, bytes, TextScanner::Comments::none);

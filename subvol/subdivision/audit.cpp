@@ -93,7 +93,7 @@ void find_flattened(const VolumeMesh& mesh, const MeshTopology& topology, Subdiv
   std::sort(result.flattened_edges.begin(), result.flattened_edges.end());
 }
 
-Vec3 unit_normal(const SurfaceTopology& surface, Index f, std::span<const Vec3> points) {
+Vec3 face_normal(const SurfaceTopology& surface, Index f, std::span<const Vec3> points) {
   Vec3 area = Vec3::Zero();
   const auto face = surface.face(f);
   const Vec3& origin = points[face[0]];
@@ -105,8 +105,8 @@ Vec3 unit_normal(const SurfaceTopology& surface, Index f, std::span<const Vec3> 
 bool is_reflex(const SurfaceTopology& surface, Index e, std::span<const Vec3> points) {
   const Index h = surface.edge_corners[e];
   const Vec3 along = points[surface.corner_vertices[surface.next(h)]] - points[surface.corner_vertices[h]];
-  const Vec3 left = unit_normal(surface, surface.corner_faces[h], points);
-  const Vec3 right = unit_normal(surface, surface.corner_faces[surface.twins[h]], points);
+  const Vec3 left = face_normal(surface, surface.corner_faces[h], points);
+  const Vec3 right = face_normal(surface, surface.corner_faces[surface.twins[h]], points);
   return left.cross(right).dot(along.normalized()) < -std::sin(kSlack);
 }
 

@@ -56,7 +56,6 @@ class PolygonCutter {
   /// Returns the corner with the shortest cut among those that are convex and cover no other corner; if there is none,
   /// the corner with the shortest cut of all.
   std::size_t best_ear(const std::vector<Index>& rest, const Vec3& normal) const {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const std::size_t n = rest.size();
     std::size_t best = 0, best_poor = 0;
     double length = kInfinity, poor_length = kInfinity;

@@ -37,8 +37,6 @@ struct Placement {
 /// Edge lengths to try, relative to the length that follows from the count and the volume.
 constexpr std::array<double, 7> kSizes{1, 0.97, 1.03, 0.94, 1.06, 0.9, 1.1};
 constexpr double kLeastSize = *std::min_element(kSizes.begin(), kSizes.end());
-/// Layers of cells on each side of a grid: the outer one stays empty, the inner one leaves room for handles.
-constexpr int kSpare = 2;
 /// Largest number of cells of one grid, including the empty and spare ones, if `cells` are requested in the solid: half
 /// a gigabyte per thread or less.
 double most_grid_cells(std::size_t cells) { return 1e6 + 64 * static_cast<double>(cells); }
@@ -54,7 +52,7 @@ Eigen::AlignedBox3d box_in(const Mat3& frame, const TriangleMesh& surface) {
 /// Number of cells, along each axis, of the grid around a box; a whole number that may exceed the range of int. On
 /// every side the grid has its spare layers.
 Eigen::Array3d cells_around(const Eigen::AlignedBox3d& box, double size) {
-  return (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
+  return (box.sizes().array() / size).ceil() + (1 + 2 * kSpareLayers);
 }
 
 /// Returns the frames whose grids have at most `most` cells in all if about `cells` of them lie in the solid. The
@@ -98,16 +96,6 @@ struct ShareRange {
   double least = 0, most = std::numeric_limits<double>::infinity();
   bool holds(double share) const { return share >= least && share <= most; }
 };
-
-/// Adds the spare layers around the lines of a grid, `size` wide.
-std::array<std::vector<double>, 3> with_spare(std::array<std::vector<double>, 3> lines, double size) {
-  for (std::vector<double>& at : lines)
-    for (int layer = 0; layer < kSpare; ++layer) {
-      at.insert(at.begin(), at.front() - size);
-      at.push_back(at.back() + size);
-    }
-  return lines;
-}
 
 std::size_t num_boundary_faces(const VoxelSolid& solid) {
   std::size_t count = 0;
@@ -277,7 +265,7 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
       return std::nullopt;
     }
     const double size = search.size();
-    std::array<std::vector<double>, 3> lines = lines_through_planes(solid_.surface, planes, size, kSpare, most_cells);
+    std::array<std::vector<double>, 3> lines = lines_through_planes(solid_.surface, planes, size, most_cells);
     if (lines[0].empty()) {
       search.be_coarser();
       continue;
@@ -286,7 +274,7 @@ std::optional<Candidate> Search::best_through(const AxisPlanes& planes, double m
     ++result.grids;
     std::size_t num_right = 0;
     std::optional<Candidate> found =
-        best_in(planes.frame, grid_through(planes.frame, with_spare(std::move(lines), size)), {}, num_right);
+        best_in(planes.frame, grid_through(planes.frame, with_spare_layers(std::move(lines), size)), {}, num_right);
     if (stop_.is_stopped()) {
       result.cancelled = true;
       return std::nullopt;

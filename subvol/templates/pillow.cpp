@@ -37,14 +37,14 @@ std::vector<char> marked(const VolumeMesh& mesh, std::span<const Index> cells) {
 }
 
 /// A face of the set's boundary, seen from outside.
-struct Face {
+struct SetFace {
   std::array<Index, 4> corners;
   std::size_t size, cell;
   std::span<const Index> vertices() const { return {corners.data(), size}; }
 };
 
-std::vector<Face> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const char> in_set) {
-  std::vector<Face> faces;
+std::vector<SetFace> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const char> in_set) {
+  std::vector<SetFace> faces;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     if (!in_set[c]) continue;
     const CellTopology& local = cell_topology(mesh.kinds[c]);
@@ -52,7 +52,7 @@ std::vector<Face> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& to
       const auto& cells = topology.face_cells(topology.cell_faces(c)[f]);
       const Index other = cells[0] == static_cast<Index>(c) ? cells[1] : cells[0];
       if (other != kNoIndex && in_set[other]) continue;
-      Face face{{}, static_cast<std::size_t>(local.face_sizes[f]), c};
+      SetFace face{{}, static_cast<std::size_t>(local.face_sizes[f]), c};
       for (std::size_t i = 0; i < face.size; ++i) face.corners[i] = mesh.cell(c)[local.faces[f][i]];
       faces.push_back(face);
     }
@@ -62,9 +62,9 @@ std::vector<Face> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& to
 
 /// New vertex number of each old vertex on the faces, counted from `num_vertices` in the old order; kNoIndex for
 /// vertices on none.
-std::vector<Index> new_numbers(std::size_t num_vertices, std::span<const Face> faces) {
+std::vector<Index> new_numbers(std::size_t num_vertices, std::span<const SetFace> faces) {
   std::vector<Index> number(num_vertices, kNoIndex);
-  for (const Face& face : faces)
+  for (const SetFace& face : faces)
     for (Index v : face.vertices()) number[v] = 0;
   Index next = static_cast<Index>(num_vertices);
   for (Index& n : number)
@@ -72,11 +72,11 @@ std::vector<Index> new_numbers(std::size_t num_vertices, std::span<const Face> f
   return number;
 }
 
-void require_manifold(std::span<const Face> faces, std::span<const Index> number, std::size_t num_vertices) {
+void require_manifold(std::span<const SetFace> faces, std::span<const Index> number, std::size_t num_vertices) {
   std::vector<Index> names, offsets{0}, corners;
   for (std::size_t v = 0; v < num_vertices; ++v)
     if (number[v] != kNoIndex) names.push_back(static_cast<Index>(v));
-  for (const Face& face : faces) {
+  for (const SetFace& face : faces) {
     for (Index v : face.vertices()) corners.push_back(number[v] - static_cast<Index>(num_vertices));
     offsets.push_back(static_cast<Index>(corners.size()));
   }
@@ -94,7 +94,7 @@ Vec3 unit_normal(const VolumeMesh& mesh, std::span<const Index> face) {
 
 /// Displacement of each vertex of the faces: against the sum of its distinct normals, in proportion to its shortest
 /// edge in the set.
-std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const Face> faces, std::span<const char> in_set) {
+std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set) {
   std::vector<double> shortest(mesh.num_vertices(), std::numeric_limits<double>::infinity());
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     if (!in_set[c]) continue;
@@ -107,7 +107,7 @@ std::vector<Vec3> steps_inward(const VolumeMesh& mesh, std::span<const Face> fac
     }
   }
   std::vector<std::vector<Vec3>> normals(mesh.num_vertices());
-  for (const Face& face : faces) {
+  for (const SetFace& face : faces) {
     const Vec3 n = unit_normal(mesh, face.vertices());
     for (Index v : face.vertices())
       if (std::none_of(normals[v].begin(), normals[v].end(), [&](const Vec3& m) { return m.dot(n) > kSameNormal; }))
@@ -148,7 +148,7 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
 }
 
 /// Returns the faces of those connected parts of a boundary that are wanted.
-std::vector<Face> chosen_parts(std::span<const Face> faces, std::size_t num_vertices, int reference,
+std::vector<SetFace> chosen_parts(std::span<const SetFace> faces, std::size_t num_vertices, int reference,
                                const PillowChoice& takes) {
   std::vector<Index> part(num_vertices);
   std::iota(part.begin(), part.end(), 0);
@@ -156,25 +156,25 @@ std::vector<Face> chosen_parts(std::span<const Face> faces, std::size_t num_vert
     while (part[v] != v) v = part[v] = part[part[v]];
     return v;
   };
-  for (const Face& face : faces)
+  for (const SetFace& face : faces)
     for (const Index v : face.vertices()) part[root(v)] = root(face.corners[0]);
   std::map<Index, std::vector<std::array<Index, 4>>> parts;
-  const auto corners = [](const Face& face) {
+  const auto corners = [](const SetFace& face) {
     std::array<Index, 4> all = face.corners;
     for (std::size_t i = face.size; i < all.size(); ++i) all[i] = kNoIndex;
     return all;
   };
-  for (const Face& face : faces) parts[root(face.corners[0])].push_back(corners(face));
+  for (const SetFace& face : faces) parts[root(face.corners[0])].push_back(corners(face));
   std::map<Index, bool> is_wanted;
   for (const auto& [first, members] : parts) is_wanted[first] = takes(reference, members);
-  std::vector<Face> chosen;
-  for (const Face& face : faces)
+  std::vector<SetFace> chosen;
+  for (const SetFace& face : faces)
     if (is_wanted[root(face.corners[0])]) chosen.push_back(face);
   return chosen;
 }
 
 /// Puts a layer inside some faces of the boundary of a set.
-VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const Face> faces, std::span<const char> in_set) {
+VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const SetFace> faces, std::span<const char> in_set) {
   const std::vector<Index> number = new_numbers(mesh.num_vertices(), faces);
   require_manifold(faces, number, mesh.num_vertices());
   const std::vector<Vec3> steps = steps_inward(mesh, faces, in_set);
@@ -186,7 +186,7 @@ VolumeMesh pillowed(const VolumeMesh& mesh, std::span<const Face> faces, std::sp
     for (std::size_t i = mesh.cell_offsets[c]; in_set[c] && i < mesh.cell_offsets[c + 1]; ++i)
       if (const Index n = number[mesh.cell_vertices[i]]; n != kNoIndex) result.cell_vertices[i] = n;
   std::vector<Index> corners;
-  for (const Face& face : faces) {
+  for (const SetFace& face : faces) {
     corners.clear();
     for (Index v : face.vertices()) corners.push_back(number[v]);
     corners.insert(corners.end(), face.vertices().begin(), face.vertices().end());
@@ -212,7 +212,7 @@ VolumeMesh pillow_regions(const VolumeMesh& mesh, const PillowChoice& takes) {
     std::vector<char> in_set;
     for (std::size_t c = 0; c < result.num_cells(); ++c)
       in_set.push_back(mesh.references.empty() || result.references[c] == reference);
-    std::vector<Face> faces = boundary_of_set(result, MeshTopology(result), in_set);
+    std::vector<SetFace> faces = boundary_of_set(result, MeshTopology(result), in_set);
     if (takes) faces = chosen_parts(faces, result.num_vertices(), reference, takes);
     if (!faces.empty()) result = pillowed(result, faces, in_set);
   }

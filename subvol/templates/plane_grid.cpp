@@ -84,13 +84,13 @@ Mat3 turned_onto_planes(Mat3 frame, const std::vector<Vec3>& areas) {
 }
 
 /// A triangle along an axis.
-struct Facet {
+struct AxisFacet {
   double position = 0, area = 0;  ///< area > 0 if it faces up
   Index triangle = 0;
 };
 
-std::vector<Facet> facets_along(const TriangleMesh& surface, const Vec3& axis) {
-  std::vector<Facet> facets;
+std::vector<AxisFacet> facets_along(const TriangleMesh& surface, const Vec3& axis) {
+  std::vector<AxisFacet> facets;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     const auto& [a, b, c] = surface.triangles[t];
     const Vec3 area = area_vector(surface, surface.triangles[t]);
@@ -102,7 +102,7 @@ std::vector<Facet> facets_along(const TriangleMesh& surface, const Vec3& axis) {
         first + ((surface.positions[b].dot(axis) - first) + (surface.positions[c].dot(axis) - first)) / 3;
     facets.push_back({position, along, static_cast<Index>(t)});
   }
-  std::sort(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) {
+  std::sort(facets.begin(), facets.end(), [](const AxisFacet& a, const AxisFacet& b) {
     return a.position != b.position ? a.position < b.position : a.triangle < b.triangle;
   });
   return facets;
@@ -312,7 +312,7 @@ AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame) {
   }
   result.tolerance = kCoplanar * (result.high - result.low).norm();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::vector<Facet> facets = facets_along(surface, frame.col(static_cast<Index>(axis)));
+    const std::vector<AxisFacet> facets = facets_along(surface, frame.col(static_cast<Index>(axis)));
     for (auto first = facets.begin(), last = first; first != facets.end(); first = last) {
       while (last != facets.end() && last->position - first->position < result.tolerance) ++last;
       if (last == first) ++last;  // if the tolerance is zero to rounding
@@ -323,15 +323,15 @@ AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame) {
 }
 
 std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surface, const AxisPlanes& planes,
-                                                        double size, int spare, double most) {
+                                                        double size, double most) {
   constexpr double kMostPart = 1.5;  // widest of equal parts, in units of the size
   std::array<std::vector<double>, 3> keys, lines;
-  const double fewest = ((planes.high - planes.low).array() / (kMostPart * size) + 2.0 * spare).prod();
+  const double fewest = ((planes.high - planes.low).array() / (kMostPart * size) + 2.0 * kSpareLayers).prod();
   if (!(fewest <= most)) return lines;  // known before any sampling
   double cells = 1;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     keys[axis] = key_lines(surface, planes, axis, size);
-    double count = 2.0 * spare;
+    double count = 2.0 * kSpareLayers;
     for (std::size_t i = 0; i + 1 < keys[axis].size(); ++i)
       count += parts_between(keys[axis][i], keys[axis][i + 1], size);
     cells *= count;
@@ -355,6 +355,15 @@ double share_on_lines(const AxisPlanes& planes, const std::array<std::vector<dou
       if (line != lines[axis].end() && *line <= plane.position + planes.tolerance) sum += plane.whole_area();
     }
   return std::min(1.0, sum / planes.area);
+}
+
+std::array<std::vector<double>, 3> with_spare_layers(std::array<std::vector<double>, 3> lines, double size) {
+  for (std::vector<double>& at : lines)
+    for (int layer = 0; layer < kSpareLayers; ++layer) {
+      at.insert(at.begin(), at.front() - size);
+      at.push_back(at.back() + size);
+    }
+  return lines;
 }
 
 }  // namespace subvol

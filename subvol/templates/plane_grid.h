@@ -8,6 +8,9 @@
 
 namespace subvol {
 
+/// Layers of cells on each side of a grid: the outer one stays empty, the inner one leaves room for handles.
+inline constexpr int kSpareLayers = 2;
+
 /// A plane that holds triangles of a surface and is perpendicular to an axis of a frame.
 struct AxisPlane {
   double position = 0;           ///< along the axis, length
@@ -57,12 +60,14 @@ AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame);
 ///
 /// size     length, > 0; at least about sqrt(area / cells) / 2 if so many cells are wanted: cost and memory grow with
 ///          area / size^2.
-/// spare    >= 1, layers of cells on each side that the caller adds.
-/// most     largest number of cells, with those of the layers; below 10^8.
+/// most     largest number of cells, with the spare layers; below 10^8.
 /// returns  for each axis the positions of at least two lines along it, increasing; empty for all axes if there would
 ///          be more cells.
 std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surface, const AxisPlanes& planes,
-                                                        double size, int spare, double most);
+                                                        double size, double most);
+
+/// Adds the spare layers around the lines of a grid, `size` wide.
+std::array<std::vector<double>, 3> with_spare_layers(std::array<std::vector<double>, 3> lines, double size);
 
 /// Returns the share of the surface's area that lies on planes through the lines, in [0, 1].
 double share_on_lines(const AxisPlanes& planes, const std::array<std::vector<double>, 3>& lines);

@@ -23,7 +23,6 @@ namespace subvol {
 
 namespace {
 
-constexpr int kSpare = 2;          ///< layers of empty cells on each side of a grid
 constexpr double kNoPlanes = 0.03; ///< share of the area on planes below which these are no help
 constexpr double kAllPlanes = 0.999;  ///< share from which on the grid is taken to be exact, and needs no pillows
 
@@ -35,7 +34,7 @@ double area_of(const TriangleMesh& mesh) {
 }
 
 /// A labelled grid.
-struct Candidate {
+struct LabelledGrid {
   VoxelGrid grid;
   std::vector<int> labels;
   std::size_t wrong_sheets = 0;
@@ -44,7 +43,7 @@ struct Candidate {
   double aligned = 0;
 };
 
-bool is_better(const Candidate& a, const Candidate& b) {
+bool is_better(const LabelledGrid& a, const LabelledGrid& b) {
   return a.wrong_sheets != b.wrong_sheets ? a.wrong_sheets < b.wrong_sheets : a.score < b.score;
 }
 
@@ -68,13 +67,13 @@ class RegionSearch {
   RegionTemplateResult run();
 
  private:
-  std::optional<Candidate> best_through(const AxisPlanes& planes, double cells, double most_cells);
-  std::optional<Candidate> best_of_cubes(double cells, double most_cells);
-  std::optional<Candidate> labelled(VoxelGrid grid, double cells, bool is_exact);
+  std::optional<LabelledGrid> best_through(const AxisPlanes& planes, double cells, double most_cells);
+  std::optional<LabelledGrid> best_of_cubes(double cells, double most_cells);
+  std::optional<LabelledGrid> labelled(VoxelGrid grid, double cells, bool is_exact);
   VoxelGrid cubes(const Mat3& frame, double size, double offset) const;
   double size_for(double cells, bool counts_pillow) const;
   double count_of(const VoxelLabels& labels, bool counts_pillow) const;
-  RegionTemplate finished(const Candidate& candidate, std::size_t cells) const;
+  RegionTemplate finished(const LabelledGrid& candidate, std::size_t cells) const;
 
   const RegionSurface& surface_;
   const RegionTemplateOptions& options_;
@@ -117,7 +116,7 @@ VoxelGrid RegionSearch::cubes(const Mat3& frame, double size, double offset) con
   Eigen::AlignedBox3d box;
   for (const auto& t : surface_.mesh.triangles)
     for (const Index v : t) box.extend(Vec3(frame.transpose() * surface_.mesh.positions[v]));
-  const Eigen::Array3d counts = (box.sizes().array() / size).ceil() + (1 + 2 * kSpare);
+  const Eigen::Array3d counts = (box.sizes().array() / size).ceil() + (1 + 2 * kSpareLayers);
   VoxelGrid grid;
   Vec3 low = box.center();
   for (int a = 0; a < 3; ++a) {
@@ -130,7 +129,7 @@ VoxelGrid RegionSearch::cubes(const Mat3& frame, double size, double offset) con
 }
 
 /// Labels a grid. Returns nothing if its regions cannot be made right.
-std::optional<Candidate> RegionSearch::labelled(VoxelGrid grid, double cells, bool is_exact) {
+std::optional<LabelledGrid> RegionSearch::labelled(VoxelGrid grid, double cells, bool is_exact) {
   constexpr int kWeightRounds = 5;
   constexpr double kRaise = 1.7, kThin = 4;  // cells: regions that are thicker need no weight
   const auto num_regions = static_cast<int>(surface_.regions.size());
@@ -190,7 +189,7 @@ std::optional<Candidate> RegionSearch::labelled(VoxelGrid grid, double cells, bo
           if (touches(pair[0]) && touches(pair[1])) is_wrong[r] = 1;
         }
     if (all_right && same_pairs) {
-      Candidate candidate{std::move(grid), {labels.labels().begin(), labels.labels().end()}, wrong_sheets, 0, 0, 0};
+      LabelledGrid candidate{std::move(grid), {labels.labels().begin(), labels.labels().end()}, wrong_sheets, 0, 0, 0};
       for (std::size_t c = 0; c < labels.num_cells(); ++c)
         candidate.score += (1 - fractions[labels.label(static_cast<Index>(c))][c]) * unit *
                            (volumes.empty() ? 1 : volumes[c]) / volume_;
@@ -209,30 +208,25 @@ std::optional<Candidate> RegionSearch::labelled(VoxelGrid grid, double cells, bo
   return std::nullopt;
 }
 
-std::optional<Candidate> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
+std::optional<LabelledGrid> RegionSearch::best_through(const AxisPlanes& planes, double cells, double most_cells) {
   constexpr int kGrids = 5;
   constexpr double kLeast = 0.6, kMost = 1.25, kFiner = 0.85, kCoarser = 1.25, kBelieved = 8;
-  std::optional<Candidate> best;
+  std::optional<LabelledGrid> best;
   double size = size_for(cells, options_.for_pillow), finer = 0, coarser = 0;
   const auto step = [&](bool too_fine, double factor) {
     (too_fine ? finer : coarser) = size;
     size = finer > 0 && coarser > 0 ? std::sqrt(finer * coarser) : factor * size;
   };
   for (int attempt = 0; attempt < kGrids && !stop_.is_stopped(); ++attempt) {
-    auto lines = lines_through_planes(surface_.mesh, planes, size, kSpare, most_cells);
+    auto lines = lines_through_planes(surface_.mesh, planes, size, most_cells);
     if (lines[0].empty()) {
       step(true, kCoarser);
       continue;
     }
     const double aligned = share_on_lines(planes, lines);
     if (aligned < kNoPlanes) break;
-    for (std::vector<double>& at : lines)
-      for (int layer = 0; layer < kSpare; ++layer) {
-        at.insert(at.begin(), at.front() - size);
-        at.push_back(at.back() + size);
-      }
-    std::optional<Candidate> found =
-        labelled(grid_through(planes.frame, std::move(lines)), cells, aligned > kAllPlanes);
+    std::optional<LabelledGrid> found =
+        labelled(grid_through(planes.frame, with_spare_layers(std::move(lines), size)), cells, aligned > kAllPlanes);
     if (!found) {
       step(false, kFiner);
       continue;
@@ -247,20 +241,20 @@ std::optional<Candidate> RegionSearch::best_through(const AxisPlanes& planes, do
   return best;
 }
 
-std::optional<Candidate> RegionSearch::best_of_cubes(double cells, double most_cells) {
+std::optional<LabelledGrid> RegionSearch::best_of_cubes(double cells, double most_cells) {
   constexpr double kMost = 1.25;
   constexpr std::array<double, 3> kSizes{1, 0.95, 1.06};
   constexpr std::array<double, 2> kOffsets{0, 0.5};
   const std::vector<Mat3> frames = template_frames(surface_.mesh);
   double size = size_for(cells, options_.for_pillow);
-  std::optional<Candidate> best;
+  std::optional<LabelledGrid> best;
   for (const double factor : kSizes)
     for (const Mat3& frame : frames)
       for (const double offset : kOffsets) {
         if (stop_.is_stopped()) return std::nullopt;
         VoxelGrid grid = cubes(frame, factor * size, offset);
         if (static_cast<double>(grid.num_cells()) > most_cells) continue;
-        std::optional<Candidate> found = labelled(std::move(grid), cells, false);
+        std::optional<LabelledGrid> found = labelled(std::move(grid), cells, false);
         if (!found) continue;
         if (found->share > kMost || found->share < 1 / kMost) {  // the estimate was wrong: for all grids alike
           const double corrected = size * std::cbrt(found->share);
@@ -273,7 +267,7 @@ std::optional<Candidate> RegionSearch::best_of_cubes(double cells, double most_c
   return best;
 }
 
-RegionTemplate RegionSearch::finished(const Candidate& candidate, std::size_t cells) const {
+RegionTemplate RegionSearch::finished(const LabelledGrid& candidate, std::size_t cells) const {
   RegionTemplate result;
   std::vector<char> kept;
   for (const int label : candidate.labels) kept.push_back(label != kOutside);
@@ -295,7 +289,7 @@ RegionTemplateResult RegionSearch::run() {
   constexpr double kRoom = 64, kLeastRoom = 1e6;  // cells of a grid, empty ones counted, for each one requested
   const AxisPlanes planes = axis_planes(surface_.mesh, frame_along_planes(surface_.mesh));
   RegionTemplateResult result;
-  std::optional<Candidate> best;
+  std::optional<LabelledGrid> best;
   std::size_t asked = 0;
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     fraction_ = rung == 0 ? 0 : static_cast<double>(rung) / kLadder.size();
@@ -303,7 +297,7 @@ RegionTemplateResult RegionSearch::run() {
     if (result.cancelled) return result;
     const double cells = kLadder[rung] * static_cast<double>(options_.cells);
     const double most_cells = kLeastRoom + kRoom * cells;
-    std::optional<Candidate> found = best_through(planes, cells, most_cells);
+    std::optional<LabelledGrid> found = best_through(planes, cells, most_cells);
     if (!found && !stop_.is_stopped()) found = best_of_cubes(cells, most_cells);
     if (stop_.is_stopped()) {
       result.cancelled = true;

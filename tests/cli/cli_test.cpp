@@ -27,6 +27,7 @@
 
 namespace fs = std::filesystem;
 using subvol::test::content_of;
+using subvol::test::kFit;
 using subvol::test::kSanitized;
 using subvol::test::Run;
 using subvol::test::TemporaryFolder;
@@ -34,14 +35,13 @@ using subvol::test::Workplace;
 
 namespace {
 
-constexpr const char* kFit = "fit target.off --template template.mesh ";
 
 }  // namespace
 
 TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the truth", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
-      std::string(kFit) + "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
+      kFit + "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   CHECK(run.out.empty());
@@ -80,7 +80,7 @@ TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the t
 
 TEST_CASE("A report becomes a page that needs nothing else", "[cli][slow]") {
   const Workplace place;
-  REQUIRE(place.run(std::string(kFit) + "--levels 1 -o a&b.mesh -o cage:cage.mesh --report report.json").status == 0);
+  REQUIRE(place.run(kFit + "--levels 1 -o a&b.mesh -o cage:cage.mesh --report report.json").status == 0);
   const auto words = place.json("report.json").at("command_line");
   CHECK(words.at(1) == "fit");
   const Run run = place.run("report report.json --no-viewer -o page.html");
@@ -137,7 +137,7 @@ TEST_CASE("What is no report is refused, and nothing is written", "[cli]") {
 
 TEST_CASE("A fit of curved elements goes from files to files that check agrees with", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "--order 3 -o out.vtu -o out.glb -o out.mesh --report report.json");
+  const Run run = place.run(kFit + "--order 3 -o out.vtu -o out.glb -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   const auto report = place.json("report.json");
@@ -155,7 +155,7 @@ TEST_CASE("A fit of curved elements goes from files to files that check agrees w
 TEST_CASE("An adaptive fit goes from files to files", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
-      std::string(kFit) + "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
+      kFit + "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   const auto orders = place.json("report.json").at("orders");
@@ -202,7 +202,7 @@ TEST_CASE("Points are fitted and checked one way, and what makes no sense with t
   refused(fit + "--crease-angle 40 -o no.mesh", 2, "--crease-angle");
   refused(fit + "--correspondence voronoi -o no.mesh", 2, "voronoi");
   refused(fit + "--order 2 --correspondence voronoi -o no.vtu", 2, "voronoi");
-  refused(std::string(kFit) + "--point-weights area -o no.mesh", 2, "--point-weights");
+  refused(kFit + "--point-weights area -o no.mesh", 2, "--point-weights");
   refused("optimize template.mesh --target points.xyz -o no.mesh", 3, "points without faces");
   refused("optimize template.mesh --order 2 --target points.xyz -o no.vtu", 3, "points without faces");
   refused("template auto points.xyz -o no.mesh", 3, "points without faces");
@@ -220,20 +220,20 @@ TEST_CASE("A template with a few inverted cells is untangled before a fit, a mir
     break;
   }
   const Workplace place(sample);
-  const Run run = place.run(std::string(kFit) + "--levels 1 -o out.mesh");
+  const Run run = place.run(kFit + "--levels 1 -o out.mesh");
   INFO(run.err);
   CHECK(run.status == 0);
   CHECK(run.err.find("untangled") != std::string::npos);
   CHECK(place.run("check out.mesh").status == 0);
   for (const char* words : {"--levels 1 -o late.mesh", "--order 2 -o late.vtu"}) {
-    const Run late = place.run(std::string(kFit) + "--time-limit 0.001 " + words);
+    const Run late = place.run(kFit + "--time-limit 0.001 " + words);
     INFO(late.err);
     CHECK(late.status == 4);
     CHECK(late.err.find("there is nothing to write") != std::string::npos);
   }
   for (subvol::Vec3& p : sample.template_mesh.positions) p.x() = -p.x();
   const Workplace mirrored(sample);
-  CHECK(mirrored.run(std::string(kFit) + "--levels 1 -o out.mesh").status == 3);
+  CHECK(mirrored.run(kFit + "--levels 1 -o out.mesh").status == 3);
 }
 
 TEST_CASE("The report tells the state of a target and whether the template can become it", "[cli][slow]") {
@@ -241,7 +241,7 @@ TEST_CASE("The report tells the state of a target and whether the template can b
   sample.template_mesh = subvol::samples::ball_sample().template_mesh;
   std::swap(sample.target.triangles[5][0], sample.target.triangles[5][1]);
   const Workplace place(sample);
-  const Run run = place.run(std::string(kFit) + "--levels 1 --max-iterations 1 -o out.mesh --report report.json");
+  const Run run = place.run(kFit + "--levels 1 --max-iterations 1 -o out.mesh --report report.json");
   CHECK(run.err.find("topology differs") != std::string::npos);
   const auto target = place.json("report.json").at("target");
   CHECK(target.at("turned_edges") == 3);
@@ -253,15 +253,15 @@ TEST_CASE("The report tells the state of a target and whether the template can b
 
 TEST_CASE("A fit is the same bits for one thread and for two", "[cli][slow]") {
   const Workplace place;
-  REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 1 -o one.mesh -o one.obj").status == 0);
-  REQUIRE(place.run(std::string(kFit) + "--levels 1 --threads 2 -o two.mesh -o two.obj").status == 0);
+  REQUIRE(place.run(kFit + "--levels 1 --threads 1 -o one.mesh -o one.obj").status == 0);
+  REQUIRE(place.run(kFit + "--levels 1 --threads 2 -o two.mesh -o two.obj").status == 0);
   CHECK(content_of(place / "one.mesh") == content_of(place / "two.mesh"));
   CHECK(content_of(place / "one.obj") == content_of(place / "two.obj"));
 }
 
 TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "--levels 1 --tolerance 0.000001 -o out.mesh --report report.json");
+  const Run run = place.run(kFit + "--levels 1 --tolerance 0.000001 -o out.mesh --report report.json");
   INFO(run.err);
   CHECK(run.status == 4);
   CHECK(place.has("out.mesh"));
@@ -270,7 +270,7 @@ TEST_CASE("A tolerance that is missed ends with status 4 and the best result", "
 
 TEST_CASE("A fit converges only where its file and its limit surface are within the tolerance", "[cli][slow]") {
   const Workplace place;
-  const std::string fit = std::string(kFit) + "--levels 1 --chord 5 --force -o out.mesh -o out.glb --report r.json ";
+  const std::string fit = kFit + "--levels 1 --chord 5 --force -o out.mesh -o out.glb --report r.json ";
   const auto farthest = [](const nlohmann::json& report) {
     const auto& limit = report.at("limit_surface_distance");
     CHECK(limit.at("chord_error_percent") < 0.01);  // whatever the scene's are
@@ -291,7 +291,7 @@ TEST_CASE("A fit converges only where its file and its limit surface are within 
 
 TEST_CASE("A time limit ends with status 4 and the best result", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "--levels 3 --time-limit 0.01 -o out.mesh --report report.json");
+  const Run run = place.run(kFit + "--levels 3 --time-limit 0.01 -o out.mesh --report report.json");
   INFO(run.err);
   CHECK(run.status == 4);
   CHECK(place.has("out.mesh"));
@@ -300,7 +300,7 @@ TEST_CASE("A time limit ends with status 4 and the best result", "[cli][slow]") 
 
 TEST_CASE("Ctrl-C ends a fit with the best result and status 130", "[cli]") {
   const Workplace place(subvol::samples::torus_sample());
-  const pid_t child = place.start(std::string(kFit) + "--levels 4 --progress json -o out.mesh --report report.json");
+  const pid_t child = place.start(kFit + "--levels 4 --progress json -o out.mesh --report report.json");
   // The first line of progress says that the fit is under way.
   for (int i = 0; i < 600 && content_of(place / "stdout.txt").empty(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -326,39 +326,41 @@ TEST_CASE("What stands in no file is refused before any work, and nothing is wri
   };
   refuses("", 2, "subcommand");
   refuses("frobnicate", 2, "frobnicate");
+  refuses("optimise in.mesh -o out.mesh", 2, "there is no verb 'optimise'; did you mean optimize?");
+  refuses("transmogrify", 2, "there is no verb 'transmogrify'; there are: fit");
   refuses("--helpp", 2, "there is no option '--helpp'; did you mean --help?");
   refuses("fit --helpp", 2, "did you mean --help?");
   refuses("fit target.off --tolerence 1 -o out.glb", 2, "did you mean --tolerance?");
   refuses("template carve --zzzzzzz", 2, "template carve --help lists them");
   refuses("fit target.off --cells 3 -o out.glb", 2, "--cells");
   refuses("fit target.off --template template.mesh", 2, "-o");
-  refuses(std::string(kFit) + "--levels 0 -o out.glb", 2, "levels");
-  refuses(std::string(kFit) + "--levels 7 -o out.glb", 2, "levels");
-  refuses(std::string(kFit) + "--levels two -o out.glb", 2, "levels");
-  refuses(std::string(kFit) + "--tolerance -1 -o out.glb", 2, "tolerance");
-  refuses(std::string(kFit) + "--tolerance nan -o out.glb", 2, "tolerance");
-  refuses(std::string(kFit) + "--crease-angle 181 -o out.glb", 2, "crease-angle");
-  refuses(std::string(kFit) + "--surface sphere -o out.glb", 2, "surface");
-  refuses(std::string(kFit) + "--solver magic -o out.glb", 2, "solver");
-  refuses(std::string(kFit) + "--progress loud -o out.glb", 2, "progress");
-  refuses(std::string(kFit) + "--threads 0 -o out.glb", 2, "threads");
-  refuses(std::string(kFit) + "--order 17 -o out.glb", 2, "order");
-  refuses(std::string(kFit) + "--order 3 --levels 2 -o out.glb", 2, "levels");
-  refuses(std::string(kFit) + "--basis legendre -o out.glb", 2, "order");
-  refuses(std::string(kFit) + "--adaptive -o out.glb", 2, "order");
-  refuses(std::string(kFit) + "--order 3 --basis spline -o out.glb", 2, "basis");
-  refuses(std::string(kFit) + "--order 3 -o out.usda", 2, "out.usda");
-  refuses(std::string(kFit) + "--order 3 -o cage:out.mesh", 2, "cage");
-  refuses(std::string(kFit) + "--order 10 -o out.msh", 3, "order");
-  refuses(std::string(kFit) + "-o cages:out.mesh", 2, "cages:");
-  refuses(std::string(kFit) + "-o out.mesh --report= target.off", 2, "--report: expected a value");
-  refuses(std::string(kFit) + "-o out.docx", 2, "out.docx");
-  refuses(std::string(kFit) + "-o out", 2, "out");
-  refuses(std::string(kFit) + "-o out.mesh -o ./out.mesh", 2, "twice");
-  refuses(std::string(kFit) + "-o template.mesh", 2, "template.mesh");
-  refuses(std::string(kFit) + "-o out.glb --config none.toml", 2, "none.toml");
-  refuses(std::string(kFit) + "-o nowhere/out.glb", 1, "nowhere/out.glb");
-  refuses(std::string(kFit) + "-o out.glb --report nowhere/report.json", 1, "nowhere/report.json");
+  refuses(kFit + "--levels 0 -o out.glb", 2, "levels");
+  refuses(kFit + "--levels 7 -o out.glb", 2, "levels");
+  refuses(kFit + "--levels two -o out.glb", 2, "levels");
+  refuses(kFit + "--tolerance -1 -o out.glb", 2, "tolerance");
+  refuses(kFit + "--tolerance nan -o out.glb", 2, "tolerance");
+  refuses(kFit + "--crease-angle 181 -o out.glb", 2, "crease-angle");
+  refuses(kFit + "--surface sphere -o out.glb", 2, "surface");
+  refuses(kFit + "--solver magic -o out.glb", 2, "solver");
+  refuses(kFit + "--progress loud -o out.glb", 2, "progress");
+  refuses(kFit + "--threads 0 -o out.glb", 2, "threads");
+  refuses(kFit + "--order 17 -o out.glb", 2, "order");
+  refuses(kFit + "--order 3 --levels 2 -o out.glb", 2, "levels");
+  refuses(kFit + "--basis legendre -o out.glb", 2, "order");
+  refuses(kFit + "--adaptive -o out.glb", 2, "order");
+  refuses(kFit + "--order 3 --basis spline -o out.glb", 2, "basis");
+  refuses(kFit + "--order 3 -o out.usda", 2, "out.usda");
+  refuses(kFit + "--order 3 -o cage:out.mesh", 2, "cage");
+  refuses(kFit + "--order 10 -o out.msh", 3, "order");
+  refuses(kFit + "-o cages:out.mesh", 2, "cages:");
+  refuses(kFit + "-o out.mesh --report= target.off", 2, "--report: expected a value");
+  refuses(kFit + "-o out.docx", 2, "out.docx");
+  refuses(kFit + "-o out", 2, "out");
+  refuses(kFit + "-o out.mesh -o ./out.mesh", 2, "twice");
+  refuses(kFit + "-o template.mesh", 2, "template.mesh");
+  refuses(kFit + "-o out.glb --config none.toml", 2, "none.toml");
+  refuses(kFit + "-o nowhere/out.glb", 1, "nowhere/out.glb");
+  refuses(kFit + "-o out.glb --report nowhere/report.json", 1, "nowhere/report.json");
   refuses("fit none.off --template template.mesh -o out.glb", 3, "none.off");
   refuses("fit target.off --template none.mesh -o out.glb", 3, "none.mesh");
   refuses("fit target.off --template target.off -o out.glb", 3, "target.off");
@@ -411,14 +413,14 @@ TEST_CASE("An output that cannot be written does not cost the others", "[cli][sl
 
 TEST_CASE("A name that is too long is found before the work", "[cli]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "-o " + std::string(300, 'x') + ".mesh");
+  const Run run = place.run(kFit + "-o " + std::string(300, 'x') + ".mesh");
   CHECK(run.status == 1);
   CHECK(run.err.find(" s  ") == std::string::npos);  // no progress was told
 }
 
 TEST_CASE("A file that somebody makes during the work is not replaced without --force", "[cli][slow]") {
   const Workplace place;
-  const pid_t child = place.start(std::string(kFit) + "--levels 1 --progress json -o out.mesh");
+  const pid_t child = place.start(kFit + "--levels 1 --progress json -o out.mesh");
   for (int i = 0; i < 600 && content_of(place / "stdout.txt").empty() && content_of(place / "stderr.txt").empty(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   place.file("out.mesh", "precious");
@@ -428,7 +430,7 @@ TEST_CASE("A file that somebody makes during the work is not replaced without --
 
 TEST_CASE("A folder that cannot be written to is found before the work", "[cli]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "-o /proc/out.mesh");
+  const Run run = place.run(kFit + "-o /proc/out.mesh");
   CHECK(run.status == 1);
   CHECK(run.err.find("/proc/out.mesh") != std::string::npos);
   CHECK(run.err.find(" s  ") == std::string::npos);  // no progress was told

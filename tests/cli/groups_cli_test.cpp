@@ -18,12 +18,11 @@
 
 using namespace subvol;
 using subvol::test::content_of;
+using subvol::test::has;
 using subvol::test::Run;
 using subvol::test::Workplace;
 
 namespace {
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// A surface as .obj with the groups "north" and "south": above and below z = 0.
 std::string obj_with_halves(const TriangleMesh& surface) {

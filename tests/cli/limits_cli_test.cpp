@@ -17,7 +17,6 @@ using namespace subvol::test;
 
 namespace {
 
-const std::string kFit = "fit target.off --template template.mesh ";
 const std::string kShort = kFit + "--max-iterations 1 ";
 constexpr int kStepsRanOut = 4;
 

@@ -14,8 +14,6 @@ using namespace subvol::test;
 
 namespace {
 
-bool has(const std::string& text, const char* words) { return text.find(words) != std::string::npos; }
-
 std::string npy(const LabelGrid& grid) {
   std::string header = "{'descr': '|u1', 'fortran_order': True, 'shape': (" + std::to_string(grid.counts[0]) + ", " +
                        std::to_string(grid.counts[1]) + ", " + std::to_string(grid.counts[2]) + "), }";

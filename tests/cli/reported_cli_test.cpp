@@ -11,6 +11,7 @@
 #include <optional>
 
 using subvol::test::content_of;
+using subvol::test::has;
 using subvol::test::Run;
 using subvol::test::Workplace;
 
@@ -23,8 +24,6 @@ std::optional<std::string> reported_inputs() {
   WARN("SKIPPED: no folder with reported inputs");
   return std::nullopt;
 }
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 

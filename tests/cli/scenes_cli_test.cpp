@@ -17,13 +17,13 @@
 
 using subvol::test::check_with_validator;
 using subvol::test::content_of;
+using subvol::test::kFit;
 using subvol::test::Run;
 using subvol::test::Workplace;
 using subvol_tests::GlbFile;
 
 namespace {
 
-constexpr const char* kFit = "fit target.off --template template.mesh ";
 
 std::vector<std::string> node_names(const GlbFile& file) {
   std::vector<std::string> names;
@@ -35,7 +35,7 @@ std::vector<std::string> node_names(const GlbFile& file) {
 
 TEST_CASE("A fit writes a cutaway and its own animation beside the surface", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "--levels 2 -o out.glb -o cutaway:cut.glb -o animation:steps.glb "
+  const Run run = place.run(kFit + "--levels 2 -o out.glb -o cutaway:cut.glb -o animation:steps.glb "
                                                 "-o out.mesh --cut x:0.4 --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
@@ -51,14 +51,14 @@ TEST_CASE("A fit writes a cutaway and its own animation beside the surface", "[c
   CHECK(steps.json.at("animations").size() == 1);
   check_with_validator({place / "out.glb", place / "cut.glb", place / "steps.glb"});
 
-  REQUIRE(place.run(std::string(kFit) + "--levels 2 -o animation:again.glb --threads 1").status == 0);
+  REQUIRE(place.run(kFit + "--levels 2 -o animation:again.glb --threads 1").status == 0);
   const GlbFile again(content_of(place / "again.glb"));
   CHECK(again.binary == steps.binary);
 }
 
 TEST_CASE("A fit of curved cells writes a cutaway and its own animation", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "--order 2 -o out.vtu -o cutaway:cut.glb -o animation:steps.glb");
+  const Run run = place.run(kFit + "--order 2 -o out.vtu -o cutaway:cut.glb -o animation:steps.glb");
   INFO(run.err);
   REQUIRE(run.status == 0);
   CHECK(GlbFile(content_of(place / "steps.glb")).json.at("animations").size() == 1);
@@ -97,7 +97,7 @@ TEST_CASE("Parts that there are not are refused before any work", "[cli]") {
 
 TEST_CASE("Scripts are told of every step, of the time left, and of the work after the solve", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(std::string(kFit) + "--levels 2 --max-iterations 2 -o out.glb --progress json");
+  const Run run = place.run(kFit + "--levels 2 --max-iterations 2 -o out.glb --progress json");
   std::istringstream lines(run.out);
   std::size_t steps = 0, with_time = 0;
   std::set<std::string> parts;

@@ -12,12 +12,11 @@
 #include <string>
 
 using subvol::test::content_of;
+using subvol::test::has;
 using subvol::test::Run;
 using subvol::test::Workplace;
 
 namespace {
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// A box of quads, 2 x 1 x 1, whose six sides are groups; each side is one face.
 const char* const kBox =

@@ -11,6 +11,7 @@
 #include <string>
 
 using subvol::test::content_of;
+using subvol::test::kFit;
 using subvol::test::Run;
 using subvol::test::Workplace;
 
@@ -129,4 +130,27 @@ TEST_CASE("What cannot be viewed is refused, and nothing is written", "[cli]") {
   if (!has_viewer(gone)) return;
   CHECK(gone.status == 3);
   CHECK(gone.err.find("gone.mesh") != std::string::npos);
+}
+
+TEST_CASE("The course of a fit becomes a page with a timeline", "[cli]") {
+  const Workplace place;
+  const Run linear = place.run(kFit + "--levels 1 -o animation:course.html");
+  INFO(linear.err);
+  if (!has_viewer(linear)) {
+    CHECK(linear.status == 2);
+    return;
+  }
+  REQUIRE(linear.status == 0);
+  REQUIRE(place.run(kFit + "--order 2 -o animation:curved.html").status == 0);
+  REQUIRE(place.run("fit target.off --cells 300 -o animation:automatic.html -o automatic.mesh --quality 0.3").status == 0);
+  for (const char* name : {"course.html", "curved.html", "automatic.html"}) {
+    INFO(name);
+    const nlohmann::json data = data_of(content_of(place / name));
+    REQUIRE(data["meshes"].size() >= 3);
+    CHECK(data["is_timeline"] == true);
+    CHECK(data["shown"] == data["meshes"].size() - 1);
+    CHECK(data["meshes"].back()["name"] == "result");
+    for (const auto& mesh : data["meshes"]) CHECK(mesh["num_cells"] == data["meshes"][0]["num_cells"]);
+  }
+  CHECK(place.run(kFit + "--levels 1 -o cutaway:inside.html").status == 2);
 }

@@ -128,7 +128,7 @@ void require_bent(const std::filesystem::path& file, CellKind kind) {
     CHECK((read.mesh.position(0, u) - bent(u)).norm() < 1e-12);
 }
 
-VolumeMesh mixed_cells() {
+VolumeMesh cells_of_all_kinds() {
   VolumeMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0},     {0, 1, 0},     {0, 0, 1},     {1, 0, 1.25},
                     {1, 1, 1}, {0, 1, 1}, {2, 0.5, 0.1}, {2, 0.5, 1.1}, {1.3, 0.5, 2.3}};
@@ -139,7 +139,7 @@ VolumeMesh mixed_cells() {
   return mesh;
 }
 
-void write_linear(const std::filesystem::path& path, const VolumeMesh& mesh) {
+void write_straight(const std::filesystem::path& path, const VolumeMesh& mesh) {
   const std::string extension = path.extension().string();
   extension == ".mesh" || extension == ".vtk" ? write_volume_mesh(path, mesh) : write_volume(path, mesh);
 }
@@ -154,7 +154,7 @@ void require_same(const VolumeMesh& a, const VolumeMesh& b, double tolerance) {
 
 /// The mixed cells with modes that are no symmetric shape.
 HighOrderMesh curved_cells(int order) {
-  const VolumeMesh cells = mixed_cells();
+  const VolumeMesh cells = cells_of_all_kinds();
   HighOrderMesh mesh(ElementSpace(cells, Basis::legendre, order), cells);
   for (std::size_t n = cells.num_vertices(); n < mesh.coefficients.size(); ++n) {
     const double s = static_cast<double>(n);
@@ -200,7 +200,7 @@ TEST_CASE("curved_file: quadratic cells of every format have their nodes in the 
 
 TEST_CASE("curved_file: linear meshes go from format to format and back", "[export]") {
   const TemporaryFolder folder;
-  const VolumeMesh mesh = mixed_cells();
+  const VolumeMesh mesh = cells_of_all_kinds();
   const std::vector<std::string> formats{"mesh", "vtk", "vtu", "msh", "inp", "bdf", "mfem", "e"};
   for (const std::string& a : formats)
     for (const std::string& b : formats) {
@@ -208,13 +208,13 @@ TEST_CASE("curved_file: linear meshes go from format to format and back", "[expo
       const double tolerance = a == "bdf" || b == "bdf" ? 1e-12 : 0;
       const std::filesystem::path first = folder.path() / ("a." + a), second = folder.path() / ("b." + b);
       // Medit has hexes first, then prisms and tets; so have all others here.
-      write_linear(first, mesh);
+      write_straight(first, mesh);
       const VolumeMesh one = read_volume_mesh(first);
       require_same(one, mesh, tolerance);
-      write_linear(second, one);
+      write_straight(second, one);
       const VolumeMesh two = read_volume_mesh(second);
       require_same(two, mesh, tolerance);
-      write_linear(first, two);
+      write_straight(first, two);
       require_same(read_volume_mesh(first), mesh, tolerance);
     }
 }

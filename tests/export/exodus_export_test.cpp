@@ -30,7 +30,7 @@ bool is_missing() {
   return true;
 }
 
-VolumeMesh grouped_cells() {
+VolumeMesh exodus_cells() {
   VolumeMesh mesh = with_floor_and_roof(mixed_cells(), 1);
   mesh.face_groups.groups[0].name = "the \"floor\"";
   mesh.face_groups.groups[1].number = 7;
@@ -46,7 +46,7 @@ std::vector<std::size_t> order_of(const VolumeMesh& mesh) { return exodus_order(
 
 TEST_CASE("exodus: cells, references, regions and groups of all kinds come back", "[export]") {
   if (is_missing()) return;
-  const VolumeMesh mesh = grouped_cells();
+  const VolumeMesh mesh = exodus_cells();
   const TemporaryFolder folder;
   write_volume(folder / "a.e", mesh);
   CHECK_NOTHROW(require_written(folder / "a.e", mesh));
@@ -85,7 +85,7 @@ TEST_CASE("exodus: cells of order 2 are exact, and have nodes on edges only if t
   if (is_missing()) return;
   const TemporaryFolder folder;
   PointSource source(3);
-  const VolumeMesh cells = grouped_cells();
+  const VolumeMesh cells = exodus_cells();
   const HighOrderMesh mesh = random_mesh(ElementSpace(cells, Basis::legendre, 2), source);
   const HighOrderFileOptions options{
       .references = cells.references, .face_groups = &cells.face_groups, .regions = cells.regions};
@@ -144,7 +144,7 @@ TEST_CASE("exodus: VTK sees the same cells, curved and straight", "[export][cons
 TEST_CASE("exodus: damaged files are refused", "[export]") {
   if (is_missing()) return;
   const TemporaryFolder folder;
-  const std::string bytes = exodus_bytes(nodal_mesh(grouped_cells()));
+  const std::string bytes = exodus_bytes(nodal_mesh(exodus_cells()));
   const NodalMesh whole = read_nodal_mesh(folder.file("whole.e", bytes));
   for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 200) {
     try {  // what lacks only its last bytes, those of node sets, is the same mesh

@@ -18,7 +18,7 @@ using subvol_tests::UsdaFile;
 
 namespace {
 
-const double kNaN = std::numeric_limits<double>::quiet_NaN();
+const double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 /// The unit cube's quads, outward, with an awkward coordinate.
 PolygonMesh cube() {
@@ -167,14 +167,14 @@ TEST_CASE("cages that cannot be written are refused") {
   using T = FeatureTags;
   using O = UsdOptions;
   refused([](M& m, T&, O&) { m = {}; });
-  refused([](M& m, T&, O&) { m.positions[2].z() = kNaN; });
+  refused([](M& m, T&, O&) { m.positions[2].z() = kNotANumber; });
   refused([](M& m, T&, O&) { m.face_vertices[5] = 8; });
   refused([](M& m, T&, O&) { m.face_vertices[5] = -1; });
   refused([](M& m, T&, O&) { m.face_vertices.pop_back(); });
   refused([](M& m, T&, O&) { m.face_offsets = {0, 2, 24}; });
   refused([](M&, T& t, O&) { t.creases.push_back({0, 7, 10}); });
   refused([](M&, T& t, O&) { t.creases[0].sharpness = 0; });
-  refused([](M&, T& t, O&) { t.creases[0].sharpness = kNaN; });
+  refused([](M&, T& t, O&) { t.creases[0].sharpness = kNotANumber; });
   refused([](M&, T& t, O&) { t.corners[0].vertex = 8; });
   refused([](M&, T& t, O&) { t.corners[0].sharpness = -1; });
   refused([](M&, T&, O& o) { o.name = "1cage"; });
@@ -182,7 +182,7 @@ TEST_CASE("cages that cannot be written are refused") {
   refused([](M&, T&, O& o) { o.name = ""; });
   refused([](M&, T&, O& o) { o.metres_per_unit = 0; });
   PolygonMesh broken = cube();
-  broken.positions[0].x() = kNaN;
+  broken.positions[0].x() = kNotANumber;
   CHECK_THROWS_AS(obj_text(broken), InputError);
   CHECK_THROWS_AS(obj_text({}), InputError);
   CHECK_THROWS_AS(write_usd("cage.usdc", cube(), {}), InputError);

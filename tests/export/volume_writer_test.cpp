@@ -20,7 +20,7 @@ using Catch::Contains;
 
 namespace {
 
-VolumeMesh marked_cells() {
+VolumeMesh referenced_cells() {
   VolumeMesh mesh = mixed_cells();
   jitter(mesh, 0.05);
   mesh.references = {2, 0, 2, 5};
@@ -55,7 +55,7 @@ std::vector<T> data_array(const std::string& text, const std::string& name) {
 }  // namespace
 
 TEST_CASE("a .vtu holds points, plain cells and cell data bit by bit") {
-  const VolumeMesh mesh = marked_cells();
+  const VolumeMesh mesh = referenced_cells();
   const std::string text = vtu_text(mesh, kMinima);
   CHECK(text.find("version=\"1.0\"") != std::string::npos);
   const auto points = data_array<double>(text, "Points");
@@ -77,7 +77,7 @@ TEST_CASE("a .vtu holds points, plain cells and cell data bit by bit") {
 }
 
 TEST_CASE("a .msh holds the cells by volume and kind, with physical groups and element data") {
-  const VolumeMesh mesh = marked_cells();
+  const VolumeMesh mesh = referenced_cells();
   std::istringstream in(msh_text(mesh, kMinima));
   const auto expect = [&](const std::string& expected) {
     std::string word;
@@ -118,7 +118,7 @@ TEST_CASE("a .msh holds the cells by volume and kind, with physical groups and e
 }
 
 TEST_CASE("every cell of a .msh is in a physical group, whatever the references are") {
-  VolumeMesh mesh = marked_cells();
+  VolumeMesh mesh = referenced_cells();
   const auto entities = [&](std::vector<int> references) {
     mesh.references = std::move(references);
     const std::string text = msh_text(mesh);
@@ -148,7 +148,7 @@ TEST_CASE("every cell of a .msh is in a physical group, whatever the references 
 
 TEST_CASE("meshes that cannot be written as volumes are refused") {
   const auto refused = [](auto spoil) {
-    VolumeMesh mesh = marked_cells();
+    VolumeMesh mesh = referenced_cells();
     std::vector<double> minima = kMinima;
     spoil(mesh, minima);
     CHECK_THROWS_AS(vtu_text(mesh, minima), InputError);
@@ -163,11 +163,11 @@ TEST_CASE("meshes that cannot be written as volumes are refused") {
   refused([nan](VolumeMesh& m, std::vector<double>&) { m.positions[2].x() = nan; });
   refused([](VolumeMesh&, std::vector<double>& q) { q.pop_back(); });
   refused([nan](VolumeMesh&, std::vector<double>& q) { q[0] = nan; });
-  CHECK_THROWS_AS(write_volume("mesh.vtk", marked_cells()), InputError);
+  CHECK_THROWS_AS(write_volume("mesh.vtk", referenced_cells()), InputError);
 }
 
 TEST_CASE("fields stand at the vertices of a .vtu and a .msh") {
-  const VolumeMesh mesh = marked_cells();
+  const VolumeMesh mesh = referenced_cells();
   VertexField field{"thickness", {}};
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v) field.values.push_back(0.1 * static_cast<double>(v));
   const std::vector<VertexField> fields{field};

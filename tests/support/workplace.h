@@ -13,6 +13,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -60,6 +61,11 @@ struct Run {
   int status = -1;
   std::string out, err;
 };
+
+/// The beginning of a fit of the sample of a `Workplace`.
+inline const std::string kFit = "fit target.off --template template.mesh ";
+
+inline bool has(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
 
 /// A folder with one sample in it, in which the program is run.
 class Workplace {

@@ -14,9 +14,7 @@ using namespace subvol;
 
 namespace {
 
-using Random = std::mt19937;
-
-HexPart random_part(Random& random, const HexContraction& contraction) {
+HexPart random_part(std::mt19937& random, const HexContraction& contraction) {
   HexPart part;
   for (int d = 0; d < 3; ++d) {
     part.levels[d] = static_cast<int>(random() % 6);
@@ -30,7 +28,7 @@ HexPart random_part(Random& random, const HexContraction& contraction) {
 
 TEST_CASE("A hex contracted in single precision is what it is in double, less a point, up to its bounds",
           "[hex_matrices]") {
-  Random random(11);
+  std::mt19937 random(11);
   for (const Basis basis : {Basis::fourier, Basis::legendre})
     for (const int order : {1, 2, 3, 4, 5, 8, 12, 16}) {
       HexContraction contraction(basis, order);

@@ -30,7 +30,7 @@ std::vector<Vec3> bent(const ElementSpace& space, const VolumeMesh& mesh, PointS
   return curved.coefficients;
 }
 
-std::vector<Vec3> moved(std::vector<Vec3> x, const std::vector<Vec3>& d, double t) {
+std::vector<Vec3> moved_along(std::vector<Vec3> x, const std::vector<Vec3>& d, double t) {
   for (std::size_t i = 0; i < x.size(); ++i) x[i] += t * d[i];
   return x;
 }
@@ -48,9 +48,9 @@ void check_derivatives(VolumeTerm& energy, const std::vector<Vec3>& x, const std
     slope += gradient[i].dot(d[i]);
   }
   CHECK(slope ==
-        Approx(scale * (energy.value(moved(x, d, h)) - energy.value(moved(x, d, -h))) / (2 * h)).epsilon(1e-7));
-  energy.add_gradient(moved(x, d, h), scale, plus);
-  energy.add_gradient(moved(x, d, -h), scale, minus);
+        Approx(scale * (energy.value(moved_along(x, d, h)) - energy.value(moved_along(x, d, -h))) / (2 * h)).epsilon(1e-7));
+  energy.add_gradient(moved_along(x, d, h), scale, plus);
+  energy.add_gradient(moved_along(x, d, -h), scale, minus);
   energy.multiply(d, product);
   double largest = 0, error = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -136,7 +136,7 @@ TEST_CASE("an inverted curved cell costs infinity and leaves the gradient alone;
   CHECK(energy.value(x) < 1e-28);
   CHECK(energy.uncertified(x).empty());
   d[space.cell_nodes(0)] = Vec3(10, 0, 0);
-  const std::vector<Vec3> folded = moved(x, d, 1);
+  const std::vector<Vec3> folded = moved_along(x, d, 1);
   std::vector<Vec3> gradient(x.size(), Vec3::Zero());
   CHECK(energy.value(folded) == std::numeric_limits<double>::infinity());
   CHECK(energy.add_gradient(folded, 1, gradient) == std::numeric_limits<double>::infinity());
@@ -144,7 +144,7 @@ TEST_CASE("an inverted curved cell costs infinity and leaves the gradient alone;
   CHECK(energy.uncertified(folded) == std::vector<Index>{0});
   const double step = energy.max_step(x, d);
   CHECK((step > 0 && step < 1));
-  CHECK(std::isfinite(energy.value(moved(x, d, step))));
+  CHECK(std::isfinite(energy.value(moved_along(x, d, step))));
   CHECK(energy.points_per_direction()[0] == 5);
   energy.densify(std::vector<Index>{0}, x);
   CHECK(energy.points_per_direction()[0] == 9);

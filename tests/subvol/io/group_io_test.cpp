@@ -24,7 +24,7 @@ std::vector<std::string> labels(const FaceGroups& groups) {
 
 using Labels = std::vector<std::string>;
 
-PolygonMesh read(const std::string& name, const std::string& text, std::vector<std::string>* warnings = nullptr) {
+PolygonMesh read_groups(const std::string& name, const std::string& text, std::vector<std::string>* warnings = nullptr) {
   const TemporaryFolder folder;
   return read_polygon_mesh(folder.file(name, text), warnings);
 }
@@ -35,7 +35,7 @@ const std::string kCorners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
 
 TEST_CASE("groups of an .obj are named by g, else by materials, else by several objects") {
   std::vector<std::string> warnings;
-  const PolygonMesh by_g = read("a.obj", kCorners + "o tet\nusemtl red\nf 1 3 2\ng base plate\nf 1 2 4\ng side\n"
+  const PolygonMesh by_g = read_groups("a.obj", kCorners + "o tet\nusemtl red\nf 1 3 2\ng base plate\nf 1 2 4\ng side\n"
                                                     "usemtl blue\nf 2 3 4\ng\nf 3 1 4\n", &warnings);
   CHECK(labels(by_g.face_groups) == Labels{"", "base plate", "side", ""});
   CHECK(by_g.face_groups.groups == std::vector<Group>{{"base plate", 1, 2}, {"side", 2, 2}});
@@ -43,11 +43,11 @@ TEST_CASE("groups of an .obj are named by g, else by materials, else by several 
   CHECK_THAT(warnings[0], Contains("2 uses of materials"));
 
   const std::string faces = "usemtl red\nf 1 3 2\nusemtl blue\nf 1 2 4\nf 2 3 4\nusemtl red\nf 3 1 4\n";
-  CHECK(labels(read("a.obj", kCorners + "g all\n" + faces).face_groups) == Labels{"red", "blue", "blue", "red"});
-  CHECK(labels(read("a.obj", kCorners + "g all\nf 1 3 2\nf 1 2 4\n").face_groups) == Labels{"all", "all"});
-  CHECK(labels(read("a.obj", kCorners + "o a\nf 1 3 2\no b\nf 1 2 4\n").face_groups) == Labels{"a", "b"});
-  CHECK(read("a.obj", kCorners + "o a\nf 1 3 2\nf 1 2 4\n").face_groups.empty());
-  CHECK(read("a.obj", kCorners + "g unused\ng\nf 1 3 2\nf 1 2 4\n").face_groups.empty());
+  CHECK(labels(read_groups("a.obj", kCorners + "g all\n" + faces).face_groups) == Labels{"red", "blue", "blue", "red"});
+  CHECK(labels(read_groups("a.obj", kCorners + "g all\nf 1 3 2\nf 1 2 4\n").face_groups) == Labels{"all", "all"});
+  CHECK(labels(read_groups("a.obj", kCorners + "o a\nf 1 3 2\no b\nf 1 2 4\n").face_groups) == Labels{"a", "b"});
+  CHECK(read_groups("a.obj", kCorners + "o a\nf 1 3 2\nf 1 2 4\n").face_groups.empty());
+  CHECK(read_groups("a.obj", kCorners + "g unused\ng\nf 1 3 2\nf 1 2 4\n").face_groups.empty());
 }
 
 TEST_CASE("dropped faces take their groups along") {
@@ -66,8 +66,8 @@ TEST_CASE("several solids of an .stl are groups, one is none") {
   const std::string o = facet("0 0 0", "0 1 0", "1 0 0"), x = facet("0 0 0", "1 0 0", "0 0 1"),
                     y = facet("1 0 0", "0 1 0", "0 0 1");
   const std::string two = "solid  base plate \n" + o + "endsolid\nsolid\n" + x + y + "endsolid\n";
-  CHECK(labels(read("a.stl", two).face_groups) == Labels{"base plate", "solid 2", "solid 2"});
-  CHECK(read("a.stl", "solid one\n" + o + x + y + "endsolid one\n").face_groups.empty());
+  CHECK(labels(read_groups("a.stl", two).face_groups) == Labels{"base plate", "solid 2", "solid 2"});
+  CHECK(read_groups("a.stl", "solid one\n" + o + x + y + "endsolid one\n").face_groups.empty());
 }
 
 TEST_CASE("labels and colors of the faces of a .ply and an .off are groups") {
@@ -77,15 +77,15 @@ TEST_CASE("labels and colors of the faces of a .ply and an .off are groups") {
            "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 " + values[0] + "\n3 0 1 3 " + values[1] + "\n";
   };
   const std::string material = "property int flags\nproperty int material_id\n";
-  const FaceGroups numbered = read("a.ply", ply(material, {"1 9", "1 4"})).face_groups;
+  const FaceGroups numbered = read_groups("a.ply", ply(material, {"1 9", "1 4"})).face_groups;
   CHECK(numbered.groups == std::vector<Group>{{"", 4, 2}, {"", 9, 2}});
   CHECK(numbered.of_face == std::vector<Index>{1, 0});
-  CHECK(labels(read("a.ply", ply(material, {"1 0", "1 4"})).face_groups) == Labels{"material_id 0", "material_id 4"});
+  CHECK(labels(read_groups("a.ply", ply(material, {"1 0", "1 4"})).face_groups) == Labels{"material_id 0", "material_id 4"});
   const std::string colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  CHECK(labels(read("a.ply", ply(colors, {"255 0 0", "0 128 0"})).face_groups) == Labels{"#ff0000", "#008000"});
-  CHECK(read("a.ply", ply(colors, {"255 0 0", "255 0 0"})).face_groups.empty());
+  CHECK(labels(read_groups("a.ply", ply(colors, {"255 0 0", "0 128 0"})).face_groups) == Labels{"#ff0000", "#008000"});
+  CHECK(read_groups("a.ply", ply(colors, {"255 0 0", "255 0 0"})).face_groups.empty());
   const std::string off = "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1 255 0 0\n3 0 1 3 0.0 1.0 0.0 1.0\n3 1 2 3\n";
-  CHECK(labels(read("a.off", off).face_groups) == Labels{"#ff0000", "#00ff00", ""});
+  CHECK(labels(read_groups("a.off", off).face_groups) == Labels{"#ff0000", "#00ff00", ""});
 }
 
 TEST_CASE("a repaired surface keeps its groups, and holes that are closed have none") {

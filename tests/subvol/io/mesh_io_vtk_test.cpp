@@ -85,7 +85,7 @@ VolumeMesh read_bytes(const std::string& bytes, std::vector<std::string>* warnin
   return read_volume_mesh(folder.file("in.vtk", bytes), {.warnings = warnings});
 }
 
-std::string refusal(const std::string& bytes) {
+std::string vtk_refusal(const std::string& bytes) {
   try {
     read_bytes(bytes);
   } catch (const InputError& error) {
@@ -94,7 +94,7 @@ std::string refusal(const std::string& bytes) {
   return "";
 }
 
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
+std::string vtk_replaced(std::string text, const std::string& from, const std::string& to) {
   REQUIRE(text.find(from) != std::string::npos);
   return text.replace(text.find(from), from.size(), to);
 }
@@ -233,9 +233,9 @@ TEST_CASE("attributes that cannot be passed over end the reading of a VTK file, 
     CHECK(read_bytes(base + "CELL_DATA 5\n" + part + attribute, &warnings).references == std::vector<int>{5, 6, 7});
     CHECK(warnings.size() == 1);
   }
-  CHECK_THAT(refusal(base + "POINT_DATA 11\nVECTORS v float\n1 2 3\n"), Contains("the file ends"));
-  CHECK_THAT(refusal(base + "POINT_DATA 11\nLOOKUP_TABLE t 999999999\n"), Contains("999999999"));
-  CHECK_THAT(refusal(base + "POINT_DATA 11\nCOLOR_SCALARS c -1\n"), Contains("negative"));
+  CHECK_THAT(vtk_refusal(base + "POINT_DATA 11\nVECTORS v float\n1 2 3\n"), Contains("the file ends"));
+  CHECK_THAT(vtk_refusal(base + "POINT_DATA 11\nLOOKUP_TABLE t 999999999\n"), Contains("999999999"));
+  CHECK_THAT(vtk_refusal(base + "POINT_DATA 11\nCOLOR_SCALARS c -1\n"), Contains("negative"));
 }
 
 TEST_CASE("references that do not fit become 0, with a warning") {
@@ -267,35 +267,35 @@ TEST_CASE("a mesh of all kinds survives a VTK round trip bit by bit") {
 
 TEST_CASE("what is malformed in a VTK file is refused with its line") {
   const std::string good = vtk_file({}, kPoints, kCells, kTypes);
-  REQUIRE(refusal(good).empty());
-  CHECK_THAT(refusal(""), Contains(":1:"));
-  CHECK_THAT(refusal("hello\n"), Contains(":1:") && Contains("vtk DataFile"));
-  CHECK_THAT(refusal(replaced(good, "Version 3.0", "Version 6.0")), Contains("2.0 to 5.1"));
-  CHECK_THAT(refusal(replaced(good, "ASCII", "UTF8")), Contains(":3:"));
-  CHECK_THAT(refusal(replaced(good, "UNSTRUCTURED_GRID", "POLYDATA")), Contains(":4:") && Contains("'POLYDATA'"));
-  CHECK_THAT(refusal(replaced(good, "POINTS 11", "POINTS 999999999999")), Contains(":5:") && Contains("999999999999"));
-  CHECK_THAT(refusal(replaced(good, "POINTS 11", "POINTS -1")), Contains("negative"));
-  CHECK_THAT(refusal(replaced(good, "POINTS 11", "POINTS 10")), Contains("expected a section"));
-  CHECK_THAT(refusal(replaced(good, "double", "bit")), Contains("'bit'"));
-  CHECK_THAT(refusal(replaced(good, "0.500000", "nan")), Contains(":6:") && Contains("'nan'"));
-  CHECK_THAT(refusal(replaced(good, "0.5", "x")), Contains(":6:"));
-  CHECK_THAT(refusal(replaced(good, "CELLS 5", "CELLS 6")), Contains("fewer cells"));
-  CHECK_THAT(refusal(replaced(good, "CELLS 5", "CELLS 4")), Contains("larger than its cells"));
-  CHECK_THAT(refusal(replaced(good, "8 0 1 2", "88 0 1 2")), Contains("88 corners"));
-  CHECK_THAT(refusal(replaced(good, "8 0 1 2", "8 0 1 11")), Contains("point 11 of 11"));
-  CHECK_THAT(refusal(replaced(good, "8 0 1 2", "8 0 1 -2")), Contains("point -2"));
-  CHECK_THAT(refusal(replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n14")), Contains("apex"));
-  CHECK_THAT(refusal(replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n25")), Contains("type 25"));
-  CHECK_THAT(refusal(replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n10")), Contains("expected 4"));
-  CHECK_THAT(refusal(replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 4\n")), Contains("4 cell types for 5 cells"));
-  CHECK_THAT(refusal(good.substr(0, good.find("CELL_TYPES"))), Contains("CELL_TYPES"));
-  CHECK_THAT(refusal(good.substr(0, good.find("CELLS"))), Contains("CELLS"));
-  CHECK_THAT(refusal(vtk_file({}, kPoints, {{0, 3, 2, 1}}, {9})), Contains("no hexes"));
-  CHECK_THAT(refusal(vtk_file({}, kPoints, {}, {})), Contains("no hexes"));
-  CHECK_THAT(refusal(good + "CELL_DATA 4\n"), Contains("expected 5"));
+  REQUIRE(vtk_refusal(good).empty());
+  CHECK_THAT(vtk_refusal(""), Contains(":1:"));
+  CHECK_THAT(vtk_refusal("hello\n"), Contains(":1:") && Contains("vtk DataFile"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "Version 3.0", "Version 6.0")), Contains("2.0 to 5.1"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "ASCII", "UTF8")), Contains(":3:"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "UNSTRUCTURED_GRID", "POLYDATA")), Contains(":4:") && Contains("'POLYDATA'"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS 999999999999")), Contains(":5:") && Contains("999999999999"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS -1")), Contains("negative"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS 10")), Contains("expected a section"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "double", "bit")), Contains("'bit'"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "0.500000", "nan")), Contains(":6:") && Contains("'nan'"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "0.5", "x")), Contains(":6:"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELLS 5", "CELLS 6")), Contains("fewer cells"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELLS 5", "CELLS 4")), Contains("larger than its cells"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "8 0 1 2", "88 0 1 2")), Contains("88 corners"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "8 0 1 2", "8 0 1 11")), Contains("point 11 of 11"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "8 0 1 2", "8 0 1 -2")), Contains("point -2"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n14")), Contains("apex"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n25")), Contains("type 25"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n10")), Contains("expected 4"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 4\n")), Contains("4 cell types for 5 cells"));
+  CHECK_THAT(vtk_refusal(good.substr(0, good.find("CELL_TYPES"))), Contains("CELL_TYPES"));
+  CHECK_THAT(vtk_refusal(good.substr(0, good.find("CELLS"))), Contains("CELLS"));
+  CHECK_THAT(vtk_refusal(vtk_file({}, kPoints, {{0, 3, 2, 1}}, {9})), Contains("no hexes"));
+  CHECK_THAT(vtk_refusal(vtk_file({}, kPoints, {}, {})), Contains("no hexes"));
+  CHECK_THAT(vtk_refusal(good + "CELL_DATA 4\n"), Contains("expected 5"));
   const std::string offsets = vtk_file({"5.1", false, "double", true}, kPoints, kCells, kTypes);
-  CHECK_THAT(refusal(replaced(offsets, "0 8 14", "0 14 8")), Contains("OFFSETS must rise"));
-  CHECK_THAT(refusal(replaced(offsets, "CONNECTIVITY", "CONNECTED")), Contains("'CONNECTED'"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(offsets, "0 8 14", "0 14 8")), Contains("OFFSETS must rise"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(offsets, "CONNECTIVITY", "CONNECTED")), Contains("'CONNECTED'"));
 }
 
 TEST_CASE("a binary VTK file with bytes that are no coordinates, or cut short anywhere, is refused") {
@@ -307,8 +307,8 @@ TEST_CASE("a binary VTK file with bytes that are no coordinates, or cut short an
     }
     std::vector<double> points = kPoints;
     points[4] = std::numeric_limits<double>::quiet_NaN();
-    CHECK_THAT(refusal(vtk_file(style, points, kCells, kTypes)), Contains("point 1 "));
+    CHECK_THAT(vtk_refusal(vtk_file(style, points, kCells, kTypes)), Contains("point 1 "));
     points[4] = -std::numeric_limits<double>::infinity();
-    CHECK_THAT(refusal(vtk_file(style, points, kCells, kTypes)), Contains("not finite"));
+    CHECK_THAT(vtk_refusal(vtk_file(style, points, kCells, kTypes)), Contains("not finite"));
   }
 }

@@ -22,16 +22,16 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-const TemporaryFolder& folder() {
+const TemporaryFolder& nodal_folder() {
   static const TemporaryFolder kFolder;
   return kFolder;
 }
 
 NodalMesh read(const std::string& name, std::string_view bytes, const std::string& references = {}) {
-  return read_nodal_mesh(folder().file(name, bytes), references);
+  return read_nodal_mesh(nodal_folder().file(name, bytes), references);
 }
 
-std::string refusal(const std::string& name, std::string_view bytes) {
+std::string nodal_refusal(const std::string& name, std::string_view bytes) {
   try {
     read(name, bytes);
   } catch (const InputError& error) {
@@ -113,7 +113,7 @@ TEST_CASE("nodal_mesh: binary files of Gmsh", "[io]") {
   require_unit_tet(other);
   CHECK(other.references == std::vector<int>{7});
   for (std::size_t size = 0; size < recent.size(); size += 7)
-    CHECK_FALSE(refusal("c.msh", std::string_view(recent).substr(0, size)).empty());
+    CHECK_FALSE(nodal_refusal("c.msh", std::string_view(recent).substr(0, size)).empty());
 }
 
 TEST_CASE("nodal_mesh: what is wrong with a .msh is said with its line", "[io]") {
@@ -121,12 +121,12 @@ TEST_CASE("nodal_mesh: what is wrong with a .msh is said with its line", "[io]")
     std::string text = kMsh41;
     return text.replace(text.find(from), from.size(), to);
   };
-  CHECK_THAT(refusal("a.msh", changed("4.1 0", "3.0 0")), Contains("2.2, 4.0 or 4.1"));
-  CHECK_THAT(refusal("a.msh", changed("90\n3\n0 0 0", "90\n90\n0 0 0")), Contains("second node 90"));
-  CHECK_THAT(refusal("a.msh", changed("2 90 3 50 4\n", "2 90 3 50 5\n")), Contains(".msh:") && Contains("names node 5"));
-  CHECK_THAT(refusal("a.msh", changed("3 1 4 1\n2 90 3 50 4", "3 1 7 1\n2 90 3 50 4 3")), Contains("pyramid"));
-  CHECK_THAT(refusal("a.msh", changed("3 1 4 1\n", "3 1 4 1000000000\n")), Contains("more than the rest"));
-  CHECK_THAT(refusal("a.msh", changed("0 1 0 .1", "nan 1 0 .1")), Contains("finite"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("4.1 0", "3.0 0")), Contains("2.2, 4.0 or 4.1"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("90\n3\n0 0 0", "90\n90\n0 0 0")), Contains("second node 90"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("2 90 3 50 4\n", "2 90 3 50 5\n")), Contains(".msh:") && Contains("names node 5"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n2 90 3 50 4", "3 1 7 1\n2 90 3 50 4 3")), Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n", "3 1 4 1000000000\n")), Contains("more than the rest"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("0 1 0 .1", "nan 1 0 .1")), Contains("finite"));
 }
 
 // --- VTK XML --------------------------------------------------------------------------------------------------------
@@ -204,7 +204,7 @@ TEST_CASE("nodal_mesh: VTK XML in every encoding", "[io]") {
           const NodalMesh mesh = read("a.vtu", text);
           require_unit_tet(mesh);
           CHECK(mesh.references == std::vector<int>{12});
-          for (std::size_t size = 0; size + 30 < text.size(); size += 13) refusal("b.vtu", text.substr(0, size));
+          for (std::size_t size = 0; size + 30 < text.size(); size += 13) nodal_refusal("b.vtu", text.substr(0, size));
         }
 }
 
@@ -213,15 +213,15 @@ TEST_CASE("nodal_mesh: blocks that claim to be huge are refused", "[io]") {
   const std::size_t lengths = text.find("\n_") + 2;
   const std::uint64_t huge = std::uint64_t{1} << 40;
   std::memcpy(text.data() + lengths + 8, &huge, sizeof huge);
-  CHECK_THAT(refusal("a.vtu", text), Contains("larger than its data can be"));
-  CHECK_THAT(refusal("a.vtu", "<VTKFile"), Contains("not whole XML"));
-  CHECK_THAT(refusal("a.vtu", "<VTKFile type=\"PolyData\"/>"), Contains("UnstructuredGrid"));
+  CHECK_THAT(nodal_refusal("a.vtu", text), Contains("larger than its data can be"));
+  CHECK_THAT(nodal_refusal("a.vtu", "<VTKFile"), Contains("not whole XML"));
+  CHECK_THAT(nodal_refusal("a.vtu", "<VTKFile type=\"PolyData\"/>"), Contains("UnstructuredGrid"));
 }
 
 // --- Abaqus ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files of Abaqus", "[io]") {
-  folder().file("nodes.txt", "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1.,0.,1.D0\n7,1,1,1\n8,0,1,1\n"
+  nodal_folder().file("nodes.txt", "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1.,0.,1.D0\n7,1,1,1\n8,0,1,1\n"
                              "9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n");
   const std::string text =
       "*Heading\n*INCLUDE, INPUT=nodes.txt\n*Elset, elset=both\nupper, LOWER\n*Elset, elset=lower, generate\n10, 14, 2\n"
@@ -246,15 +246,15 @@ TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files o
 
 TEST_CASE("nodal_mesh: what is wrong with a .inp is said with its line", "[io]") {
   const std::string nodes = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n";
-  CHECK_THAT(refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,5\n"), Contains("a.inp:7: ") && Contains("node 5"));
-  CHECK_THAT(refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3\n"), Contains("ends within an element"));
-  CHECK_THAT(refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D5\n"), Contains("pyramid"));
-  CHECK_THAT(refusal("a.inp", nodes + "*INCLUDE, INPUT=a.inp\n"), Contains("8 files in one another"));
-  CHECK_THAT(refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4, ELSET=e\n1,1,2,3,4\n*ELSET, ELSET=e\ne\n"),
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,5\n"), Contains("a.inp:7: ") && Contains("node 5"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3\n"), Contains("ends within an element"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D5\n"), Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*INCLUDE, INPUT=a.inp\n"), Contains("8 files in one another"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4, ELSET=e\n1,1,2,3,4\n*ELSET, ELSET=e\ne\n"),
              Contains("includes itself"));
-  CHECK_THAT(refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,4\n*SURFACE, NAME=s\nnone, S1\n"),
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,4\n*SURFACE, NAME=s\nnone, S1\n"),
              Contains("no element set 'none'"));
-  CHECK_THAT(refusal("a.inp", nodes + "*PART, NAME=a\n*PART, NAME=b\n"), Contains("one part"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*PART, NAME=a\n*PART, NAME=b\n"), Contains("one part"));
 }
 
 TEST_CASE("nodal_mesh: numbers of a .inp have twenty characters at most, which is what CalculiX reads", "[io]") {
@@ -306,9 +306,9 @@ TEST_CASE("nodal_mesh: small, large and free fields of Nastran, with its numbers
   CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[4])] == Vec3(0.5, 0, -0.1));
   CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[5])] == Vec3(0.5, 0.5, 0));  // left out: straight
   CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[3])] == Vec3(0, 0, 1));
-  CHECK_THAT(refusal("a.bdf", "BEGIN BULK\nGRID,1,5,0.,0.,0.\n"), Contains("a.bdf:2:") && Contains("coordinate system"));
-  CHECK_THAT(refusal("a.bdf", "GRID,1,,0.,0.,x\n"), Contains("finite number"));
-  CHECK_THAT(refusal("a.bdf", "CHEXA,1,1,1,2,3,4,5,6\n"), Contains("number of a point"));
+  CHECK_THAT(nodal_refusal("a.bdf", "BEGIN BULK\nGRID,1,5,0.,0.,0.\n"), Contains("a.bdf:2:") && Contains("coordinate system"));
+  CHECK_THAT(nodal_refusal("a.bdf", "GRID,1,,0.,0.,x\n"), Contains("finite number"));
+  CHECK_THAT(nodal_refusal("a.bdf", "CHEXA,1,1,1,2,3,4,5,6\n"), Contains("number of a point"));
 }
 
 // --- MFEM -----------------------------------------------------------------------------------------------------------
@@ -320,14 +320,14 @@ TEST_CASE("nodal_mesh: MFEM meshes, and what is not read of them", "[io]") {
   require_unit_tet(mesh);
   CHECK(mesh.references == std::vector<int>{4});
   CHECK(mesh.face_groups.groups == std::vector<Group>{{"", 6, 2}});
-  CHECK(read_volume_mesh(folder() / "a.mesh").num_cells() == 1);
+  CHECK(read_volume_mesh(nodal_folder() / "a.mesh").num_cells() == 1);
   const std::string nodes = head + "\nnodes\nFiniteElementSpace\nFiniteElementCollection: H1_3D_P1\nVDim: 3\nOrdering: ";
   require_unit_tet(read("b.mesh", nodes + "1\n" + kUnitTet));
   require_unit_tet(read("b.mesh", nodes + "0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"));
-  CHECK_THAT(refusal("b.mesh", nodes + "1\n0 0 0\n"), Contains("ends"));
-  CHECK_THAT(refusal("b.mesh", "MFEM NURBS mesh v1.0\n"), Contains("NURBS"));
-  CHECK_THAT(refusal("b.mesh", "MFEM mesh v1.0\ndimension\n2\n"), Contains("dimension 3"));
-  CHECK_THAT(refusal("b.mesh", "MFEM mesh v1.0\ndimension\n3\nelements\n1\n1 7 0 1 2 3 4\n"), Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("b.mesh", nodes + "1\n0 0 0\n"), Contains("ends"));
+  CHECK_THAT(nodal_refusal("b.mesh", "MFEM NURBS mesh v1.0\n"), Contains("NURBS"));
+  CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n2\n"), Contains("dimension 3"));
+  CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n3\nelements\n1\n1 7 0 1 2 3 4\n"), Contains("pyramid"));
 }
 
 TEST_CASE("nodal_mesh: MFEM's nodes of neighbors are the same on what they share", "[io]") {

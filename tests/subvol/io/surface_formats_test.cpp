@@ -24,7 +24,7 @@ using Catch::Contains;
 
 namespace {
 
-const TemporaryFolder& folder() {
+const TemporaryFolder& format_folder() {
   static const TemporaryFolder kFolder;
   return kFolder;
 }
@@ -47,9 +47,9 @@ std::map<std::string, double> areas(const PolygonMesh& mesh) {
   return result;
 }
 
-std::string refusal(const std::string& name, std::string_view bytes) {
+std::string format_refusal(const std::string& name, std::string_view bytes) {
   try {
-    read_polygon_mesh(folder().file(name, bytes));
+    read_polygon_mesh(format_folder().file(name, bytes));
   } catch (const InputError& error) {
     return error.what();
   }
@@ -64,7 +64,7 @@ TEST_CASE("surface formats: surfaces that are written come back with their group
   const std::map<std::string, double> wanted = areas(surface);
   for (const std::string extension : {".stl", ".ply", ".vtp", ".3mf"}) {
     CAPTURE(extension);
-    const auto path = folder().path() / ("a" + extension);
+    const auto path = format_folder().path() / ("a" + extension);
     write_surface(path, surface);
     CHECK_NOTHROW(require_written(path, surface));
     std::vector<std::string> warnings;
@@ -86,8 +86,8 @@ TEST_CASE("surface formats: surfaces that are written come back with their group
   }
   surface.face_groups = {};
   for (const std::string extension : {".stl", ".ply", ".vtp", ".3mf"}) {
-    write_surface(folder().path() / ("b" + extension), surface);
-    const PolygonMesh found = read_polygon_mesh(folder().path() / ("b" + extension));
+    write_surface(format_folder().path() / ("b" + extension), surface);
+    const PolygonMesh found = read_polygon_mesh(format_folder().path() / ("b" + extension));
     CHECK(found.face_groups.empty());
     CHECK(areas(found).at("") == Approx(10));
   }
@@ -104,8 +104,8 @@ TEST_CASE("surface formats: glTF is read in place, without its lines, with mater
       SurfaceSceneOptions options;
       options.up_axis = UpAxis::y;
       options.quantize = quantize;
-      write_gltf(folder() / name, boundary_scene(mesh, options));
-      const PolygonMesh found = read_polygon_mesh(folder() / name);
+      write_gltf(format_folder() / name, boundary_scene(mesh, options));
+      const PolygonMesh found = read_polygon_mesh(format_folder() / name);
       CHECK(found.positions.size() == 12);
       const auto names = areas(found);
       CHECK(names.at("floor") == Approx(2).epsilon(1e-3));
@@ -115,12 +115,12 @@ TEST_CASE("surface formats: glTF is read in place, without its lines, with mater
       CHECK((low - Vec3(0, 0, 0)).norm() < 1e-3);
       CHECK((high - Vec3(2, 1, 1)).norm() < 1e-3);
     }
-  const std::string glb = content_of(folder() / "a.glb");
+  const std::string glb = content_of(format_folder() / "a.glb");
   for (std::size_t size = 0; size < glb.size(); size += 1 + glb.size() / 60)
-    CHECK_FALSE(refusal("cut.glb", std::string_view(glb).substr(0, size)).empty());
-  CHECK_THAT(refusal("a.gltf", R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
+    CHECK_FALSE(format_refusal("cut.glb", std::string_view(glb).substr(0, size)).empty());
+  CHECK_THAT(format_refusal("a.gltf", R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
     "extensionsUsed":["KHR_draco_mesh_compression"]})"), Contains("KHR_draco_mesh_compression"));
-  CHECK_THAT(refusal("b.gltf", R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})"),
+  CHECK_THAT(format_refusal("b.gltf", R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})"),
              Contains("children of themselves"));
 }
 
@@ -137,20 +137,20 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
     zip.add("3D/part.model", text.replace(text.find(from), from.size(), to));
     return zip.take();
   };
-  const PolygonMesh found = read_polygon_mesh(folder().file("a.3mf", archive("one", "one")));
+  const PolygonMesh found = read_polygon_mesh(format_folder().file("a.3mf", archive("one", "one")));
   REQUIRE(found.num_faces() == 2);
   CHECK(found.positions[4] == Vec3(7, 6, 8));
   CHECK(areas(found) == std::map<std::string, double>{{"one", 0.5}, {"two", 2}});
-  CHECK_THAT(refusal("b.3mf", archive("v3=\"2\"", "v3=\"3\"")), Contains("number of a vertex"));
-  CHECK_THAT(refusal("b.3mf", archive("objectid=\"1\" transform", "objectid=\"2\" transform")), Contains("themselves"));
-  CHECK_THAT(refusal("b.3mf", archive("objectid=\"2\"", "objectid=\"5\"")), Contains("no object"));
-  CHECK_THAT(refusal("b.3mf", archive("x=\"1\"", "x=\"nan\"")), Contains("expected a number x"));
+  CHECK_THAT(format_refusal("b.3mf", archive("v3=\"2\"", "v3=\"3\"")), Contains("number of a vertex"));
+  CHECK_THAT(format_refusal("b.3mf", archive("objectid=\"1\" transform", "objectid=\"2\" transform")), Contains("themselves"));
+  CHECK_THAT(format_refusal("b.3mf", archive("objectid=\"2\"", "objectid=\"5\"")), Contains("no object"));
+  CHECK_THAT(format_refusal("b.3mf", archive("x=\"1\"", "x=\"nan\"")), Contains("expected a number x"));
   const std::string bytes = archive("one", "one");
   for (std::size_t size = 0; size < bytes.size(); size += 7)
-    CHECK_FALSE(refusal("cut.3mf", std::string_view(bytes).substr(0, size)).empty());
+    CHECK_FALSE(format_refusal("cut.3mf", std::string_view(bytes).substr(0, size)).empty());
   std::string damaged = bytes;
   damaged[60] = static_cast<char>(damaged[60] ^ 4);
-  CHECK_THAT(refusal("d.3mf", damaged), Contains("damaged"));
+  CHECK_THAT(format_refusal("d.3mf", damaged), Contains("damaged"));
 }
 
 TEST_CASE("surface formats: polygons and strips of a .vtp, and labels of its cells", "[io]") {
@@ -163,7 +163,7 @@ NumberOfPolys="1" NumberOfStrips="1"><Points><DataArray type="Float64" NumberOfC
 format="ascii">4</DataArray></Strips><CellData><DataArray type="Int32" Name="material" format="ascii">9 5 7</DataArray>
 </CellData></Piece></PolyData></VTKFile>)";
   std::vector<std::string> warnings;
-  const PolygonMesh found = read_polygon_mesh(folder().file("a.vtp", text), &warnings);
+  const PolygonMesh found = read_polygon_mesh(format_folder().file("a.vtp", text), &warnings);
   REQUIRE(found.num_faces() == 3);
   CHECK(found.face_groups.groups == std::vector<Group>{{"", 5, 2}, {"", 7, 2}});
   CHECK(found.face_groups.of_face == std::vector<Index>{0, 1, 1});
@@ -174,13 +174,13 @@ format="ascii">4</DataArray></Strips><CellData><DataArray type="Int32" Name="mat
     std::string other = text;
     return other.replace(other.find(from), from.size(), to);
   };
-  CHECK_THAT(refusal("b.vtp", changed("0 1 2</", "0 1 5</")), Contains("names point 5 of 5"));
-  CHECK_THAT(refusal("b.vtp", changed(">3<", ">4<")), Contains("beyond the connectivity"));
-  CHECK_THAT(refusal("b.vtp", changed("PolyData\" v", "ImageData\" v")), Contains("expected the type PolyData"));
+  CHECK_THAT(format_refusal("b.vtp", changed("0 1 2</", "0 1 5</")), Contains("names point 5 of 5"));
+  CHECK_THAT(format_refusal("b.vtp", changed(">3<", ">4<")), Contains("beyond the connectivity"));
+  CHECK_THAT(format_refusal("b.vtp", changed("PolyData\" v", "ImageData\" v")), Contains("expected the type PolyData"));
 }
 
 TEST_CASE("surface formats: elements of two dimensions in a .msh or .inp without cells are a surface", "[io]") {
-  const FileCells msh = read_cells(folder().file(
+  const FileCells msh = read_cells(format_folder().file(
       "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 8 \"inlet\"\n$EndPhysicalNames\n$Nodes\n5\n"
                "9 0 0 0\n3 1 0 0\n5 0 1 0\n4 1 1 0\n7 2 1 0\n$EndNodes\n$Elements\n3\n1 2 2 8 1 9 3 5\n"
                "2 2 2 0 1 3 4 5\n3 1 2 0 1 9 3\n$EndElements\n"));
@@ -189,9 +189,9 @@ TEST_CASE("surface formats: elements of two dimensions in a .msh or .inp without
   CHECK(surface.positions.size() == 4);  // the fifth belongs to no face
   CHECK(surface.face_groups.groups == std::vector<Group>{{"inlet", 8, 2}});
   CHECK(surface.face_groups.of_face == std::vector<Index>{0, kNoIndex});
-  const FileCells inp = read_cells(folder().file(
+  const FileCells inp = read_cells(format_folder().file(
       "a.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,1,1,0\n*ELEMENT,TYPE=S3,ELSET=left\n1,1,2,3\n"
                "*ELEMENT,TYPE=S4R,ELSET=right\n2,2,4,3,1\n"));
   CHECK(std::get<PolygonMesh>(inp).face_groups.groups == std::vector<Group>{{"left", 1, 2}, {"right", 2, 2}});
-  CHECK_THROWS_WITH(read_volume_mesh(folder() / "a.msh"), Contains("faces without cells"));
+  CHECK_THROWS_WITH(read_volume_mesh(format_folder() / "a.msh"), Contains("faces without cells"));
 }

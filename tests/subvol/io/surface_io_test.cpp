@@ -30,7 +30,7 @@ TriangleMesh read_triangles(const std::string& name, const std::string& text,
   return read_triangle_mesh(folder.file(name, text), warnings);
 }
 
-std::string refusal(const std::string& name, const std::string& text) {
+std::string surface_refusal(const std::string& name, const std::string& text) {
   try {
     read_triangles(name, text);
   } catch (const InputError& error) {
@@ -152,15 +152,15 @@ TEST_CASE("bytes after the last facet of a binary STL are told, and refused wher
   CHECK_THAT(warnings[0], Contains("4 bytes after the last facet"));
   for (const std::string header : {"b", "solid b"}) {
     const std::string attributes = binary_stl(header, 4, "more");
-    CHECK_THAT(refusal("a.stl", binary_stl(header) + "more"), Contains("byte 284") && Contains("288 bytes"));
-    CHECK_THAT(refusal("a.stl", attributes + "x"), Contains("byte 284") && Contains("byte 300"));
-    CHECK_THAT(refusal("a.stl", attributes.substr(0, 299)), Contains("byte 284"));
+    CHECK_THAT(surface_refusal("a.stl", binary_stl(header) + "more"), Contains("byte 284") && Contains("288 bytes"));
+    CHECK_THAT(surface_refusal("a.stl", attributes + "x"), Contains("byte 284") && Contains("byte 300"));
+    CHECK_THAT(surface_refusal("a.stl", attributes.substr(0, 299)), Contains("byte 284"));
     for (std::size_t n = 85; n < 284; n += 7) {
       CAPTURE(header, n);
-      CHECK_THAT(refusal("a.stl", binary_stl(header, 0).substr(0, n)), Contains("byte 80: 4 facets"));
+      CHECK_THAT(surface_refusal("a.stl", binary_stl(header, 0).substr(0, n)), Contains("byte 80: 4 facets"));
     }
   }
-  CHECK_THAT(refusal("a.stl", "solid cube" + std::string(70, ' ')), Contains("80 bytes without a facet"));
+  CHECK_THAT(surface_refusal("a.stl", "solid cube" + std::string(70, ' ')), Contains("80 bytes without a facet"));
 }
 
 TEST_CASE("text whose lines end with CR, or CR and LF, is read, and its lines are counted") {
@@ -175,8 +175,8 @@ TEST_CASE("text whose lines end with CR, or CR and LF, is read, and its lines ar
     check_tet(read_triangles("a.obj", with_ends(obj, end)));
     check_tet(read_triangles("a.ply", with_ends(kTextPly, end)));
     CHECK(read_triangles("a.stl", with_ends(text_stl(), end)).triangles.size() == 4);
-    CHECK_THAT(refusal("a.obj", with_ends(replaced(obj, "f 2 3 4", "f 2 3 x"), end)), Contains(":9:"));
-    CHECK_THAT(refusal("a.off", with_ends(replaced(kTetOff, "3 0 2 1", "3 0 2 9"), end)), Contains(":7:"));
+    CHECK_THAT(surface_refusal("a.obj", with_ends(replaced(obj, "f 2 3 4", "f 2 3 x"), end)), Contains(":9:"));
+    CHECK_THAT(surface_refusal("a.off", with_ends(replaced(kTetOff, "3 0 2 1", "3 0 2 9"), end)), Contains(":7:"));
     // The first of the binary numbers may look like the end of a line.
     std::string header = replaced(replaced(kPlyHeader, "uchar red", "uchar r"), "uchar int", "uchar uchar");
     header = with_ends("ply\nformat binary_little_endian 1.0\n" +
@@ -211,7 +211,7 @@ TEST_CASE("text in UTF-16 is named as such by every reader") {
       for (const auto& [name, text] : {std::pair("a.off", kTetOff), {"a.obj", "v 0 0 0\n"}, {"a.stl", text_stl()},
                                        {"a.stl", long_stl}, {"a.stl", "solid"}, {"a.ply", kTextPly}}) {
         CAPTURE(name, big_endian, mark);
-        CHECK_THAT(refusal(name, wide(text, big_endian, mark)), Contains(name) && Contains("UTF-16"));
+        CHECK_THAT(surface_refusal(name, wide(text, big_endian, mark)), Contains(name) && Contains("UTF-16"));
       }
   // A binary file may have any header.
   std::string bytes = binary_stl(wide("solid", false, true), 0);
@@ -284,70 +284,70 @@ TEST_CASE("a soup keeps its separate vertices") {
 }
 
 TEST_CASE("what is malformed in an OFF file is refused with its line") {
-  CHECK_THAT(refusal("a.off", ""), Contains(":1:") && Contains("empty"));
-  CHECK_THAT(refusal("a.off", "4 4 6\n"), Contains("expected OFF"));
-  CHECK_THAT(refusal("a.off", "OFF BINARY\n"), Contains("binary"));
-  CHECK_THAT(refusal("a.off", "OFF\n4000000000 4000000000 0\n0 0 0\n"), Contains(":2:") && Contains("4000000000"));
-  CHECK_THAT(refusal("a.off", "OFF\n1 -1 0\n0 0 0\n"), Contains("negative"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 4")), Contains(":7:") && Contains("number 4"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 -1")), Contains(":7:"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "3 0 2 1", "2000000000 0 2 1")), Contains(":7:"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "1 0 0", "1 nan 0")), Contains(":4:") && Contains("'nan'"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "4 4 6", "4 3 6")),
+  CHECK_THAT(surface_refusal("a.off", ""), Contains(":1:") && Contains("empty"));
+  CHECK_THAT(surface_refusal("a.off", "4 4 6\n"), Contains("expected OFF"));
+  CHECK_THAT(surface_refusal("a.off", "OFF BINARY\n"), Contains("binary"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n4000000000 4000000000 0\n0 0 0\n"), Contains(":2:") && Contains("4000000000"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n1 -1 0\n0 0 0\n"), Contains("negative"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 4")), Contains(":7:") && Contains("number 4"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 -1")), Contains(":7:"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "2000000000 0 2 1")), Contains(":7:"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "1 0 0", "1 nan 0")), Contains(":4:") && Contains("'nan'"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "4 4 6", "4 3 6")),
              Contains(":10:") && Contains("more than the counts"));
-  CHECK_THAT(refusal("a.off", replaced(kTetOff, "4 4 6", "4 5 6")), Contains("the file ends"));
-  CHECK_THAT(refusal("a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"), Contains("no faces"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "4 4 6", "4 5 6")), Contains("the file ends"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"), Contains("no faces"));
 }
 
 TEST_CASE("what is malformed in an OBJ file is refused with its line") {
   const std::string points = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-  CHECK_THAT(refusal("a.obj", ""), Contains("no faces"));
-  CHECK_THAT(refusal("a.obj", points + "f 0 1 2\n"), Contains(":4:") && Contains("number 0"));
-  CHECK_THAT(refusal("a.obj", points + "f -1 -2 -7\n"), Contains(":4:") && Contains("-7"));
-  CHECK_THAT(refusal("a.obj", points + "f 1 2 4\n"), Contains(":4:") && Contains("number 4 of 3"));
-  CHECK_THAT(refusal("a.obj", points + "f 1 2 x\n"), Contains(":4:") && Contains("'x'"));
-  CHECK_THAT(refusal("a.obj", points + "f 1 2 99999999999999999999\n"), Contains(":4:"));
-  CHECK_THAT(refusal("a.obj", "v 0 0\nf 1 1 1\n"), Contains(":1:"));
-  CHECK_THAT(refusal("a.obj", "v 0 0 inf\n"), Contains(":1:") && Contains("'inf'"));
-  CHECK_THAT(refusal("a.obj", std::string("\0\1\2 x\n", 6)), Contains(":1:") && Contains("unknown"));
+  CHECK_THAT(surface_refusal("a.obj", ""), Contains("no faces"));
+  CHECK_THAT(surface_refusal("a.obj", points + "f 0 1 2\n"), Contains(":4:") && Contains("number 0"));
+  CHECK_THAT(surface_refusal("a.obj", points + "f -1 -2 -7\n"), Contains(":4:") && Contains("-7"));
+  CHECK_THAT(surface_refusal("a.obj", points + "f 1 2 4\n"), Contains(":4:") && Contains("number 4 of 3"));
+  CHECK_THAT(surface_refusal("a.obj", points + "f 1 2 x\n"), Contains(":4:") && Contains("'x'"));
+  CHECK_THAT(surface_refusal("a.obj", points + "f 1 2 99999999999999999999\n"), Contains(":4:"));
+  CHECK_THAT(surface_refusal("a.obj", "v 0 0\nf 1 1 1\n"), Contains(":1:"));
+  CHECK_THAT(surface_refusal("a.obj", "v 0 0 inf\n"), Contains(":1:") && Contains("'inf'"));
+  CHECK_THAT(surface_refusal("a.obj", std::string("\0\1\2 x\n", 6)), Contains(":1:") && Contains("unknown"));
   std::string fan = "f";
   std::string circle;
   for (int i = 1; i <= 1001; ++i) {
     circle += "v " + std::to_string(i) + " " + std::to_string(i * i) + " 0\n";
     fan += " " + std::to_string(i);
   }
-  CHECK_THAT(refusal("a.obj", circle + fan), Contains("1001 corners"));
+  CHECK_THAT(surface_refusal("a.obj", circle + fan), Contains("1001 corners"));
 }
 
 TEST_CASE("what is malformed in an STL file is refused with its line or byte") {
-  CHECK_THAT(refusal("a.stl", ""), Contains("no faces"));
-  CHECK_THAT(refusal("a.stl", "hello"), Contains(":1:") && Contains("solid"));
-  CHECK_THAT(refusal("a.stl", replaced(text_stl(), "outer", "inner")), Contains(":3:") && Contains("'inner'"));
-  CHECK_THAT(refusal("a.stl", replaced(text_stl(), "vertex 0", "vertex x")), Contains(":4:"));
-  CHECK_THAT(refusal("a.stl", replaced(text_stl(), "endsolid", "")), Contains("facet or endsolid"));
-  CHECK_THAT(refusal("a.stl", replaced(" SOLID" + text_stl().substr(5), "outer", "inner")), Contains("'inner'"));
+  CHECK_THAT(surface_refusal("a.stl", ""), Contains("no faces"));
+  CHECK_THAT(surface_refusal("a.stl", "hello"), Contains(":1:") && Contains("solid"));
+  CHECK_THAT(surface_refusal("a.stl", replaced(text_stl(), "outer", "inner")), Contains(":3:") && Contains("'inner'"));
+  CHECK_THAT(surface_refusal("a.stl", replaced(text_stl(), "vertex 0", "vertex x")), Contains(":4:"));
+  CHECK_THAT(surface_refusal("a.stl", replaced(text_stl(), "endsolid", "")), Contains("facet or endsolid"));
+  CHECK_THAT(surface_refusal("a.stl", replaced(" SOLID" + text_stl().substr(5), "outer", "inner")), Contains("'inner'"));
   std::string bytes = binary_stl("x");
-  CHECK_THAT(refusal("a.stl", bytes.substr(0, bytes.size() - 1)), Contains("byte 80"));
+  CHECK_THAT(surface_refusal("a.stl", bytes.substr(0, bytes.size() - 1)), Contains("byte 80"));
   bytes[83] = '\x7f';
-  CHECK_THAT(refusal("a.stl", bytes), Contains("byte 80"));
+  CHECK_THAT(surface_refusal("a.stl", bytes), Contains("byte 80"));
   bytes = binary_stl("x");
   for (int i = 0; i < 4; ++i) bytes[static_cast<std::size_t>(84 + 12 + i)] = '\xff';
-  CHECK_THAT(refusal("a.stl", bytes), Contains("byte 96") && Contains("not finite"));
+  CHECK_THAT(surface_refusal("a.stl", bytes), Contains("byte 96") && Contains("not finite"));
 }
 
 TEST_CASE("what is malformed in a PLY file is refused with its line or byte") {
-  CHECK_THAT(refusal("a.ply", ""), Contains(":1:"));
-  CHECK_THAT(refusal("a.ply", "ply\nelement vertex 1\nend_header\n"), Contains("no format"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "ascii 1.0", "ascii 2.0")), Contains(":2:"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "property float x", "property half x")), Contains("'half'"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "property float x", "property float u")),
+  CHECK_THAT(surface_refusal("a.ply", ""), Contains(":1:"));
+  CHECK_THAT(surface_refusal("a.ply", "ply\nelement vertex 1\nend_header\n"), Contains("no format"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "ascii 1.0", "ascii 2.0")), Contains(":2:"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "property float x", "property half x")), Contains("'half'"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "property float x", "property float u")),
              Contains("without x, y and z"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "vertex_indices", "corners")), Contains("without vertex_indices"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "vertex 4", "vertex 4000000000")), Contains(":4:"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 4 0")), Contains("vertex 4 of 4"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 -1 0")), Contains("out of range"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "2000000000 0 2 1 0")), Contains("impossible length"));
-  CHECK_THAT(refusal("a.ply", replaced(kTextPly, "9 1 0 0", "9 inf 0 0")), Contains("'inf'"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "vertex_indices", "corners")), Contains("without vertex_indices"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "vertex 4", "vertex 4000000000")), Contains(":4:"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 4 0")), Contains("vertex 4 of 4"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 -1 0")), Contains("out of range"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "2000000000 0 2 1 0")), Contains("impossible length"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "9 1 0 0", "9 inf 0 0")), Contains("'inf'"));
   const std::string good = binary_ply(false);
   for (std::size_t n = 0; n < good.size(); ++n) {
     CAPTURE(n);
@@ -356,10 +356,10 @@ TEST_CASE("what is malformed in a PLY file is refused with its line or byte") {
 }
 
 TEST_CASE("surfaces without extent, or whose areas leave the range of a double, are refused") {
-  CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n5 5 5\n5 5 5\n5 5 5\n3 0 1 2\n"), Contains("one place"));
-  CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e300 0 0\n0 1e300 0\n3 0 1 2\n"), Contains("1e+300"));
-  CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e-200 0 0\n0 1e-200 0\n3 0 1 2\n"), Contains("1e-200"));
-  CHECK_THAT(refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"), Contains("no triangle has any area"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n5 5 5\n5 5 5\n5 5 5\n3 0 1 2\n"), Contains("one place"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e300 0 0\n0 1e300 0\n3 0 1 2\n"), Contains("1e+300"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e-200 0 0\n0 1e-200 0\n3 0 1 2\n"), Contains("1e-200"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"), Contains("no triangle has any area"));
   CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e-39 0 0\n0 1e-39 0\n3 0 1 2\n").triangles.size() == 1);
   CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e39 0 0\n0 1e39 0\n3 0 1 2\n").triangles.size() == 1);
 }

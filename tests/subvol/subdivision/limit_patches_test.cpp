@@ -13,7 +13,7 @@ using namespace subvol::test;
 namespace {
 
 constexpr int kLevels = 4;            // of patches, in the twin
-constexpr double kRounding = 1e-12;   // of lengths near 1 after a few dozen operations
+constexpr double kPatchRounding = 1e-12;   // of lengths near 1 after a few dozen operations
 constexpr double kDartNormals = 1e-4; // header of limit_masks.h: darts are good to 2e-5
 
 using Place = std::array<int, 2>;
@@ -82,7 +82,7 @@ VolumeMesh creased(VolumeMesh mesh, double sharpness = kInfiniteSharpness) {
 TEST_CASE("patches agree with refinement and limit masks at every kind of smooth vertex") {
   for (const VolumeMesh& cage : {jittered(lattice(2, 2, 1)), jittered(mixed_cells()), jittered(fan(5, 300, 2))}) {
     const Difference difference = compare(cage);
-    CHECK(difference.position < kRounding);
+    CHECK(difference.position < kPatchRounding);
     CHECK(difference.normal < 1e-8);
   }
 }
@@ -93,7 +93,7 @@ TEST_CASE("patches agree with refinement and limit masks beside creases, corners
   VolumeMesh blunt = creased(lattice(2, 1, 1), 1.7);
   blunt.tags.corners.push_back({0, 2.3});
   for (const VolumeMesh& cage : {box, blunt, creased(l_shape(2)), creased(mixed_cells()), creased(fan(5, 300, 2))})
-    CHECK(compare(cage).position < kRounding);
+    CHECK(compare(cage).position < kPatchRounding);
   CHECK(compare(box).normal < 1e-8);
   CHECK(compare(blunt).normal < 1e-8);
 }
@@ -102,7 +102,7 @@ TEST_CASE("patches agree with refinement and limit masks at the end of a crease"
   VolumeMesh dart = jittered(lattice(2, 2, 1));
   dart.tags.creases.push_back({0, 1});
   const Difference difference = compare(dart);
-  CHECK(difference.position < kRounding);
+  CHECK(difference.position < kPatchRounding);
   CHECK(difference.normal < kDartNormals);
 }
 
@@ -120,7 +120,7 @@ TEST_CASE("a patch is continued by its neighbour at the same parameter of their 
   };
   for (std::size_t h = 0; h < quads.corner_vertices.size(); ++h) {
     const std::vector<Vec3> here = side(static_cast<Index>(h)), there = side(quads.twins[h]);
-    for (std::size_t i = 0; i < t.size(); ++i) CHECK((here[i] - there[i]).norm() < kRounding);
+    for (std::size_t i = 0; i < t.size(); ++i) CHECK((here[i] - there[i]).norm() < kPatchRounding);
   }
 }
 
@@ -136,7 +136,7 @@ TEST_CASE("depth needs no more than what is irregular: a deep sample equals the 
     patches.evaluate(static_cast<Index>(p), ends, ends, points.data());
     const auto [face, corner] = patches.face_corner(static_cast<Index>(p));
     const Vec3& at = limit[topology.face(topology.boundary_faces()[face])[corner]];
-    CHECK((points[0] - at).norm() < kRounding);
+    CHECK((points[0] - at).norm() < kPatchRounding);
     for (const Vec3& q : points) CHECK((q - at).norm() < 0.05);  // 0.6^14 and more of a patch
   }
 }

@@ -19,7 +19,7 @@ namespace subvol::test {
 
 namespace {
 
-constexpr double kRounding = 1e-13;
+constexpr double kRegionRounding = 1e-13;
 
 /// A lattice whose cells have the reference that `region(i, j, k)` returns.
 template <class Region>
@@ -168,13 +168,13 @@ TEST_CASE("interfaces are averaged on themselves by the rules of the boundary", 
   for (const VolumeMesh& coarse : meshes_of_regions()) {
     CAPTURE(coarse.num_cells());
     VolumeMesh mesh = coarse;
-    CHECK(distance_from_direct(mesh) <= kRounding);
+    CHECK(distance_from_direct(mesh) <= kRegionRounding);
     mesh = subdivide(mesh).fine;
-    CHECK(distance_from_direct(mesh) <= kRounding);
+    CHECK(distance_from_direct(mesh) <= kRegionRounding);
     mesh = coarse;
     mesh.tags = features_by_angle(mesh, 40);
-    CHECK(distance_from_direct(mesh) <= kRounding);
-    CHECK(distance_from_direct(subdivide(mesh).fine) <= kRounding);
+    CHECK(distance_from_direct(mesh) <= kRegionRounding);
+    CHECK(distance_from_direct(subdivide(mesh).fine) <= kRegionRounding);
   }
 }
 
@@ -270,7 +270,7 @@ TEST_CASE("sheets that are refined on their own are those of the refined mesh", 
       const std::vector<Vec3> on_boundary = boundary.positions.apply(mesh.positions);
       for (std::size_t q = 0; q < boundary.quads.size(); ++q)
         for (int k = 0; k < 4; ++k)
-          CHECK((on_boundary[boundary.quads[q][k]] - points[once.quads[q][k]]).norm() <= kRounding);
+          CHECK((on_boundary[boundary.quads[q][k]] - points[once.quads[q][k]]).norm() <= kRegionRounding);
     }
 }
 
@@ -283,7 +283,7 @@ TEST_CASE("tags that the boundary needs on its own give it the same surface with
     const SubdivisionLevel without = subdivide(mesh);
     for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
       if (topology.is_boundary_vertex(static_cast<Index>(v)))
-        CHECK((with.fine.positions[v] - without.fine.positions[v]).norm() <= kRounding);
+        CHECK((with.fine.positions[v] - without.fine.positions[v]).norm() <= kRegionRounding);
   }
 }
 
@@ -310,7 +310,7 @@ TEST_CASE("a crease of a material is a tag, one of neither boundary nor interfac
   };
   mesh.tags.creases = {crease({2, 2, 2}, {2, 3, 2})};
   CHECK(validate(mesh).empty());
-  CHECK(distance_from_direct(mesh) <= kRounding);
+  CHECK(distance_from_direct(mesh) <= kRegionRounding);
   mesh.tags.creases = {crease({1, 2, 2}, {2, 2, 2})};
   CHECK(validate(mesh).size() == 1);
   CHECK_THROWS(subdivide(mesh));

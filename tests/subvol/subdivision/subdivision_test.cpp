@@ -54,7 +54,7 @@ double oracle_distance(VolumeMesh mesh, int levels = 2) {
   return distance;
 }
 
-std::vector<VolumeMesh> some_meshes() {
+std::vector<VolumeMesh> meshes_to_subdivide() {
   std::vector<VolumeMesh> meshes = {lattice(1, 1, 1), lattice(3, 2, 2), l_shape(2), fan(4, 270, 2), fan(5, 360 - 20, 1),
                                     mixed_cells()};
   for (VolumeMesh& mesh : meshes) jitter(mesh, 0.1);
@@ -74,7 +74,7 @@ TEST_CASE("what a row throws, or no memory for it, leaves the assembly of a map"
 }
 
 TEST_CASE("rows of the subdivision matrix sum to one and no weight is negative", "[subdivision]") {
-  for (const VolumeMesh& untagged : some_meshes())
+  for (const VolumeMesh& untagged : meshes_to_subdivide())
     for (double sharpness : {0.0, kInfiniteSharpness, 2.5, 1.3, 0.4})
       for (BoundaryRule rule : {BoundaryRule::catmull_clark, BoundaryRule::averaging}) {
         VolumeMesh mesh = untagged;
@@ -90,7 +90,7 @@ TEST_CASE("rows of the subdivision matrix sum to one and no weight is negative",
 }
 
 TEST_CASE("the boundary is OpenSubdiv's for smooth, creased and semi-sharp boundaries", "[subdivision][opensubdiv]") {
-  for (const VolumeMesh& untagged : some_meshes())
+  for (const VolumeMesh& untagged : meshes_to_subdivide())
     for (double sharpness : {0.0, kInfiniteSharpness, 2.5, 1.3, 1.0, 0.4}) {
       VolumeMesh mesh = untagged;
       if (sharpness > 0) tag_creases(mesh, 40, sharpness);

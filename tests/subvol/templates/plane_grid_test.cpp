@@ -30,7 +30,7 @@ Mat3 turn_of(double degrees) {
   return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vec3(1, 2, 3).normalized()).toRotationMatrix();
 }
 
-TriangleMesh boundary_of(const VolumeMesh& mesh) { return triangulate(boundary_surface(mesh, MeshTopology(mesh))); }
+TriangleMesh surface_of(const VolumeMesh& mesh) { return triangulate(boundary_surface(mesh, MeshTopology(mesh))); }
 
 TriangleMesh turned(TriangleMesh surface, const Mat3& turn) {
   for (Vec3& p : surface.positions) p = turn * p;
@@ -44,7 +44,7 @@ TriangleMesh block(const Lines& lines, const std::function<bool(int, int, int)>&
   for (Vec3& p : mesh.positions)
     for (std::size_t a = 0; a < 3; ++a)
       p[static_cast<Index>(a)] = lines[a][static_cast<std::size_t>(std::lround(p[static_cast<Index>(a)]))];
-  return boundary_of(mesh);
+  return surface_of(mesh);
 }
 
 TriangleMesh box(const Vec3& size) {
@@ -70,7 +70,7 @@ AutoTemplate made_through(const TriangleMesh& surface, std::size_t cells, bool p
   REQUIRE(result.templates.size() == 1);
   const AutoTemplate& made = result.templates.front();
   for (const MeshDefect& defect : validate(made.mesh)) FAIL_CHECK(defect.message);
-  CHECK(solid_boundary(boundary_of(made.mesh)).topology == result.wanted);
+  CHECK(solid_boundary(surface_of(made.mesh)).topology == result.wanted);
   CHECK(made.cells_asked == cells);
   CHECK(made.pillowed == pillow);
   for (std::size_t c = 0; c < made.mesh.num_cells(); ++c) CHECK(test::min_scaled_jacobian(made.mesh, c) > 0);
@@ -78,7 +78,7 @@ AutoTemplate made_through(const TriangleMesh& surface, std::size_t cells, bool p
 }
 
 void check_same_volume(const AutoTemplate& made, const TriangleMesh& surface) {
-  CHECK(solid_boundary(boundary_of(made.mesh)).volume == Approx(solid_boundary(surface).volume).epsilon(1e-12));
+  CHECK(solid_boundary(surface_of(made.mesh)).volume == Approx(solid_boundary(surface).volume).epsilon(1e-12));
 }
 
 /// True if a plane with a unit normal, at a position along it, holds lines of the template's grid.
@@ -113,7 +113,7 @@ TEST_CASE("A grid through a turned cube's planes has the cube's boundary", "[tem
       CHECK(made.lines[static_cast<std::size_t>(a)].size() == 6);
       for (const double side : {-1.0, 1.0}) CHECK(has_line(made, turn.col(a), side));
     }
-    for (const Vec3& p : boundary_of(made.mesh).positions)
+    for (const Vec3& p : surface_of(made.mesh).positions)
       CHECK(std::abs((turn.transpose() * p).cwiseAbs().maxCoeff() - 1) < 1e-12);
   }
 }
@@ -166,7 +166,7 @@ TEST_CASE("A thin plate becomes one layer of flat cells", "[templates]") {
 
 TEST_CASE("Lines are close together only across thin walls and gaps", "[templates]") {
   const auto lines_of = [](const TriangleMesh& surface, double size) {
-    return lines_through_planes(surface, axis_planes(surface, Mat3::Identity()), size, 2, 1e6)[2];
+    return lines_through_planes(surface, axis_planes(surface, Mat3::Identity()), size, 1e6)[2];
   };
   const auto everywhere = [](int, int, int) { return true; };
   using Positions = std::vector<double>;
