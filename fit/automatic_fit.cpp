@@ -162,9 +162,9 @@ class AutomaticFit {
   std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
   AutomaticFitResult result_;
   std::vector<FitState> states_;  ///< of the present mesh, if they are kept
-  double share_at_end_ = 0;   ///< of the attempt in progress
-  double aligned_share_ = 0;  ///< of the target's area on planes of the last grid through planes
-  double least_share_ = 1;    ///< of the goal that the last level reached, at caps of the lower goal there
+  double share_at_end_ = 0;       ///< of the attempt in progress
+  double aligned_share_ = 0;      ///< of the target's area on planes of the last grid through planes
+  double least_share_ = 1;        ///< of the goal that the last level reached, at caps of the lower goal there
   StageRunner runner_;
 };
 
@@ -182,11 +182,13 @@ void AutomaticFit::find_edges() {
   facets_ = flat_facets(target_.mesh);
 }
 
-/// Finds the features that are so small that a distance within the tolerance may be too large there.
+/// Finds the features that are so small that a distance within the tolerance may be too large there. Those that are
+/// smaller than the mean distance that is aimed at are faults of the surface.
 void AutomaticFit::find_features() {
   target_.sample(0);
+  const double most = options_.max_tolerance_percent / 100 / kAutomaticFeatureShare;
   features_ =
-      feature_sizes(target_.surface, *target_.tree, options_.max_tolerance_percent / 100 / kAutomaticFeatureShare);
+      feature_sizes(target_.surface, *target_.tree, std::min(options_.mean_tolerance_percent / 100, most / 2), most);
 }
 
 /// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
@@ -375,9 +377,10 @@ std::vector<Index> AutomaticFit::cells_that_meet(const VolumeMesh& mesh) const {
 
 /// Returns how poor each cell of the present mesh is, 0 for good ones.
 std::vector<double> AutomaticFit::faults_of_cells() const {
-  constexpr double kAcceptable = 0.3, kMeets = 1;
+  constexpr double kMeets = 1;
   std::vector<double> faults;
-  for (const double least : measure_quality(mesh_).cell_minima) faults.push_back(std::max(0.0, kAcceptable - least));
+  for (const double least : measure_quality(mesh_).cell_minima)
+    faults.push_back(std::max(0.0, kAcceptableQuality - least));
   for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
   return faults;
 }
@@ -569,8 +572,7 @@ AutomaticFitResult AutomaticFit::run() {
   }
   if (going) conclude();
   result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
-  for (FitState& state : result_.states)
-    state.positions = target_.normalisation.from_unit(std::move(state.positions));
+  for (FitState& state : result_.states) state.positions = target_.normalisation.from_unit(std::move(state.positions));
   result_.report.seconds = {{"total", runner_.seconds()}};
   return std::move(result_);
 }

@@ -36,13 +36,16 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
   constexpr double kEdgeWeight = 3, kMostMiss = 3;
   constexpr double kNotValid = 10;  // so much that a valid trial wins, however many edges an invalid one follows
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
+  const double least_acceptable = std::min(kAcceptableQuality, options.quality);
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
   const double missed = counts_misses ? excess(trial.feature_miss->share, kAutomaticFeatureShare) : 0;
   return excess(trial.max_percent, options.max_tolerance_percent) +
          excess(trial.mean_percent, options.mean_tolerance_percent) + std::min(kMostMiss, missed) +
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
-         kQualityWeight * (1 - trial.least_share) + kEdgeWeight * (1 - trial.within_share) +
-         (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
+         kQualityWeight * (1 - trial.least_share) +
+         kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
+         kEdgeWeight * (1 - trial.within_share) + (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) +
+         (trial.uncertified > 0 ? kNotValid : 0);
 }
 
 bool is_valid(const AutomaticFitTrial& trial) {

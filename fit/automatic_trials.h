@@ -20,6 +20,10 @@ inline constexpr double kMaxMargin = 0.8;
 /// the goal: larger templates have the same angles at sharp edges and irregular vertices.
 inline constexpr double kEnoughQuality = 0.85;
 
+/// Scaled Jacobian below which a cell is poor even at an acute corner, where less than the goal is asked for: edges of
+/// the target are given up for it.
+inline constexpr double kAcceptableQuality = 0.3;
+
 /// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases; and
 /// the portions of what is left of an attempt that its template, the coarser of two levels and a smooth fit take.
 inline constexpr double kAttemptPortion = 0.7, kTemplatePortion = 0.1, kCoarsePortion = 0.2, kSmoothPortion = 0.25;

@@ -33,8 +33,9 @@ double ball_radius(const Vec3& p, const Vec3& n, const ClosestPoint& tree, doubl
 
 }  // namespace
 
-FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double most) {
-  if (!(most > 0) || !std::isfinite(most)) throw InputError("feature sizes: the largest radius must be > 0");
+FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most) {
+  if (!(least >= 0) || !(most > least) || !std::isfinite(most))
+    throw InputError("feature sizes: the largest radius must be finite and above the smallest, which must be >= 0");
   FeatureSizes features;
   if (surface.is_cloud()) return features;
   const std::vector<Vec3>&samples = surface.samples(), &normals = surface.sample_normals();
@@ -44,7 +45,7 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
     sizes[i] =
         std::min(ball_radius(samples[i], normals[i], tree, most), ball_radius(samples[i], -normals[i], tree, most));
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (sizes[i] >= most) continue;
+    if (sizes[i] < least || sizes[i] >= most) continue;
     features.points.push_back(samples[i]);
     features.sizes.push_back(sizes[i]);
   }

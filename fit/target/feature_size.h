@@ -29,10 +29,12 @@ struct FeatureSizes {
 /// edge of 90 degrees, whose radius falls to 0 at the edge, is no feature.
 ///
 /// surface  its samples are tried; points of clouds and samples without a normal are not.
-/// tree     of the same surface.  most  largest radius that is of interest, > 0, else InputError.
-/// returns  the samples with a smaller radius, in their order. Empty if there is none.
+/// tree     of the same surface.
+/// least    smallest radius that is of interest, >= 0: crossings and slivers of a triangulation look like tiny slots.
+/// most     largest one, > least. InputError: another range.
+/// returns  the samples with a radius in that range, in their order. Empty if there is none.
 /// Parallel; same bits for any number of threads. Cost: some six closest points for each sample and side.
-FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double most);
+FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tree, double least, double most);
 
 /// The place where a fitted surface misses a feature by the largest share of its size.
 struct FeatureMiss {

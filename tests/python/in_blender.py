@@ -8,8 +8,6 @@ import sys
 
 import numpy
 
-numpy.bool = bool  # some of Blender 3.4's own modules still ask for it
-
 import addon_utils
 import bpy
 

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Run by Blender (test_blender.py): imports .glb files and tells what is there.
 
-arguments after "--": a .json to write, then .glb files; the .json has one entry for each, by the file's name.
+arguments after "--": a .json to write, the add-on as a .zip, then .glb files; the .json has one entry for each, by the
+file's name.
 """
 
 import json
 import os
 import sys
 
-import numpy
-
-numpy.bool = bool  # some of Blender 3.4's own modules still ask for it
-
 import bpy
 
-answer, *files = sys.argv[sys.argv.index("--") + 1 :]
+answer, archive, *files = sys.argv[sys.argv.index("--") + 1 :]
 
 
 def facts(thing):
@@ -40,10 +37,12 @@ def facts(thing):
     return found
 
 
+bpy.ops.preferences.addon_install(filepath=archive)
 told = {}
 for file in files:
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    assert bpy.ops.import_scene.gltf(filepath=file) == {"FINISHED"}, file
+    bpy.ops.preferences.addon_enable(module="subvol_cage")
+    assert bpy.ops.import_scene.subvol(filepath=file) == {"FINISHED"}, file
     told[os.path.basename(file)] = {
         "things": {thing.name: facts(thing) for thing in list(bpy.data.objects)},
         "actions": [action.name for action in bpy.data.actions]}

@@ -84,7 +84,7 @@ class Scenes(InFolder):
         subvol.write("small.glb", cls.fit, unit=0.01, chord=fine, quantize=True)
         subvol.write("cutaway:inside.glb", cls.fit, unit=0.01)
         subvol.write("animation:steps.glb", cls.fit, unit=0.01)
-        done = run_in_blender("scenes_in_blender.py", os.path.abspath("told.json"),
+        done = run_in_blender("scenes_in_blender.py", os.path.abspath("told.json"), ADDON,
                               *(os.path.abspath(f"{name}.glb") for name in ("torus", "small", "inside", "steps")))
         assert done.returncode == 0, done.stdout + done.stderr
         with open("told.json") as file:

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Control cages of subdivision volumes in Blender; fits and shells of the active mesh."""
+"""Control cages of subdivision volumes and scenes in Blender; fits and shells of the active mesh."""
 
 bl_info = {
     "name": "subvol: control cages, fits, shells",
     "author": "subvol",
     "version": (0, 1, 0),
     "blender": (3, 4, 0),
-    "location": "File > Import > subvol cage; Object > subvol",
-    "description": "Imports control cages with creases below their limit surface; runs subvol fit and subvol shell",
+    "location": "File > Import > subvol cage, subvol scene; Object > subvol",
+    "description": "Imports control cages with creases below their limit surface, and scenes; runs subvol fit and subvol shell",
     "category": "Mesh",
 }
 
 import bpy
 from bpy.props import StringProperty
 
-from . import cage_object, runs
+from . import cage_object, runs, scene_import
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -38,13 +38,14 @@ class Menu(bpy.types.Menu):
 
 def import_entry(self, context):
     self.layout.operator(cage_object.ImportCage.bl_idname, text="subvol cage (.mesh)")
+    self.layout.operator(scene_import.ImportScene.bl_idname, text="subvol scene (.glb)")
 
 
 def menu_entry(self, context):
     self.layout.menu(Menu.bl_idname)
 
 
-CLASSES = (Preferences, cage_object.ImportCage, runs.Fit, runs.Shell, Menu)
+CLASSES = (Preferences, cage_object.ImportCage, scene_import.ImportScene, runs.Fit, runs.Shell, Menu)
 
 
 def register():

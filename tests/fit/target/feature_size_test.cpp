@@ -16,8 +16,8 @@ using namespace subvol::test;
 
 namespace {
 
-FeatureSizes sizes_of(const TriangleMesh& mesh, double most) {
-  return feature_sizes(TargetSurface(mesh, {.sample_spacing = 0.05}), ClosestPoint(mesh), most);
+FeatureSizes sizes_of(const TriangleMesh& mesh, double most, double least = 0) {
+  return feature_sizes(TargetSurface(mesh, {.sample_spacing = 0.05}), ClosestPoint(mesh), least, most);
 }
 
 /// The cube [-1, 1]^3, scaled along z.
@@ -36,6 +36,8 @@ TEST_CASE("features: the size of a wall is half its thickness, wherever its side
     CHECK(sizes.sizes[i] == Approx(0.05).epsilon(0.03));
     CHECK(std::abs(sizes.points[i].z()) == Approx(0.05));  // no point of the rim
   }
+  CHECK(sizes_of(plate(0.1), 0.5, 0.06).points.empty());
+  CHECK_THROWS_AS(sizes_of(plate(0.1), 0.5, 0.5), InputError);
 }
 
 TEST_CASE("features: the size of a pin is its radius") {
