@@ -21,13 +21,33 @@ if(TARGET subvol_cli)
 
   find_program(SUBVOL_HELP2MAN help2man DOC "help2man, which makes the manual of the program from its help")
   if(SUBVOL_HELP2MAN)
-    set(manual "${made}/subvol.1")
-    add_custom_command(OUTPUT "${manual}" DEPENDS subvol_cli COMMENT "Manual of the program" VERBATIM
-      COMMAND ${SUBVOL_HELP2MAN} --no-info --name "volume meshes from surfaces" --output "${manual}"
-        "$<TARGET_FILE:subvol_cli>")
-    add_custom_target(subvol_manual ALL DEPENDS "${manual}")
-    install(FILES "${manual}" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1")
+    # A verb's manual is subvol-VERB(1); that of the program comes first.
+    set(manuals "")
+    foreach(verb "" fit optimize shell subdivide template check convert view report batch formats)
+      set(name subvol)
+      set(command "$<TARGET_FILE:subvol_cli>")
+      if(verb)
+        string(APPEND name "-${verb}")
+        string(APPEND command " ${verb}")
+      endif()
+      add_custom_command(OUTPUT "${made}/${name}.1" DEPENDS subvol_cli COMMENT "Manual: ${name}(1)" VERBATIM
+        COMMAND ${SUBVOL_HELP2MAN} --no-info --name "volume meshes from surfaces"
+          --version-string "subvol ${PROJECT_VERSION}" --output "${made}/${name}.1" "${command}")
+      list(APPEND manuals "${made}/${name}.1")
+    endforeach()
+    add_custom_target(subvol_manual ALL DEPENDS ${manuals})
+    install(FILES ${manuals} DESTINATION "${CMAKE_INSTALL_MANDIR}/man1")
   endif()
+
+  # The add-on for Blender runs the program.
+  set(addon "${made}/subvol_cage.zip")
+  file(GLOB addon_files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/export/blender/subvol_cage/*.py")
+  add_custom_command(OUTPUT "${addon}" DEPENDS ${addon_files} COMMENT "Add-on for Blender" VERBATIM
+    COMMAND ${CMAKE_COMMAND} -E make_directory "${made}"
+    COMMAND ${CMAKE_COMMAND} -E tar cf "${addon}" --format=zip subvol_cage
+    WORKING_DIRECTORY "${PROJECT_SOURCE_DIR}/export/blender")
+  add_custom_target(subvol_addon ALL DEPENDS "${addon}")
+  install(FILES "${addon}" DESTINATION "${CMAKE_INSTALL_DATADIR}/subvol")
 endif()
 
 set(CPACK_GENERATOR DEB)

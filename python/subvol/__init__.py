@@ -8,6 +8,22 @@
 Meshes are NumPy arrays in and out; options have the names of the command line.
 """
 
+import os as _os
+
+
+def _load_with_short_waits():
+    """OpenMP's library reads its settings when it is loaded: threads that wait spin for microseconds, not milliseconds."""
+    if "OMP_WAIT_POLICY" in _os.environ or "GOMP_SPINCOUNT" in _os.environ:
+        return
+    _os.environ["GOMP_SPINCOUNT"] = "1000"
+    try:
+        from . import _subvol  # noqa: F401
+    finally:
+        del _os.environ["GOMP_SPINCOUNT"]
+
+
+_load_with_short_waits()
+
 from . import _subvol, template
 
 __version__ = _subvol.__version__
