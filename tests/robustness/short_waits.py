@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The program runs with OpenMP threads that spin for a short time, unless the user has said how long they do.
+
+    short_waits.py PROGRAM SAMPLES
+"""
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+KNOWN = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")
+
+
+def running(program, samples, folder, **settings):
+    """Name of the process of a fit, and what it runs with of the settings that are known."""
+    environment = {name: value for name, value in os.environ.items() if name not in KNOWN} | settings
+    words = [program, "fit", samples / "torus_target.off", "--template", samples / "torus_template.mesh", "--levels", "3",
+             "-o", folder / "out.mesh", "--force", "--quiet"]
+    process = subprocess.Popen(words, env=environment)
+    time.sleep(0.5)
+    process_folder = pathlib.Path("/proc") / str(process.pid)
+    name = (process_folder / "comm").read_text().strip()
+    entries = (entry.partition("=") for entry in (process_folder / "environ").read_text().split("\0"))
+    found = {key: value for key, _, value in entries if key in KNOWN}
+    process.terminate()
+    process.wait()
+    return name, found
+
+
+def main():
+    program, writer = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
+    if not os.path.isdir("/proc/self"):
+        print("SKIPPED: no /proc")
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        subprocess.run([writer, folder / "samples"], check=True, stdout=subprocess.DEVNULL)
+        own = os.path.basename(program)
+        for settings, expected in (({}, {"GOMP_SPINCOUNT": "1000"}), ({"OMP_WAIT_POLICY": "active"},) * 2,
+                                   ({"GOMP_SPINCOUNT": "7"},) * 2):
+            found = running(program, folder / "samples", folder, **settings)
+            if found != (own, expected):
+                print(f"with {settings}: expected {own} with {expected}, found {found}")
+                return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
