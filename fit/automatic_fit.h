@@ -54,7 +54,7 @@ struct AutomaticFitOptions {
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
   StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
-  bool keep_states = false; ///< fills AutomaticFitResult::states, but not if the target has several regions
+  bool keep_states = false;  ///< fills AutomaticFitResult::states, but not if the target has several regions
 };
 
 /// A sharp edge of the target that no edges of the mesh follow.

@@ -33,7 +33,6 @@ namespace subvol {
 
 namespace {
 
-
 /// The faces of all sheets of a mesh as one surface, on its vertices.
 TriangleMesh sheet_triangles(const VolumeMesh& mesh) {
   const MeshTopology topology(mesh);

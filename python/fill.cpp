@@ -106,8 +106,9 @@ void add_fill(py::module_& module) {
   using Type = py::class_<Filled, Reported, std::shared_ptr<Filled>>;
   Type type(module, "FillResult", "What `fill` returns.");
   type.def_property_readonly("mesh", [](const Filled& filled) { return filled.mesh; }, "The mesh, a VolumeMesh.");
-  module.def("fill", [](const py::object& target, const py::kwargs& given) { return Filling(target, given).run(); },
-             py::arg("target"), kFillHelp);
+  module.def(
+      "fill", [](const py::object& target, const py::kwargs& given) { return Filling(target, given).run(); },
+      py::arg("target"), kFillHelp);
 }
 
 }  // namespace subvol::python

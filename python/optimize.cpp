@@ -182,9 +182,9 @@ void add_optimize(py::module_& module) {
   using Type = py::class_<Optimized, Reported, std::shared_ptr<Optimized>>;
   Type type(module, "OptimizeResult", "What `optimize` returns.");
   type.def_property_readonly("mesh", &mesh_of<Optimized>, "The mesh, a VolumeMesh; or curved cells, a HighOrderMesh.");
-  module.def("optimize", [](const py::object& mesh, const py::kwargs& given) {
-    return Optimization(mesh, given).run();
-  }, py::arg("mesh"), kOptimizeHelp);
+  module.def(
+      "optimize", [](const py::object& mesh, const py::kwargs& given) { return Optimization(mesh, given).run(); },
+      py::arg("mesh"), kOptimizeHelp);
 }
 
 }  // namespace subvol::python

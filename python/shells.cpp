@@ -241,9 +241,12 @@ void add_shell(py::module_& module) {
                              "What there was room for: (2, n). A view.");
   type.def_property_readonly("clearance", by_side(&ShellResult::clearance),
                              "Distance of each column's end from the whole surface: (2, n). A view.");
-  module.def("shell", [](const py::object& surface, const py::object& thickness, const py::kwargs& given) {
-    return Growing(surface, thickness, given).run();
-  }, py::arg("surface"), py::arg("thickness"), kShellHelp);
+  module.def(
+      "shell",
+      [](const py::object& surface, const py::object& thickness, const py::kwargs& given) {
+        return Growing(surface, thickness, given).run();
+      },
+      py::arg("surface"), py::arg("thickness"), kShellHelp);
 }
 
 }  // namespace subvol::python

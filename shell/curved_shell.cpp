@@ -161,7 +161,8 @@ void solve(const ShellResult& shell, const CurvedShellOptions& options, const No
   record.cells = mesh.space.num_cells();
   runner.work() = WorkShare(kStraightShare);
   runner.work().begin_part(1, kDefaultShellIterations);
-  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultShellIterations}, std::move(record), unknowns, report)) {
+  if (runner.run(problem, {.lambda = 1, .max_iterations = kDefaultShellIterations}, std::move(record), unknowns,
+                 report)) {
     report.stop_reason = stop_reason(report.stages.back().ended);
     report.explanation = report.stages.back().stop;
   }

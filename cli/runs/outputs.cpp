@@ -47,8 +47,7 @@ Output parse_output(const std::string& text) {
   std::transform(output.extension.begin(), output.extension.end(), output.extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (output.part == Part::animation && output.is_page()) {
-    if (!has_viewer())
-      throw UsageError("-o " + text + ": this program was built without the viewer (docs/viewer.md)");
+    if (!has_viewer()) throw UsageError("-o " + text + ": this program was built without the viewer (docs/viewer.md)");
     return output;
   }
   const FileFormat* format = format_of_extension(output.extension);

@@ -13,11 +13,11 @@ namespace subvol::cli {
 
 /// Part of a result that goes to a file: `FILE`, or `PART:FILE`.
 enum class Part {
-  result,    ///< the finest mesh, or its surface
-  cage,      ///< the control mesh
-  cutaway,   ///< a scene that shows the cells inside
-  animation, ///< the course of the fit: a scene of the surface, or a page in which the mesh can be turned
-  boundary   ///< the faces of the boundary as cells, with their groups
+  result,     ///< the finest mesh, or its surface
+  cage,       ///< the control mesh
+  cutaway,    ///< a scene that shows the cells inside
+  animation,  ///< the course of the fit: a scene of the surface, or a page in which the mesh can be turned
+  boundary    ///< the faces of the boundary as cells, with their groups
 };
 
 /// One -o: the part to write, and the file.

@@ -56,7 +56,8 @@ std::string colour_scale(const ReportPicture& picture) {
   for (int i = 0; i <= kStops; ++i) {
     const LinearColor color = quality_color(std::max(1e-9, double(i) / kStops));
     text += ",rgb(";
-    for (int k = 0; k < 3; ++k) text += formatted(k ? ",%d" : "%d", int(std::lround(255 * std::pow(color[k], 1 / 2.2))));
+    for (int k = 0; k < 3; ++k)
+      text += formatted(k ? ",%d" : "%d", int(std::lround(255 * std::pow(color[k], 1 / 2.2))));
     text += ')';
   }
   return text + ")\"></i>" + escaped(picture.high) + "</span>";

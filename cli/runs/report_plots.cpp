@@ -63,7 +63,7 @@ std::string energy_plot(const Json& stages) {
   const int every = std::max(1, static_cast<int>((top - bottom) / 6));
   for (int decade = static_cast<int>(bottom); decade <= static_cast<int>(top); decade += every)
     svg += formatted("<path class=\"axis\" d=\"M%g %.1fH%g\"/><text x=\"4\" y=\"%.1f\">1e%d</text>", kLeft,
-                  y(std::pow(10.0, decade)), kWidth, y(std::pow(10.0, decade)) + 4, decade);
+                     y(std::pow(10.0, decade)), kWidth, y(std::pow(10.0, decade)) + 4, decade);
   for (const std::size_t end : ends)
     if (end < num_steps)
       svg += formatted("<path class=\"axis\" d=\"M%.1f %gV%g\"/>", x(double(end) - 0.5), kTop, kHeight - kBottom);
@@ -72,8 +72,8 @@ std::string energy_plot(const Json& stages) {
     for (std::size_t i = 0; i < num_steps; ++i) svg += formatted("%.1f,%.1f ", x(double(i)), y(energies[k][i]));
     svg += "\"/>";
   }
-  return svg +
-         formatted("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5, num_steps);
+  return svg + formatted("<text x=\"%g\" y=\"%g\" text-anchor=\"end\">%zu steps</text></svg>", kWidth, kHeight - 5,
+                         num_steps);
 }
 
 std::string histogram_plot(const Json& counts) {
@@ -86,13 +86,13 @@ std::string histogram_plot(const Json& counts) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] > 0)) continue;
     const double height = std::max(1.0, (kHeight - kBottom - kTop) * values[i] / most);
-    svg +=
-        formatted("<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
-               kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
+    svg += formatted(
+        "<rect class=\"bar\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"><title>%.15g</title></rect>",
+        kLeft + width * double(i) + 1, kHeight - kBottom - height, width - 2, height, values[i]);
   }
   for (int i = 0; i <= 4; ++i)
     svg += formatted("<text x=\"%.1f\" y=\"%g\" text-anchor=\"%s\">%g</text>", kLeft + (kWidth - kLeft) * i / 4,
-                  kHeight - 5, i == 4 ? "end" : "middle", -1 + 0.5 * i);
+                     kHeight - 5, i == 4 ? "end" : "middle", -1 + 0.5 * i);
   return svg + formatted("<text x=\"4\" y=\"%g\">%.0f</text></svg>", kTop + 10, most);
 }
 

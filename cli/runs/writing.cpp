@@ -251,7 +251,8 @@ void write_animation(const Output& output, const VolumeMesh& cage, const VolumeM
   constexpr std::size_t kMostCells = 500'000;  // of all moments together: a page of 15 MB
   const std::size_t most = std::min(result.num_cells(), kMostCells / (states.size() + 1));
   int levels = 0;
-  for (std::size_t cells = cage.cell_vertices.size(); cells <= most && cage.num_cells() < result.num_cells(); cells *= 8)
+  for (std::size_t cells = cage.cell_vertices.size(); cells <= most && cage.num_cells() < result.num_cells();
+       cells *= 8)
     ++levels;
   const auto moment = [&](const std::string& name, const std::vector<Vec3>& positions) {
     VolumeMesh mesh = cage;

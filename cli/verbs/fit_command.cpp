@@ -484,10 +484,11 @@ void add_fit_command(CLI::App& app, Action& action) {
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
   add_high_order_options(*verb, *arguments);
-  add_output_options(*verb, arguments->run,
-                     "Finest mesh, or its surface, by extension: " + output_formats() +
-                         "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb or .html\n"
-                         "for the fit as it went; may be given several times");
+  add_output_options(
+      *verb, arguments->run,
+      "Finest mesh, or its surface, by extension: " + output_formats() +
+          "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb or .html\n"
+          "for the fit as it went; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   add_checkpoint_options(*verb, arguments->run);

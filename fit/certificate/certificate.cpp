@@ -278,13 +278,6 @@ CellCertificate certify_checked(CellKind kind, std::span<const Vec3> corners, co
   return certify_tet(corners, c);
 }
 
-void check_options(const CertificateOptions& options) {
-  if (options.max_depth < 0 || options.max_depth > 50)
-    throw InputError("certificate: max_depth is " + std::to_string(options.max_depth) + ", expected 0 to 50");
-  if (options.max_boxes < 1)
-    throw InputError("certificate: max_boxes is " + std::to_string(options.max_boxes) + ", expected 1 or more");
-}
-
 void check_corners(CellKind kind, std::span<const Vec3> corners) {
   const CellTopology& topology = cell_topology(kind);
   if (corners.size() != static_cast<std::size_t>(topology.num_vertices))
@@ -298,6 +291,13 @@ void check_size(const char* what, std::size_t size, std::size_t expected, bool o
 }
 
 }  // namespace
+
+void check_options(const CertificateOptions& options) {
+  if (options.max_depth < 0 || options.max_depth > 50)
+    throw InputError("certificate: max_depth is " + std::to_string(options.max_depth) + ", expected 0 to 50");
+  if (options.max_boxes < 1)
+    throw InputError("certificate: max_boxes is " + std::to_string(options.max_boxes) + ", expected 1 or more");
+}
 
 const char* to_string(CellValidity validity) {
   constexpr const char* kNames[] = {"valid", "invalid", "undecided"};

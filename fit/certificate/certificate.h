@@ -23,6 +23,9 @@ struct CertificateOptions {
   int max_boxes = 4096;  ///< boxes examined per cell (linear cells: up to 7 more); >= 1
 };
 
+/// InputError: an option is out of range.
+void check_options(const CertificateOptions& options);
+
 /// Result of certifying one cell.
 struct CellCertificate {
   CellValidity validity = CellValidity::undecided;

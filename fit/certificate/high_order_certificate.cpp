@@ -61,7 +61,9 @@ class BoxSearch {
   using Box = typename Boxes::Box;
 
   BoxSearch(Boxes& boxes, const Cell& cell, const CertificateOptions& options)
-      : boxes_(boxes), cell_(cell), options_(options),
+      : boxes_(boxes),
+        cell_(cell),
+        options_(options),
         max_level_(Boxes::kLevelsPerDepth * std::min(options.max_depth, Boxes::kMaxDepth)) {
     result_.lower_bound = kInfinity;
     result_.witness_determinant = kInfinity;

@@ -14,7 +14,6 @@ namespace subvol {
 
 namespace {
 
-
 /// P_0 .. P_count at t.
 std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
   std::array<long double, kMaxOrder + 2> p{1, t};
@@ -23,13 +22,16 @@ std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
 }
 
 long double mode_value(Basis basis, int i, long double x) {
-  if (basis == Basis::fourier) return std::numbers::sqrt2_v<long double> * std::sin(i * std::numbers::pi_v<long double> * x) / (i * std::numbers::pi_v<long double>);
+  if (basis == Basis::fourier)
+    return std::numbers::sqrt2_v<long double> * std::sin(i * std::numbers::pi_v<long double> * x) /
+           (i * std::numbers::pi_v<long double>);
   const auto p = legendre(i + 1, 1 - 2 * x);
   return (p[i - 1] - p[i + 1]) / (2 * std::sqrt(2 * i + 1.0L));
 }
 
 long double mode_slope(Basis basis, int i, long double x) {
-  if (basis == Basis::fourier) return std::numbers::sqrt2_v<long double> * std::cos(i * std::numbers::pi_v<long double> * x);
+  if (basis == Basis::fourier)
+    return std::numbers::sqrt2_v<long double> * std::cos(i * std::numbers::pi_v<long double> * x);
   return std::sqrt(2 * i + 1.0L) * legendre(i, 1 - 2 * x)[i];
 }
 
@@ -139,14 +141,14 @@ LineModels::Level LineModels::make_level(int l) const {
       const double* b = row(part, i);
       float* deviations = level.deviations.data() + (b - level.coefficients.data());
       const auto [least, largest] = std::minmax_element(b, b + q + 1);
-      const double middle = 0.5 * (*least + *largest), size = std::max(-*least, *largest);
-      level.largest_coefficient[i] = std::max(level.largest_coefficient[i], size);
+      const double middle = 0.5 * (*least + *largest), bound = std::max(-*least, *largest);
+      level.largest_coefficient[i] = std::max(level.largest_coefficient[i], bound);
       for (int o = 0; o <= q; ++o) deviations[o] = static_cast<float>(b[o] - middle);
       float* then = deviations + q + 1;
       then[kMiddle] = static_cast<float>(middle);
       then[kLargestDeviation] = static_cast<float>(*largest - middle);
       then[kMiddleSize] = std::abs(then[kMiddle]);
-      then[kLargest] = static_cast<float>(size);
+      then[kLargest] = static_cast<float>(bound);
     }
   return level;
 }

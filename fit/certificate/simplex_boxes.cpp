@@ -49,9 +49,12 @@ constexpr double kFall = 0.05;
 
 /// Along a prism's w, models have the degree whose coefficients are one `Wide`.
 SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
-    : kind_(kind), simplex_(SimplexModels::get(kind, basis, order)), line_(LineModels::get(basis, order, kWide - 1)),
+    : kind_(kind),
+      simplex_(SimplexModels::get(kind, basis, order)),
+      line_(LineModels::get(basis, order, kWide - 1)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1),
-      lanes_(rounded_up(3 * num_layers_, kQuad)), small_error_(small_error(order)),
+      lanes_(rounded_up(3 * num_layers_, kQuad)),
+      small_error_(small_error(order)),
       whole_models_(simplex_.num_tiers()) {
   layer_terms_.resize(num_layers_);
 }

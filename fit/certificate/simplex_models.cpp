@@ -10,7 +10,6 @@ namespace subvol {
 
 namespace {
 
-
 /// sin(z) / z and its derivative, z >= 0.
 void sinc(long double z, long double& value, long double& slope) {
   if (z > 1) {
@@ -32,7 +31,8 @@ void sinc(long double z, long double& value, long double& slope) {
 void kernel_below_half(Basis basis, int i, long double x, long double& value, long double& slope) {
   if (basis == Basis::fourier) {  // sqrt2 sinc(i pi x) / (1 - x)
     sinc(i * std::numbers::pi_v<long double> * x, value, slope);
-    slope = std::numbers::sqrt2_v<long double> * (slope * i * std::numbers::pi_v<long double> + value / (1 - x)) / (1 - x);
+    slope =
+        std::numbers::sqrt2_v<long double> * (slope * i * std::numbers::pi_v<long double> + value / (1 - x)) / (1 - x);
     value *= std::numbers::sqrt2_v<long double> / (1 - x);
     return;
   }

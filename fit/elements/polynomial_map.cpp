@@ -19,11 +19,11 @@
 namespace subvol {
 namespace {
 
-
 /// Number of Legendre modes that represent Fourier modes up to `count` to rounding: coefficients decay faster than any
 /// power beyond i pi / 2.
 int series_length(Basis basis, int count) {
-  return basis == Basis::legendre || count == 0 ? count : static_cast<int>(std::ceil(count * std::numbers::pi / 2)) + 24;
+  return basis == Basis::legendre || count == 0 ? count
+                                                : static_cast<int>(std::ceil(count * std::numbers::pi / 2)) + 24;
 }
 
 /// c(j - 1, i - 1) = (phi_i', (phi^L_j)'), j = 1 .. `series_length`.
@@ -38,7 +38,8 @@ Eigen::MatrixXd series_matrix(Basis basis, int count) {
     for (int j = 1; j <= length; ++j) {
       const double slope = std::sqrt(2 * j + 1.0) * legendre * rule.weights[q];
       for (int i = 1; i <= count; ++i)
-        if (mode_parity(i) == mode_parity(j)) matrix(j - 1, i - 1) += slope * std::numbers::sqrt2 * std::cos(i * std::numbers::pi * x);
+        if (mode_parity(i) == mode_parity(j))
+          matrix(j - 1, i - 1) += slope * std::numbers::sqrt2 * std::cos(i * std::numbers::pi * x);
       const double next = ((2 * j + 1) * t * legendre - j * before) / (j + 1);
       before = legendre;
       legendre = next;

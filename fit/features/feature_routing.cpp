@@ -20,7 +20,6 @@ namespace subvol {
 
 namespace {
 
-
 // Found on twelve CAD parts, as all constants here without another reason. Lengths are in units of h.
 /// Corners farther from a vertex get none: the smooth fit rounds them off by about half an edge.
 constexpr double kCornerReach = 1.6;

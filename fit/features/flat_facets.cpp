@@ -46,7 +46,8 @@ class FacetGrower {
 
   FlatFacets run() {
     std::vector<double> areas;
-    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) areas.push_back(doubled_area_vector(mesh_, mesh_.triangles[t]).norm());
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
+      areas.push_back(doubled_area_vector(mesh_, mesh_.triangles[t]).norm());
     std::vector<std::size_t> order(areas.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return areas[a] > areas[b]; });
@@ -58,7 +59,8 @@ class FacetGrower {
  private:
   bool is_in_plane(std::size_t t, const FacetPlane& plane) const {
     const auto& corners = mesh_.triangles[t];
-    return doubled_area_vector(mesh_, mesh_.triangles[t]).dot(plane.normal) > 0 && std::all_of(corners.begin(), corners.end(), [&](Index v) {
+    return doubled_area_vector(mesh_, mesh_.triangles[t]).dot(plane.normal) > 0 &&
+           std::all_of(corners.begin(), corners.end(), [&](Index v) {
              return std::abs(plane.normal.dot(mesh_.positions[v]) - plane.offset) <= tolerance_;
            });
   }

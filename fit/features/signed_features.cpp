@@ -62,7 +62,8 @@ double interior_angle(const TriangleMesh& mesh, std::span<const OrientedSide> pa
   return axis.dot(along) >= 0 ? 180 - turn : 180 + turn;
 }
 
-std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const OrientedSide> sides, const FeatureCurve& curve) {
+std::vector<double> angles_along(const TriangleMesh& mesh, std::span<const OrientedSide> sides,
+                                 const FeatureCurve& curve) {
   std::vector<double> angles;
   for (std::size_t i = 0; i + 1 < curve.vertices.size(); ++i) {
     const Index v = curve.vertices[i], w = curve.vertices[i + 1];

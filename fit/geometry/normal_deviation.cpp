@@ -47,7 +47,8 @@ NormalDeviation normal_deviation(const TriangleMesh& fitted, const TriangleMesh&
                                  const ClosestPoint& target_tree, int num_samples) {
   const ClosestPoint order(fitted);  // neighbors in its order are neighbors in space
   double total = 0;
-  for (std::size_t t = 0; t < fitted.triangles.size(); ++t) total += doubled_area_vector(fitted, fitted.triangles[t]).norm();
+  for (std::size_t t = 0; t < fitted.triangles.size(); ++t)
+    total += doubled_area_vector(fitted, fitted.triangles[t]).norm();
   constexpr std::size_t kRun = 32;   // sums and hints stay within a run, whatever thread takes it
   std::vector<Angles> runs((fitted.triangles.size() + kRun - 1) / kRun);
 #pragma omp parallel for schedule(dynamic)

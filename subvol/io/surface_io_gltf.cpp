@@ -55,8 +55,8 @@ class GltfParser {
 
   void load(std::string_view bytes) {
     tinygltf::TinyGLTF reader;
-    reader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
-                             void*) { return true; },
+    reader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*,
+                             int, void*) { return true; },
                           nullptr);  // pictures do not matter
     std::string errors, warnings;
     const std::string folder = std::filesystem::path(name_).parent_path().string();

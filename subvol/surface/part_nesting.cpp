@@ -61,8 +61,8 @@ constexpr double kClearlyWhole = 0.2;    // farthest from a whole number: ten ti
 
 /// The triangles of each part.
 struct Parts {
-  Parts(const TriangleMesh& mesh, std::span<const int> part, int count)
-      : mesh(mesh), triangles(static_cast<std::size_t>(count)), boxes(static_cast<std::size_t>(count)) {
+  Parts(const TriangleMesh& surface, std::span<const int> part, int count)
+      : mesh(surface), triangles(static_cast<std::size_t>(count)), boxes(static_cast<std::size_t>(count)) {
     for (std::size_t t = 0; t < part.size(); ++t) {
       triangles[part[t]].push_back(static_cast<Index>(t));
       for (Index v : mesh.triangles[t]) boxes[part[t]].extend(mesh.positions[v]);

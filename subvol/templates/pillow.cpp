@@ -43,7 +43,8 @@ struct SetFace {
   std::span<const Index> vertices() const { return {corners.data(), size}; }
 };
 
-std::vector<SetFace> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const char> in_set) {
+std::vector<SetFace> boundary_of_set(const VolumeMesh& mesh, const MeshTopology& topology,
+                                     std::span<const char> in_set) {
   std::vector<SetFace> faces;
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     if (!in_set[c]) continue;
@@ -149,7 +150,7 @@ void shorten_steps(VolumeMesh& mesh, std::span<const Index> number, std::span<co
 
 /// Returns the faces of those connected parts of a boundary that are wanted.
 std::vector<SetFace> chosen_parts(std::span<const SetFace> faces, std::size_t num_vertices, int reference,
-                               const PillowChoice& takes) {
+                                  const PillowChoice& takes) {
   std::vector<Index> part(num_vertices);
   std::iota(part.begin(), part.end(), 0);
   const auto root = [&](Index v) {

@@ -40,8 +40,8 @@ namespace {
 
 TEST_CASE("A fit goes from files to a .glb, a cage and a report that tells the truth", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(
-      kFit + "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
+  const Run run =
+      place.run(kFit + "--levels 2 -o out.glb -o out.mesh -o cage:cage.mesh -o cage:cage.usda --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   CHECK(run.out.empty());
@@ -154,8 +154,8 @@ TEST_CASE("A fit of curved elements goes from files to files that check agrees w
 
 TEST_CASE("An adaptive fit goes from files to files", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(
-      kFit + "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
+  const Run run =
+      place.run(kFit + "--order 3 --adaptive --tolerance 1 -o out.vtu -o out.glb -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   const auto orders = place.json("report.json").at("orders");

@@ -24,7 +24,6 @@ using subvol_tests::GlbFile;
 
 namespace {
 
-
 std::vector<std::string> node_names(const GlbFile& file) {
   std::vector<std::string> names;
   for (const auto& node : file.json.at("nodes")) names.push_back(node.at("name"));
@@ -35,8 +34,9 @@ std::vector<std::string> node_names(const GlbFile& file) {
 
 TEST_CASE("A fit writes a cutaway and its own animation beside the surface", "[cli][slow]") {
   const Workplace place;
-  const Run run = place.run(kFit + "--levels 2 -o out.glb -o cutaway:cut.glb -o animation:steps.glb "
-                                                "-o out.mesh --cut x:0.4 --report report.json");
+  const Run run = place.run(kFit +
+                            "--levels 2 -o out.glb -o cutaway:cut.glb -o animation:steps.glb "
+                            "-o out.mesh --cut x:0.4 --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
   CHECK(place.json("report.json").at("outputs") == nlohmann::json({"out.glb", "cut.glb", "steps.glb", "out.mesh"}));

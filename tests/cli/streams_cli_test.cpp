@@ -20,7 +20,6 @@ using namespace subvol::test;
 
 namespace {
 
-
 /// Runs shell commands in a workplace, with the program as $SUBVOL; their exit status.
 int shell(const Workplace& place, const std::string& commands) {
   const std::string folder = (place / "").string();

@@ -142,7 +142,8 @@ TEST_CASE("The course of a fit becomes a page with a timeline", "[cli]") {
   }
   REQUIRE(linear.status == 0);
   REQUIRE(place.run(kFit + "--order 2 -o animation:curved.html").status == 0);
-  REQUIRE(place.run("fit target.off --cells 300 -o animation:automatic.html -o automatic.mesh --quality 0.3").status == 0);
+  REQUIRE(place.run("fit target.off --cells 300 -o animation:automatic.html -o automatic.mesh --quality 0.3").status ==
+          0);
   for (const char* name : {"course.html", "curved.html", "automatic.html"}) {
     INFO(name);
     const nlohmann::json data = data_of(content_of(place / name));

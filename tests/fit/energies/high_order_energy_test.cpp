@@ -47,8 +47,8 @@ void check_derivatives(VolumeTerm& energy, const std::vector<Vec3>& x, const std
     CHECK((gradient[i] - again[i]).norm() < 1e-14);
     slope += gradient[i].dot(d[i]);
   }
-  CHECK(slope ==
-        Approx(scale * (energy.value(moved_along(x, d, h)) - energy.value(moved_along(x, d, -h))) / (2 * h)).epsilon(1e-7));
+  CHECK(slope == Approx(scale * (energy.value(moved_along(x, d, h)) - energy.value(moved_along(x, d, -h))) / (2 * h))
+                     .epsilon(1e-7));
   energy.add_gradient(moved_along(x, d, h), scale, plus);
   energy.add_gradient(moved_along(x, d, -h), scale, minus);
   energy.multiply(d, product);

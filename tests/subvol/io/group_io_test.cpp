@@ -24,7 +24,8 @@ std::vector<std::string> labels(const FaceGroups& groups) {
 
 using Labels = std::vector<std::string>;
 
-PolygonMesh read_groups(const std::string& name, const std::string& text, std::vector<std::string>* warnings = nullptr) {
+PolygonMesh read_groups(const std::string& name, const std::string& text,
+                        std::vector<std::string>* warnings = nullptr) {
   const TemporaryFolder folder;
   return read_polygon_mesh(folder.file(name, text), warnings);
 }
@@ -35,8 +36,11 @@ const std::string kCorners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
 
 TEST_CASE("groups of an .obj are named by g, else by materials, else by several objects") {
   std::vector<std::string> warnings;
-  const PolygonMesh by_g = read_groups("a.obj", kCorners + "o tet\nusemtl red\nf 1 3 2\ng base plate\nf 1 2 4\ng side\n"
-                                                    "usemtl blue\nf 2 3 4\ng\nf 3 1 4\n", &warnings);
+  const PolygonMesh by_g = read_groups("a.obj",
+                                       kCorners +
+                                           "o tet\nusemtl red\nf 1 3 2\ng base plate\nf 1 2 4\ng side\n"
+                                           "usemtl blue\nf 2 3 4\ng\nf 3 1 4\n",
+                                       &warnings);
   CHECK(labels(by_g.face_groups) == Labels{"", "base plate", "side", ""});
   CHECK(by_g.face_groups.groups == std::vector<Group>{{"base plate", 1, 2}, {"side", 2, 2}});
   REQUIRE(warnings.size() == 1);
@@ -80,7 +84,8 @@ TEST_CASE("labels and colors of the faces of a .ply and an .off are groups") {
   const FaceGroups numbered = read_groups("a.ply", ply(material, {"1 9", "1 4"})).face_groups;
   CHECK(numbered.groups == std::vector<Group>{{"", 4, 2}, {"", 9, 2}});
   CHECK(numbered.of_face == std::vector<Index>{1, 0});
-  CHECK(labels(read_groups("a.ply", ply(material, {"1 0", "1 4"})).face_groups) == Labels{"material_id 0", "material_id 4"});
+  CHECK(labels(read_groups("a.ply", ply(material, {"1 0", "1 4"})).face_groups) ==
+        Labels{"material_id 0", "material_id 4"});
   const std::string colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   CHECK(labels(read_groups("a.ply", ply(colors, {"255 0 0", "0 128 0"})).face_groups) == Labels{"#ff0000", "#008000"});
   CHECK(read_groups("a.ply", ply(colors, {"255 0 0", "255 0 0"})).face_groups.empty());

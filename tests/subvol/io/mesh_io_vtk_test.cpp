@@ -272,8 +272,10 @@ TEST_CASE("what is malformed in a VTK file is refused with its line") {
   CHECK_THAT(vtk_refusal("hello\n"), Contains(":1:") && Contains("vtk DataFile"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "Version 3.0", "Version 6.0")), Contains("2.0 to 5.1"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "ASCII", "UTF8")), Contains(":3:"));
-  CHECK_THAT(vtk_refusal(vtk_replaced(good, "UNSTRUCTURED_GRID", "POLYDATA")), Contains(":4:") && Contains("'POLYDATA'"));
-  CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS 999999999999")), Contains(":5:") && Contains("999999999999"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "UNSTRUCTURED_GRID", "POLYDATA")),
+             Contains(":4:") && Contains("'POLYDATA'"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS 999999999999")),
+             Contains(":5:") && Contains("999999999999"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS -1")), Contains("negative"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "POINTS 11", "POINTS 10")), Contains("expected a section"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "double", "bit")), Contains("'bit'"));
@@ -287,7 +289,8 @@ TEST_CASE("what is malformed in a VTK file is refused with its line") {
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n14")), Contains("apex"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n25")), Contains("type 25"));
   CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 5\n10")), Contains("expected 4"));
-  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 4\n")), Contains("4 cell types for 5 cells"));
+  CHECK_THAT(vtk_refusal(vtk_replaced(good, "CELL_TYPES 5\n12", "CELL_TYPES 4\n")),
+             Contains("4 cell types for 5 cells"));
   CHECK_THAT(vtk_refusal(good.substr(0, good.find("CELL_TYPES"))), Contains("CELL_TYPES"));
   CHECK_THAT(vtk_refusal(good.substr(0, good.find("CELLS"))), Contains("CELLS"));
   CHECK_THAT(vtk_refusal(vtk_file({}, kPoints, {{0, 3, 2, 1}}, {9})), Contains("no hexes"));

@@ -123,7 +123,8 @@ TEST_CASE("nodal_mesh: what is wrong with a .msh is said with its line", "[io]")
   };
   CHECK_THAT(nodal_refusal("a.msh", changed("4.1 0", "3.0 0")), Contains("2.2, 4.0 or 4.1"));
   CHECK_THAT(nodal_refusal("a.msh", changed("90\n3\n0 0 0", "90\n90\n0 0 0")), Contains("second node 90"));
-  CHECK_THAT(nodal_refusal("a.msh", changed("2 90 3 50 4\n", "2 90 3 50 5\n")), Contains(".msh:") && Contains("names node 5"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("2 90 3 50 4\n", "2 90 3 50 5\n")),
+             Contains(".msh:") && Contains("names node 5"));
   CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n2 90 3 50 4", "3 1 7 1\n2 90 3 50 4 3")), Contains("pyramid"));
   CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n", "3 1 4 1000000000\n")), Contains("more than the rest"));
   CHECK_THAT(nodal_refusal("a.msh", changed("0 1 0 .1", "nan 1 0 .1")), Contains("finite"));
@@ -221,8 +222,9 @@ TEST_CASE("nodal_mesh: blocks that claim to be huge are refused", "[io]") {
 // --- Abaqus ---------------------------------------------------------------------------------------------------------
 
 TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files of Abaqus", "[io]") {
-  nodal_folder().file("nodes.txt", "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1.,0.,1.D0\n7,1,1,1\n8,0,1,1\n"
-                             "9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n");
+  nodal_folder().file("nodes.txt",
+                      "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1.,0.,1.D0\n7,1,1,1\n8,0,1,1\n"
+                      "9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n");
   const std::string text =
       "*Heading\n*INCLUDE, INPUT=nodes.txt\n*Elset, elset=both\nupper, LOWER\n*Elset, elset=lower, generate\n10, 14, 2\n"
       "*Element, type=C3D8R, elset=Body\n10, 1,2,3,4,\n5,6,7,8\n20, 5,6,7,8, 9,10,11,12\n"
@@ -246,7 +248,8 @@ TEST_CASE("nodal_mesh: sets, sets of sets, ranges, surfaces and included files o
 
 TEST_CASE("nodal_mesh: what is wrong with a .inp is said with its line", "[io]") {
   const std::string nodes = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n";
-  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,5\n"), Contains("a.inp:7: ") && Contains("node 5"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,5\n"),
+             Contains("a.inp:7: ") && Contains("node 5"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3\n"), Contains("ends within an element"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D5\n"), Contains("pyramid"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*INCLUDE, INPUT=a.inp\n"), Contains("8 files in one another"));
@@ -306,7 +309,8 @@ TEST_CASE("nodal_mesh: small, large and free fields of Nastran, with its numbers
   CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[4])] == Vec3(0.5, 0, -0.1));
   CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[5])] == Vec3(0.5, 0.5, 0));  // left out: straight
   CHECK(mesh.positions[static_cast<std::size_t>(mesh.cell(0)[3])] == Vec3(0, 0, 1));
-  CHECK_THAT(nodal_refusal("a.bdf", "BEGIN BULK\nGRID,1,5,0.,0.,0.\n"), Contains("a.bdf:2:") && Contains("coordinate system"));
+  CHECK_THAT(nodal_refusal("a.bdf", "BEGIN BULK\nGRID,1,5,0.,0.,0.\n"),
+             Contains("a.bdf:2:") && Contains("coordinate system"));
   CHECK_THAT(nodal_refusal("a.bdf", "GRID,1,,0.,0.,x\n"), Contains("finite number"));
   CHECK_THAT(nodal_refusal("a.bdf", "CHEXA,1,1,1,2,3,4,5,6\n"), Contains("number of a point"));
 }
@@ -327,7 +331,8 @@ TEST_CASE("nodal_mesh: MFEM meshes, and what is not read of them", "[io]") {
   CHECK_THAT(nodal_refusal("b.mesh", nodes + "1\n0 0 0\n"), Contains("ends"));
   CHECK_THAT(nodal_refusal("b.mesh", "MFEM NURBS mesh v1.0\n"), Contains("NURBS"));
   CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n2\n"), Contains("dimension 3"));
-  CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n3\nelements\n1\n1 7 0 1 2 3 4\n"), Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n3\nelements\n1\n1 7 0 1 2 3 4\n"),
+             Contains("pyramid"));
 }
 
 TEST_CASE("nodal_mesh: MFEM's nodes of neighbors are the same on what they share", "[io]") {

@@ -119,9 +119,11 @@ TEST_CASE("surface formats: glTF is read in place, without its lines, with mater
   for (std::size_t size = 0; size < glb.size(); size += 1 + glb.size() / 60)
     CHECK_FALSE(format_refusal("cut.glb", std::string_view(glb).substr(0, size)).empty());
   CHECK_THAT(format_refusal("a.gltf", R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"],
-    "extensionsUsed":["KHR_draco_mesh_compression"]})"), Contains("KHR_draco_mesh_compression"));
-  CHECK_THAT(format_refusal("b.gltf", R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})"),
-             Contains("children of themselves"));
+    "extensionsUsed":["KHR_draco_mesh_compression"]})"),
+             Contains("KHR_draco_mesh_compression"));
+  CHECK_THAT(
+      format_refusal("b.gltf", R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"children":[0]}]})"),
+      Contains("children of themselves"));
 }
 
 TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "[io]") {
@@ -142,7 +144,8 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
   CHECK(found.positions[4] == Vec3(7, 6, 8));
   CHECK(areas(found) == std::map<std::string, double>{{"one", 0.5}, {"two", 2}});
   CHECK_THAT(format_refusal("b.3mf", archive("v3=\"2\"", "v3=\"3\"")), Contains("number of a vertex"));
-  CHECK_THAT(format_refusal("b.3mf", archive("objectid=\"1\" transform", "objectid=\"2\" transform")), Contains("themselves"));
+  CHECK_THAT(format_refusal("b.3mf", archive("objectid=\"1\" transform", "objectid=\"2\" transform")),
+             Contains("themselves"));
   CHECK_THAT(format_refusal("b.3mf", archive("objectid=\"2\"", "objectid=\"5\"")), Contains("no object"));
   CHECK_THAT(format_refusal("b.3mf", archive("x=\"1\"", "x=\"nan\"")), Contains("expected a number x"));
   const std::string bytes = archive("one", "one");
@@ -181,17 +184,19 @@ format="ascii">4</DataArray></Strips><CellData><DataArray type="Int32" Name="mat
 
 TEST_CASE("surface formats: elements of two dimensions in a .msh or .inp without cells are a surface", "[io]") {
   const FileCells msh = read_cells(format_folder().file(
-      "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 8 \"inlet\"\n$EndPhysicalNames\n$Nodes\n5\n"
-               "9 0 0 0\n3 1 0 0\n5 0 1 0\n4 1 1 0\n7 2 1 0\n$EndNodes\n$Elements\n3\n1 2 2 8 1 9 3 5\n"
-               "2 2 2 0 1 3 4 5\n3 1 2 0 1 9 3\n$EndElements\n"));
+      "a.msh",
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 8 \"inlet\"\n$EndPhysicalNames\n$Nodes\n5\n"
+      "9 0 0 0\n3 1 0 0\n5 0 1 0\n4 1 1 0\n7 2 1 0\n$EndNodes\n$Elements\n3\n1 2 2 8 1 9 3 5\n"
+      "2 2 2 0 1 3 4 5\n3 1 2 0 1 9 3\n$EndElements\n"));
   const auto& surface = std::get<PolygonMesh>(msh);
   CHECK(surface.num_faces() == 2);
   CHECK(surface.positions.size() == 4);  // the fifth belongs to no face
   CHECK(surface.face_groups.groups == std::vector<Group>{{"inlet", 8, 2}});
   CHECK(surface.face_groups.of_face == std::vector<Index>{0, kNoIndex});
-  const FileCells inp = read_cells(format_folder().file(
-      "a.inp", "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,1,1,0\n*ELEMENT,TYPE=S3,ELSET=left\n1,1,2,3\n"
-               "*ELEMENT,TYPE=S4R,ELSET=right\n2,2,4,3,1\n"));
+  const FileCells inp = read_cells(
+      format_folder().file("a.inp",
+                           "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,1,1,0\n*ELEMENT,TYPE=S3,ELSET=left\n1,1,2,3\n"
+                           "*ELEMENT,TYPE=S4R,ELSET=right\n2,2,4,3,1\n"));
   CHECK(std::get<PolygonMesh>(inp).face_groups.groups == std::vector<Group>{{"left", 1, 2}, {"right", 2, 2}});
   CHECK_THROWS_WITH(read_volume_mesh(format_folder() / "a.msh"), Contains("faces without cells"));
 }

@@ -287,9 +287,11 @@ TEST_CASE("what is malformed in an OFF file is refused with its line") {
   CHECK_THAT(surface_refusal("a.off", ""), Contains(":1:") && Contains("empty"));
   CHECK_THAT(surface_refusal("a.off", "4 4 6\n"), Contains("expected OFF"));
   CHECK_THAT(surface_refusal("a.off", "OFF BINARY\n"), Contains("binary"));
-  CHECK_THAT(surface_refusal("a.off", "OFF\n4000000000 4000000000 0\n0 0 0\n"), Contains(":2:") && Contains("4000000000"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n4000000000 4000000000 0\n0 0 0\n"),
+             Contains(":2:") && Contains("4000000000"));
   CHECK_THAT(surface_refusal("a.off", "OFF\n1 -1 0\n0 0 0\n"), Contains("negative"));
-  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 4")), Contains(":7:") && Contains("number 4"));
+  CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 4")),
+             Contains(":7:") && Contains("number 4"));
   CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "3 0 2 -1")), Contains(":7:"));
   CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "3 0 2 1", "2000000000 0 2 1")), Contains(":7:"));
   CHECK_THAT(surface_refusal("a.off", replaced(kTetOff, "1 0 0", "1 nan 0")), Contains(":4:") && Contains("'nan'"));
@@ -325,7 +327,8 @@ TEST_CASE("what is malformed in an STL file is refused with its line or byte") {
   CHECK_THAT(surface_refusal("a.stl", replaced(text_stl(), "outer", "inner")), Contains(":3:") && Contains("'inner'"));
   CHECK_THAT(surface_refusal("a.stl", replaced(text_stl(), "vertex 0", "vertex x")), Contains(":4:"));
   CHECK_THAT(surface_refusal("a.stl", replaced(text_stl(), "endsolid", "")), Contains("facet or endsolid"));
-  CHECK_THAT(surface_refusal("a.stl", replaced(" SOLID" + text_stl().substr(5), "outer", "inner")), Contains("'inner'"));
+  CHECK_THAT(surface_refusal("a.stl", replaced(" SOLID" + text_stl().substr(5), "outer", "inner")),
+             Contains("'inner'"));
   std::string bytes = binary_stl("x");
   CHECK_THAT(surface_refusal("a.stl", bytes.substr(0, bytes.size() - 1)), Contains("byte 80"));
   bytes[83] = '\x7f';
@@ -342,11 +345,13 @@ TEST_CASE("what is malformed in a PLY file is refused with its line or byte") {
   CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "property float x", "property half x")), Contains("'half'"));
   CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "property float x", "property float u")),
              Contains("without x, y and z"));
-  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "vertex_indices", "corners")), Contains("without vertex_indices"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "vertex_indices", "corners")),
+             Contains("without vertex_indices"));
   CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "vertex 4", "vertex 4000000000")), Contains(":4:"));
   CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 4 0")), Contains("vertex 4 of 4"));
   CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "3 0 2 -1 0")), Contains("out of range"));
-  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "2000000000 0 2 1 0")), Contains("impossible length"));
+  CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "3 0 2 1 0", "2000000000 0 2 1 0")),
+             Contains("impossible length"));
   CHECK_THAT(surface_refusal("a.ply", replaced(kTextPly, "9 1 0 0", "9 inf 0 0")), Contains("'inf'"));
   const std::string good = binary_ply(false);
   for (std::size_t n = 0; n < good.size(); ++n) {
@@ -359,7 +364,8 @@ TEST_CASE("surfaces without extent, or whose areas leave the range of a double, 
   CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n5 5 5\n5 5 5\n5 5 5\n3 0 1 2\n"), Contains("one place"));
   CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e300 0 0\n0 1e300 0\n3 0 1 2\n"), Contains("1e+300"));
   CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1e-200 0 0\n0 1e-200 0\n3 0 1 2\n"), Contains("1e-200"));
-  CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"), Contains("no triangle has any area"));
+  CHECK_THAT(surface_refusal("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"),
+             Contains("no triangle has any area"));
   CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e-39 0 0\n0 1e-39 0\n3 0 1 2\n").triangles.size() == 1);
   CHECK(read_triangles("a.off", "OFF\n3 1 0\n0 0 0\n1e39 0 0\n0 1e39 0\n3 0 1 2\n").triangles.size() == 1);
 }
