@@ -12,8 +12,8 @@ function(add_variants library)
     get_target_property(sources ${library} SOURCES)
     add_library(${variant} SHARED ${sources})
     make_relocatable(${variant})
-    foreach(property LINK_LIBRARIES INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_FEATURES COMPILE_OPTIONS VERSION SOVERSION
-        UNITY_BUILD UNITY_BUILD_MODE)
+    foreach(property LINK_LIBRARIES INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_FEATURES COMPILE_OPTIONS
+        VERSION SOVERSION UNITY_BUILD UNITY_BUILD_MODE)
       get_target_property(value ${library} ${property})
       if(value)
         set_target_properties(${variant} PROPERTIES ${property} "${value}")

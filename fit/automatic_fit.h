@@ -31,8 +31,6 @@ inline constexpr double kAutomaticVolumePercent = 0.1;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp
 /// edges, and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
-/// Number of hexes that a hex is subdivided into.
-inline constexpr std::size_t kChildren = 8;
 inline constexpr std::array<std::size_t, 3> kAutomaticEdgeCells{3000, 10000, 30000};
 
 struct AutomaticFitOptions {
@@ -115,8 +113,11 @@ struct AutomaticFitResult {
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
-///         + 5 (1 - least share of the quality that a cell reaches) + 3 (1 - share of the edges within 0.1 %)
+///         + 5 (1 - least share of the quality that a cell reaches) + 5 max(0, 1 - least scaled Jacobian / 0.3)
+///         + 3 (1 - share of the edges within 0.1 %)
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
+///
+/// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.
 ///
 /// If no trial is good, cells of the best one are cut in 27 where it meets itself, where it is too far from the target,
 /// where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the result is

@@ -12,10 +12,6 @@
 #include <sstream>
 
 namespace subvol::cli {
-namespace {
-
-}  // namespace
-
 std::vector<Index> not_certified_cells(const MeshCheck& check) {
   return check.quality ? check.quality->certificate.not_certified : std::vector<Index>{};
 }

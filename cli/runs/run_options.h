@@ -14,6 +14,7 @@ namespace subvol::cli {
 /// Keeps the order of entries as written: reports list them in the order that people expect.
 using Json = nlohmann::ordered_json;
 
+/// Returns the three coordinates as an array.
 inline Json point_json(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
 
 /// Options that several verbs share.

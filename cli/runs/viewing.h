@@ -41,7 +41,9 @@ struct Moment {
   ShownMesh mesh;
 };
 
-/// What a page shows of the course of a fit, which begins with the last moment. moments: at least one.
+/// Returns what a page shows of the course of a fit. The page begins with the last moment.
+///
+/// moments  in their order, at least one.
 ViewerContent timeline_content(const std::string& title, std::span<const Moment> moments,
                                const ViewingOptions& options);
 

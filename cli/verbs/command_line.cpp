@@ -32,14 +32,14 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-/// Of some words, the one that differs least from a given one, if it is similar enough to be what was meant.
+/// Finds the word that a mistyped word stands for: the one that differs least from it, if it differs little.
 class NearestWord {
  public:
   explicit NearestWord(std::string_view meant) : meant_(meant) {}
   void consider(const std::string& word) {
     if (const std::size_t edits = edit_distance(meant_, word); edits < least_) least_ = edits, nearest_ = word;
   }
-  /// Returns a question, or what to do if no word is similar.
+  /// Returns a question that names the word that was found, or `otherwise` if none was.
   std::string hint(const std::string& otherwise) const {
     return nearest_.empty() ? otherwise : "did you mean " + nearest_ + "?";
   }

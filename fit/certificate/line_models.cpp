@@ -22,16 +22,15 @@ std::array<long double, kMaxOrder + 2> legendre(int count, long double t) {
 }
 
 long double mode_value(Basis basis, int i, long double x) {
-  if (basis == Basis::fourier)
-    return std::numbers::sqrt2_v<long double> * std::sin(i * std::numbers::pi_v<long double> * x) /
-           (i * std::numbers::pi_v<long double>);
+  constexpr long double pi = std::numbers::pi_v<long double>, sqrt2 = std::numbers::sqrt2_v<long double>;
+  if (basis == Basis::fourier) return sqrt2 * std::sin(i * pi * x) / (i * pi);
   const auto p = legendre(i + 1, 1 - 2 * x);
   return (p[i - 1] - p[i + 1]) / (2 * std::sqrt(2 * i + 1.0L));
 }
 
 long double mode_slope(Basis basis, int i, long double x) {
-  if (basis == Basis::fourier)
-    return std::numbers::sqrt2_v<long double> * std::cos(i * std::numbers::pi_v<long double> * x);
+  constexpr long double pi = std::numbers::pi_v<long double>, sqrt2 = std::numbers::sqrt2_v<long double>;
+  if (basis == Basis::fourier) return sqrt2 * std::cos(i * pi * x);
   return std::sqrt(2 * i + 1.0L) * legendre(i, 1 - 2 * x)[i];
 }
 

@@ -14,22 +14,22 @@ namespace subvol {
 
 namespace {
 
-constexpr std::size_t kQuad = SimplexTables::kLanes;
-using Quad = double __attribute__((vector_size(kQuad * sizeof(double))));
+constexpr std::size_t kFour = SimplexTables::kLanes;
+using FourDoubles = double __attribute__((vector_size(kFour * sizeof(double))));
 
-Quad load_lanes(const double* from) {
-  Quad result;
+FourDoubles load_lanes(const double* from) {
+  FourDoubles result;
   std::memcpy(&result, from, sizeof result);
   return result;
 }
-void store_lanes(const Quad& value, double* to) { std::memcpy(to, &value, sizeof value); }
+void store_lanes(const FourDoubles& value, double* to) { std::memcpy(to, &value, sizeof value); }
 
 /// Turns rows into columns.
-void transpose(Quad (&x)[kQuad]) {
-  const Quad a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
-  const Quad b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
-  const Quad c = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
-  const Quad d = __builtin_shufflevector(x[2], x[3], 1, 5, 3, 7);
+void transpose(FourDoubles (&x)[kFour]) {
+  const FourDoubles a = __builtin_shufflevector(x[0], x[1], 0, 4, 2, 6);
+  const FourDoubles b = __builtin_shufflevector(x[0], x[1], 1, 5, 3, 7);
+  const FourDoubles c = __builtin_shufflevector(x[2], x[3], 0, 4, 2, 6);
+  const FourDoubles d = __builtin_shufflevector(x[2], x[3], 1, 5, 3, 7);
   x[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
   x[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   x[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
@@ -53,7 +53,7 @@ SimplexBoxes::SimplexBoxes(CellKind kind, Basis basis, int order)
       simplex_(SimplexModels::get(kind, basis, order)),
       line_(LineModels::get(basis, order, kWide - 1)),
       num_layers_(kind == CellKind::tet ? 1 : order + 1),
-      lanes_(rounded_up(3 * num_layers_, kQuad)),
+      lanes_(rounded_up(3 * num_layers_, kFour)),
       small_error_(small_error(order)),
       whole_models_(simplex_.num_tiers()) {
   layer_terms_.resize(num_layers_);
@@ -214,24 +214,24 @@ void SimplexBoxes::store_sums(std::span<const Weighted> models, std::size_t firs
       for (int n = 0; n < kWide; ++n)
         for (int row = 0; row < 3; ++row) out[n * lanes_ + row * num_layers_] = sums[i][row][n];
     } else {
-      Quad low[kQuad] = {}, high[kQuad] = {};
+      FourDoubles low[kFour] = {}, high[kFour] = {};
       for (int row = 0; row < 3; ++row) {
         low[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 0, 1, 2, 3);
         high[row] = __builtin_shufflevector(sums[i][row], sums[i][row], 4, 5, 6, 7);
       }
       transpose(low);
       transpose(high);
-      for (std::size_t n = 0; n < kQuad; ++n) {
-        store_lanes(low[n], out + n * kQuad);
-        store_lanes(high[n], out + (kQuad + n) * kQuad);
+      for (std::size_t n = 0; n < kFour; ++n) {
+        store_lanes(low[n], out + n * kFour);
+        store_lanes(high[n], out + (kFour + n) * kFour);
       }
     }
   }
 }
 
 bool SimplexBoxes::improve(Box& box, double lowest, bool) {
-  if (simplex_.is_exact() || box.tier < 0 || box.modelled != box.halvings ||
-      box.tier + 1 >= simplex_.num_tiers() || !models_matter(box, lowest))
+  if (simplex_.is_exact() || box.tier < 0 || box.modelled != box.halvings || box.tier + 1 >= simplex_.num_tiers() ||
+      !models_matter(box, lowest))
     return false;
   const double error = by_mean_edges(lasting_error(box));
   take_models(box, std::max(wanted_error(lowest / mean_edges_.prod()), kFall * error), box.tier + 1);
@@ -292,16 +292,15 @@ std::array<SimplexBoxes::Box, 2> SimplexBoxes::children(Box box, double lowest) 
   return result;
 }
 
-void SimplexBoxes::halve_control(const SimplexHalving& halving, AlignedDoubles& low,
-                                 AlignedDoubles& high) const {
+void SimplexBoxes::halve_control(const SimplexHalving& halving, AlignedDoubles& low, AlignedDoubles& high) const {
   for (const SimplexHalving::Round& round : halving.rounds) {
     for (const auto& [n, other] : round.means)
-      for (std::size_t lane = 0; lane < lanes_; lane += kQuad) {
+      for (std::size_t lane = 0; lane < lanes_; lane += kFour) {
         double* x = low.data() + n * lanes_ + lane;
         store_lanes(0.5 * (load_lanes(x) + load_lanes(low.data() + other * lanes_ + lane)), x);
       }
     for (const auto& [from, to] : round.copies)
-      for (std::size_t lane = 0; lane < lanes_; lane += kQuad)
+      for (std::size_t lane = 0; lane < lanes_; lane += kFour)
         store_lanes(load_lanes(low.data() + from * lanes_ + lane), high.data() + to * lanes_ + lane);
   }
 }
@@ -326,13 +325,13 @@ ControlMatrices& TetBoxes::matrices(const Box& box) {
   const SimplexTables& t = tables(box);
   matrices_.resize(t.lower.size());
   const double* x = box.control.data();
-  const Quad degree = Quad{} + t.index.degree();
-  for (std::size_t first = 0; first < t.raised[0].size(); first += kQuad) {
-    Quad columns[3][kQuad];
-    for (std::size_t n = 0; n < kQuad; ++n) {
-      const Quad origin = load_lanes(x + t.raised[0][first + n] * kQuad);
+  const FourDoubles degree = FourDoubles{} + t.index.degree();
+  for (std::size_t first = 0; first < t.raised[0].size(); first += kFour) {
+    FourDoubles columns[3][kFour];
+    for (std::size_t n = 0; n < kFour; ++n) {
+      const FourDoubles origin = load_lanes(x + t.raised[0][first + n] * kFour);
       for (int d = 0; d < 3; ++d)
-        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kQuad) - origin);
+        columns[d][n] = degree * (load_lanes(x + t.raised[d + 1][first + n] * kFour) - origin);
     }
     for (int d = 0; d < 3; ++d) {
       transpose(columns[d]);

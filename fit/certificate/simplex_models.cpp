@@ -30,10 +30,10 @@ void sinc(long double z, long double& value, long double& slope) {
 /// psi_i and its derivative for x in [0, 1/2].
 void kernel_below_half(Basis basis, int i, long double x, long double& value, long double& slope) {
   if (basis == Basis::fourier) {  // sqrt2 sinc(i pi x) / (1 - x)
-    sinc(i * std::numbers::pi_v<long double> * x, value, slope);
-    slope =
-        std::numbers::sqrt2_v<long double> * (slope * i * std::numbers::pi_v<long double> + value / (1 - x)) / (1 - x);
-    value *= std::numbers::sqrt2_v<long double> / (1 - x);
+    constexpr long double pi = std::numbers::pi_v<long double>, sqrt2 = std::numbers::sqrt2_v<long double>;
+    sinc(i * pi * x, value, slope);
+    slope = sqrt2 * (slope * i * pi + value / (1 - x)) / (1 - x);
+    value *= sqrt2 / (1 - x);
     return;
   }
   // psi_i = 2 sqrt(2i+1) / (i (i+1)) P_i'(1 - 2x); P_{n+1}' = P_{n-1}' + (2n+1) P_n, and likewise for P''.
@@ -133,8 +133,8 @@ double kernel_bound(Basis basis, int i) {
   return (1 + 1e-14) * (basis == Basis::legendre ? std::sqrt(2 * i + 1.0) : 2 * std::numbers::sqrt2);
 }
 double kernel_slope_bound(Basis basis, int i) {
-  return (1 + 1e-14) * (basis == Basis::legendre ? 2.0 * i * i * std::sqrt(2 * i + 1.0)
-                                                 : std::numbers::sqrt2 * i * std::numbers::pi);
+  return (1 + 1e-14) *
+         (basis == Basis::legendre ? 2.0 * i * i * std::sqrt(2 * i + 1.0) : std::numbers::sqrt2 * i * std::numbers::pi);
 }
 
 /// Values of an affine function at the vertices of a part.
@@ -283,7 +283,10 @@ const SimplexModels& SimplexModels::get(CellKind kind, Basis basis, int order) {
 }
 
 SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
-    : kind_(kind), basis_(basis), order_(order), tiers_(make_tiers(kind, basis, order)),
+    : kind_(kind),
+      basis_(basis),
+      order_(order),
+      tiers_(make_tiers(kind, basis, order)),
       most_halvings_(most_depth(basis, order) * halvings_between()),
       expansion_(num_nodes(basis, order)) {
   assert(num_tiers() <= kMostTiers);
@@ -318,8 +321,8 @@ SimplexModels::SimplexModels(CellKind kind, Basis basis, int order)
     slots_[address] = static_cast<int>(slot);
   }
   for (int o = 0; o <= kMaxOrder; ++o)
-    first_slots_[o] = static_cast<std::size_t>(std::count_if(
-        modes_.begin(), modes_.end(), [&](const LocalMode& mode) { return own_order(mode) < o; }));
+    first_slots_[o] = static_cast<std::size_t>(
+        std::count_if(modes_.begin(), modes_.end(), [&](const LocalMode& mode) { return own_order(mode) < o; }));
 }
 
 std::size_t SimplexModels::slot_address(const LocalMode& mode) const {

@@ -8,11 +8,6 @@
 
 namespace subvol {
 
-namespace {
-
-
-}  // namespace
-
 const SimplexTables& SimplexTables::get(int dimension, int degree) {
   assert((dimension == 2 || dimension == 3) && degree >= 1 && degree <= kMaxDegree);
   static std::array<std::array<std::unique_ptr<const SimplexTables>, kMaxDegree + 1>, 2> tables;

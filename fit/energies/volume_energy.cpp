@@ -16,11 +16,6 @@
 
 namespace subvol {
 
-namespace {
-
-
-}  // namespace
-
 VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction)
     : mesh_(&mesh),
       num_nodes_(mesh.num_vertices()),

@@ -44,7 +44,9 @@ class CreaseEnergy {
                double tangential_weight);
 
   /// Returns the same energy over other samples, some of which are fixed. Segments between two of these are known to
-  /// the correspondences, but have none themselves. numbers  new number of each sample that is an end of a segment.
+  /// the correspondences, but have none themselves.
+  ///
+  /// numbers  new number of each sample that is an end of a segment.
   /// is_free  of each new sample: 1 if it moves.
   CreaseEnergy part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const;
 

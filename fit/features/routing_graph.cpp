@@ -16,11 +16,6 @@
 
 namespace subvol {
 
-namespace {
-
-
-}  // namespace
-
 RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets, std::vector<double> sizes)
     : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0), sizes_(std::move(sizes)) {
   if (!sizes_.empty() && sizes_.size() != mesh.num_vertices())

@@ -3,8 +3,7 @@
 
 namespace subvol {
 
-/// Lambda of the stages that bring a template from afar: lower than that of the final shape would allow, because a
-/// stiff start rounds the template.
+/// Lambda of the first stages. It is low, because stiff cells round the template before it reaches the target.
 inline constexpr double kCoarseLambda = 0.05;
 /// Weights of tangential distances, as shares of that of normal ones, far from the target and close to it.
 inline constexpr double kFarTangentialWeight = 0.1, kCloseTangentialWeight = 0.003;

@@ -177,8 +177,9 @@ std::vector<Index> largest_shares(std::vector<Share> shares, const std::vector<G
 }
 
 /// Gives a group that no face lies mostly on the face that is nearest to the middle of its largest triangle, if that is
-/// no farther than the face is wide and the face's own group has another one. Large groups come first. reach  width of
-/// each face.
+/// no farther than the face is wide and the face's own group has another one. Large groups come first.
+///
+/// reach  width of each face.
 void keep_small_groups(const TriangleMesh& target, const CurvedBoundary& boundary, const std::vector<double>& reach,
                        std::vector<Index>& group_of_face) {
   std::vector<std::size_t> faces(target.face_groups.groups.size(), 0);

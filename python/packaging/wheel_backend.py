@@ -19,8 +19,8 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     with tempfile.TemporaryDirectory() as folder:
         build, stage = os.path.join(folder, "build"), os.path.join(folder, "stage")
         run("cmake", "-S", SOURCE, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DSUBVOL_BUILD_PYTHON=ON",
-            "-DSUBVOL_BUILD_CLI=OFF", "-DSUBVOL_UNITY=ON", "-DSUBVOL_BUILD_TESTS=OFF", "-DSUBVOL_BUILD_SAMPLES=OFF", "-DSUBVOL_PYTHON_DIR=.",
-            f"-DPython_EXECUTABLE={sys.executable}", *options)
+            "-DSUBVOL_BUILD_CLI=OFF", "-DSUBVOL_BUILD_TESTS=OFF", "-DSUBVOL_BUILD_SAMPLES=OFF", "-DSUBVOL_UNITY=ON",
+            "-DSUBVOL_PYTHON_DIR=.", f"-DPython_EXECUTABLE={sys.executable}", *options)
         run("cmake", "--build", build, "--target", "subvol_python")
         run("cmake", "--install", build, "--component", "python", "--prefix", stage, "--strip")
         return write_wheel(stage, wheel_directory)

@@ -14,20 +14,26 @@ import time
 KNOWN = ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")
 
 
-def running(program, samples, folder, **settings):
-    """Name of the process of a fit, and what it runs with of the settings that are known."""
+def running(program, samples, folder, expected, **settings):
+    """Returns the name of the process of a fit, and those of the known settings that it runs with.
+
+    A busy machine starts programs slowly: the process is asked until it runs as expected, for 20 seconds at most.
+    """
     environment = {name: value for name, value in os.environ.items() if name not in KNOWN} | settings
     words = [program, "fit", samples / "torus_target.off", "--template", samples / "torus_template.mesh", "--levels", "3",
              "-o", folder / "out.mesh", "--force", "--quiet"]
     process = subprocess.Popen(words, env=environment)
-    time.sleep(0.5)
     process_folder = pathlib.Path("/proc") / str(process.pid)
-    name = (process_folder / "comm").read_text().strip()
-    entries = (entry.partition("=") for entry in (process_folder / "environ").read_text().split("\0"))
-    found = {key: value for key, _, value in entries if key in KNOWN}
+    end = time.monotonic() + 20
+    found = None
+    while found != expected and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.1)
+        name = (process_folder / "comm").read_text().strip()
+        entries = (entry.partition("=") for entry in (process_folder / "environ").read_text().split("\0"))
+        found = name, {key: value for key, _, value in entries if key in KNOWN}
     process.terminate()
     process.wait()
-    return name, found
+    return found
 
 
 def main():
@@ -41,7 +47,7 @@ def main():
         own = os.path.basename(program)
         for settings, expected in (({}, {"GOMP_SPINCOUNT": "1000"}), ({"OMP_WAIT_POLICY": "active"},) * 2,
                                    ({"GOMP_SPINCOUNT": "7"},) * 2):
-            found = running(program, folder / "samples", folder, **settings)
+            found = running(program, folder / "samples", folder, (own, expected), **settings)
             if found != (own, expected):
                 print(f"with {settings}: expected {own} with {expected}, found {found}")
                 return 1

@@ -25,7 +25,7 @@ Mat3 random_feasible(std::mt19937& random, double spread) {
   }
 }
 
-VolumeMesh skewed_cell(CellKind kind) {
+VolumeMesh ideal_cell(CellKind kind) {
   VolumeMesh mesh;
   std::vector<Index> corners;
   const Mat3 a = ideal_inverse(kind).inverse();
@@ -118,7 +118,7 @@ TEST_CASE("Element rules integrate constants and reproduce affine maps for every
   for (CellKind kind : kKinds)
     for (int n : {2, 3, 5}) {
       const ElementRule rule = make_element_rule(kind, n);
-      const VolumeMesh mesh = skewed_cell(kind);
+      const VolumeMesh mesh = ideal_cell(kind);
       double sum = 0;
       for (std::size_t q = 0; q < rule.num_points(); ++q) {
         sum += rule.weights[q];
@@ -133,7 +133,7 @@ TEST_CASE("Element rules integrate constants and reproduce affine maps for every
 
 TEST_CASE("The volume energy of an ideal cell is zero and that of a scaled one is known") {
   for (CellKind kind : kKinds) {
-    VolumeMesh mesh = skewed_cell(kind);
+    VolumeMesh mesh = ideal_cell(kind);
     const std::vector<Vec3> lengths = {Vec3::Ones()};
     const VolumeEnergy energy(mesh, lengths, 3);
     CHECK(energy.value(mesh.positions) < 1e-28);
@@ -145,7 +145,7 @@ TEST_CASE("The volume energy of an ideal cell is zero and that of a scaled one i
 }
 
 TEST_CASE("A box costs nothing where a box of its lengths is ideal") {
-  VolumeMesh mesh = skewed_cell(CellKind::hex);
+  VolumeMesh mesh = ideal_cell(CellKind::hex);
   const std::vector<Vec3> lengths = {Vec3(3, 0.2, 1)};
   for (Vec3& p : mesh.positions) p = p.cwiseProduct(lengths[0]);
   CHECK(VolumeEnergy(mesh, lengths, 3).value(mesh.positions) < 1e-28);
@@ -156,7 +156,7 @@ TEST_CASE("Gradient and Hessian of the volume energy agree with differences for 
   std::normal_distribution<double> normal;
   for (CellKind kind : kKinds)
     for (int n : {2, 3}) {
-      VolumeMesh mesh = skewed_cell(kind);
+      VolumeMesh mesh = ideal_cell(kind);
       const std::vector<Vec3> lengths = {Vec3(1.1, 0.9, 1.05)};
       const VolumeEnergy energy(mesh, lengths, n);
       std::vector<Vec3> x = mesh.positions, d(x.size());
@@ -172,7 +172,7 @@ TEST_CASE(
   std::normal_distribution<double> normal;
   for (CellKind kind : kKinds)
     for (int n : {2, 3}) {
-      VolumeMesh mesh = skewed_cell(kind);
+      VolumeMesh mesh = ideal_cell(kind);
       Mat3 shape;
       shape << 1.2, 0.3, -0.1, 0.1, 0.8, 0.2, -0.2, 0.1, 0.1;
       const Mat3 reference = shape * ideal_matrix(kind);
@@ -184,12 +184,12 @@ TEST_CASE(
       for (Vec3& p : d) p = Vec3(normal(random), normal(random), normal(random));
       check_derivatives(energy, x, d, 1e-6, 1e-6);
     }
-  const VolumeMesh mesh = skewed_cell(CellKind::hex);
+  const VolumeMesh mesh = ideal_cell(CellKind::hex);
   CHECK_THROWS(VolumeEnergy(mesh, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, 2));
 }
 
 TEST_CASE("A step of the size that max_step allows stays feasible, a longer one may not") {
-  VolumeMesh mesh = skewed_cell(CellKind::hex);
+  VolumeMesh mesh = ideal_cell(CellKind::hex);
   const std::vector<Vec3> lengths = {Vec3::Ones()};
   const VolumeEnergy energy(mesh, lengths, 2);
   std::vector<Vec3> d(mesh.positions.size(), Vec3::Zero());
@@ -204,7 +204,7 @@ TEST_CASE("A step of the size that max_step allows stays feasible, a longer one 
 }
 
 TEST_CASE("Element rules and volume energies refuse what they cannot use") {
-  const VolumeMesh mesh = skewed_cell(CellKind::hex);
+  const VolumeMesh mesh = ideal_cell(CellKind::hex);
   CHECK_THROWS(make_element_rule(CellKind::hex, 1));
   CHECK_THROWS(VolumeEnergy(mesh, std::vector<Vec3>{}, 2));
   CHECK_THROWS(VolumeEnergy(mesh, std::vector<Vec3>{Vec3(1, -1, 1)}, 2));
