@@ -209,7 +209,9 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
     return std::nullopt;
   }
   if (made.templates.empty()) {
-    no_template_ = "target: " + why_no_grid(original_, options.cells, made.wanted) + "; give a --template";
+    no_template_ = "target: " +
+                   why_no_grid(original_, options.cells, made.wanted, [this] { return runner_.is_to_end(); }) +
+                   "; give a --template";
     return std::nullopt;
   }
   VolumeMesh& mesh = made.templates.front().mesh;

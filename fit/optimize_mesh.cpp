@@ -10,6 +10,7 @@
 #include "subvol/fit/features/flat_facets.h"
 #include "subvol/fit/features/followed_creases.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/region_volumes.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/surface_distance.h"
@@ -58,8 +59,10 @@ constexpr double kLeastRelief = 0.25;
 constexpr double kShareAfterUntangling = 0.25, kShareAfterRounds = 0.5, kFirstQualityPortion = 0.7;
 constexpr double kExpectedUntanglingSteps = 30;
 
-/// Largest relative change of a region's volume.
+/// Largest relative change of a region's volume at which interfaces may slide.
 constexpr double kMostVolumeChange = 1e-3;
+/// A relative change of the whole volume that is told.
+constexpr double kToldVolumeChange = 1e-4;
 
 /// State that a round has reached.
 struct Progress {
@@ -141,6 +144,7 @@ class MeshOptimizer {
   std::unique_ptr<SurfaceTerm> surface_term(bool emphasize_far) const;
   StageRecord record(std::string name) const;
   bool attempt(double least_jacobian);
+  bool keeps_volumes() const { return own_boundary_ && !options_.fixed_boundary; }
   double volume_change() const;
   bool changes_volumes() const { return volume_change() > kMostVolumeChange; }
   bool untangle_all();
@@ -151,6 +155,7 @@ class MeshOptimizer {
   Measured measure() const;
   bool is_better(const Measured& now, const Measured& before) const;
   void flatten(double least_jacobian);
+  void keep_volumes();
   bool run_quality_stages(const QualitySchedule& schedule);
   bool raise_quality(double goal);
   bool raise_quality();
@@ -422,7 +427,7 @@ struct MeshOptimizer::Measured {
 /// volumes.
 double MeshOptimizer::volume_change() const {
   double largest = 0;
-  if (interfaces_.empty() || !own_boundary_) return largest;
+  if (!own_boundary_) return largest;
   const std::vector<double> volumes = region_volumes(mesh_);
   for (std::size_t r = 0; r < volumes.size(); ++r)
     largest = std::max(largest, std::abs(volumes[r] / start_volumes_[r] - 1));
@@ -541,6 +546,14 @@ void MeshOptimizer::flatten(double least_jacobian) {
   flatten_sheets(mesh_, target_, std::max(least_jacobian, 0.0));
 }
 
+/// Gives all regions the volumes that they had at the start, if nothing else determines them.
+void MeshOptimizer::keep_volumes() {
+  constexpr double kKeptQuality = 0.99;  // share of the least scaled Jacobian that must be left
+  const bool have_volumes = std::ranges::all_of(start_volumes_, [](double volume) { return volume > 0; });
+  if (!keeps_volumes() || !have_volumes) return;
+  restore_volumes(mesh_, start_volumes_, kKeptQuality * measure_quality(mesh_).min_scaled_jacobian);
+}
+
 /// There is nothing to measure if the target is the mesh's own boundary.
 void MeshOptimizer::measure_start() {
   if (own_boundary_) return;
@@ -601,6 +614,7 @@ bool MeshOptimizer::attempt(double least_jacobian) {
   // Cells that are positive at their quadrature points but not certified may still become valid.
   going = going && improve() && raise_quality();
   flatten(least_jacobian);
+  keep_volumes();
   return going;
 }
 
@@ -609,7 +623,7 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
   const Measured start = measure();
   std::vector<Vec3> start_positions = mesh_.positions;
   bool going = attempt(start.least_jacobian);
-  while (going && !options_.fixed_boundary && held_ != Held::sheets && changes_volumes()) {
+  while (going && keeps_volumes() && !interfaces_.empty() && held_ != Held::sheets && changes_volumes()) {
     report_.undo_stages(0, report_.stages.size());
     mesh_.positions = start_positions;
     mesh_.tags = original.tags;
@@ -629,6 +643,9 @@ OptimizeResult MeshOptimizer::run(const VolumeMesh& original) {
     report_.undo_stages(0, report_.stages.size());
     gains_ended_ = true;
   }
+  if (const double change = volume_change(); keeps_volumes() && change > kToldVolumeChange)
+    report_.warnings.push_back(formatted("the volume of %s changed by %.2g %%",
+                                         interfaces_.empty() ? "the mesh" : "a region", 100 * change));
   if (options_.fixed_boundary)
     for (std::size_t v = 0; v < original.num_vertices(); ++v)
       if (topology_.is_boundary_vertex(static_cast<Index>(v))) result.mesh.positions[v] = original.positions[v];

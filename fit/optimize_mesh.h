@@ -63,9 +63,12 @@ struct OptimizeResult {
 ///         shaped or cannot be untangled.
 /// Interfaces between regions (cells of different references) keep their shape as the boundary does without a target:
 /// their vertices slide along them, or stay if the boundary is fixed; their sharp edges, and the curves where they meet
-/// each other or a boundary without a target, stay sharp. Distances then include theirs. Without a target, the volumes of
-/// regions are kept within 0.1 %: if one is off by more in the end, all is done again with lambda lowered while it is,
-/// then with vertices of interfaces fixed, then with those of the boundary fixed, too.
+/// each other or a boundary without a target, stay sharp. Distances then include theirs.
+///
+/// Without a target, each region gets the volume back that it had, up to 1e-6 (`restore_volumes`); if its cells do not
+/// permit that, a change by more than 1e-4 is a warning. If the volume of one of several regions is off by more than
+/// 0.1 %, all is done again with lambda lowered while it is, then with vertices of interfaces fixed, then with those of
+/// the boundary fixed, too.
 ///
 /// Faces on flat parts of the target, and flat parts of interfaces, are made exactly flat (`flatten_sheets`) unless the
 /// boundary is fixed.

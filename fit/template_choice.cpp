@@ -147,7 +147,7 @@ bool Chooser::try_count(std::size_t cells) {
   std::vector<AutoTemplate> plain = candidates(cells, false, kPlain);
   if (choice_.cancelled) return false;
   if (plain.empty())
-    throw InputError("target: " + why_no_grid(target_, cells, choice_.topology) + "; give a --template");
+    throw InputError("target: " + why_no_grid(target_, cells, choice_.topology, options_.cancelled) + "; give a --template");
   if (plain.front().cells_asked != cells)
     choice_.warnings.push_back(std::to_string(cells) + " cells cannot carry the target's " +
                                to_string(choice_.topology) + "; the template is made for " +

@@ -6,6 +6,7 @@ the records with those of `subvol batch` alone, byte by byte but for times.
 ENGINE is parallel, futures, dask, slurm or snakemake. With slurm, a running task is killed and requeued. Exit status 0
 if the records agree, 1 if not, 77 if the engine is not here.
 """
+import difflib
 import json
 import os
 import shutil
@@ -59,8 +60,9 @@ def with_python(script):
 
 
 def with_slurm(place):
-    print(place.run(place.scripts / "one_machine_slurm.sh", place.folder / "slurm", sys.executable, __file__,
-                    *sys.argv[1:4], "inside slurm", place.folder, status=(0, 77)), end="")
+    words = [Path(word).resolve() for word in (__file__, *sys.argv[1:4])]
+    print(place.run(place.scripts / "one_machine_slurm.sh", place.folder / "slurm", sys.executable, *words,
+                    "inside slurm", place.folder, status=(0, 77)), end="")
     if not place.num_records("out"):
         print("SKIPPED: Slurm does not start on this machine")
         sys.exit(77)
@@ -133,8 +135,10 @@ def main():
         if sys.argv[4] == "snakemake":
             return 0
         place.run(program, "batch", "models.jsonl", "-o", "alone", "--quiet", status=(1,))
-        if place.merged("out") != place.merged("alone"):
-            print("the records differ from those of subvol batch alone")
+        found, wanted = (place.merged(name).decode().splitlines() for name in ("out", "alone"))
+        if found != wanted:
+            print("the records differ from those of subvol batch alone:")
+            print("\n".join(difflib.unified_diff(wanted, found, "alone", sys.argv[4], n=0, lineterm="")))
             return 1
     print("10 models, the same records")
     return 0

@@ -78,7 +78,14 @@ struct Job {
   double started;                    ///< seconds since 1970
   Clock::time_point end_by;          ///< when to ask it to end, or when to kill it
   bool was_asked = false, is_timed_out = false;
+  std::optional<ChildEnd> end;       ///< how it ended, if a signal from outside has ended it
+  Clock::time_point judge_at;        ///< when to take that for an end of its own
 };
+
+/// Whoever ends a batch together with its processes (a scheduler that requeues a task) may reach a process first. So a
+/// signal from outside is taken for one that was sent to the process alone only if the batch itself lives this long
+/// without one.
+constexpr std::chrono::milliseconds kSignalSettles{1000};
 
 class Batch {
  public:
@@ -198,30 +205,42 @@ class Batch {
   std::chrono::milliseconds time_to_sleep() const {
     auto sleep = kLongestSleep;
     const auto now = Clock::now();
-    for (const Job& job : jobs_)
-      if (job.end_by < now + sleep)
-        sleep = std::max(std::chrono::milliseconds(0), std::chrono::ceil<std::chrono::milliseconds>(job.end_by - now));
+    for (const Job& job : jobs_) {
+      const auto due = job.end ? job.judge_at : job.end_by;
+      if (due < now + sleep)
+        sleep = std::max(std::chrono::milliseconds(0), std::chrono::ceil<std::chrono::milliseconds>(due - now));
+    }
     return sleep;
   }
 
   void collect() {
     for (std::size_t i = 0; i < jobs_.size();) {
-      const std::optional<ChildEnd> end = jobs_[i].process.poll();
-      if (!end) {
+      if (!has_ended(jobs_[i])) {
         ++i;
         continue;
       }
-      Job job = std::move(jobs_[i]);
+      const Job job = std::move(jobs_[i]);
       jobs_.erase(jobs_.begin() + static_cast<std::ptrdiff_t>(i));
-      finish(job, *end);
+      finish(job);
       tell();
     }
+  }
+
+  /// True if the process of a job has ended and it is known whom a signal from outside was meant for.
+  static bool has_ended(Job& job) {
+    if (job.end) return interrupted() || Clock::now() >= job.judge_at;
+    job.end = job.process.poll();
+    if (!job.end) return false;
+    if (job.was_asked || !is_ended_from_outside(*job.end)) return true;
+    job.judge_at = Clock::now() + kSignalSettles;
+    return interrupted();
   }
 
   /// Asks jobs to end whose time is over, and all if the batch is interrupted; kills those that do not.
   void enforce_limits() {
     const auto now = Clock::now();
     for (Job& job : jobs_) {
+      if (job.end) continue;
       const bool is_over = now >= job.end_by;
       if (job.was_asked && is_over) {
         job.process.signal(SIGKILL);
@@ -235,10 +254,12 @@ class Batch {
     }
   }
 
-  void finish(const Job& job, const ChildEnd& end) {
+  void finish(const Job& job) {
+    const ChildEnd& end = *job.end;
     const BatchModel& model = manifest_.models[job.model];
     const fs::path folder = work_folder(model);
-    if (job.was_asked && !job.is_timed_out && end.exit_code != kDone) {  // the next batch runs it again
+    const bool ends_with_batch = job.was_asked ? !job.is_timed_out : interrupted() && is_ended_from_outside(end);
+    if (ends_with_batch && end.exit_code != kDone) {  // the next batch runs it again
       fs::remove_all(folder);
       records_.release(model.id);
       return;

@@ -114,6 +114,10 @@ std::optional<Outcome> outcome_named(std::string_view name) {
   return {};
 }
 
+bool is_ended_from_outside(const ChildEnd& end) {
+  return end.signal != 0 ? is_sent_from_outside(end.signal) : end.exit_code == kInterrupted;
+}
+
 std::string_view status_of(Outcome outcome) { return is_failure(outcome) ? "failed" : name_of(outcome); }
 
 Verdict judge(const ChildEnd& end, const Remains& remains) {

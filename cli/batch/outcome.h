@@ -53,6 +53,9 @@ struct Verdict {
   std::string reason;  ///< in one line; empty for valid results
 };
 
+/// True if a signal that others send, such as SIGTERM or SIGKILL, has ended a process.
+bool is_ended_from_outside(const ChildEnd& end);
+
 /// Judges a process by its exit status or signal, by its report, and by its last message if that is "out of memory".
 Verdict judge(const ChildEnd& end, const Remains& remains);
 

@@ -102,13 +102,12 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
   });
   if (result.cancelled && interrupted()) return kInterrupted;
   if (result.cancelled) {
-    std::cerr << "subvol: the time limit was reached before a template was made; "
-              << why_no_grid(target, arguments.options.cells, result.wanted) << '\n';
+    std::cerr << "subvol: the time limit was reached before a template was made\n";
     return kNotConverged;
   }
   if (result.templates.empty()) {
-    std::cerr << "subvol: " << why_no_grid(target, arguments.options.cells, result.wanted) << '\n';
-    return kFailed;
+    std::cerr << "subvol: " << why_no_grid(target, arguments.options.cells, result.wanted, interrupted) << '\n';
+    return interrupted() ? kInterrupted : kFailed;
   }
   const AutoTemplate& made = result.templates.front();
   const bool as_asked = made.cells_asked == arguments.options.cells;

@@ -191,11 +191,12 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
   return repair;
 }
 
-std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted) {
+std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted,
+                        const std::function<bool()>& cancelled) {
   constexpr double kMostTimes = 20;  // the largest count that `auto_templates` tries, as a multiple of the wanted one
   const std::string text = "no grid that was tried, of up to 20 times " + std::to_string(cells) +
                            " cells, has the target's " + to_string(wanted);
-  const SurfaceDiagnosis diagnosis = diagnose(surface);
+  const SurfaceDiagnosis diagnosis = diagnose(surface, cancelled);
   const double cell = std::cbrt(std::abs(diagnosis.volume) / (kMostTimes * static_cast<double>(cells)));
   const std::string causes = obstacles_for_cells(diagnosis, cell);
   return causes.empty() ? text : text + ": " + causes;

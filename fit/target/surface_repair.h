@@ -41,6 +41,8 @@ SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bo
 
 /// Returns why grids with up to 20 times a number of cells do not have the topology of a surface's solid: that they
 /// have not, and each cause that a diagnosis finds, with its place.
-std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted);
+/// cancelled  asked now and then, from the calling thread; if it returns true, causes may be missing. Empty: never.
+std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted,
+                        const std::function<bool()>& cancelled = {});
 
 }  // namespace subvol

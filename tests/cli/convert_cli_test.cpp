@@ -84,7 +84,7 @@ TEST_CASE("an input that cannot be read is told as what it is, by every verb", "
   for (const char* name : {"a.med", "a.cgns", "a.vol", "a"}) {
     place.file(name, "x");
     const std::string file = name;
-    for (const std::string verb :
+    for (const std::string& verb :
          {"convert " + file + " -o b.mesh", "convert " + file + " -o b.obj", "check " + file,
           "optimize " + file + " -o b.mesh", "subdivide " + file + " -o b.mesh", "fit " + file + " -o b.mesh",
           "template auto " + file + " -o b.mesh", "template pillow " + file + " -o b.mesh",

@@ -4,6 +4,7 @@
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/optimize_mesh.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
@@ -146,6 +147,26 @@ TEST_CASE("Graded meshes stay graded with local sizes, and become even with unif
   };
   CHECK(farthest_move(CellSizes::local) < 0.01);
   CHECK(farthest_move(CellSizes::uniform) > 0.3);
+}
+
+TEST_CASE("Without a target, optimisation keeps the volume of a curved body") {
+  constexpr int kLength = 24, kWidth = 4;
+  VolumeMesh bar = test::lattice(kLength, kWidth, kWidth);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-0.2, 0.2);
+  const MeshTopology topology(bar);
+  for (std::size_t v = 0; v < bar.num_vertices(); ++v) {
+    Vec3& p = bar.positions[v];
+    if (p.x() > 0 && p.x() < kLength) p.x() += uniform(random);
+    if (!topology.is_boundary_vertex(static_cast<Index>(v))) p += Vec3(0, uniform(random), uniform(random));
+    const double angle = 0.1 * p.x(), radius = 12 - p.y();
+    p = Vec3(radius * std::sin(angle), radius * (1 - std::cos(angle)), p.z());
+  }
+  const OptimizeResult result = optimize_mesh(bar, nullptr, {});
+  CHECK(measure_quality(result.mesh).min_scaled_jacobian > measure_quality(bar).min_scaled_jacobian + 0.2);
+  CHECK(result.uncertified.empty());
+  CHECK(result.report.warnings.empty());
+  CHECK(region_volumes(result.mesh)[0] == Approx(region_volumes(bar)[0]).epsilon(1e-6));
 }
 
 TEST_CASE("Optimisation says which cells stay inverted") {

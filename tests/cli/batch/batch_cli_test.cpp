@@ -23,7 +23,7 @@ using nlohmann::json;
 namespace {
 
 /// A program in the place of subvol that does what the name of its input says, and notes that it was run.
-constexpr const char* kActor = R"(#!/bin/sh
+constexpr const char* kActor = R"sh(#!/bin/sh
 base=$(basename "$2" .off)
 echo "$base" >> "$LOG"
 case "$base" in
@@ -35,8 +35,12 @@ case "$base" in
   stubborn*) trap '' TERM; sleep 60 & wait; sleep 60 ;;
   pause*) sleep 0.2 ;;
   family*) sleep 60 & ;;
+  ended*) [ "$(grep -c "$base" "$LOG")" -eq 1 ] || exit 0
+    setsid --fork sh -c ": > \"$LOG.killer\"; sleep 0.3; kill -${base#ended} $PPID"
+    while [ ! -e "$LOG.killer" ]; do sleep 0.01; done
+    kill "-${base#ended}" $$ ;;
 esac
-)";
+)sh";
 
 /// A folder in which batches are run.
 class BatchPlace {
@@ -215,6 +219,19 @@ TEST_CASE("Batches that are killed at any moment lose nothing but the models tha
   for (const auto& [input, count] : place.runs()) runs += count;
   CHECK(runs <= kModels + kills * kJobs);
   CHECK(fs::is_empty(*place / "out/work"));
+}
+
+TEST_CASE("A scheduler that ends a batch may end its processes first", "[cli][batch][slow]") {
+  for (const std::string model : {"endedTERM", "endedKILL"}) {
+    INFO(model);
+    const BatchPlace place;
+    place.manifest({model, "good"});
+    CHECK(place.act("m.csv -o out --jobs 1").status != 0);
+    CHECK(place.class_of(model) == "none");
+    CHECK(place.act("m.csv -o out --jobs 1").status == 0);
+    CHECK(place.class_of(model) == "valid");
+    CHECK(place.records().size() == 2);
+  }
 }
 
 TEST_CASE("Workers on one folder share the models", "[cli][batch][slow]") {
