@@ -160,7 +160,7 @@ TEST_CASE("Without a target, optimisation keeps the volume of a curved body") {
     if (p.x() > 0 && p.x() < kLength) p.x() += uniform(random);
     if (!topology.is_boundary_vertex(static_cast<Index>(v))) p += Vec3(0, uniform(random), uniform(random));
     const double angle = 0.1 * p.x(), radius = 12 - p.y();
-    p = Vec3(radius * std::sin(angle), radius * (1 - std::cos(angle)), p.z());
+    p = Vec3(radius * std::sin(angle), -radius * std::cos(angle), p.z());
   }
   const OptimizeResult result = optimize_mesh(bar, nullptr, {});
   CHECK(measure_quality(result.mesh).min_scaled_jacobian > measure_quality(bar).min_scaled_jacobian + 0.2);
