@@ -19,6 +19,7 @@
 #include <cstdlib>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 int main(int argc, char** argv) {
   samples::Sample sample = samples::torus_sample();

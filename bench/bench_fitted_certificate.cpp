@@ -17,6 +17,7 @@
 #include <vector>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -25,6 +25,7 @@
 #include <ctime>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -20,6 +20,7 @@
 #include <string>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

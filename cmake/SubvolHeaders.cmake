@@ -6,6 +6,7 @@
 
 set(entry_points
   # Meshes, surfaces, their topology and files
+  subvol/base/atomic_file.h
   subvol/base/error.h
   subvol/base/types.h
   subvol/base/version.h

@@ -11,6 +11,8 @@
 #include <string>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 /// Polygons whose vertices depend linearly on the positions of a mesh.

@@ -11,6 +11,8 @@
 #include <vector>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 void require_boundary(const PolygonMesh& boundary, const BoundaryOrigin& origin) {

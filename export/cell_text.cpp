@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr int kGmshTets[] = {4, 11, 29, 30, 31, 71, 72, 73, 74, 75};
@@ -398,4 +398,4 @@ std::string msh_document(const CellView& mesh, std::span<const double> cell_mini
   return text;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Cells with points on regular grids, in the order of the file format. The writers make sure that the arrays are
 /// consistent.
@@ -54,4 +54,4 @@ std::string msh_document(const CellView& mesh, std::span<const double> cell_mini
 /// Throws InputError unless there is one finite number per cell, or none at all.
 void require_cell_minima(std::span<const double> cell_minima, std::size_t num_cells);
 
-}  // namespace subvol
+}  // namespace subvol::internal

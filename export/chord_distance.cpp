@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr double kNeighbourReach = 0.25;  // relative to the triangle's size; farther out the neighbor may bend away
@@ -78,4 +78,4 @@ double chord_distance(const CellSamples& samples, const ChordQuery& query) {
   return std::sqrt(largest);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

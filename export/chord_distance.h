@@ -5,7 +5,7 @@
 
 #include <array>
 
-namespace subvol {
+namespace subvol::internal {
 
 inline constexpr int kCellSteps = 4;
 
@@ -30,4 +30,4 @@ struct ChordQuery {
 /// point lies beyond the edge by more than a quarter of the triangle's longest edge.
 double chord_distance(const CellSamples& samples, const ChordQuery& query);
 
-}  // namespace subvol
+}  // namespace subvol::internal

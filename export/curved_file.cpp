@@ -12,6 +12,8 @@
 #include <utility>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 CellView view_of(const NodalMesh& mesh) {

@@ -16,6 +16,8 @@
 #include <utility>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 constexpr LinearColor kWireColor{0.01, 0.01, 0.01, 1};

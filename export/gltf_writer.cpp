@@ -16,6 +16,8 @@
 #include <sstream>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 namespace gltf = tinygltf;

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -98,4 +98,4 @@ FileGroups read_groups(const VtuArrays& file, std::size_t num_points) {
   return groups;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the groups of faces and the names of references as field data of a .vtu, for `read_groups`; empty if there
 /// are none.
@@ -31,4 +31,4 @@ struct FileGroups {
 /// length, numbers out of range.
 FileGroups read_groups(const VtuArrays& file, std::size_t num_points);
 
-}  // namespace subvol
+}  // namespace subvol::internal

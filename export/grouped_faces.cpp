@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -120,4 +120,4 @@ GroupedFaces grouped_faces(const LagrangeMesh& cells, const MeshTopology& topolo
   });
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

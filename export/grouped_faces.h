@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The faces of a mesh that are in groups, each once, with their points in Gmsh's order.
 struct GroupedFaces {
@@ -42,4 +42,4 @@ GroupedFaces grouped_faces(const LagrangeMesh& cells, const MeshTopology& topolo
 /// towards the second, and towards the last.
 std::vector<std::array<int, 2>> gmsh_face_lattice(std::size_t num_corners, int order);
 
-}  // namespace subvol
+}  // namespace subvol::internal

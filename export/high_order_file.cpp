@@ -20,6 +20,8 @@
 #include <cmath>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 constexpr std::int64_t kFormatVersion = 1;

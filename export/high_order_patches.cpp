@@ -12,6 +12,8 @@
 #include <numbers>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 constexpr double kVanishes = 1e-13;

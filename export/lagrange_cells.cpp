@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 /// Largest difference between the curves that two cells give a common edge or face, as a share of a cell's extent: far
@@ -205,4 +205,4 @@ HighOrderMesh joined_polynomials(const CellView& cells, const VolumeMesh& corner
   return mesh;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include "subvol/io/cell_lattice.h"
 #include "subvol/io/nodal_mesh.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the polynomials that a reader of Lagrange cells evaluates: in each cell the only one of its order that
 /// passes through its points on the regular grid. Positions, Jacobians, certificates and qualities of the result are
@@ -28,4 +28,4 @@ HighOrderMesh polynomials_of(const CellView& cells, NodeOrdering ordering, NodeS
 HighOrderMesh joined_polynomials(const CellView& cells, const VolumeMesh& corners, int order, NodeOrdering ordering,
                                  NodeSpacing spacing);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 /// Location of a grid point: the part of its cell on which it lies, and its weights at the cell's vertices.
@@ -277,4 +277,4 @@ VolumeMesh linear_cells(const HighOrderMesh& mesh, int intervals, std::vector<In
   return out;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

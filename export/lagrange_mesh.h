@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Points of the regular grids of all cells; each point on common vertices, edges and faces occurs once.
 ///
@@ -43,4 +43,4 @@ std::vector<int> lagrange_orders(const ElementSpace& space, int limit);
 ///            the cell of each small one; may be null.
 VolumeMesh linear_cells(const HighOrderMesh& mesh, int intervals, std::vector<Index>* parents = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

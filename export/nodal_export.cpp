@@ -14,6 +14,8 @@
 #include <cmath>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 NodalMesh equal_nodes(const HighOrderMesh& mesh, int order) {

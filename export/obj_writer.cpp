@@ -9,6 +9,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Returns the name of a group as one word: blanks would separate the names of several groups.

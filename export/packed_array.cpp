@@ -9,7 +9,7 @@
 #include <new>
 #include <stdexcept>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 /// A level that takes half the time of zlib's default; the result is 3 % larger.
@@ -49,4 +49,4 @@ void append_packed(std::string& json, std::span<const float> values, std::size_t
   append(json, "f32", values.size(), stride, [&](std::size_t i) { return std::bit_cast<std::uint32_t>(values[i]); });
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

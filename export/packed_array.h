@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Appends numbers of four bytes as JSON that export/viewer/data.js decodes: {"type", "size", "stride", "data"}.
 ///
@@ -15,4 +15,4 @@ namespace subvol {
 void append_packed(std::string& json, std::span<const std::uint32_t> values, std::size_t stride);
 void append_packed(std::string& json, std::span<const float> values, std::size_t stride);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <numbers>
 #include <numeric>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 struct Corner {
@@ -103,4 +103,4 @@ std::vector<Vec3> shaded_normals(const PolygonMesh& mesh, const std::vector<Inde
   return normals;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

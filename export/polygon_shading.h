@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Polygons with one vertex for every normal: vertices are doubled where faces meet at more than an angle.
 struct ShadedPolygons {
@@ -27,4 +27,4 @@ ShadedPolygons shade_polygons(const PolygonMesh& mesh, double crease_angle_degre
 std::vector<Vec3> shaded_normals(const PolygonMesh& mesh, const std::vector<Index>& corner_vertices,
                                  std::size_t num_vertices);
 
-}  // namespace subvol
+}  // namespace subvol::internal

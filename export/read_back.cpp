@@ -25,6 +25,8 @@
 #include <tuple>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 namespace fs = std::filesystem;

@@ -8,7 +8,7 @@
 #include <bit>
 #include <numeric>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr double kBetweenSamples = 16.0 / 15;  // the largest value of a quadratic over a triangle, relative to that at
@@ -205,4 +205,4 @@ CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t 
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

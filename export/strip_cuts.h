@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Cuts of all patches of a surface, such that neighbors agree.
 ///
@@ -44,4 +44,4 @@ struct CutResult {
 CutResult cut_strips(PatchSurface& patches, double max_chord_error, std::size_t max_quads,
                      const WorkProgress& progress = {});
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -17,6 +17,8 @@
 #include <cstring>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the binary formats here are little-endian");

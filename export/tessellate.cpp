@@ -9,6 +9,8 @@
 #include <Eigen/Geometry>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 constexpr double kCancelled = 1e-6;  // a sum of unit normals this short has no direction

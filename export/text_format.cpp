@@ -3,7 +3,7 @@
 
 #include "subvol/base/error.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 void append_vector(std::string& text, const Vec3& vector, const char* separator) {
   for (int k = 0; k < 3; ++k) {
@@ -37,4 +37,4 @@ void require_polygons(const PolygonMesh& mesh, const std::string& what) {
       throw InputError(what + ": group " + std::to_string(group) + " is out of range");
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Appends a whole number.
 void append_number(std::string& text, std::integral auto value) { text += std::to_string(value); }
@@ -23,4 +23,4 @@ std::string lower_case_extension(const std::filesystem::path& path);
 /// are finite, and the groups of the faces are in range.
 void require_polygons(const PolygonMesh& mesh, const std::string& what);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,6 +12,8 @@
 #include <set>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 /// A run of crease edges of one sharpness; it is closed if the last vertex is the first.

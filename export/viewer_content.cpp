@@ -8,7 +8,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr std::uint8_t kTriangle = 3, kQuad = 4;  // kinds of cells of surfaces, after those of CellKind
@@ -176,4 +176,4 @@ ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> fines
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Values to color a mesh by.
 struct ViewerField {
@@ -101,4 +101,4 @@ ViewerSurface viewer_wires(const VolumeMesh& mesh);
 /// as `tessellate`.
 ViewerSurface viewer_limit(const VolumeMesh& cage, std::span<const double> finest_cell_minima, double max_chord_error);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 /// Text as JSON that may stand inside an element of HTML.
@@ -180,4 +180,4 @@ std::string viewer_page(const ViewerContent& content) {
          escaped_title(content.title) + "</title>\n</head>\n<body>\n" + element(content, "page") + "</body>\n</html>\n";
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

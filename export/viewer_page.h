@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// True if the program was built with the viewer (`viewer_script`).
 bool has_viewer();
@@ -20,4 +20,4 @@ std::string viewer_page(const ViewerContent& content);
 /// Returns the same as a part of a larger page: an element, and a script that must follow it.
 std::string viewer_element(const ViewerContent& content);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -15,6 +15,8 @@
 #include <cmath>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 void require_cells(const VolumeMesh& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields) {

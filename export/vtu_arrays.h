@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 static_assert(std::endian::native == std::endian::little, "the arrays of a .vtu are written as they lie in memory");
 
@@ -38,4 +38,4 @@ void append_data_array(std::string& text, const std::string& attributes, std::sp
   text += "</DataArray>\n";
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 std::string_view attribute(std::string_view tag, const std::string& key) {
@@ -56,4 +56,4 @@ void VtuArrays::add(std::string_view bytes, std::size_t begin) {
   if (!arrays_.try_emplace(array, found).second) fail("expected one data array " + in_quotes(array) + ", found more");
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The data arrays of a .vtu in the form that subvol writes, by name; each is decoded on request. InputError, naming
 /// the file: it is not such a file, or an array is missing, of another type or malformed. Cost: linear in the size of
@@ -55,4 +55,4 @@ class VtuArrays {
   std::map<std::string, Array> arrays_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -36,6 +36,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
@@ -131,6 +133,9 @@ class AutomaticFit {
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
+  void begin_attempt() {
+    share_at_end_ += (edges_.features.curves.empty() ? kAttemptPortion : kEdgesAttemptPortion) * (1 - share_at_end_);
+  }
   /// Begins a part of the attempt that takes this portion of what is left of it.
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
@@ -416,7 +421,7 @@ bool AutomaticFit::route_and_fit(AutomaticFitTrial trial) {
     if (round > 0) lay_out(routing);
     QualitySchedule schedule = single_quality_schedule(options_.quality);
     schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    bool going = fit_level(0, schedule, ", edges");
+    bool going = fit_level(0, schedule, ", edges", kRoutingPortion);
     trial.pads = layout_->pads.pads.size();
     if (going || result_.trials.empty()) going = judge(trial) && going;
     if (!going) return false;
@@ -553,7 +558,7 @@ AutomaticFitResult AutomaticFit::run() {
   const std::vector<Attempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
-    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+    begin_attempt();
     if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
   }
   for (Attempt attempt : std::exchange(skipped_, {})) {
@@ -564,12 +569,12 @@ AutomaticFitResult AutomaticFit::run() {
   going = going && !result_.trials.empty();
   for (int round = 0; going && !is_good() && round < kMostRefinements; ++round) {
     const std::size_t before = result_.chosen;
-    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+    begin_attempt();
     going = run_refined();
     if (result_.chosen == before) break;
   }
   if (going && !edges_.features.curves.empty() && !is_valid(result_.trials[result_.chosen])) {
-    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+    begin_attempt();
     going = run_attempt({Attempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   }
   if (going) conclude();

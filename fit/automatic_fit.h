@@ -20,7 +20,9 @@
 
 namespace subvol {
 
+namespace internal {
 class StageLog;
+}
 
 /// Distances that an automatic fit aims at, in percent of the diagonal.
 inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5;
@@ -51,7 +53,7 @@ struct AutomaticFitOptions {
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
-  StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
+  internal::StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
   bool keep_states = false;  ///< fills AutomaticFitResult::states, but not if the target has several regions
 };
 

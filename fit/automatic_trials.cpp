@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -100,4 +100,4 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
                 longest.place.z(), to_string(longest.reason).c_str()));
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

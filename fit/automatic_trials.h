@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The lift aims at this share of the largest distance allowed: it measures at samples, which miss the farthest places.
 inline constexpr double kMaxMargin = 0.8;
@@ -27,9 +27,11 @@ inline constexpr std::size_t kChildren = 8;
 /// the target are given up for it.
 inline constexpr double kAcceptableQuality = 0.3;
 
-/// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases; and
-/// the portions of what is left of an attempt that its template, the coarser of two levels and a smooth fit take.
-inline constexpr double kAttemptPortion = 0.7, kTemplatePortion = 0.1, kCoarsePortion = 0.2, kSmoothPortion = 0.25;
+/// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases, less
+/// often if there are edges to follow; and the portions of what is left of an attempt that its template, the coarser of
+/// two levels, a smooth fit and the first of several routings take.
+inline constexpr double kAttemptPortion = 0.85, kEdgesAttemptPortion = 0.6, kTemplatePortion = 0.1,
+                        kCoarsePortion = 0.25, kSmoothPortion = 0.35, kRoutingPortion = 0.8;
 
 /// Returns the options, with the least goal that the stages can use in place of none. InputError: one out of range.
 AutomaticFitOptions checked_options(AutomaticFitOptions options);
@@ -60,4 +62,4 @@ std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed
 void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_curves, const char* name,
                           FitReport& report);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -31,6 +31,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// p-adaptivity: share of the total possible gain that one raise aims at, and the least gain, relative to E_S, that

@@ -35,7 +35,7 @@ struct HighOrderFitOptions {
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
   /// Supplies the results of earlier minimizations and records new ones; null: no log.
-  StageLog* log = nullptr;
+  internal::StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills HighOrderFitResult::states
 };
 

@@ -22,6 +22,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 using Kind = MeshDefect::Kind;

@@ -33,6 +33,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kTangentialWeight = 0.003;

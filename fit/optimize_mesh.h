@@ -12,7 +12,9 @@
 
 namespace subvol {
 
+namespace internal {
 class StageLog;
+}
 
 /// Wanted sizes of the cells.
 enum class CellSizes {
@@ -37,7 +39,7 @@ struct OptimizeOptions {
   std::function<bool(const FitProgress&)> progress;  ///< returns false to cancel; may be empty
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
-  StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
+  internal::StageLog* log = nullptr;  ///< supplies the results of earlier minimizations and records new ones; null: no log
 };
 
 struct OptimizeResult {

@@ -31,6 +31,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// The faces of all sheets of a mesh as one surface, on its vertices.
@@ -368,7 +370,7 @@ AutomaticFitResult RegionFit::run() {
   bool going = true;
   for (std::size_t i = 0; i < counts.size() && going; ++i) {
     if (!result_.trials.empty() && is_good_enough(result_.trials[result_.chosen])) break;
-    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+    share_at_end_ += (follows_edges_ ? kEdgesAttemptPortion : kAttemptPortion) * (1 - share_at_end_);
     going = run_count(counts[i]);
   }
   if (result_.trials.empty() && !no_template_.empty()) throw InputError(no_template_);

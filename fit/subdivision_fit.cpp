@@ -39,6 +39,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 void check_options(const FitOptions& options) {

@@ -22,6 +22,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kGoodMaxPercent = 1.5, kGoodMeanPercent = 0.15, kGoodShape = 0.9, kShapeWeight = 5;

@@ -14,6 +14,8 @@
 #include <variant>
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 /// The mesh to check: linear or curved cells, from memory or a file.

@@ -10,6 +10,8 @@
 #include "subvol/surface/boundary.h"
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 std::shared_ptr<CurvedMesh> make_curved(const py::object& object, int order, const py::kwargs& given) {

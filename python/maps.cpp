@@ -11,6 +11,8 @@
 #include "subvol/subdivision/repeated_subdivision.h"
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 /// Arguments of `subdivide` and `subdivision_matrix`.

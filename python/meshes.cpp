@@ -21,6 +21,8 @@
 #include <utility>
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 template <class Read>

@@ -18,6 +18,8 @@
 #include "subvol/surface/boundary.h"
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 /// One call of `optimize`, from its arguments to its result.

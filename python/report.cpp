@@ -7,6 +7,8 @@
 
 namespace subvol::python {
 
+using namespace internal;
+
 py::object to_python(const Json& json) {
   switch (json.type()) {
     case Json::value_t::object: {

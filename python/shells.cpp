@@ -19,6 +19,8 @@
 #include <algorithm>
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 /// One call of `shell`, from its arguments to its result.

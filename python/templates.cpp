@@ -23,6 +23,8 @@
 #include <utility>
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 using MeshPointer = std::shared_ptr<VolumeMesh>;

@@ -14,6 +14,8 @@
 #include <utility>
 
 namespace subvol::python {
+
+using namespace internal;
 namespace {
 
 /// A page of the viewer.

@@ -8,6 +8,8 @@
 
 namespace subvol::python {
 
+using namespace internal;
+
 Work::Work(Keywords& keywords) : callback_(keywords.object("progress")) {
   if (!callback_.is_none() && !PyCallable_Check(callback_.ptr()))
     throw py::type_error("progress must be callable, not " + py::repr(callback_).cast<std::string>());

@@ -25,6 +25,7 @@
 namespace {
 
 using namespace subvol;
+using namespace subvol::internal;
 
 constexpr int kSide = 4, kLayers = 1, kOrder = 3;
 

@@ -17,6 +17,8 @@
 #include <random>
 
 namespace subvol::samples {
+
+using namespace internal;
 namespace {
 
 constexpr double kTau = 2 * std::numbers::pi;

@@ -15,6 +15,8 @@
 #include <string>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 constexpr int kLeastIntervals = 4;

@@ -12,6 +12,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 VolumeMesh extrude(const PolygonMesh& surface, const ExtrudeOptions& options) {
   if (!(options.thickness > 0) || !std::isfinite(options.thickness))
     throw InputError("extrude: the thickness must be finite and above 0");

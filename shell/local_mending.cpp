@@ -18,7 +18,7 @@
 #include <set>
 #include <tuple>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 using Corners = std::array<Index, 3>;
@@ -458,4 +458,4 @@ LocalMending mend_locally(TriangleMesh& mesh, double distance, const std::functi
   return LocalMender(mesh, distance, cancelled).run();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns true if every edge has one triangle or two that run along it in opposite directions, and every vertex one
 /// fan of triangles.
@@ -36,4 +36,4 @@ struct LocalMending {
 /// Faults for which no change helps are left, and if there are more than a thousand, all are.
 LocalMending mend_locally(TriangleMesh& mesh, double distance, const std::function<bool()>& cancelled);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -20,6 +20,8 @@
 #include <set>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 /// Distance below which vertices are one, as a share of the diagonal: the rounding of numbers in single precision.

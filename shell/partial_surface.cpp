@@ -20,6 +20,8 @@
 #include <utility>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 std::span<const Index> corners_of(const PolygonMesh& surface, std::size_t face) {

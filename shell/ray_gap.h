@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Measures from each vertex of a surface, along the vertex's own direction, the distance to another part of the
 /// surface.
@@ -18,4 +18,4 @@ namespace subvol {
 /// Parallel, same result for any number of threads. Cost: some microseconds per vertex.
 std::vector<double> ray_gaps(const TriangleMesh& surface, std::span<const Vec3> directions);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <limits>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 // With exact predicates, a ray through an edge or a corner does not slip between triangles.
@@ -51,4 +51,4 @@ std::vector<double> ray_gaps(const TriangleMesh& surface, std::span<const Vec3> 
   return gaps;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

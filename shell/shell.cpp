@@ -20,6 +20,8 @@
 #include <optional>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 using Clock = std::chrono::steady_clock;

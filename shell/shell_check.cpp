@@ -8,6 +8,8 @@
 #include <numeric>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 std::vector<int> sheets_to_check(const ShellLayers& layers, CheckedSheets which) {

@@ -15,6 +15,8 @@
 #include <utility>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 std::span<const Index> face_of(const PolygonMesh& surface, std::size_t f) {

@@ -10,6 +10,8 @@
 #include <algorithm>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 Index name_of(Index number, std::span<const Index> names) {

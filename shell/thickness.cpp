@@ -16,6 +16,8 @@
 #include <string>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 /// Calls visit(a, b, length) for every edge of the surface.

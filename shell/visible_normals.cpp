@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr double kLeastVisibility = 1e-6;
@@ -120,4 +120,4 @@ VisibleNormals visible_normals(const PolygonMesh& surface) {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

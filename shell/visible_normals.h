@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the direction for which the sides with these normals are farthest from edge-on: the unit vector n with the
 /// largest min_i n . m_i, which is the center of the smallest cap of the sphere that contains all m_i.
@@ -37,4 +37,4 @@ VisibleNormals visible_normals(const PolygonMesh& surface);
 /// Returns the normal of a polygon at one of its corners, from the two edges there; 0 if they are collinear.
 Vec3 corner_normal(const PolygonMesh& surface, std::size_t face, std::size_t corner);
 
-}  // namespace subvol
+}  // namespace subvol::internal

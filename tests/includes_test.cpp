@@ -10,6 +10,7 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -61,6 +62,9 @@ const std::vector<Room> kRooms{
     {"tests", {"subvol", "fit", "shell", "export", "cli", "samples"}},
 };
 
+/// The folders whose headers make the library.
+constexpr const char* kLibraryFolders[] = {"subvol", "fit", "shell", "export"};
+
 /// A library of others, known by how its includes begin, and the files that may include it: those in these folders
 /// whose names end so.
 struct Library {
@@ -85,6 +89,7 @@ struct Source {
   std::string path;                        ///< from the root of the project
   std::vector<std::string> includes;       ///< of files of ours: "..."
   std::vector<std::string> libraries{};    ///< of others' files: <...>
+  std::vector<std::string> namespaces{};   ///< named ones that are opened at the beginning of a line
 };
 
 /// Path from the root of the project of a header of the library, which is included as it is installed.
@@ -185,12 +190,46 @@ std::vector<std::string> unknown_files(const std::vector<Source>& sources) {
   return wrong;
 }
 
+/// The entry points and all headers that these include.
+std::set<std::string> public_headers(const std::vector<Source>& sources, const std::vector<std::string>& entry_points) {
+  std::set<std::string> found;
+  std::vector<std::string> open = entry_points;
+  while (!open.empty()) {
+    const std::string header = open.back();
+    open.pop_back();
+    if (!found.insert(header).second) continue;
+    for (const Source& source : sources)
+      if (source.path == header) open.insert(open.end(), source.includes.begin(), source.includes.end());
+  }
+  return found;
+}
+
+/// Headers of the library that are public and open none but subvol::internal, or that are not and open another.
+std::vector<std::string> misplaced_names(const std::vector<Source>& sources,
+                                         const std::vector<std::string>& entry_points) {
+  const std::set<std::string> is_public = public_headers(sources, entry_points);
+  std::vector<std::string> wrong;
+  for (const Source& source : sources) {
+    const auto has_it = [&](const char* folder) { return is_in(source.path, folder); };
+    if (!source.path.ends_with(".h") || std::ranges::none_of(kLibraryFolders, has_it)) continue;
+    const bool opens_public =
+        std::ranges::any_of(source.namespaces, [](const std::string& name) { return name == "subvol"; });
+    if (opens_public != is_public.contains(source.path))
+      wrong.push_back(source.path + (opens_public ? " is not public, and not in subvol::internal"
+                                                  : " is public, and in subvol::internal"));
+  }
+  return wrong;
+}
+
 // --- The sources of the project --------------------------------------------------------------------------------------
 
 Source read_source(const fs::path& root, const fs::path& file) {
   Source source{fs::relative(file, root).generic_string(), {}};
   std::ifstream stream(file);
   for (std::string line; std::getline(stream, line);) {
+    constexpr std::string_view kNamespace = "namespace ";
+    if (line.starts_with(kNamespace))
+      source.namespaces.push_back(line.substr(kNamespace.size(), line.find(" {") - kNamespace.size()));
     if (!line.starts_with("#include ")) continue;
     const auto open = line.find_first_of("\"<"), close = line.find_last_of("\">");
     const std::string name = line.substr(open + 1, close - open - 1);
@@ -211,6 +250,18 @@ std::vector<Source> all_sources() {
         sources.push_back(read_source(root, entry.path()));
   std::sort(sources.begin(), sources.end(), [](const Source& a, const Source& b) { return a.path < b.path; });
   return sources;
+}
+
+/// The entry points that cmake/SubvolHeaders.cmake lists.
+std::vector<std::string> entry_points() {
+  std::ifstream stream(fs::path(subvol::test::source_dir()) / "cmake" / "SubvolHeaders.cmake");
+  std::vector<std::string> found;
+  for (std::string line; std::getline(stream, line);) {
+    if (line.ends_with(')')) line.pop_back();
+    if (line.starts_with("  ") && line.ends_with(".h") && line.find(' ', 2) == std::string::npos)
+      found.push_back(line.substr(2));
+  }
+  return found;
 }
 
 using Strings = std::vector<std::string>;
@@ -254,6 +305,11 @@ TEST_CASE("Libraries of others are included only where they belong", "[includes]
 }
 
 TEST_CASE("No header includes itself through others", "[includes]") { CHECK(cycles(all_sources()) == Strings{}); }
+
+TEST_CASE("What is not public is in subvol::internal", "[includes]") {
+  CHECK(entry_points().size() > 50);
+  CHECK(misplaced_names(all_sources(), entry_points()) == Strings{});
+}
 
 TEST_CASE("Every file that is included is named from the root", "[includes]") {
   CHECK(unknown_files(all_sources()) == Strings{});
@@ -319,6 +375,15 @@ TEST_CASE("The checks of includes report what is wrong", "[includes]") {
                   "fit/fits/fit_level.cpp includes opensubdiv/far/topologyRefiner.h",
                   "cli/runs/writing.cpp includes tiny_gltf.h", "cli/runs/report.h includes CLI/CLI.hpp",
                   "cli/runs/loading.cpp includes pybind11/pybind11.h"});
+  }
+  SECTION("names on the wrong side") {
+    CHECK(misplaced_names({{"fit/a.h", {"fit/b.h"}, {}, {"subvol"}},
+                           {"fit/b.h", {}, {}, {"subvol::internal"}},
+                           {"fit/c.h", {}, {}, {"subvol"}},
+                           {"fit/d.h", {}, {}, {"pugi", "subvol::internal"}},
+                           {"cli/runs/report.h", {}, {}, {"subvol::cli"}}},
+                          {"fit/a.h"}) ==
+          Strings{"fit/b.h is public, and in subvol::internal", "fit/c.h is not public, and not in subvol::internal"});
   }
   SECTION("a file that is not named from the root") {
     CHECK(unknown_files({{"tests/support/data.h", {}}, {"tests/main.cpp", {"data.h", "tests/support/data.h"}}}) ==

@@ -6,6 +6,8 @@
 #include "subvol/base/text_scanner.h"
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 constexpr std::size_t kLongestFolderName = 160;  ///< file systems allow 255 bytes; temporary names need some

@@ -10,6 +10,8 @@
 #include <cmath>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 constexpr std::size_t kMostRows = 200, kMostReasons = 20;

@@ -26,6 +26,8 @@
 #include <stdio.h>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 namespace fs = std::filesystem;

@@ -17,6 +17,8 @@
 #include <glob.h>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 namespace fs = std::filesystem;

@@ -12,6 +12,8 @@
 #include <sys/stat.h>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 namespace fs = std::filesystem;

@@ -9,6 +9,8 @@
 
 namespace subvol::cli {
 
+using namespace internal;
+
 TableRows::TableRows(std::string name, std::string_view text, char separator)
     : name_(std::move(name)), text_(text), separator_(separator) {
   require_no_utf16(name_, text);

@@ -12,6 +12,8 @@
 #include <sstream>
 
 namespace subvol::cli {
+
+using namespace internal;
 std::vector<Index> not_certified_cells(const MeshCheck& check) {
   return check.quality ? check.quality->certificate.not_certified : std::vector<Index>{};
 }

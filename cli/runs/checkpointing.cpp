@@ -11,6 +11,8 @@
 #include <string_view>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// Options that do not affect the fit's result, and names of inputs, which are identified by their content.

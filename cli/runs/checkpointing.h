@@ -14,6 +14,9 @@
 
 namespace subvol::cli {
 
+using internal::RunIdentity;
+using internal::StageLog;
+
 /// Identifies an input: covers everything that a fit reads of it.
 std::string fingerprint(const TriangleMesh& mesh);
 std::string fingerprint(const PointCloud& cloud);

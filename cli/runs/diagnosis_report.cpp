@@ -16,6 +16,8 @@
 #include <sstream>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 Json numbers_json(const std::array<Index, 2>& numbers) {

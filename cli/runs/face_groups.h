@@ -12,6 +12,8 @@
 
 namespace subvol::cli {
 
+using internal::CarriedGroup;
+
 /// The groups of a target as they arrived on a result, and the warnings about them. Both are empty if the target has no
 /// groups.
 struct GroupsFound {

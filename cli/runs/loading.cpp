@@ -22,6 +22,8 @@
 
 namespace subvol::cli {
 
+using namespace internal;
+
 namespace {
 
 /// A .vtu with an exact map beside its cells, which has not been read yet.

@@ -22,6 +22,8 @@
 #include <unistd.h>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 namespace fs = std::filesystem;

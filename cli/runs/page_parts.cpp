@@ -6,6 +6,8 @@
 #include "subvol/base/format.h"
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 constexpr const char* kStyle = R"(

@@ -11,6 +11,8 @@
 #include <unistd.h>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 using Kind = ProgressTeller::Kind;

@@ -13,6 +13,8 @@
 #include <cstdio>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// A JSON value as text for people.

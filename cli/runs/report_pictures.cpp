@@ -21,6 +21,8 @@
 #include <optional>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 constexpr int kPictureWidth = 720, kPictureHeight = 540;

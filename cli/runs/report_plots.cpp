@@ -10,6 +10,8 @@
 #include <vector>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 constexpr double kWidth = 640, kHeight = 240, kLeft = 48, kBottom = 20, kTop = 10;

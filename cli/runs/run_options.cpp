@@ -13,6 +13,8 @@
 
 namespace subvol::cli {
 
+using namespace internal;
+
 void apply_resources(const RunOptions& options) {
   if (options.threads > 0) omp_set_num_threads(options.threads);
   if (options.memory_limit == 0) return;

@@ -21,6 +21,8 @@
 #include <span>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// Statistics of the thicknesses of one side, in the mesh's unit.

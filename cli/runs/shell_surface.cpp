@@ -16,6 +16,8 @@
 #include <cmath>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// Parses X,Y,Z.

@@ -17,6 +17,8 @@
 #include <set>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();

@@ -14,6 +14,9 @@
 
 namespace subvol::cli {
 
+using internal::ViewerContent;
+using internal::ViewerMesh;
+
 /// What to show of a mesh besides its cells.
 struct ViewingOptions {
   const TriangleMesh* target = nullptr;  ///< the surface to measure distances to and to show as a ghost; or null

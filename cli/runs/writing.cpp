@@ -30,6 +30,8 @@
 #include <map>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 SceneValue scene_value(const Json& value) {

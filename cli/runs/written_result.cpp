@@ -15,6 +15,8 @@
 #include <string_view>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// The first output of this part and extension that is a regular file; null if there is none.

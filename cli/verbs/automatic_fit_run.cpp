@@ -27,6 +27,8 @@
 #include <utility>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// One run, from its input file to its output files.

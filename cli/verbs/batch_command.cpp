@@ -26,6 +26,8 @@
 #include <sstream>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 namespace fs = std::filesystem;

@@ -26,6 +26,8 @@
 #include <optional>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 struct OptimizeArguments {

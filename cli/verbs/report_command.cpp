@@ -17,6 +17,8 @@
 #include <optional>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 struct ReportArguments {

@@ -29,6 +29,8 @@
 #include <optional>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 struct ShellArguments {

@@ -17,6 +17,8 @@
 #include <utility>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 struct SubdivideArguments {

@@ -19,6 +19,8 @@
 #include <memory>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 struct AutoArguments : TemplateRun {

@@ -24,6 +24,8 @@
 #include <optional>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 struct ViewArguments {

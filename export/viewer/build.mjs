@@ -42,7 +42,7 @@ writeFileSync(
   `// Made by export/viewer/build.mjs.
 #include "export/viewer_script.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 std::string_view viewer_script() {
   static constexpr char kScript[] =
@@ -50,7 +50,7 @@ ${literals.join("\n")};
   return {kScript, sizeof kScript - 1};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal
 `
 );
 console.log(`${out}: ${script.length} characters`);

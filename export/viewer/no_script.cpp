@@ -2,8 +2,8 @@
 // Stands for the bundled script in builds without node.
 #include "subvol/export/viewer_script.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 std::string_view viewer_script() { return {}; }
 
-}  // namespace subvol
+}  // namespace subvol::internal

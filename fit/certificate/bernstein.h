@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol::bernstein {
+namespace subvol::internal::bernstein {
 
 /// Bernstein coefficients of det J over linear cells. They bound det J from both sides: a polynomial in Bernstein form
 /// stays inside the hull of its coefficients. T is `double`, or a fixed-size Eigen array that holds one cell per lane.
@@ -139,4 +139,4 @@ inline double rounding_margin(double scale, int level) {
   return (16 + 6.5 * level) * u * scale;
 }
 
-}  // namespace subvol::bernstein
+}  // namespace subvol::internal::bernstein

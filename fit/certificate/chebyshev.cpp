@@ -3,7 +3,7 @@
 
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree) {
   std::vector<std::vector<long double>> rows;
@@ -20,4 +20,4 @@ std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree) {
   return rows;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

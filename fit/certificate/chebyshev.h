@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Expansions in Chebyshev polynomials with proved error bounds, in extended precision if the platform has it.
 ///
@@ -66,4 +66,4 @@ class ChebyshevExpansion {
 /// entries.
 std::vector<std::vector<long double>> chebyshev_to_bernstein(int degree);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,7 +13,7 @@
 #include <optional>
 #include <type_traits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -385,4 +385,4 @@ template double determinant_bound(HexMatrices&, const Mat3&, const Mat3&, const 
 template double determinant_bound(NarrowHexMatrices&, const Mat3&, const Mat3&, const BoundOptions&, Mat3*);
 template double determinant_bound(PrismMatrices&, const Mat3&, const Mat3&, const BoundOptions&, Mat3*);
 
-}  // namespace subvol
+}  // namespace subvol::internal

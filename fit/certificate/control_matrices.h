@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Entries [row][column] of as many matrices as a vector has lanes.
 template <class Vector>
@@ -131,4 +131,4 @@ template <class Matrices>
 double determinant_bound(Matrices& matrices, const Mat3& remainder, const Mat3& frame,
                          const BoundOptions& options = {}, Mat3* near_l = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -324,4 +324,4 @@ Mat3 HexBoxes::remainder(const Box& box) {
   return (1 + 1e-10) * result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

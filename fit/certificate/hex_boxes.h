@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Pool of coefficients in one precision, which keeps those no longer needed for reuse.
 template <class Vector>
@@ -171,4 +171,4 @@ class HexBoxes {
   AlignedDoubles sums_;                            // scratch of make_weights
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

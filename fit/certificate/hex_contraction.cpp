@@ -7,7 +7,7 @@
 #include <limits>
 #include <type_traits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -308,4 +308,4 @@ void HexContraction::contract_narrow_v(const HexPart& part) {
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

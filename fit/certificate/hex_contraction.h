@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A dyadic box of [0, 1]^3, and the models that replace N_i(u), N_j(v), N_k(w) on it.
 struct HexPart {
@@ -115,4 +115,4 @@ class HexContraction {
   AlignedFloats sizes_w_, sizes_v_, middle_sizes_v_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

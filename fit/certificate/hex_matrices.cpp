@@ -5,7 +5,7 @@
 #include <limits>
 #include <type_traits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -203,4 +203,4 @@ NarrowHexMatrices::NarrowProduct NarrowHexMatrices::narrow_product(const Mat3& l
   return NarrowProduct(*this);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

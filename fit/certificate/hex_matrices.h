@@ -9,7 +9,7 @@
 #include <memory>
 #include <type_traits>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Largest relative error of rounding to single precision.
 inline constexpr double kNarrowRoundoff = std::numeric_limits<float>::epsilon() / 2;
@@ -180,4 +180,4 @@ inline void NarrowHexMatrices::NarrowProduct::load(std::size_t first, MatrixOf<W
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -16,7 +16,7 @@
 #include <optional>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -246,4 +246,4 @@ CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coef
   return summarize(validity);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <memory>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Proves or refutes, cell by cell, that a high-order map is nowhere inverted.
 ///
@@ -49,4 +49,4 @@ class HighOrderCertifier {
 CertificateSummary certify(const ElementSpace& space, std::span<const Vec3> coefficients,
                            const CertificateOptions& options = {});
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <memory>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -152,4 +152,4 @@ LineModels::Level LineModels::make_level(int l) const {
   return level;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

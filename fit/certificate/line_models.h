@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Polynomial models of the functions N_0 .. N_order of `line_functions` over the dyadic intervals of [0, 1].
 ///
@@ -82,4 +82,4 @@ class LineModels {
   mutable std::array<std::once_flag, kMaxLevel + 1> made_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

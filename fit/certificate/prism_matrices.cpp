@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 struct PrismMatrices::Triangle {
   /// Numbers of alpha - e_c + e_i for c = 0, 1, 2: neighbors of alpha, and of one another.
@@ -160,4 +160,4 @@ PrismMatrices::NarrowProduct PrismMatrices::narrow_product(const Mat3& l) {
   return NarrowProduct(*this);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The `ControlMatrices` J_b of a map from a triangle times [0, 1], given by Bernstein coefficients: of any degree over
 /// the triangle (numbered by `SimplexIndex`), of degree kWide - 1 along w.
@@ -83,4 +83,4 @@ class PrismMatrices {
   Vec3 narrow_sizes_, narrow_errors_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

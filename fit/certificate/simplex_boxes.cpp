@@ -10,7 +10,7 @@
 #include <cstring>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -411,4 +411,4 @@ Mat3 SimplexBoxes::rounding_error(const Box& box) const {
   return differences * control * Eigen::RowVector3d::Ones();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

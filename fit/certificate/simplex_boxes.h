@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Bernstein coefficients of the Jacobian of one high-order tet or prism over its boxes, computed by bisecting longest
 /// sides.
@@ -181,4 +181,4 @@ class PrismBoxes : public SimplexBoxes {
   PrismMatrices matrices_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <cassert>
 #include <mutex>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -481,4 +481,4 @@ SimplexModels::Batch SimplexModels::make_batch(int own_order, int tier, const Pa
   return batch;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Polynomial models of tet functions, and of the triangle's part of prism functions, over parts of the simplex.
 ///
@@ -126,4 +126,4 @@ class SimplexModels {
   mutable std::size_t stored_bytes_ = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -163,4 +163,4 @@ void SimplexPolynomial::bernstein(double* coefficients) const {
   });
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Exponents of the Bernstein polynomials of one degree over a triangle (3 barycentric coordinates) or tetrahedron (4):
 /// all alpha with alpha_0 + .. + alpha_d = degree; alpha_1 varies fastest, alpha_d slowest.
@@ -88,4 +88,4 @@ class SimplexPolynomial {
   std::vector<double> terms_;  ///< c_alpha at row(alpha_2, alpha_3) + alpha_1; rows are padded with zeros
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

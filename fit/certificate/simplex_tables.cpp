@@ -6,7 +6,7 @@
 #include <cassert>
 #include <memory>
 
-namespace subvol {
+namespace subvol::internal {
 
 const SimplexTables& SimplexTables::get(int dimension, int degree) {
   assert((dimension == 2 || dimension == 3) && degree >= 1 && degree <= kMaxDegree);
@@ -34,4 +34,4 @@ const SimplexHalving& SimplexTables::halving(int a, int b) const {
   return halvings_[a][b];
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 
 #include <mutex>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the least multiple of `unit` that is n or more.
 inline std::size_t rounded_up(std::size_t n, std::size_t unit) { return (n + unit - 1) / unit * unit; }
@@ -33,4 +33,4 @@ class SimplexTables {
   mutable std::array<std::array<std::once_flag, 4>, 4> halved_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

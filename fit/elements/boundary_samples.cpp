@@ -9,6 +9,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Numbers samples when a face first asks for them.

@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -72,4 +72,4 @@ ElementRule make_element_rule(CellKind kind, int points_per_direction) {
   return rule;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

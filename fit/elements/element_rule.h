@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Quadrature of a linear cell, as gradients of its shape functions in the coordinates of its ideal cell.
 ///
@@ -45,4 +45,4 @@ Mat3 ideal_matrix(CellKind kind);
 Mat3 ideal_inverse(CellKind kind);
 double ideal_volume(CellKind kind);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,6 +11,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kZeroWeight = 1e-15, kOutside = 1e-9;

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -101,4 +101,4 @@ std::vector<Vec3> interpolated_boxes(const VolumeMesh& mesh, std::span<const Vec
   return boxes;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

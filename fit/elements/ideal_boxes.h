@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Lengths by which to stretch the ideal cell (`element_rule.h`) of each cell along its coordinates, between one size
 /// for all cells (own_share 0) and the cell's own size (1):
@@ -35,4 +35,4 @@ std::vector<Vec3> ideal_boxes(const VolumeMesh& mesh, std::span<const Vec3> node
 std::vector<Vec3> interpolated_boxes(const VolumeMesh& mesh, std::span<const Vec3> nodes, double volume,
                                      std::span<const std::uint8_t> trusted);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <map>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -185,4 +185,4 @@ HighOrderMesh project_map(const ElementSpace& space, const std::function<Vec3(st
   return Projector(space, map).run();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

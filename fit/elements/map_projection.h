@@ -5,7 +5,7 @@
 
 #include <functional>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Projects a given map onto a space, entity by entity: vertices are interpolated, then the modes of edges, of faces
 /// and of cells fit the remainder by least squares, weighted as the integral (order + 2 Gauss points in each direction
@@ -18,4 +18,4 @@ namespace subvol {
 /// Cost: for every cell, the number of its points times that of its modes.
 HighOrderMesh project_map(const ElementSpace& space, const std::function<Vec3(std::size_t, const Vec3&)>& map);
 
-}  // namespace subvol
+}  // namespace subvol::internal

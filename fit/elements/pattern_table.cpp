@@ -7,7 +7,7 @@
 #include <cassert>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 PatternTable::PatternTable(const ElementSpace& space, std::size_t pattern, std::span<const Vec3> points,
                            Derivatives derivatives)
@@ -73,4 +73,4 @@ std::vector<std::vector<Index>> cells_by_pattern(const ElementSpace& space) {
   return cells;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The shape functions of one pattern at fixed points: one small product evaluates a cell of that pattern there.
 class PatternTable {
@@ -38,4 +38,4 @@ class PatternTable {
 /// The cells of every pattern, ascending.
 std::vector<std::vector<Index>> cells_by_pattern(const ElementSpace& space);
 
-}  // namespace subvol
+}  // namespace subvol::internal

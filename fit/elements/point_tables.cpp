@@ -9,7 +9,7 @@
 #include <map>
 #include <tuple>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -211,4 +211,4 @@ void PointTables::apply_transposed(std::span<const Vec3> in, std::span<Vec3> out
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The map of `point_map` for many products: positions at points, from dense tables of shape functions that cells
 /// share.
@@ -54,4 +54,4 @@ class PointTables {
   mutable std::vector<Vec3> local_;  ///< by place: coefficients of the blocks' modes, or their sums over points
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -17,6 +17,8 @@
 #include <utility>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 /// Number of Legendre modes that represent Fourier modes up to `count` to rounding: coefficients decay faster than any

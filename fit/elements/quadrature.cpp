@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -198,4 +198,4 @@ int nested_points_for_order(int order) {
   return n;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

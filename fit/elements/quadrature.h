@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The rule of a quadrature along a line.
 ///
@@ -46,4 +46,4 @@ LineRule gauss_rule(int n);
 LineRule gauss_lobatto_rule(int n);
 LineRule trapezoidal_rule(int n);
 
-}  // namespace subvol
+}  // namespace subvol::internal

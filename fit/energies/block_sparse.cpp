@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 std::size_t BlockSparse::find(Index row, Index column) const {
   const auto first = columns.begin() + static_cast<std::ptrdiff_t>(offsets[row]);
@@ -101,4 +101,4 @@ void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, 
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

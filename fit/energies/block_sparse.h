@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A square sparse matrix of 3x3 blocks over points, stored by rows (CSR): y_i = sum_j B_ij x_j.
 ///
@@ -46,4 +46,4 @@ BlockSparse clique_pattern(std::size_t num_rows, std::span<const std::size_t> of
 void add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed, const BlockSparse& hessian,
                          std::span<Mat3> diagonal);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 std::vector<int> color_cells(const VolumeMesh& mesh) {
   std::vector<std::vector<std::uint64_t>> used;  // one bit mask per vertex for every 64 colors
@@ -49,4 +49,4 @@ BlockSparse CellBlocks::zero_matrix() const {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

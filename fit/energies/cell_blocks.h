@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Colors the cells greedily, so that cells of one color share no vertex. Returns one color per cell, from 0 on.
 std::vector<int> color_cells(const VolumeMesh& mesh);
@@ -32,4 +32,4 @@ class CellBlocks {
   std::vector<Index> slots_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

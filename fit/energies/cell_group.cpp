@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/energies/cell_group.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Fills the quadrature points and weights, and the values and gradients of the functions there.
 void CellGroup::make_tables(Basis basis, QuadratureRule rule) {
@@ -53,4 +53,4 @@ void CellGroup::make_tables(Basis basis, QuadratureRule rule) {
                             vv[i] * vd[j] * vd[k], vd[i] * vv[j] * vd[k]});
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

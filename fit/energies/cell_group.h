@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Cells of one kind, order and quadrature, in batches of eight: the tables that they share and the data of each batch.
 struct CellGroup {
@@ -50,4 +50,4 @@ struct CellGroup {
   void make_tables(Basis basis, QuadratureRule rule);
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <span>
 
 /// Kernels of `VolumeEnergy` at one quadrature point of kLanes cells; private to it.
-namespace subvol {
+namespace subvol::internal {
 
 /// Computes J_q of all lanes: J = sum_a x_a g_a^T diag(1/h).
 inline void jacobians(std::span<const ElementRule::Entry> entries, const double (*x)[3][kLanes],
@@ -194,4 +194,4 @@ struct RegularisedKernel {
   }
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -154,4 +154,4 @@ void CellSweep::from_lines() {
     }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Maps the coefficients of one batch to the Jacobians at its points, and back. Holds the work space of one thread.
 class CellSweep {
@@ -107,4 +107,4 @@ class CellSweep {
   std::unique_ptr<Wide[][9]> points_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

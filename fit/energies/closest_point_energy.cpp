@@ -10,7 +10,7 @@
 #include <cmath>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -305,4 +305,4 @@ std::vector<double> ClosestPointEnergy::triangle_distances_with_corners() const 
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <memory>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Direction n in which the surfaces are drawn to each other; the first two differ in the second sum below only.
 ///
@@ -147,4 +147,4 @@ class ClosestPointEnergy final : public SurfaceTerm {
   std::vector<double> surface_distances_;    ///< |x_q - t(x_q)|
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -224,15 +224,6 @@ constexpr DistortionKernels kKernels = {evaluate<kDistortion, Order::energy>, ev
 
 }  // namespace
 
-const char* to_string(Distortion distortion) {
-  switch (distortion) {
-    case Distortion::hencky: return "hencky";
-    case Distortion::inverse_mean_ratio: return "inverse_mean_ratio";
-    case Distortion::condition_number: return "condition_number";
-  }
-  return "unknown";
-}
-
 const DistortionKernels& kernels_of(Distortion distortion) {
   switch (distortion) {
     case Distortion::inverse_mean_ratio: return kKernels<Distortion::inverse_mean_ratio>;
@@ -258,4 +249,4 @@ double hencky(const Mat3& jacobian, Mat3* stress) {
   return batch.energy[0];
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

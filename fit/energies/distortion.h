@@ -5,7 +5,7 @@
 #include "subvol/fit/energies/distortion_kind.h"
 #include "subvol/fit/simd/lanes.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Default floor to which the eigenvalues of a distortion's second derivative are raised (dimensionless).
 inline constexpr double kHessianFloor = 0.01;
@@ -58,4 +58,4 @@ void hencky_hessian(DistortionBatch& batch);
 /// Returns the Hencky distortion e(J) of one Jacobian, +infinity if det J <= 0; `stress` (may be null) receives de/dJ.
 double hencky(const Mat3& jacobian, Mat3* stress = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include "subvol/fit/energies/distortion.h"
 #include "subvol/fit/simd/wide_matrix.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The second derivative of a distortion at points of eight cells, stored for the products of conjugate gradients.
 ///
@@ -106,4 +106,4 @@ template <bool kCoupled>
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -18,7 +18,7 @@
 #include <map>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 HighOrderEnergy::~HighOrderEnergy() = default;
 
@@ -435,4 +435,4 @@ void HighOrderEnergy::densify(std::span<const Index> cells, std::span<const Vec3
   weigh_points(nodes);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

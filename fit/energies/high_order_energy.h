@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 struct CellGroup;
 
@@ -117,4 +117,4 @@ class HighOrderEnergy final : public VolumeTerm {
   std::vector<std::int64_t> incidences_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/energies/surface_energy.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
                                                const std::vector<std::array<Index, 3>>& sample_triangles,
@@ -32,4 +32,4 @@ void require_closest(Correspondence correspondence) {
         "Correspondence::voronoi: a cloud has no surface to cut into cells; points pull at the closest places");
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Groups of the triangles of both surfaces, as for `ClosestPointEnergy::set_groups`; empty: there are none.
 struct SurfaceGroups {
@@ -40,4 +40,4 @@ std::unique_ptr<SurfaceTerm> make_surface_term(const TargetSurface& target,
 /// Throws InputError unless correspondences are closest points: Voronoi cells of a point cloud have no area.
 void require_closest(Correspondence correspondence);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -332,7 +332,7 @@ double QualityEnergy::linearize(std::span<const Vec3> nodes, double scale, std::
 
 void QualityEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                                         std::span<Mat3> diagonal) const {
-  subvol::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
+  internal::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
 }
 
 double QualityEnergy::least_scaled_jacobian(std::size_t cell, const Points& points,
@@ -445,4 +445,4 @@ void QualityEnergy::densify(std::span<const Index> cells, std::span<const Vec3>)
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

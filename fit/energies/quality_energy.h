@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Weights of the terms of `QualityEnergy`. All are >= 0 and dimensionless.
 struct QualityWeights {
@@ -139,4 +139,4 @@ class QualityEnergy final : public VolumeTerm {
   BlockSparse hessian_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

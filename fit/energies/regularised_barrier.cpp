@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -55,4 +55,4 @@ void regularised_barrier(RegularisedBatch& batch, double epsilon) {
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include "subvol/base/types.h"
 #include "subvol/fit/energies/distortion.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Distortion energy that is finite for every Jacobian, including inverted ones, and tends to a barrier as eps tends to
 /// 0; kLanes at once.
@@ -33,4 +33,4 @@ struct RegularisedBatch {
 /// Fills everything. epsilon > 0, dimensionless.
 void regularised_barrier(RegularisedBatch& batch, double epsilon);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include "subvol/fit/simd/wide.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 // Eight 3x3 matrices at once, in registers: everything is inlined everywhere.
 
@@ -146,4 +146,4 @@ struct Singular {
   for (int i = 0; i < 3; ++i) square[i] = dot(jv[i], jv[i]);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

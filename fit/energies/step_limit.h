@@ -9,7 +9,7 @@
 #include <atomic>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Finds the largest t = limit * 0.8^n, n <= 200, such that every det(J + s D), 0 <= s <= t, keeps at least a tenth of
 /// det J, over all admitted pairs (J, D). Several threads may admit pairs at once; t does not depend on their order.
@@ -57,4 +57,4 @@ class StepLimit {
   std::atomic<int> steps_{0};               // step_[steps_] is safe for every pair seen so far
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

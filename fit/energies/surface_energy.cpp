@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -109,4 +109,4 @@ void SurfaceEnergy::add_sample_pieces(std::size_t sample, Row& row) const {
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Squared distance between the fitted surface S, given by samples z, and the target T, both ways, with frozen cells.
 ///
@@ -56,4 +56,4 @@ class SurfaceEnergy final : public SurfaceTerm {
   std::vector<Index> site_pieces_;  ///< indices into `target_pieces_`, ordered by site
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -105,4 +105,4 @@ void SurfaceTerm::add_gradient(std::span<const Vec3> z, std::span<Vec3> g) const
   for (std::size_t i = 0; i < z.size(); ++i) g[i] += gradient_[i] + hessian_times_step(z, i);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A surface energy with frozen correspondences. Once assigned, it is an exact quadratic in the samples z,
 ///
@@ -146,4 +146,4 @@ void SurfaceTerm::assemble(double scale, const AddRow& add_row) {
   surface_to_target_ = scale * sliced_sum(n, [&](std::size_t i) { return to_target[i]; });
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

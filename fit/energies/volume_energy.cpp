@@ -14,7 +14,7 @@
 #include <limits>
 #include <map>
 
-namespace subvol {
+namespace subvol::internal {
 
 VolumeEnergy::VolumeEnergy(const VolumeMesh& mesh, std::span<const Vec3> ideal_lengths, int points_per_direction)
     : mesh_(&mesh),
@@ -318,7 +318,7 @@ void VolumeEnergy::multiply(std::span<const Vec3> in, std::span<Vec3> out) const
 
 void VolumeEnergy::add_diagonal_blocks(const SparseMap& map, const SparseMap& map_transposed,
                                        std::span<Mat3> diagonal) const {
-  subvol::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
+  internal::add_diagonal_blocks(map, map_transposed, hessian_, diagonal);
 }
 
 std::vector<Index> VolumeEnergy::uncertified(std::span<const Vec3> nodes) const {
@@ -352,4 +352,4 @@ double VolumeEnergy::max_step(std::span<const Vec3> nodes, std::span<const Vec3>
   return steps.step();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Mean distortion of a mesh of linear cells against ideal or given reference cells.
 ///
@@ -120,4 +120,4 @@ class VolumeEnergy final : public VolumeTerm {
   BlockSparse hessian_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The distortion E_W of the cells of a finite element mesh, as a function of its nodes y. Paper: Eqs. 2, 3, 7.
 ///
@@ -62,4 +62,4 @@ class VolumeTerm {
   virtual void densify(std::span<const Index> cells, std::span<const Vec3> nodes) = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

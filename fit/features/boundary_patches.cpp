@@ -17,7 +17,7 @@
 #include <numeric>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -293,4 +293,4 @@ std::vector<EdgeAngle> smooth_edge_angles(const MeshTopology& topology, std::spa
   return angles;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The parts into which paths divide a mesh's boundary.
 struct BoundaryPatches {
@@ -77,4 +77,4 @@ struct EdgeAngle {
 std::vector<EdgeAngle> smooth_edge_angles(const MeshTopology& topology, std::span<const CreasePath> paths,
                                           std::span<const Vec3> positions, const TriangleMesh& target);
 
-}  // namespace subvol
+}  // namespace subvol::internal

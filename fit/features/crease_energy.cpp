@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -154,4 +154,4 @@ void CreaseEnergy::assign(std::span<const Vec3> samples) {
     for (Index end : links_[k].ends) link_numbers_[next[end]++] = static_cast<Index>(k);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Squared distance between crease curves of the fitted surface S and the feature curves of the target T that they
 /// follow, both ways, with frozen correspondences. It is added to a `SurfaceTerm`, which scales it like its own terms.
@@ -97,4 +97,4 @@ class CreaseEnergy {
   std::vector<Index> link_numbers_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <optional>
 #include <queue>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -320,4 +320,4 @@ FeatureTags tags_of_paths(const std::vector<CreasePath>& paths, const FeatureCur
   return merge_tags(tags, {});
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

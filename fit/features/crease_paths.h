@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A path of boundary edges of a volume mesh that follows a feature curve of the target.
 struct CreasePath {
@@ -40,4 +40,4 @@ std::vector<CreasePath> follow_curves(const VolumeMesh& mesh, const FeatureCurve
 /// target.
 FeatureTags tags_of_paths(const std::vector<CreasePath>& paths, const FeatureCurves& curves);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -90,4 +90,4 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

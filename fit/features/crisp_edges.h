@@ -4,7 +4,7 @@
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/surface/triangle_mesh.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// How much the sharp edges of a surface stand out from what is around them.
 struct EdgeCrispness {
@@ -24,4 +24,4 @@ struct EdgeCrispness {
 /// mesh, curves  as for and from `feature_curves`. Cost: one sort of the edges.
 EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curves);
 
-}  // namespace subvol
+}  // namespace subvol::internal

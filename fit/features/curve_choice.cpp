@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -72,4 +72,4 @@ bool give_up_poor_curves(const PatchedMesh& patched, const SignedFeatures& featu
   return count > 0;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Excludes curves from the next routing because cells at their paths came out poor.
 ///
@@ -25,4 +25,4 @@ namespace subvol {
 bool give_up_poor_curves(const PatchedMesh& patched, const SignedFeatures& features, const FeatureRouting& routing,
                          std::span<const double> faults, RoutingOptions& options);
 
-}  // namespace subvol
+}  // namespace subvol::internal

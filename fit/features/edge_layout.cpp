@@ -5,7 +5,7 @@
 
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
                        const SignedFeatures& features, const RoutingOptions& options) {
@@ -33,4 +33,4 @@ EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, con
   return layout;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

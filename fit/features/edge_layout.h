@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A grid prepared to follow the sharp edges of a target: routed, divided into patches and padded.
 struct EdgeLayout {
@@ -40,4 +40,4 @@ struct EdgeLayout {
 EdgeLayout edge_layout(const VolumeMesh& grid, std::span<const Vec3> fitted, const TriangleMesh& target,
                        const SignedFeatures& features, const RoutingOptions& options);
 
-}  // namespace subvol
+}  // namespace subvol::internal

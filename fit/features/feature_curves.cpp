@@ -15,6 +15,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 struct Side {

@@ -16,7 +16,7 @@
 #include <tuple>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -587,4 +587,4 @@ FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& featu
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

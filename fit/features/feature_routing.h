@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A curve that no path follows, with a point of the target for a report: the corner that is at fault, or the middle of
 /// the curve.
@@ -87,4 +87,4 @@ FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& feat
 /// mesh, features, routing  as above.
 FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,7 +13,7 @@
 #include <numeric>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -104,4 +104,4 @@ class FacetGrower {
 
 FlatFacets flat_facets(const TriangleMesh& surface) { return FacetGrower(surface).run(); }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The points x with normal . x = offset; the normal has length 1.
 struct FacetPlane {
@@ -30,4 +30,4 @@ inline constexpr double kFlatTolerance = 1e-6;
 /// Deterministic. Cost: sorts of the triangles and edges.
 FlatFacets flat_facets(const TriangleMesh& surface);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -157,4 +157,4 @@ CreaseDistance FollowedCreases::distance(const BoundaryRefinement& limit, std::s
   return crease_distance(curves_, points, segments(limit.crease_edges), diagonal);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Width of the strip of surface that counts as much as a crease, in units of the target's length V/A.
 inline constexpr double kCreaseWidth = 1;
@@ -74,4 +74,4 @@ class FollowedCreases {
   std::vector<Index> curve_of_crease_;  ///< in the order of the mesh's tags; kNoIndex for creases that follow nothing
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

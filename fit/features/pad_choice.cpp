@@ -16,7 +16,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -278,4 +278,4 @@ PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features) {
   return PadChoice(patched, features).run();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

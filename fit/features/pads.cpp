@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -272,4 +272,4 @@ std::optional<PadRefusal> pad(PatchedMesh& patched, std::span<const Index> patch
   return std::nullopt;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

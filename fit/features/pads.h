@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A mesh whose boundary is divided into patches by paths along the sharp edges of a target.
 struct PatchedMesh {
@@ -111,4 +111,4 @@ struct PadReport {
 /// together, and the edges between them keep their numbers of cells.
 PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -81,4 +81,4 @@ std::optional<PadRefusal> topological_refusal(const PatchFans& fans, const Patch
   return std::nullopt;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The boundary of a patched mesh, vertex by vertex.
 struct PatchFans {
@@ -51,4 +51,4 @@ struct FanState {
 FanState fan_state(const PatchFans& fans, const PatchedMesh& patched, std::span<const PatchFans::Place> fan,
                    std::span<const std::uint8_t> is_padded);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -12,7 +12,7 @@
 #include <numbers>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -79,4 +79,4 @@ QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& featu
   return {edge_caps(patched, features), corner_caps(patched, features)};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

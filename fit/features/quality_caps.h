@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Bound on the scaled Jacobian at both ends of an edge, in the cells around it.
 struct EdgeCap {
@@ -40,4 +40,4 @@ struct QualityCaps {
 /// that does not exist. Cost: one pass over the mesh.
 QualityCaps quality_caps(const PatchedMesh& patched, const SignedFeatures& features);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 RoutingGraph::RoutingGraph(const VolumeMesh& mesh, bool on_sheets, std::vector<double> sizes)
     : mesh_(&mesh), offsets_(mesh.num_vertices() + 1, 0), sizes_(std::move(sizes)) {
@@ -138,4 +138,4 @@ std::vector<Index> cheapest_path(const RoutingGraph& graph, FollowingCost& cost,
   return path;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

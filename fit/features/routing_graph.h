@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The edges of a mesh's boundary, or of all its sheets, as a graph in space.
 class RoutingGraph {
@@ -89,4 +89,4 @@ class FollowingCost {
 std::vector<Index> cheapest_path(const RoutingGraph& graph, FollowingCost& cost, Index from, Index to,
                                  const Occupied& occupied);
 
-}  // namespace subvol
+}  // namespace subvol::internal

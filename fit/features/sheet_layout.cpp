@@ -15,7 +15,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -145,4 +145,4 @@ std::vector<Index> groups_of_faces(const SheetLayout& layout, const VolumeMesh& 
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

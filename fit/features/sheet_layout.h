@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Curves of a target with regions that a mesh is to follow.
 struct SheetCurves {
@@ -48,4 +48,4 @@ SheetLayout sheet_layout(const VolumeMesh& mesh, const RegionSurface& target, co
 /// inside regions.
 std::vector<Index> groups_of_faces(const SheetLayout& layout, const VolumeMesh& mesh);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -15,7 +15,7 @@
 #include <tuple>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -134,4 +134,4 @@ Vec3 direction_at_end(const FeatureCurve& curve, bool from_front, double reach) 
   return Vec3::Zero();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The sharp edges of a solid with the angles of the solid along them, and the parts of the surface between them.
 struct SignedFeatures {
@@ -35,4 +35,4 @@ SignedFeatures signed_features(const TriangleMesh& target, FeatureCurves curves)
 /// point of the curve which is farther away than `reach`, or to the other end. Zero if that is the same point.
 Vec3 direction_at_end(const FeatureCurve& curve, bool from_front, double reach);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -137,4 +137,4 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   return level;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// One level of the recursive fit (paper: section 4.3): a finite element mesh over the vertices of a control mesh.
 ///
@@ -50,4 +50,4 @@ struct FitLevel {
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -71,4 +71,4 @@ FitSchedule make_schedule(const FitOptions& options, double distance, bool creas
   return schedule;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

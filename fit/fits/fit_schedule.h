@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A fit without a tolerance lowers lambda further until the mean distance is below this, in per cent of the diagonal.
 inline constexpr double kDefaultAccuracyPercent = 0.015;
@@ -59,4 +59,4 @@ std::vector<double> own_box_shares(double distance);
 /// creases_hold  true if creases are drawn to most of the target's sharp edges.
 FitSchedule make_schedule(const FitOptions& options, double distance, bool creases_hold = false);
 
-}  // namespace subvol
+}  // namespace subvol::internal

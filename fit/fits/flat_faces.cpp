@@ -19,7 +19,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -231,4 +231,4 @@ std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target)
   return moved;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 
 #include <cstddef>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Moves the boundary vertices of a fitted mesh onto the planes of the target's flat facets, so that planar faces are
 /// planar and the edges between them straight, up to rounding.
@@ -45,4 +45,4 @@ std::size_t flatten_sheets(VolumeMesh& mesh, const FitTarget& target, double lea
 /// returns the number of vertices that were moved. Cost: five closest points for each interface face.
 std::size_t flatten_interface_patches(VolumeMesh& cage, const FitTarget& target);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -47,4 +47,4 @@ HighOrderSchedule make_high_order_schedule(double lambda_close, double distance)
   return schedule;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

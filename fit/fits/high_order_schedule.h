@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// How curved elements approach the target.
 ///
@@ -50,4 +50,4 @@ inline constexpr double kMostUnfoldingLambdaOfOrders = 1;
 /// distance  mean distance between template and target, divided by the target's length V/A.
 HighOrderSchedule make_high_order_schedule(double lambda_close, double distance);
 
-}  // namespace subvol
+}  // namespace subvol::internal

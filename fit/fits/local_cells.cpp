@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -154,4 +154,4 @@ std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& t
   return factors;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A mesh of which some cells are smaller than the others on purpose.
 struct SizedMesh {
@@ -70,4 +70,4 @@ std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const d
 std::vector<double> crease_factors(const VolumeMesh& mesh, const MeshTopology& topology, std::span<const double> sizes,
                                    const SparseMap& samples);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -117,4 +117,4 @@ EntityOrders raised_where_it_pays(const ElementSpace& space, const EntityOrders&
   return orders;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A number for every edge, face and cell.
 struct EntityValues {
@@ -42,4 +42,4 @@ EntityValues order_gains(FitProblem& problem, const ElementSpace& raised, const 
 EntityOrders raised_where_it_pays(const ElementSpace& space, const EntityOrders& next, const EntityValues& gains,
                                   double share);
 
-}  // namespace subvol
+}  // namespace subvol::internal

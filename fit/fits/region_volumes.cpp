@@ -13,7 +13,7 @@
 #include <cmath>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -154,4 +154,4 @@ bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double le
   return good;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

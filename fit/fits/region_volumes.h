@@ -5,7 +5,7 @@
 
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Moves the sheets of a mesh, its boundary and its interfaces, a little so that every region gets a given volume:
 /// straight cells between points on a curved surface have less volume inside it and more outside.
@@ -21,4 +21,4 @@ namespace subvol {
 ///          `least_jacobian` would become poorer; or if no such move exists.
 bool restore_volumes(VolumeMesh& mesh, std::span<const double> wanted, double least_jacobian);
 
-}  // namespace subvol
+}  // namespace subvol::internal

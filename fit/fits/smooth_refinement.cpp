@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 VolumeMesh smooth_refinement(const VolumeMesh& mesh) {
   constexpr double kLeastJacobian = 0.2;
@@ -34,4 +34,4 @@ VolumeMesh smooth_refinement(const VolumeMesh& mesh) {
   return fine;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include "subvol/mesh/volume_mesh.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Refines a mesh once by Catmull-Clark subdivision, its boundary vertices at limit positions. Where a cell would get a
 /// scaled Jacobian below 0.2, its vertices go half of the way to the multi-linear split, again and again, and at last
@@ -12,4 +12,4 @@ namespace subvol {
 /// mesh  as for `subdivide`; the result carries its tags.
 VolumeMesh smooth_refinement(const VolumeMesh& mesh);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A point of a triangle: weights of its corners, with sum 1. Also the values at the corners of a linear function.
 using Barycentric = std::array<double, 3>;
@@ -58,4 +58,4 @@ void add_moments(std::size_t num_corners, const At& at, std::array<double, 6>& m
 /// Returns the sum of all nine moments: the polygon's share of the triangle's area.
 inline double total(const std::array<double, 6>& m) { return m[0] + m[3] + m[5] + 2 * (m[1] + m[2] + m[4]); }
 
-}  // namespace subvol
+}  // namespace subvol::internal

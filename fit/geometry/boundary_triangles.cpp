@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -100,4 +100,4 @@ TriangleMesh fan_triangles(const PolygonMesh& polygons, std::vector<Index>* poly
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

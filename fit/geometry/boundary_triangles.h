@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns triangles that follow the faces of linear cells: a quad face is the bilinear patch of its corners.
 ///
@@ -23,4 +23,4 @@ TriangleMesh refined_triangles(const PolygonMesh& polygons, std::vector<Index>* 
 /// fan of its center over its edges. Points [corners][centers].
 TriangleMesh fan_triangles(const PolygonMesh& polygons, std::vector<Index>* polygon_of_triangle = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

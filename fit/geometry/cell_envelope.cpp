@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -138,4 +138,4 @@ bool CellEnvelope::compute(std::span<const Barycentric> polygon, int first, doub
   return std::abs(area) <= kAreaTolerance;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Divides a convex polygon into the parts in which each of a set of linear functions is the lowest: the Voronoi cells
 /// of nearby sites, if they are known to be few.
@@ -75,4 +75,4 @@ class CellEnvelope {
   Polygon* rest_ = &buffers_[1];     ///< the cell after the current cut
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

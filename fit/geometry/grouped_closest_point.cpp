@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 GroupedClosestPoint::GroupedClosestPoint(const TriangleMesh& mesh, std::span<const Index> groups)
     : all_(mesh), group_(groups.begin(), groups.end()), place_(groups.size()), is_one_(groups.empty()) {
@@ -53,4 +53,4 @@ void GroupedClosestPoint::closest(std::span<const Vec3> points, std::span<const 
   for (std::size_t i = 0; i < points.size(); ++i) hits[i] = closest(points[i], groups[i], hits[i].triangle);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

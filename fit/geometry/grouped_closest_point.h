@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Finds closest points on those triangles of a mesh that belong to a group: one tree for each group, and one for all.
 ///
@@ -40,4 +40,4 @@ class GroupedClosestPoint {
   bool is_one_;                                     // all triangles are in one group
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

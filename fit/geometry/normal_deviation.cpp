@@ -15,6 +15,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kBinsPerDegree = 2;

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -139,4 +139,4 @@ std::vector<VoronoiPiece> RestrictedVoronoi::compute(std::span<const Vec3> posit
   return pieces;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

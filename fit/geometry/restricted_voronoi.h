@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The part of a triangle that is nearer to one site than to all others, with what an integral over it needs.
 struct VoronoiPiece {
@@ -73,4 +73,4 @@ class RestrictedVoronoi {
   SiteTree tree_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The places where a surface intersects itself.
 struct SelfIntersections {
@@ -39,4 +39,4 @@ SelfIntersections self_intersections(const TriangleMesh& mesh, const std::functi
 /// Returns the number of pairs, or `kMostIntersectingPairs` if the search was cancelled.
 std::size_t count_intersecting_pairs(const TriangleMesh& mesh, const std::function<bool()>& cancelled = {});
 
-}  // namespace subvol
+}  // namespace subvol::internal

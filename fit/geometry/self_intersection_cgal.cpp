@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -170,4 +170,4 @@ std::size_t count_intersecting_pairs(const TriangleMesh& mesh, const std::functi
   return found.is_complete ? found.pairs.size() : kMostIntersectingPairs;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numeric>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -206,4 +206,4 @@ bool SiteTree::gather(std::span<const Ball> balls, std::size_t max_count, std::v
   return true;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

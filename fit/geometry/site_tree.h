@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Finds the nearest of a set of sites, with a tree of bounding boxes: eight children per box, eight sites per leaf.
 ///
@@ -74,4 +74,4 @@ class SiteTree {
   double extent_ = 0, built_extent_ = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

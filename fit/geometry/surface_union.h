@@ -5,7 +5,7 @@
 
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the surface of the union of two solids, or of the first without the second.
 ///
@@ -16,4 +16,4 @@ namespace subvol {
 std::optional<TriangleMesh> united(const TriangleMesh& a, const TriangleMesh& b);
 std::optional<TriangleMesh> without(const TriangleMesh& a, const TriangleMesh& b);
 
-}  // namespace subvol
+}  // namespace subvol::internal

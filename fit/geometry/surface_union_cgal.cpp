@@ -9,7 +9,7 @@
 #include <exception>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -73,4 +73,4 @@ std::optional<TriangleMesh> without(const TriangleMesh& a, const TriangleMesh& b
   });
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

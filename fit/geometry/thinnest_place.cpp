@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -129,4 +129,4 @@ std::optional<ThinPlace> thinnest_place(const TriangleMesh& mesh, const ClosestP
   return *best;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <functional>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A place where two stretches of a surface face each other.
 struct ThinPlace {
@@ -40,4 +40,4 @@ enum class ThinSide {
 std::optional<ThinPlace> thinnest_place(const TriangleMesh& mesh, const ClosestPoint& tree, ThinSide side,
                                         const std::function<bool()>& cancelled = {});
 
-}  // namespace subvol
+}  // namespace subvol::internal

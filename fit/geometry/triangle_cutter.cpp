@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -268,4 +268,4 @@ void TriangleCutter::emit(Index triangle, std::vector<VoronoiPiece>& pieces) {
             [](const VoronoiPiece& a, const VoronoiPiece& b) { return a.site < b.site; });
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 #include "subvol/fit/geometry/cell_envelope.h"
 #include "subvol/fit/geometry/restricted_voronoi.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Cuts triangles, one after the other, by the Voronoi cells of sites: the inner loop of `RestrictedVoronoi`.
 ///
@@ -83,4 +83,4 @@ class TriangleCutter {
   std::array<Vec3, 3> positions_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

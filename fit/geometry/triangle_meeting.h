@@ -5,7 +5,7 @@
 
 #include <array>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// How two triangles meet that have a point in common.
 enum class MeetingKind {
@@ -26,4 +26,4 @@ struct TriangleMeeting {
 ///       kind means nothing and the place is near both.
 TriangleMeeting meeting_of(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -105,4 +105,4 @@ TriangleMeeting meeting_of(const Corners& a, const Corners& b) {
   return {kind_of(a, b, of_a, of_b), sum / static_cast<double>(places.size())};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

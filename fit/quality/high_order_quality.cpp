@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr std::size_t kChunk = 512;  // points per table, so that tables of high orders stay small
@@ -101,4 +101,4 @@ QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_directi
   return report;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

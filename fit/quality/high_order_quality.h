@@ -5,7 +5,7 @@
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/quality/quality.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Samples the scaled Jacobian of every curved cell and certifies det J > 0, as `measure_quality` does for linear
 /// cells.
@@ -21,4 +21,4 @@ namespace subvol {
 QualityReport measure_quality(const HighOrderMesh& mesh, int samples_per_direction = 0,
                               const CellReference& reference = {});
 
-}  // namespace subvol
+}  // namespace subvol::internal

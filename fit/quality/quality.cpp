@@ -14,6 +14,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 using bernstein::Vector;

@@ -11,6 +11,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 Vec3 center_of(const VolumeMesh& mesh, std::span<const Index> vertices) {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// One number of each of kLanes hexes: kernels that are templates over the number type process them all at once.
 using Lanes = Eigen::Array<double, kLanes, 1>;
@@ -62,4 +62,4 @@ void for_each_cell_block(const VolumeMesh& mesh, const Hexes& hexes, const Cell&
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

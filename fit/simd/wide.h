@@ -13,7 +13,7 @@
 #include <immintrin.h>
 #endif
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Eight numbers that are processed at once: a vector type of GCC and Clang, on any processor.
 inline constexpr int kWide = 8;
@@ -193,4 +193,4 @@ unsigned lanes_within(const Vector& v, std::remove_cvref_t<decltype(v[0])> limit
 #endif
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include "subvol/fit/simd/lanes.h"
 #include "subvol/fit/simd/wide.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 static_assert(kWide == kLanes);
 
@@ -26,4 +26,4 @@ inline void transpose_product(const Wide* a, const Wide* b, Wide* c) {
     for (int j = 0; j < 3; ++j) c[3 * i + j] = a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

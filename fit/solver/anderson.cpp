@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -72,4 +72,4 @@ bool AndersonMemory::find_step(std::vector<Vec3>& step) const {
   return true;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

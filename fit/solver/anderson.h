@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Anderson acceleration of a descent method whose steps f(x) converge linearly: "type I", in which the products of
 /// steps and gradients take the place of a norm, so that no metric has to be chosen.
@@ -37,4 +37,4 @@ class AndersonMemory {
   std::vector<Difference> history_;  ///< oldest first
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

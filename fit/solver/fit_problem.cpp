@@ -5,7 +5,7 @@
 
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 FitProblem::FitProblem(SparseMap node_map, SparseMap sample_map, std::unique_ptr<VolumeTerm> volume_energy,
                        std::unique_ptr<SurfaceTerm> surface_energy, double volume_weight)
@@ -35,4 +35,4 @@ void FitProblem::pull_back_samples(std::span<const Vec3> g, std::span<Vec3> out)
   tables ? tables->apply_transposed(g, out) : samples_transposed.apply(g, out);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The function that a stage minimizes over its degrees of freedom x (control vertices or coefficients), in the
 /// target's unit:
@@ -46,4 +46,4 @@ struct FitProblem {
   double lambda;                          ///< > 0
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

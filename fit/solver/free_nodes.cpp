@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/solver/free_nodes.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 FreeNodes free_nodes(std::span<const std::uint8_t> is_fixed, std::span<const Vec3> positions) {
   FreeNodes result;
@@ -20,4 +20,4 @@ FreeNodes free_nodes(std::span<const std::uint8_t> is_fixed, std::span<const Vec
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Nodes of a mesh, some of which are fixed: y = M x + y0 (`FitProblem`), where x holds the free ones.
 struct FreeNodes {
@@ -20,4 +20,4 @@ struct FreeNodes {
 /// Separates fixed from free nodes. is_fixed, positions: one entry per node.
 FreeNodes free_nodes(std::span<const std::uint8_t> is_fixed, std::span<const Vec3> positions);
 
-}  // namespace subvol
+}  // namespace subvol::internal

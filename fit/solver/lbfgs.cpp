@@ -7,7 +7,7 @@
 #include <deque>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -161,4 +161,4 @@ MinimizerResult minimize_lbfgs(FitProblem& problem, std::vector<Vec3>& x, const 
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

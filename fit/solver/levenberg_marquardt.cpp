@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -192,4 +192,4 @@ double damping_after(double first, std::span<const IterationRecord> steps) {
   return damping;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

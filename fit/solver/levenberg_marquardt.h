@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The Levenberg-Marquardt method with frozen correspondences, for sums of squares whose Hessian is that of Gauss-Newton
 /// (`QualityEnergy`).
@@ -29,4 +29,4 @@ MinimizerResult minimize_levenberg_marquardt(FitProblem& problem, std::vector<Ve
 /// Returns mu after these steps of a minimization that began with mu = `first`.
 double damping_after(double first, std::span<const IterationRecord> steps);
 
-}  // namespace subvol
+}  // namespace subvol::internal

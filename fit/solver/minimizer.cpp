@@ -10,6 +10,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 void cancel(MinimizerResult& result) {

@@ -10,7 +10,9 @@
 
 namespace subvol {
 
+namespace internal {
 struct FitProblem;
+}
 
 /// Why a minimization ended; infeasible_start: at once, because E is infinite at the start.
 enum class MinimizerStop { converged, iteration_limit, cancelled, no_step, infeasible_start };
@@ -34,7 +36,7 @@ struct MinimizerResult {
 
 /// Repeats the quadrature refinements of this result in the problem, so that E is the same function again.
 /// InputError: `densified` and `densified_at` do not fit the problem.
-void densify_again(FitProblem& problem, const MinimizerResult& result);
+void densify_again(internal::FitProblem& problem, const MinimizerResult& result);
 
 /// Damping with which the Levenberg-Marquardt method usually begins.
 inline constexpr double kFirstDamping = 1e-3;

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -248,4 +248,4 @@ MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const
   return NewtonRun(problem, x, options).run();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Newton's method with frozen correspondences and conjugate gradients, preconditioned by the 3x3 diagonal blocks of
 /// the pulled-back Hessian. Each step decreases E and keeps every certified cell certified (`VolumeTerm`). The
@@ -19,4 +19,4 @@ namespace subvol {
 ///    as at the start of that one. InputError: as for `densify_again`.
 MinimizerResult minimize_newton(FitProblem& problem, std::vector<Vec3>& x, const MinimizerOptions& options);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 double Linearization::linearize(FitProblem& problem, std::span<const Vec3> y, std::span<const Vec3> z,
                                 bool keeps_hessian, bool is_assigned) {
@@ -113,4 +113,4 @@ int conjugate_gradients(ReducedHessian& hessian, std::span<const Mat3> inverse_d
   return iteration;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Energy and gradient of a problem at a state, with the work space for them.
 class Linearization {
@@ -56,4 +56,4 @@ std::vector<Mat3> inverse_blocks(std::span<const Mat3> blocks, std::span<const M
 int conjugate_gradients(ReducedHessian& hessian, std::span<const Mat3> inverse_diagonal, std::span<const Vec3> gradient,
                         const MinimizerOptions& options, std::vector<Vec3>& d);
 
-}  // namespace subvol
+}  // namespace subvol::internal

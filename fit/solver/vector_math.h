@@ -7,7 +7,7 @@
 #include <array>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// sum_i a_i . b_i over arrays of points of equal size. Fixed slices, summed in order: same bits for any thread count.
 inline double dot(std::span<const Vec3> a, std::span<const Vec3> b) {
@@ -30,4 +30,4 @@ inline void add_scaled(double alpha, std::span<const Vec3> x, std::span<Vec3> y)
   for (std::size_t i = 0; i < x.size(); ++i) y[i] += alpha * x[i];
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

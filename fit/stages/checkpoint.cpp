@@ -10,7 +10,7 @@
 #include <cstring>
 #include <map>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -201,4 +201,4 @@ void require_same_run(const RunIdentity& checkpoint, const RunIdentity& run, con
   if (!differences.empty()) throw InputError(name + ": this checkpoint is of another run: " + differences);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Properties that a run must share with the run that it continues, as pairs of name and value: the program's version,
 /// the options that affect the result, and fingerprints of the inputs.
@@ -37,4 +37,4 @@ Checkpoint read_checkpoint(const std::filesystem::path& path);
 /// Throws InputError, naming the file and all differences, unless the run has the checkpoint's identity.
 void require_same_run(const RunIdentity& checkpoint, const RunIdentity& run, const std::string& name);
 
-}  // namespace subvol
+}  // namespace subvol::internal

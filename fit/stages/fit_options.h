@@ -12,7 +12,9 @@
 
 namespace subvol {
 
+namespace internal {
 class StageLog;
+}
 
 /// Least scaled Jacobian that fits aim at.
 inline constexpr double kUsualQuality = 0.65;
@@ -57,7 +59,7 @@ struct FitOptions {
   /// Also polled within steps, from the calling thread; returns true to cancel; may be empty.
   std::function<bool()> cancelled;
   /// Supplies the results of earlier minimizations and records new ones; null: no log.
-  StageLog* log = nullptr;
+  internal::StageLog* log = nullptr;
   bool keep_states = false;                      ///< fills FitResult::states
 };
 

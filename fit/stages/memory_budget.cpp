@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 bool MemoryBudget::allows(std::size_t size) {
   if (limit_ <= 0) return true;
@@ -25,4 +25,4 @@ std::string MemoryBudget::refusal(const std::string& part) const {
   return part + formatted(" would take about %.0f MB of memory, the limit is %.0f MB", expected_ / 1e6, limit_ / 1e6);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

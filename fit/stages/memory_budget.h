@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Predicts if the next part of a fit, a level or an order, fits into the memory that the process may use.
 ///
@@ -36,4 +36,4 @@ inline constexpr double kMemoryOfLevelCell = 6e3;
 /// Bytes per node of curved cells; 5 to 8 kB were measured from order 4 to order 8.
 inline constexpr double kMemoryOfNode = 8e3;
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -141,4 +141,4 @@ SparseMap select(const SparseMap& map, std::span<const Index> rows, std::span<co
   return part;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

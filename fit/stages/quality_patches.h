@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A part of a minimization's mesh around a few of its cells: everything outside is held fixed. All lists are ascending.
 struct QualityPatch {
@@ -36,4 +36,4 @@ VolumeMesh patch_mesh(const VolumeMesh& mesh, const QualityPatch& patch);
 /// Returns part of a map: the given rows, and the entries in the given columns (both ascending, columns renumbered).
 SparseMap select(const SparseMap& map, std::span<const Index> rows, std::span<const Index> columns);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <iterator>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -138,7 +138,7 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
 }
 
 QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& patch, std::span<const Vec3> x)
-    : patch_mesh_(std::make_unique<VolumeMesh>(subvol::patch_mesh(*whole.mesh_, patch))),
+    : patch_mesh_(std::make_unique<VolumeMesh>(internal::patch_mesh(*whole.mesh_, patch))),
       mesh_(patch_mesh_.get()),
       mean_length_(whole.mean_length_),
       lambda_one_(whole.lambda_one_),
@@ -359,4 +359,4 @@ bool QualityStages::run(const QualitySchedule& schedule, const StageRunner& runn
   return lift(schedule, x);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// One minimization of E_S + lambda E_Q, E_Q being `QualityEnergy`.
 struct QualityStage {
@@ -145,4 +145,4 @@ class QualityStages {
   FitReport* report_ = nullptr;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

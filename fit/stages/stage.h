@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Lambda of the first stages. It is low, because stiff cells round the template before it reaches the target.
 inline constexpr double kCoarseLambda = 0.05;
@@ -27,4 +27,4 @@ struct Stage {
 /// Number of L-BFGS steps that replace one Newton step of a stage.
 inline constexpr int kLbfgsSteps = 30;
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include "subvol/base/error.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 const SolvedStage* StageLog::recall(const SolvedStage& begun) {
   if (recalled_ == earlier_) return nullptr;
@@ -21,4 +21,4 @@ void StageLog::add(SolvedStage stage) {
   if (on_add) on_add();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

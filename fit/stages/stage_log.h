@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Result of one minimization, or its state so far.
 struct SolvedStage {
@@ -58,4 +58,4 @@ class StageLog {
   std::size_t earlier_ = 0, recalled_ = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

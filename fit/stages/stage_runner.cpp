@@ -10,7 +10,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -145,4 +145,4 @@ void StageRunner::solve(FitProblem& problem, MinimizerOptions minimizer, SolvedS
   if (options_.log && stage.is_over()) options_.log->add(stage);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

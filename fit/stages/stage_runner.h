@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Runs the minimizations of a fit one after the other, with one clock and one report.
 class StageRunner {
@@ -85,4 +85,4 @@ class StageRunner {
   std::shared_ptr<WorkShare> work_ = std::make_shared<WorkShare>();  ///< never null; the same one in all copies
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 FitSnapshot StagedFit::snapshot() { return {unknowns(), lambda_, mean_, report().stages.size(), states_.size()}; }
 
@@ -41,4 +41,4 @@ bool StagedFit::unfold(const FitSnapshot& start, double most_lambda, std::size_t
   return true;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

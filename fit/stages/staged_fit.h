@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// State to roll back to if an attempted stage brings no improvement.
 struct FitSnapshot {
@@ -68,4 +68,4 @@ class StagedFit {
   bool keep_states_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -114,4 +114,4 @@ UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const Untan
   return {true, cells.uncertified()};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

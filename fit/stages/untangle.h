@@ -7,7 +7,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 struct UntangleOptions {
   double tangential_weight = 0;  ///< weight in the problem's surface term, for the report
@@ -31,4 +31,4 @@ struct UntangleResult {
 UntangleResult untangle(FitProblem& problem, const VolumeMesh& mesh, const UntangleOptions& options,
                         const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x, FitReport& report);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Share of a long work that is done, from work that is counted against a forecast. It never falls, grows with all that
 /// is counted, and stays below 1 however much more than the forecast that is.
@@ -14,19 +14,19 @@ class WorkShare {
   /// A work of which this share is done.
   explicit WorkShare(double done) : begin_(done), end_(done) {}
 
-  /// Begins a part, at whose end the share will be `end`; if that much is done already, a third of what is left.
+  /// Begins a part, at whose end the share will be `end`; if that much is done already, a third of what is left. The
+  /// part before is over, whatever its forecast was.
   /// forecast  work that the part is expected to take, > 0, in any unit.
   void begin_part(double end, double forecast) {
     constexpr double kLeastPart = 1.0 / 3;
-    begin_ = share();
+    begin_ = end_;
     end_ = end > begin_ ? std::min(end, 1.0) : begin_ + kLeastPart * (1 - begin_);
     forecast_ = forecast;
     done_ = 0;
   }
   /// Begins a part that ends at this portion, in (0, 1], of what is left up to `last`.
   void begin_portion(double portion, double last, double forecast) {
-    const double now = share();
-    begin_part(now + portion * (last - now), forecast);
+    begin_part(end_ + portion * (last - end_), forecast);
   }
   /// Counts work >= 0, in the unit of the forecast.
   void add(double work) { done_ += work; }
@@ -41,7 +41,8 @@ class WorkShare {
   }
 
  private:
-  double begin_ = 0, end_ = 0, forecast_ = 1, done_ = 0;
+  double begin_ = 0, end_ = 0;  ///< shares at the ends of the part
+  double forecast_ = 1, done_ = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

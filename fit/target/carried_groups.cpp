@@ -20,7 +20,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -295,4 +295,4 @@ std::vector<std::string> warnings_of_groups(const std::vector<CarriedGroup>& gro
   return warnings;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

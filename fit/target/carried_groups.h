@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns for each boundary face the group of the target's triangles that it lies on, or kNoIndex.
 ///
@@ -58,4 +58,4 @@ std::vector<CarriedGroup> areas_of_groups(const TriangleMesh& target, const Curv
 /// Returns one warning for each group that is lost, or whose area differs by more than the limits above.
 std::vector<std::string> warnings_of_groups(const std::vector<CarriedGroup>& groups);
 
-}  // namespace subvol
+}  // namespace subvol::internal

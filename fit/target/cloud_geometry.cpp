@@ -12,7 +12,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -118,4 +118,4 @@ CloudGeometry cloud_geometry(std::span<const Vec3> points) {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Properties of a surface, estimated from the points of a cloud that lie on it.
 struct CloudGeometry {
@@ -28,4 +28,4 @@ struct CloudGeometry {
 /// bits for any number of threads. Cost: about 5 microseconds a point on one core.
 CloudGeometry cloud_geometry(std::span<const Vec3> points);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -121,4 +121,4 @@ double flooded_volume(std::span<const Vec3> points, int resolution) {
   return grid.inside_volume();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <array>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns |1/6 sum of det(a, b, c)| over the triangles, relative to the first corner: the enclosed volume of a closed,
 /// oriented surface, and meaningless for others.
@@ -23,4 +23,4 @@ double flooded_volume(std::span<const Vec3> positions, std::span<const std::arra
 /// the result is 0.
 double flooded_volume(std::span<const Vec3> points, int resolution);
 
-}  // namespace subvol
+}  // namespace subvol::internal

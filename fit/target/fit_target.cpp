@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -195,4 +195,4 @@ StartComparison FitTarget::compare_start(const TriangleMesh& boundary) {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -15,7 +15,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Centered coordinates in which the target's bounding box has the diagonal 1, so that results do not depend on the
 /// origin or the unit.
@@ -96,4 +96,4 @@ std::vector<Index> groups_of_sheets(const VolumeMesh& mesh, const MeshTopology& 
 /// Returns the groups of triangles on these faces; empty if there are no groups.
 std::vector<Index> groups_of_triangles(std::span<const Index> faces, std::span<const Index> group_of_face);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -62,4 +62,4 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
   return regions;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

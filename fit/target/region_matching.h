@@ -7,7 +7,7 @@
 
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the regions of a target, numbered as the regions of a mesh in which they lie.
 ///
@@ -20,4 +20,4 @@ namespace subvol {
 /// InputError: as `find_regions`. Cost: a winding number for each cell and region.
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,6 +10,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 struct Words {

@@ -19,6 +19,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// The parts of a surface, some of which are to be united.

@@ -20,6 +20,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kClosedEnough = 0.95;  // share of paired half-edges above which the signed sum is trusted

@@ -13,7 +13,9 @@
 
 namespace subvol {
 
+namespace internal {
 class GroupedClosestPoint;
+}
 
 struct TargetSurfaceOptions {
   /// Triangles with longer edges are sampled more than once; > 0, in the mesh's unit. 0: one sample per triangle.
@@ -88,7 +90,7 @@ class TargetSurface {
   const std::vector<double>& sample_areas() const { return sample_areas_; }
   /// Tree over the triangles, which all energies share; null for a cloud. Built by the first call, which must not run
   /// beside another one.
-  std::shared_ptr<const GroupedClosestPoint> tree() const;
+  std::shared_ptr<const internal::GroupedClosestPoint> tree() const;
   /// Samples the surface anew with another spacing. A cloud keeps its points. InputError: the spacing is negative, not
   /// finite, or far too small.
   void resample(double spacing);
@@ -101,7 +103,7 @@ class TargetSurface {
   void add_samples(const std::array<Vec3, 3>& corners, Index triangle, double spacing);
   void set_box(const Vec3& low, const Vec3& high);
 
-  mutable std::shared_ptr<const GroupedClosestPoint> tree_;
+  mutable std::shared_ptr<const internal::GroupedClosestPoint> tree_;
   std::vector<Vec3> positions_, normals_, samples_, sample_normals_;
   std::vector<std::array<Index, 3>> triangles_;
   std::vector<double> areas_, sample_areas_;

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -49,4 +49,4 @@ std::optional<std::string> decode_base64(std::string_view digits) {
   return bytes;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Storage format of a number in a binary file.
 struct ValueType {
@@ -36,4 +36,4 @@ inline double decode(const char* bytes, ValueType type, std::endian order) {
   return static_cast<double>(static_cast<std::int64_t>(bits << unused_bits) >> unused_bits);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Sets of the numbers 0 .. n - 1 that are joined one by one (union-find). Each set is known by its least member, so
 /// that results do not depend on the order of the joins. Cost: almost constant for each call.
@@ -44,4 +44,4 @@ class DisjointSets {
   std::vector<Index> parent_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <type_traits>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// 64-bit hash (FNV-1a) that tells data apart: it detects changed files and mistaken inputs, not forgeries. It depends
 /// on the order of the added values, on the lengths of arrays and on how this machine stores numbers.
@@ -44,4 +44,4 @@ class Fingerprint {
   std::uint64_t hash_ = 0xcbf29ce484222325u;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

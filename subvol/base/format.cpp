@@ -6,7 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 
-namespace subvol {
+namespace subvol::internal {
 
 std::string formatted(const char* form, ...) {
   static const locale_t plain = newlocale(LC_ALL_MASK, "C", nullptr);
@@ -20,4 +20,4 @@ std::string formatted(const char* form, ...) {
   return text;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 
 #include <sstream>
 
-namespace subvol {
+namespace subvol::internal {
 
 void require_length(double extent, const char* what) {
   if (extent >= kLeastLength && extent <= kMostLength) return;
@@ -14,4 +14,4 @@ void require_length(double extent, const char* what) {
   throw InputError(said.str());
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

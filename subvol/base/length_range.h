@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Range of the sizes of meshes and targets. Within it, products of six lengths, as certificates and areas have them,
 /// are far from overflow and underflow.
@@ -10,4 +10,4 @@ inline constexpr double kLeastLength = 1e-40, kMostLength = 1e40;
 /// Throws InputError, naming `what`, unless kLeastLength <= extent <= kMostLength.
 void require_length(double extent, const char* what);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -4,7 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Throws InputError, naming the option as owner::name, unless low <= value <= high. NaN is refused, too.
 inline void require_in_range(const char* owner, const char* name, double value, double low, double high) {
@@ -12,4 +12,4 @@ inline void require_in_range(const char* owner, const char* name, double value, 
     throw InputError(formatted("%s::%s must be in [%g, %g], got %g", owner, name, low, high, value));
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

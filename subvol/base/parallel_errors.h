@@ -4,7 +4,7 @@
 #include <exception>
 #include <mutex>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Carries an exception out of a parallel region, in which an exception that leaves a thread's work ends the program.
 ///
@@ -40,4 +40,4 @@ class ParallelErrors {
   std::exception_ptr error_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

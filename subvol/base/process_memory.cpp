@@ -6,7 +6,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-namespace subvol {
+namespace subvol::internal {
 
 std::size_t held_memory_bytes() {
   std::ifstream file("/proc/self/statm");
@@ -21,4 +21,4 @@ std::size_t peak_memory_bytes() {
   return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

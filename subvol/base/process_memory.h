@@ -3,11 +3,11 @@
 
 #include <cstddef>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Return the bytes of memory that this process holds now, and the most that it has held; 0 if the system does not
 /// report them.
 std::size_t held_memory_bytes();
 std::size_t peak_memory_bytes();
 
-}  // namespace subvol
+}  // namespace subvol::internal

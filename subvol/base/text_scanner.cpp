@@ -11,7 +11,7 @@
 #include <fstream>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -214,4 +214,4 @@ void append_number(std::string& text, double value) {
   text.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the whole content of a file. InputError: the file does not exist, is not a regular file (but a folder,
 /// device or pipe), or cannot be read.
@@ -91,4 +91,4 @@ std::string lower_case(std::string_view text);
 /// Appends the shortest text that reads back as the same double.
 void append_number(std::string& text, double value);
 
-}  // namespace subvol
+}  // namespace subvol::internal

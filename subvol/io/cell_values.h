@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Values of one name in a file of cells: one number for each cell, or for each point.
 struct CellValues {
@@ -18,4 +18,4 @@ struct CellValues {
 /// reads; nothing for other formats. Ghost arrays are left out. InputError: as `read_nodal_mesh`.
 std::vector<CellValues> read_cell_values(const std::filesystem::path& path);
 
-}  // namespace subvol
+}  // namespace subvol::internal

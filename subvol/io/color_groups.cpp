@@ -8,6 +8,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Largest number of colors that become groups. CAD programs color some dozens of faces; a scan has thousands of

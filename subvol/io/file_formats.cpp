@@ -8,6 +8,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr Held kNumbers = Held::numbers, kNames = Held::names, kNone = Held::none;

@@ -19,6 +19,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Reports what is wrong with one file.

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A mesh as the file describes it, and warnings without the file's name.
 struct ParsedMesh {
@@ -34,4 +34,4 @@ inline constexpr const char* kNoPyramids =
     "into "
     "two tets, or refine it into hexes, prisms and tets";
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -18,6 +18,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace fs = std::filesystem;
 
 namespace {

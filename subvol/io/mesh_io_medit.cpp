@@ -12,7 +12,7 @@
 #include <numeric>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -430,4 +430,4 @@ std::string format_medit(const VolumeMesh& mesh) {
   return text + "End\n";
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

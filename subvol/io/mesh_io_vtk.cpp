@@ -15,7 +15,7 @@
 #include <limits>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -468,4 +468,4 @@ std::string format_legacy_vtk(const VolumeMesh& mesh) {
   return text;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <map>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -188,4 +188,4 @@ MfemNodes number_mfem_nodes(std::size_t num_vertices, std::span<const CellKind> 
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The nodes of continuous functions of one order in MFEM's numbering.
 struct MfemNodes {
@@ -27,4 +27,4 @@ struct MfemNodes {
 MfemNodes number_mfem_nodes(std::size_t num_vertices, std::span<const CellKind> kinds,
                             std::span<const std::size_t> cell_offsets, std::span<const Index> cell_vertices, int order);
 
-}  // namespace subvol
+}  // namespace subvol::internal

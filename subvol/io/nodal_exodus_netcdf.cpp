@@ -23,7 +23,7 @@
 #include <set>
 #endif
 
-namespace subvol {
+namespace subvol::internal {
 
 #ifndef SUBVOL_NETCDF
 
@@ -36,7 +36,6 @@ NodalMesh parse_exodus(const std::string& name, std::string_view, const std::str
   throw InputError(name + ": " + kMissing);
 }
 std::string exodus_bytes(const NodalMesh&) { throw InputError(kMissing); }
-bool has_exodus() { return false; }
 
 #else
 
@@ -685,8 +684,14 @@ std::string exodus_bytes(const NodalMesh& mesh) {
   return bytes_of(mesh);
 }
 
-bool has_exodus() { return true; }
-
 #endif
 
-}  // namespace subvol
+}  // namespace subvol::internal
+
+bool subvol::has_exodus() {
+#ifdef SUBVOL_NETCDF
+  return true;
+#else
+  return false;
+#endif
+}

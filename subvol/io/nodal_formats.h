@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 NodalMesh parse_msh(const std::string& name, std::string_view bytes, const std::string& references);
 NodalMesh parse_vtu(const std::string& name, std::string_view bytes, const std::string& references);
@@ -48,4 +48,4 @@ std::vector<int> mirrored_places(CellKind kind, int order);
 /// Adds a face, given by its corners in any order, to a group of the mesh.
 void add_face(NodalMesh& mesh, std::span<const Index> corners, Index group);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <set>
 #include <unordered_map>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -569,4 +569,4 @@ NodalMesh parse_inp(const std::string& name, std::string_view bytes, const std::
   return InpParser(name).parse(bytes);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,6 +14,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -50,7 +52,7 @@ bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
 
 }  // namespace
 
-std::vector<int> mirrored_places(CellKind kind, int order) {
+std::vector<int> internal::mirrored_places(CellKind kind, int order) {
   const auto lattice = cell_lattice(kind, order, NodeOrdering::vtk);
   std::map<std::array<int, 3>, int> place;
   for (std::size_t i = 0; i < lattice.size(); ++i) place[key_of(lattice[i])] = static_cast<int>(i);
@@ -132,7 +134,7 @@ bool is_nodal_extension(const fs::path& path) {
   return format && format->holds_cells && !format->read.empty();
 }
 
-NodalMesh parse_nodal(const fs::path& path, std::string_view bytes, const std::string& references) {
+NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, const std::string& references) {
   const NodalFormat* format = nodal_format(path);
   if (!format)
     throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(path.extension().string()) +

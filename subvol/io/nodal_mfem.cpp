@@ -10,7 +10,7 @@
 #include <limits>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -269,4 +269,4 @@ NodalMesh parse_mfem(const std::string& name, std::string_view bytes, const std:
   return MfemParser(name, bytes).parse();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

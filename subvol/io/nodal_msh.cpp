@@ -13,7 +13,7 @@
 #include <optional>
 #include <unordered_map>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -449,4 +449,4 @@ NodalMesh parse_msh(const std::string& name, std::string_view bytes, const std::
   return MshParser(name, bytes).parse();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <optional>
 #include <unordered_map>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -278,4 +278,4 @@ NodalMesh parse_nastran(const std::string& name, std::string_view bytes, const s
   return NastranParser(name, bytes).parse();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

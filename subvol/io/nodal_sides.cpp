@@ -9,7 +9,7 @@
 #include <set>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 int common_order(const NodalMesh& mesh, const char* format, int most) {
   const int order = mesh.orders.front();
@@ -124,4 +124,4 @@ std::vector<GroupSides> sides_of_groups(const NodalMesh& mesh, SideTable table, 
   return groups;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the order of the cells. InputError, naming the format: cells of several orders, or of an order above `most`.
 int common_order(const NodalMesh& mesh, const char* format, int most);
@@ -54,4 +54,4 @@ struct GroupSides {
 /// with_centers  true: the centers of quads of order 2 are nodes, too.
 std::vector<GroupSides> sides_of_groups(const NodalMesh& mesh, SideTable table, bool with_centers);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -104,4 +104,4 @@ VtkCellUse add_vtk_cell(NodalMesh& mesh, NodalCells& cells, int type, std::span<
   return VtkCellUse::added;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <limits>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -240,4 +240,4 @@ std::vector<CellValues> read_cell_values(const std::filesystem::path& path) {
   return parser.cell_values();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <set>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -114,4 +114,4 @@ std::string mfem_text(const NodalMesh& mesh) {
   return text;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

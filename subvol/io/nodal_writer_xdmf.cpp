@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <map>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -172,4 +172,4 @@ std::string xdmf_faces_text(const NodalMesh& mesh) {
   return document(mesh, "groups", grid, "group", groups);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

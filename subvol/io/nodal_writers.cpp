@@ -13,7 +13,7 @@
 #include <numeric>
 #include <set>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -213,4 +213,4 @@ std::string nastran_text(const NodalMesh& mesh) {
   return text + "ENDDATA\n";
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

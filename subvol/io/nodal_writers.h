@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the cells as an input file of Abaqus and CalculiX.
 ///
@@ -57,4 +57,4 @@ std::string xdmf_faces_text(const NodalMesh& mesh);
 /// Returns linear cells as a NodalMesh.
 NodalMesh nodal_mesh(const VolumeMesh& mesh);
 
-}  // namespace subvol
+}  // namespace subvol::internal

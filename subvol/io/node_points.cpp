@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -65,4 +65,4 @@ std::vector<Vec3> node_points(CellKind kind, int order, NodeOrdering ordering, N
   return points;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

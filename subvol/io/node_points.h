@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns the Gauss-Lobatto points of [0, 1], ascending: 0, 1 and the zeros of P'_order, order + 1 in all.
 ///
@@ -18,4 +18,4 @@ std::vector<double> lobatto_points(int order);
 /// x_k + x_l.
 std::vector<Vec3> node_points(CellKind kind, int order, NodeOrdering ordering, NodeSpacing spacing);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -5,7 +5,7 @@
 #include <set>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Numbers of groups for formats that want positive ones: those that are positive are kept, each other one is replaced
 /// by the first positive number that is free.
@@ -35,4 +35,4 @@ class PositiveNumbers {
   std::map<int, int> replaced_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

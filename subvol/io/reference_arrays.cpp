@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -100,4 +100,4 @@ void tell_of_references(const std::vector<CellNumbers>& arrays, std::optional<st
                        std::to_string(rivals) + " more of whole numbers, of which --references NAME chooses another");
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

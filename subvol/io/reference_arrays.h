@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A one-component array of cell data whose values are all whole numbers.
 struct CellNumbers {
@@ -42,4 +42,4 @@ std::optional<std::size_t> reference_name_rank(std::string_view name);
 /// Returns true if the array may be chosen as references without being asked for.
 bool may_be_references(const CellNumbers& array);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Checks points and returns a cloud that can be fitted, as `read_point_cloud` does with the points of a file.
 ///
@@ -16,4 +16,4 @@ namespace subvol {
 PointCloud sound_points(std::vector<Vec3> points, const std::string& name,
                         std::vector<std::string>* warnings = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

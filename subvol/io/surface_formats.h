@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Polygons as the file describes them, and warnings without the file's name.
 struct ParsedSurface {
@@ -33,4 +33,4 @@ bool ply_has_faces(const std::string& name, std::string_view bytes);
 /// Parses three coordinates per line. longer_lines: receives the number of lines with more columns.
 std::vector<Vec3> parse_xyz(const std::string& name, std::string_view bytes, std::size_t& longer_lines);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -17,6 +17,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace fs = std::filesystem;
 
 namespace {
@@ -251,7 +253,7 @@ PointCloud read_point_cloud(const fs::path& path, std::vector<std::string>* warn
   return sound_points(std::move(cloud.points), path.string(), warnings);
 }
 
-PointCloud sound_points(std::vector<Vec3> points, const std::string& name, std::vector<std::string>* warnings) {
+PointCloud internal::sound_points(std::vector<Vec3> points, const std::string& name, std::vector<std::string>* warnings) {
   Remarks remarks(name, warnings);
   if (points.empty()) remarks.fail("no points");
   check_extent(points, remarks);

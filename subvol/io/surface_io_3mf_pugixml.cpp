@@ -12,7 +12,7 @@
 #include <map>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -197,4 +197,4 @@ class ThreeMfParser {
 
 ParsedSurface parse_3mf(const std::string& name, std::string_view bytes) { return ThreeMfParser(name, bytes).parse(); }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -14,7 +14,7 @@
 #include <optional>
 #include <type_traits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -234,4 +234,4 @@ class GltfParser {
 
 ParsedSurface parse_gltf(const std::string& name, std::string_view bytes) { return GltfParser(name, bytes).parse(); }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -15,7 +15,7 @@
 #include <optional>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -343,4 +343,4 @@ std::vector<double> parse_ply_attribute(const std::string& name, std::string_vie
   return values;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -163,4 +163,4 @@ ParsedSurface parse_stl(const std::string& name, std::string_view bytes) {
   return parsed;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -303,4 +303,4 @@ std::vector<Vec3> parse_xyz(const std::string& name, std::string_view bytes, std
   return points;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

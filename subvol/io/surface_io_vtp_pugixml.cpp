@@ -12,7 +12,7 @@
 #include <limits>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -163,4 +163,4 @@ class VtpParser {
 
 ParsedSurface parse_vtp(const std::string& name, std::string_view bytes) { return VtpParser(name, bytes).parse(); }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Makes a mesh of triangles whose corners come one after the other. Equal positions become one vertex, because formats
 /// repeat a vertex in every triangle (STL), or wherever its normal differs (glTF).
@@ -36,4 +36,4 @@ class TriangleWelder {
   PolygonMesh mesh_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

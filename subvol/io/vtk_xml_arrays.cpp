@@ -14,7 +14,7 @@
 #include <limits>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -193,4 +193,4 @@ std::vector<double> decode_vtk_xml_array(const VtkXmlArray& array, const VtkXmlS
   return values;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// How the arrays of a VTK XML file are stored.
 struct VtkXmlStorage {
@@ -33,4 +33,4 @@ struct VtkXmlArray {
 /// of the compressor (about 1000 for zlib, 255 for LZ4).
 std::vector<double> decode_vtk_xml_array(const VtkXmlArray& array, const VtkXmlStorage& storage);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -16,7 +16,7 @@ class xml_document;
 class xml_node;
 }  // namespace pugi
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A VTK XML file in memory (.vtu, .vtp). Its bytes must outlive it.
 class VtkXmlFile {
@@ -52,4 +52,4 @@ class VtkXmlFile {
   bool old_numbers_ = false;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

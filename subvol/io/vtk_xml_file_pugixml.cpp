@@ -10,7 +10,7 @@
 #include <cmath>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 VtkXmlFile::VtkXmlFile(const std::string& name, std::string_view bytes, const char* type)
     : name_(name), type_(type), document_(std::make_unique<pugi::xml_document>()) {
@@ -99,4 +99,4 @@ std::size_t VtkXmlFile::claimed(const pugi::xml_node& piece, const char* attribu
   return static_cast<std::size_t>(piece.attribute(attribute).as_ullong());
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -143,4 +143,4 @@ std::string ZipWriter::take() {
   return std::move(bytes_);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The files of a ZIP archive in memory, which must outlive it: stored or deflated, not encrypted, below 4 GB.
 class ZipArchive {
@@ -41,4 +41,4 @@ class ZipWriter {
   std::size_t count_ = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -15,6 +15,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Returns an angle in [0, 180]; 0 if a vector vanishes. Uses atan2: acos would lose half the digits near 0 and 180.

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <optional>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -77,4 +77,4 @@ VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopolog
   return inherited_groups(old, refined, support);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

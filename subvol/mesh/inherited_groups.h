@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Where a vertex of a refined mesh lies in the mesh that it was made from: the vertices of the smallest edge or face
 /// that contains it, a single vertex if it is one; unused entries are kNoIndex. None at all: inside a cell.
@@ -30,4 +30,4 @@ VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopolog
 /// Returns the groups after a refinement that adds no vertices and keeps the numbers of the old ones.
 VolumeFaceGroups inherited_groups(const VolumeFaceGroups& old, const MeshTopology& refined);
 
-}  // namespace subvol
+}  // namespace subvol::internal

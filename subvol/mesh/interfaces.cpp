@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -91,4 +91,4 @@ std::string region_label(const VolumeMesh& mesh, int reference) {
   return "region " + std::to_string(reference);
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The faces between regions. A *region* is all cells of one reference; the faces between two regions are their
 /// *interface*.
@@ -49,4 +49,4 @@ void add_interface_groups(VolumeMesh& mesh);
 /// Returns the name of a region for people: that of its group in `VolumeMesh::regions`, or "region 3".
 std::string region_label(const VolumeMesh& mesh, int reference);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,6 +13,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 using Kind = MeshDefect::Kind;

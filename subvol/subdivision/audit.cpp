@@ -13,6 +13,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kSlack = std::numbers::pi / 180;  // one degree: angles this close to straight are noise

@@ -5,7 +5,7 @@
 #include <array>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 CreaseSheets::CreaseSheets(const VolumeMesh& mesh, const MeshTopology& topology, const SheetSurface& sheets)
     : topology_(topology) {
@@ -76,4 +76,4 @@ void CreaseSheets::add_edge(Index e, double weight, RowBuilder& row) const {
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

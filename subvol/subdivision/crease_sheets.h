@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Interior rows next to creases of two or more cells.
 ///
@@ -61,4 +61,4 @@ class CreaseSheets {
   std::vector<EdgeFace> edge_faces_;  // sheet faces of each treated edge, sorted
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -222,4 +222,4 @@ std::array<RingMask, 2> tangent_masks(const RingSharpness& sharpness, const Tang
   return {ring.at_start(tangents[0]), ring.at_start(tangents[1])};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

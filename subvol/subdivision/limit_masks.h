@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Weights on the ring of a surface vertex v of valence n among quads: [v][e_0 .. e_n-1][f_0 .. f_n-1], where e_i are
 /// its neighbors counter-clockwise and f_i the corner opposite v in the quad between e_i and e_i+1.
@@ -44,4 +44,4 @@ std::vector<TangentSector> tangent_sectors(const RingSharpness& ring);
 /// hundredths. Cost: O(n).
 std::array<RingMask, 2> tangent_masks(const RingSharpness& ring, const TangentSector& sector);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <cassert>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -190,4 +190,4 @@ void LimitPatches::fill_children(const Block& block, const Samples& samples) con
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

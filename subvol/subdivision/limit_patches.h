@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// The Catmull-Clark limit surface of a control cage, evaluated exactly at dyadic parameters, patch by patch.
 ///
@@ -51,4 +51,4 @@ class LimitPatches : public PatchSurface {
   PatchLayout layout_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -13,6 +13,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr int kMaxBoundaryLevels = 8;

@@ -3,7 +3,7 @@
 
 #include "subvol/mesh/feature_tags.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -84,4 +84,4 @@ CubicWeights cubic_weights(double t) {
           {-s * s / 2, (3 * t - 4) * t / 2, (4 - 3 * s) * s / 2, t * t / 2}};
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

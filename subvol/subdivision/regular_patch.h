@@ -6,7 +6,7 @@
 #include <array>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns true if the surface over a quad is one bicubic B-spline patch.
 ///
@@ -31,4 +31,4 @@ struct CubicWeights {
 };
 CubicWeights cubic_weights(double t);
 
-}  // namespace subvol
+}  // namespace subvol::internal

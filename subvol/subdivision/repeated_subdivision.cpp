@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 namespace {
 
 constexpr int kMostLevels = 8;
@@ -38,4 +38,4 @@ VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryR
   return fine;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -3,7 +3,7 @@
 
 #include "subvol/subdivision/subdivision.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Refines several times: V_fine = S_levels ... S_1 V_control.
 ///
@@ -13,4 +13,4 @@ namespace subvol {
 VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule = BoundaryRule::catmull_clark,
                                 SparseMap* matrix = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

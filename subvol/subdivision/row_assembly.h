@@ -15,7 +15,7 @@
 #include <sys/mman.h>
 #endif
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Builds one row of a sparse map: sums the weights of each column in the order in which they are added.
 class RowBuilder {
@@ -137,4 +137,4 @@ SparseMap assemble_rows(std::size_t num_rows, std::size_t num_cols, Fill&& fill)
   return map;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -8,6 +8,8 @@
 #include <string>
 
 namespace subvol {
+
+using namespace internal;
 namespace {
 
 [[noreturn]] void throw_sizes(const char* function, std::size_t in, std::size_t expected_in, std::size_t out,

@@ -16,6 +16,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Weights of the corners of a cell, by local number.

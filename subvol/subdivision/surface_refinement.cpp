@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/subdivision/surface_refinement.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -212,4 +212,4 @@ SurfacePiece surface_piece(const SurfaceTopology& surface, std::span<const Index
   return piece;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Target of the rows of a refinement: surface vertex v is column columns[v], and every weight is multiplied by
 /// `scale`.
@@ -78,4 +78,4 @@ struct SurfacePiece {
 ///        lie on a border.
 SurfacePiece surface_piece(const SurfaceTopology& surface, std::span<const Index> faces);
 
-}  // namespace subvol
+}  // namespace subvol::internal

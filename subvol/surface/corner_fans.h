@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Fans of triangles around vertices: the corners at one vertex of triangles that are joined across edges there. A
 /// manifold surface has one fan at each vertex. Corner k of triangle t has the number 3 t + k.
@@ -36,4 +36,4 @@ class CornerFans {
   DisjointSets sets_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

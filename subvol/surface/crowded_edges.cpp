@@ -3,7 +3,7 @@
 
 #include "subvol/base/text_scanner.h"
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -41,4 +41,4 @@ std::string vertex_text(Index number, const Vec3* position) {
   return text + ")";
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Collects places of one fault for a message: all are counted, the first ten are listed.
 class PlaceList {
@@ -39,4 +39,4 @@ class CrowdedEdges {
 /// Returns "4 (0 0 1)": the number of a vertex and, unless null, its position.
 std::string vertex_text(Index number, const Vec3* position);
 
-}  // namespace subvol
+}  // namespace subvol::internal

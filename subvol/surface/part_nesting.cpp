@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -155,4 +155,4 @@ int part_around(const TriangleMesh& mesh, std::span<const int> part, const PartN
   return best;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

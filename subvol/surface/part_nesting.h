@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// How the parts of a closed surface lie in each other.
 struct PartNesting {
@@ -37,4 +37,4 @@ PartNesting part_nesting(const TriangleMesh& mesh, std::span<const int> part, in
 /// the winding numbers of each part whose box contains the other's.
 int part_around(const TriangleMesh& mesh, std::span<const int> part, const PartNesting& nesting, int inner);
 
-}  // namespace subvol
+}  // namespace subvol::internal

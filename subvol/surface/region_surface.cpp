@@ -17,6 +17,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Returns six times the signed volume between a triangle and the origin.

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <string>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -214,4 +214,4 @@ PolygonMesh interface_surface(const VolumeMesh& mesh, const MeshTopology& topolo
   return surface;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

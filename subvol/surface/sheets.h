@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// What the interfaces of a mesh make of its edges and vertices under subdivision.
 ///
@@ -60,4 +60,4 @@ FeatureTags boundary_tags(const VolumeMesh& mesh, const MeshTopology& topology);
 /// `interfaces.faces`; normals point from the smaller to the larger reference.
 PolygonMesh interface_surface(const VolumeMesh& mesh, const MeshTopology& topology, const Interfaces& interfaces);
 
-}  // namespace subvol
+}  // namespace subvol::internal

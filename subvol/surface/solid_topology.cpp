@@ -20,6 +20,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 struct Neighbor {

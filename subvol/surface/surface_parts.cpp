@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -72,4 +72,4 @@ std::size_t turn_parts_outward(SurfaceParts& parts) {
   return static_cast<std::size_t>(std::count(turned.begin(), turned.end(), 1));
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

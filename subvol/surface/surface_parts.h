@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A welded surface, its edges sorted by how many triangles they have, and the parts that its edges connect.
 struct SurfaceParts {
@@ -34,4 +34,4 @@ SurfaceParts surface_parts(const TriangleMesh& surface);
 /// returns  the number of parts that were turned.
 std::size_t turn_parts_outward(SurfaceParts& parts);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -9,6 +9,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Prefix for messages: a closed surface is the boundary of a volume mesh.

@@ -71,13 +71,15 @@ struct BoundarySurface {
   SurfaceTopology topology;
 };
 
+namespace internal {
 struct SheetFeatures;
+}
 
 /// Builds the boundary of a volume mesh with its tags as sharpnesses. Where interfaces between regions reach the
 /// boundary, it has creases and corners of infinite sharpness (sheets.h); tags on interfaces are left out.
 /// features  those of the mesh; if not given, they are found.
 /// Cost: linear. InputError: as `build_surface`; a tag that is on no sheet; sharpness <= 0 or NaN.
 BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology);
-BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology, const SheetFeatures& features);
+BoundarySurface tagged_boundary(const VolumeMesh& mesh, const MeshTopology& topology, const internal::SheetFeatures& features);
 
 }  // namespace subvol

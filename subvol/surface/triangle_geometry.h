@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns an angle in [0, 180]; 0 if a vector vanishes. Uses atan2: acos would lose half the digits near 0 and 180.
 inline double angle_degrees_between(const Vec3& a, const Vec3& b) {
@@ -26,4 +26,4 @@ inline Vec3 unit_normal(const TriangleMesh& mesh, Index triangle) {
   return doubled_area_vector(mesh, mesh.triangles[triangle]).normalized();
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -11,7 +11,7 @@
 #include <tuple>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -140,4 +140,4 @@ double signed_volume_of(const TriangleMesh& mesh) {
   return sum / 6;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// A surface whose vertices of equal position are one vertex.
 struct WeldedSurface {
@@ -64,4 +64,4 @@ bool pair_around_edge(const TriangleMesh& mesh, std::span<const SurfaceHalfEdge>
 /// encloses, negative if its normals point inward.
 double signed_volume_of(const TriangleMesh& mesh);
 
-}  // namespace subvol
+}  // namespace subvol::internal

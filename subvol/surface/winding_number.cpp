@@ -11,7 +11,7 @@
 #include <numbers>
 #include <numeric>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -122,4 +122,4 @@ std::vector<double> WindingNumber::at(std::span<const Vec3> points) const {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Generalized winding numbers of triangles: the signed share of the sphere around a point that they cover.
 ///
@@ -43,4 +43,4 @@ class WindingNumber {
   std::vector<Node> nodes_;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

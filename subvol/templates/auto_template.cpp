@@ -25,6 +25,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Orientation, cell size and offset of a grid.

@@ -12,6 +12,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr std::array<double, 3> kPlaces{1.0 / 6, 0.5, 5.0 / 6};  // centers of thirds

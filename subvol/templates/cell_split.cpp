@@ -13,6 +13,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// Adds the tets that join the cell's smallest vertex to the faces that do not contain it. A quad is cut at its

@@ -16,6 +16,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr int kRim = 2;  ///< layers of empty voxels around the grid

@@ -18,6 +18,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 // With less than 1/6, no cell of a mesh of equal cubes can be inverted: each edge keeps more than half its length in

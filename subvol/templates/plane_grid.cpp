@@ -14,7 +14,7 @@
 #include <set>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -366,4 +366,4 @@ std::array<std::vector<double>, 3> with_spare_layers(std::array<std::vector<doub
   return lines;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Layers of cells on each side of a grid: the outer one stays empty, the inner one leaves room for handles.
 inline constexpr int kSpareLayers = 2;
@@ -72,4 +72,4 @@ std::array<std::vector<double>, 3> with_spare_layers(std::array<std::vector<doub
 /// Returns the share of the surface's area that lies on planes through the lines, in [0, 1].
 double share_on_lines(const AxisPlanes& planes, const std::array<std::vector<double>, 3>& lines);
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -17,6 +17,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 /// A point of the canonical hex, in sixths of its edges.

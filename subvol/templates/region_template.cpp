@@ -21,6 +21,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kNoPlanes = 0.03; ///< share of the area on planes below which these are no help

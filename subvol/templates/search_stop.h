@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Ends a search that runs in several threads. One thread, the one that makes this object, asks whether to go on.
 class SearchStop {
@@ -48,4 +48,4 @@ class SearchStop {
   std::chrono::steady_clock::time_point asked_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

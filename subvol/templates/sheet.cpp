@@ -13,6 +13,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 using Edge = std::array<Index, 2>;

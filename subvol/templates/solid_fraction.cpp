@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -154,4 +154,4 @@ std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid
   return fractions;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

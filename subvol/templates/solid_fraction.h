@@ -7,7 +7,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Computes the share of each cell of a grid that lies inside a closed, oriented surface.
 ///
@@ -27,4 +27,4 @@ namespace subvol {
 std::vector<double> solid_fractions(const TriangleMesh& surface, const VoxelGrid& grid, int num_lines = 4,
                                     SearchStop* stop = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

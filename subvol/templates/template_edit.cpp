@@ -14,6 +14,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 void require_sound(const VolumeMesh& mesh, const std::string& name) {
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError(name + ": " + defect.message);

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <map>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -98,4 +98,4 @@ std::vector<Mat3> template_frames(const TriangleMesh& surface) {
   return frames;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

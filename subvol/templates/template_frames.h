@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns orientations in which a grid may suit a surface: the coordinate axes, the principal axes of its area, and a
 /// frame of the two perpendicular directions that most of its area faces. Each is a rotation; frames with the same axes
@@ -14,4 +14,4 @@ namespace subvol {
 ///          facing directions.
 std::vector<Mat3> template_frames(const TriangleMesh& surface);
 
-}  // namespace subvol
+}  // namespace subvol::internal

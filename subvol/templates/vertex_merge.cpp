@@ -17,6 +17,8 @@
 
 namespace subvol {
 
+using namespace internal;
+
 namespace {
 
 using Corners = std::vector<Index>;

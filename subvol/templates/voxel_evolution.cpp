@@ -9,7 +9,7 @@
 #include <queue>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -261,4 +261,4 @@ std::optional<VoxelSolid> start_solid(VoxelStart start, const std::array<int, 3>
   return solid;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Target of a voxel solid: cells are filled if their fraction is above the threshold, as far as the topology allows.
 struct VoxelGoal {
@@ -52,4 +52,4 @@ enum class VoxelStart { cut, grown, shrunk };
 std::optional<VoxelSolid> start_solid(VoxelStart start, const std::array<int, 3>& cells, VertexRule rule,
                                       const VoxelGoal& goal);
 
-}  // namespace subvol
+}  // namespace subvol::internal

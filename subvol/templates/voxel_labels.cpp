@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -335,4 +335,4 @@ void evolve(VoxelLabels& labels, const LabelFractions& fractions, SearchStop* st
   }
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

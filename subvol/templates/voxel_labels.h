@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// What is true of the faces between two regions as a surface.
 struct SheetTopology {
@@ -100,4 +100,4 @@ bool assign_labels(VoxelLabels& labels, const LabelFractions& fractions, std::sp
 /// Gives cells the labels of largest share, those of the largest gain first, as long as the topology stays the same.
 void evolve(VoxelLabels& labels, const LabelFractions& fractions, SearchStop* stop);
 
-}  // namespace subvol
+}  // namespace subvol::internal

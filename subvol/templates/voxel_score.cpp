@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -36,4 +36,4 @@ double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, s
   return wrong / volume + mean_cover / volume + kExtremeWeight * (max_cover + std::max(0, max_stray - 1));
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -6,7 +6,7 @@
 
 #include <span>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Measures the dissimilarity of a voxel solid and a shape, in [0, inf): 0 if every filled cell is full and every other
 /// cell is empty.
@@ -22,4 +22,4 @@ namespace subvol {
 double voxel_score(const VoxelSolid& solid, std::span<const double> fractions, std::span<const double> volumes = {},
                    SearchStop* stop = nullptr);
 
-}  // namespace subvol
+}  // namespace subvol::internal

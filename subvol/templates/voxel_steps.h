@@ -6,7 +6,7 @@
 
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Returns for each cell the smallest number of steps between face neighbors that leads to it from a cell with `from`,
 /// stepping only onto cells with `through`; -1 if there is no such path. previous: if given, receives for each cell the
@@ -36,4 +36,4 @@ std::vector<int> voxel_steps(const VoxelSolid& solid, From&& from, Through&& thr
   return steps;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

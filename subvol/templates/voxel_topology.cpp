@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <bit>
 
-namespace subvol {
+namespace subvol::internal {
 
 namespace {
 
@@ -278,4 +278,4 @@ BettiNumbers VoxelSolid::topology() const {
   return result;
 }
 
-}  // namespace subvol
+}  // namespace subvol::internal

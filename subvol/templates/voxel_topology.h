@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace subvol {
+namespace subvol::internal {
 
 /// Condition on the cells around a lattice point.
 enum class VertexRule {
@@ -88,4 +88,4 @@ class VoxelSolid {
   std::size_t num_filled_ = 0;
 };
 
-}  // namespace subvol
+}  // namespace subvol::internal

@@ -10,6 +10,7 @@
 #include <string>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -18,6 +18,7 @@
 #include <utility>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Matchers::Contains;
 

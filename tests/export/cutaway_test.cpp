@@ -19,6 +19,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -18,6 +18,7 @@
 #include <fstream>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Contains;
 

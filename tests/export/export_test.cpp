@@ -18,6 +18,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using subvol_tests::GlbFile;
 

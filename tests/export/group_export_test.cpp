@@ -24,6 +24,7 @@
 #include <sstream>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Contains;
 

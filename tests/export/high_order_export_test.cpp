@@ -15,6 +15,7 @@
 #include <map>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using subvol_tests::GlbFile;
 

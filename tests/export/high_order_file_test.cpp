@@ -22,6 +22,7 @@
 #include <utility>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Contains;
 

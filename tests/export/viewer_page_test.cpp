@@ -18,6 +18,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -23,6 +23,7 @@
 #include <string>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -14,6 +14,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

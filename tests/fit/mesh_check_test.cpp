@@ -20,6 +20,7 @@
 #include <vector>
 
 using namespace subvol;
+using namespace subvol::internal;
 using subvol::test::lattice;
 using subvol::test::voxels;
 

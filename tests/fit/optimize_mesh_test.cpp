@@ -17,6 +17,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

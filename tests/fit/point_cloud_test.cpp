@@ -23,6 +23,7 @@
 #include <numbers>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Contains;
 

@@ -14,6 +14,7 @@
 #include <catch2/catch.hpp>
 
 using namespace subvol;
+using namespace subvol::internal;
 using test::ball_surface;
 using test::box_surface;
 using test::together;

@@ -21,6 +21,8 @@
 
 namespace subvol::test {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kMostVolumeChange = 1e-3;  // what people with several materials accept

@@ -15,6 +15,7 @@
 #include <cstring>
 
 using namespace subvol;
+using namespace subvol::internal;
 using fuzz::require;
 
 namespace {

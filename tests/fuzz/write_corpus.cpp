@@ -16,6 +16,7 @@
 namespace {
 
 using namespace subvol;
+using namespace subvol::internal;
 namespace fs = std::filesystem;
 
 VolumeMesh small_mesh(CellKind kind) {

@@ -19,6 +19,8 @@
 
 namespace subvol::test {
 
+using namespace internal;
+
 inline TriangleMesh surface_of(const VolumeMesh& mesh) {
   return triangulate(boundary_surface(mesh, MeshTopology(mesh)));
 }

@@ -18,6 +18,7 @@
 #include <vector>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -9,6 +9,7 @@
 #include <omp.h>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

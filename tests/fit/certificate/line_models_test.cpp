@@ -6,6 +6,7 @@
 #include <cmath>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

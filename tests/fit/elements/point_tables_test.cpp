@@ -8,6 +8,7 @@
 #include <omp.h>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

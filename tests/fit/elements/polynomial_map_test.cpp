@@ -11,6 +11,7 @@
 #include <cmath>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

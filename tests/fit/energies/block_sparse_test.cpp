@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 TEST_CASE("a clique pattern couples the nodes of each element, and every node with itself") {
   const std::vector<std::size_t> offsets{0, 3, 5};

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 TEST_CASE("refined triangles of the closest-point energy see corners, and pull at them") {

@@ -25,6 +25,7 @@
 #include <vector>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -13,6 +13,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -11,6 +11,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

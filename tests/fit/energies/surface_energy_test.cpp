@@ -13,6 +13,7 @@
 #include <limits>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

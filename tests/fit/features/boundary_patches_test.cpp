@@ -11,6 +11,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 TEST_CASE("paths along a cube's edges make six patches, each matched to its region") {

@@ -9,6 +9,7 @@
 #include <algorithm>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 TEST_CASE("curves at poor cells are given up, joined ones only as joined ones at first") {

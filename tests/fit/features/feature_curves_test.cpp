@@ -13,6 +13,7 @@
 #include <numbers>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -15,6 +15,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -10,6 +10,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 TEST_CASE("a cube has twelve convex edges of 90 degrees between six regions") {

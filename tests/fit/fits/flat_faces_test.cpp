@@ -15,6 +15,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

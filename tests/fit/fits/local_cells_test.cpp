@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 TEST_CASE("Cells of faults are cut in 27, and sizes say so", "[local_cells]") {
   const VolumeMesh grid = test::lattice(5, 5, 5);

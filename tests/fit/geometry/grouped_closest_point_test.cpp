@@ -10,6 +10,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 TEST_CASE("Closest points of a group lie on its triangles, and agree with a tree of them alone") {
   const TriangleMesh cube = test::cube_surface(4, false);

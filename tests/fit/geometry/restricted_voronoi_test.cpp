@@ -12,6 +12,7 @@
 #include <limits>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

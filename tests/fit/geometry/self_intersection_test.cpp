@@ -12,6 +12,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

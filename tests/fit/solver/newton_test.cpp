@@ -7,6 +7,7 @@
 #include <memory>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

@@ -18,6 +18,7 @@
 #include <cstring>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

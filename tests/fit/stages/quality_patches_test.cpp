@@ -12,6 +12,7 @@
 #include <memory>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

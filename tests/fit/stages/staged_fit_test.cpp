@@ -10,6 +10,7 @@
 #include <vector>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

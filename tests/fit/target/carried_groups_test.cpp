@@ -8,6 +8,7 @@
 #include <catch2/catch.hpp>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 
 namespace {

@@ -17,6 +17,7 @@
 #include <set>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Matchers::Contains;
 

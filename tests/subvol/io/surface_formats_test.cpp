@@ -19,6 +19,7 @@
 #include <map>
 
 using namespace subvol;
+using namespace subvol::internal;
 using namespace subvol::test;
 using Catch::Contains;
 

@@ -17,6 +17,8 @@
 
 namespace subvol::test {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kRegionRounding = 1e-13;

@@ -7,6 +7,8 @@
 
 namespace subvol::test {
 
+using namespace internal;
+
 TEST_CASE("several refinements are one after the other, and so is their matrix", "[subdivision]") {
   const VolumeMesh control = l_shape(2);
   SparseMap matrix;

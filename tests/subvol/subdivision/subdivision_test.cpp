@@ -12,6 +12,8 @@
 
 namespace subvol::test {
 
+using namespace internal;
+
 namespace {
 
 constexpr double kRowSumTolerance = 1e-14;  // some tens of additions of weights below 1

@@ -22,6 +22,7 @@
 #include <numbers>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

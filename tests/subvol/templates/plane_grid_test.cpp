@@ -21,6 +21,7 @@
 #include <numeric>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 

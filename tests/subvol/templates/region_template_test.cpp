@@ -13,6 +13,7 @@
 #include <random>
 
 using namespace subvol;
+using namespace subvol::internal;
 using test::ball_surface;
 using test::box_surface;
 using test::together;

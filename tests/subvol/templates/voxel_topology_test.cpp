@@ -10,6 +10,7 @@
 #include <algorithm>
 
 using namespace subvol;
+using namespace subvol::internal;
 
 namespace {
 
