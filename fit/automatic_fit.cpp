@@ -133,9 +133,7 @@ class AutomaticFit {
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
-  void begin_attempt() {
-    share_at_end_ += (edges_.features.curves.empty() ? kAttemptPortion : kEdgesAttemptPortion) * (1 - share_at_end_);
-  }
+  void begin_attempt() { share_at_end_ += kAttemptPortion * (1 - share_at_end_); }
   /// Begins a part of the attempt that takes this portion of what is left of it.
   void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);

@@ -27,11 +27,12 @@ inline constexpr std::size_t kChildren = 8;
 /// the target are given up for it.
 inline constexpr double kAcceptableQuality = 0.3;
 
-/// Estimates of the work: the portion of what is left that an attempt takes, since the first is good in most cases, less
-/// often if there are edges to follow; and the portions of what is left of an attempt that its template, the coarser of
-/// two levels, a smooth fit and the first of several routings take.
-inline constexpr double kAttemptPortion = 0.85, kEdgesAttemptPortion = 0.6, kTemplatePortion = 0.1,
-                        kCoarsePortion = 0.25, kSmoothPortion = 0.35, kRoutingPortion = 0.8;
+/// Estimates of the work: the portion of what is left that an attempt takes, so that the share is in the middle of its
+/// range in the middle of a fit whether it ends with its first attempt or with its second; and the portions of what is
+/// left of an attempt that its template, the coarser of two levels, a smooth fit and the first of several routings
+/// take.
+inline constexpr double kAttemptPortion = 0.62, kTemplatePortion = 0.1, kCoarsePortion = 0.25, kSmoothPortion = 0.35,
+                        kRoutingPortion = 0.9;
 
 /// Returns the options, with the least goal that the stages can use in place of none. InputError: one out of range.
 AutomaticFitOptions checked_options(AutomaticFitOptions options);

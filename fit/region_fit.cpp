@@ -370,7 +370,7 @@ AutomaticFitResult RegionFit::run() {
   bool going = true;
   for (std::size_t i = 0; i < counts.size() && going; ++i) {
     if (!result_.trials.empty() && is_good_enough(result_.trials[result_.chosen])) break;
-    share_at_end_ += (follows_edges_ ? kEdgesAttemptPortion : kAttemptPortion) * (1 - share_at_end_);
+    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
     going = run_count(counts[i]);
   }
   if (result_.trials.empty() && !no_template_.empty()) throw InputError(no_template_);

@@ -10,6 +10,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/mesh_check.h"
+#include "subvol/fit/target/surface_wrap.h"
 
 namespace subvol::python {
 namespace {
@@ -24,6 +25,8 @@ class Filling {
     take_crease_angle();
     keywords_.take("regions", options_.regions,
                    {{"auto", RegionRule::automatic}, {"keep", RegionRule::keep}, {"merge", RegionRule::merge}});
+    std::optional<double> wrap_percent;
+    keywords_.take("wrap", wrap_percent);
     keywords_.take("keep_groups", options_.keeps_groups);
     keywords_.take("tolerance", options_.mean_tolerance_percent);
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
@@ -31,6 +34,8 @@ class Filling {
     keywords_.take("time_limit", options_.time_limit_seconds);
     keywords_.finish();
     target_ = triangles_from(target, "target");
+    if (wrap_percent)
+      target_ = work_.run("wrap", [&] { return wrap_surface(target_, {.voxel_percent = *wrap_percent}); });
     checkpoints_.begin("fill", keywords_, {{"target", cli::fingerprint(target_)}});
   }
 
@@ -83,8 +88,8 @@ class Filling {
 };
 
 constexpr const char* kFillHelp =
-    R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, keep_groups=False, tolerance=0.02, max_tolerance=0.5,
-    max_iterations=0, time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
+    R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, regions='auto', wrap=None, keep_groups=False,
+    tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
 --
 
 Fills a surface with hexes that one can compute on, without a template: FillResult.
@@ -94,6 +99,9 @@ cells          number of cells that the result may have; None: as few as make it
 quality        least scaled Jacobian to aim at, at most 0.8
 crease_angle   degrees: edges of the target sharper than this stay sharp; negative: none; None: 40, if the target is a
                designed part and no scan
+regions        what becomes of closed parts inside others and of sheets inside a solid: 'auto', 'keep' or 'merge'
+wrap           fill a closed surface that follows the target, for targets with holes or with parts that cross: made of
+               voxels this large, in per cent of the diagonal; usually 0.5
 keep_groups    follow borders between groups of the target's faces like sharp edges
 tolerance      mean distance to aim at, per cent of the diagonal of the target's bounding box
 max_tolerance  the same for the largest distance

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/diagnosis_report.h"
 
+#include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/writing.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/target/surface_wrap.h"
 #include "subvol/io/label_grid_io.h"
 #include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
@@ -79,6 +81,15 @@ std::string place_line(const SurfacePlace& place) {
   return text + '\n';
 }
 
+SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, std::vector<std::string>& warnings) {
+  if (is_label_grid_file(path)) throw UsageError("--wrap: " + path.string() + " is a segmentation, expected a surface");
+  SurfaceRepair result;
+  result.surface = wrap_surface(load_surface(path, warnings), {.voxel_percent = percent}, interrupted);
+  result.done.push_back(formatted("target: wrapped with voxels of %g %% of its diagonal: %zu triangles", percent,
+                                  result.surface.triangles.size()));
+  return result;
+}
+
 }  // namespace
 
 FileSurface file_surface(const PolygonMesh& polygons) {
@@ -87,7 +98,10 @@ FileSurface file_surface(const PolygonMesh& polygons) {
   return surface;
 }
 
-SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings) {
+SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptions& options,
+                           std::vector<std::string>& warnings) {
+  const RegionRule rule = options.rule;
+  if (options.wrap_percent) return wrap_to_fill(path, *options.wrap_percent, warnings);
   if (rule != RegionRule::merge && is_nodal_extension(path)) {
     std::vector<std::string> own_warnings;
     const LoadedMesh mesh = load_mesh(path, own_warnings);

@@ -6,6 +6,7 @@
 #include "subvol/fit/target/surface_repair.h"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,16 @@ struct FileSurface {
 
 FileSurface file_surface(const PolygonMesh& polygons);
 
+/// What is done to a surface before it is filled.
+struct FillingOptions {
+  RegionRule rule = RegionRule::automatic;
+  std::optional<double> wrap_percent{};  ///< `WrapOptions::voxel_percent`; nothing: surfaces are not wrapped
+};
+
 /// Loads a surface, the sheets of a mesh with several regions, or those of a segmentation (`surface_of_labels`), ready
 /// to be filled. With RegionRule::merge, all labels are one region. An interrupt ends the repair (`interrupted`).
-SurfaceRepair load_to_fill(const std::filesystem::path& path, RegionRule rule, std::vector<std::string>& warnings);
+SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptions& options,
+                           std::vector<std::string>& warnings);
 
 /// Return the numbers, names and volumes of a surface's regions, as text and as an entry of a report.
 std::string to_text(const RegionSurface& regions);

@@ -8,6 +8,8 @@
 #include <variant>
 
 namespace subvol::cli {
+
+using namespace internal;
 namespace {
 
 /// The target if it is a surface with groups, else null.

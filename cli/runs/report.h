@@ -2,7 +2,6 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
-#include "subvol/base/process_memory.h"
 #include "subvol/fit/stages/fit_report.h"
 
 #include <filesystem>

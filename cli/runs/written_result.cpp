@@ -5,6 +5,7 @@
 #include "cli/runs/exit_status.h"
 #include "cli/runs/report.h"
 #include "subvol/base/format.h"
+#include "subvol/base/process_memory.h"
 #include "subvol/base/version.h"
 #include "subvol/export/high_order_file.h"
 #include "subvol/io/mesh_io.h"
@@ -115,7 +116,7 @@ int write_checked(const RunOptions& run, std::vector<Output> outputs, const Volu
     json.update(details);
     json.update(check_json(check));
     json["warnings"] = warnings_json(warnings, failures);
-    json["peak_memory_bytes"] = peak_memory_bytes();
+    json["peak_memory_bytes"] = internal::peak_memory_bytes();
     json["outputs"] = output_names(outputs);
     write_report(run.report, json);
   }

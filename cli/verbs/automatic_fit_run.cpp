@@ -67,7 +67,7 @@ void AutomaticFitRun::load() {
   require_fitting_options(verb_, has_only_points);
   if (has_only_points)
     throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
-  SurfaceRepair repair = load_to_fill(arguments_.target, arguments_.fit.regions, warnings_);
+  SurfaceRepair repair = load_to_fill(arguments_.target, {arguments_.fit.regions, arguments_.wrap_percent}, warnings_);
   target_ = std::move(repair.surface);
   regions_ = std::move(repair.regions);
   if (regions_) outer_ = outer_surface(*regions_);

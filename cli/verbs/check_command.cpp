@@ -11,6 +11,7 @@
 #include "cli/runs/writing.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/verb_options.h"
+#include "subvol/base/process_memory.h"
 #include "subvol/base/version.h"
 #include "subvol/export/curved_file.h"
 #include "subvol/io/surface_io.h"
@@ -77,7 +78,7 @@ Json report_json(const CheckArguments& arguments, const CLI::App& verb, const Ch
   if (checked.lagrange) json["lagrange_cells"] = lagrange_json(*checked.lagrange);
   if (checked.audit) json["audit"] = audit_json(*checked.audit);
   json["warnings"] = warnings;
-  json["peak_memory_bytes"] = peak_memory_bytes();
+  json["peak_memory_bytes"] = internal::peak_memory_bytes();
   return json;
 }
 
@@ -119,7 +120,7 @@ int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, 
       text = to_text(*regions) + text;
     }
   json["warnings"] = warnings;
-  json["peak_memory_bytes"] = peak_memory_bytes();
+  json["peak_memory_bytes"] = internal::peak_memory_bytes();
   tell_check(arguments, warnings, json, text);
   if (diagnosis.is_cancelled) return kInterrupted;
   return diagnosis.is_fillable() ? kDone : kFailed;

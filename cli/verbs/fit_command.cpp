@@ -49,7 +49,7 @@ struct FitArguments {
   std::string regions, point_weights = "equal", energy = "hencky", crease_angle = kAutomaticAngle;
   std::optional<std::size_t> cells;  ///< of the result, if the template is made
   double quality = kUsualQuality;
-  std::optional<double> quality_floor, max_tolerance_percent, size;
+  std::optional<double> quality_floor, max_tolerance_percent, wrap_percent, size;
   int order = 0;  ///< order of curved elements; 0: a subdivision volume is fitted
   std::string basis = to_string(HighOrderFitOptions{}.basis);
   bool adaptive = false;
@@ -342,7 +342,7 @@ bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
 
 /// UsageError: an option was given that has a meaning only for automatic fits.
 void refuse_automatic_options(const CLI::App& verb) {
-  for (const std::string option : {"--max-tolerance", "--size", "--regions"})
+  for (const std::string option : {"--max-tolerance", "--size", "--regions", "--wrap"})
     if (verb.count(option) > 0)
       throw UsageError(option + ": only fits without a template, --order, a cage or --levels aim at it");
 }
@@ -355,6 +355,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
                                arguments.max_tolerance_percent,
                                arguments.quality_floor,
                                arguments.target,
+                               arguments.wrap_percent,
                                arguments.size};
   AutomaticFitOptions& fit = result.fit;
   fit.cells = arguments.cells;
@@ -481,6 +482,7 @@ void add_fit_command(CLI::App& app, Action& action) {
       ->excludes(verb->get_option("--cells"));
   add_references_option(*verb, arguments->run)->needs(file);
   add_regions_option(*verb, arguments->regions);
+  add_wrap_option(*verb, arguments->wrap_percent);
   add_method_options(*verb, *arguments);
   add_solver_options(*verb, *arguments);
   add_high_order_options(*verb, *arguments);

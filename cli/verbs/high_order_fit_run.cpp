@@ -15,6 +15,7 @@
 #include "cli/runs/written_result.h"
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/error.h"
+#include "subvol/base/process_memory.h"
 #include "subvol/base/version.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/quality/quality.h"
@@ -223,7 +224,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     seconds.update(seconds_json(report));
     seconds["total"] = seconds_since(start);
     json["seconds"] = std::move(seconds);
-    json["peak_memory_bytes"] = peak_memory_bytes();
+    json["peak_memory_bytes"] = internal::peak_memory_bytes();
     json["outputs"] = output_names(outputs);
     write_report(arguments.run.report, json);
   }

@@ -3,6 +3,7 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/report.h"
+#include "subvol/base/process_memory.h"
 
 #include <algorithm>
 #include <iostream>
@@ -39,7 +40,7 @@ void LongRun::write_report(Json json, const Json& parts) const {
   seconds["total"] = this->seconds();
   json["warnings"] = warnings_json(warnings_, failures_);
   json["seconds"] = std::move(seconds);
-  json["peak_memory_bytes"] = peak_memory_bytes();
+  json["peak_memory_bytes"] = internal::peak_memory_bytes();
   json["outputs"] = output_names(outputs_);
   cli::write_report(run_.report, json);
 }

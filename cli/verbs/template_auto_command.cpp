@@ -27,6 +27,7 @@ struct AutoArguments : TemplateRun {
   std::string target;
   AutoTemplateOptions options;
   std::string regions;
+  std::optional<double> wrap_percent;
   double time_limit_seconds = 0;  ///< 0: none
 };
 
@@ -92,7 +93,8 @@ int run_with_regions(AutoArguments arguments, const CLI::App& verb, const std::v
 
 int run_auto(AutoArguments arguments, const CLI::App& verb) {
   const std::vector<Output> outputs = template_outputs(arguments, verb);
-  const SurfaceRepair repair = load_to_fill(arguments.target, region_rule(arguments.regions), arguments.warnings);
+  const SurfaceRepair repair =
+      load_to_fill(arguments.target, {region_rule(arguments.regions), arguments.wrap_percent}, arguments.warnings);
   const TriangleMesh& target = repair.surface;
   add_remarks(repair, arguments.warnings);
   arguments.writing.source = arguments.target;
@@ -150,6 +152,7 @@ void add_template_auto(CLI::App& group, Action& action) {
       ->capture_default_str();
   verb->add_flag("--pillow", arguments->options.pillow, "Put a layer of cells around the whole boundary, counted in");
   add_regions_option(*verb, arguments->regions);
+  add_wrap_option(*verb, arguments->wrap_percent);
   verb->add_option("--time-limit", arguments->time_limit_seconds, "End after this time, without a template")
       ->check(number_in(1e-3, 1e9))
       ->type_name("SECONDS");

@@ -3,6 +3,7 @@
 
 #include "cli/runs/exit_status.h"
 #include "cli/runs/scene_chord.h"
+#include "subvol/fit/target/surface_wrap.h"
 
 #include <algorithm>
 #include <sstream>
@@ -72,6 +73,16 @@ void add_regions_option(CLI::App& verb, std::string& rule) {
           "is enclosed is a region; merge: one region, parts inside others are the walls of voids")
       ->check(CLI::IsMember({"auto", "keep", "merge"}))
       ->type_name("auto|keep|merge");
+}
+
+void add_wrap_option(CLI::App& verb, std::optional<double>& percent) {
+  verb.add_option(
+          "--wrap", percent,
+          "Fill a closed surface that follows this one, for surfaces with holes, or with parts and sheets that\n"
+          "cross: made of voxels this large, in percent of the diagonal; usually 0.5. What is thinner or\n"
+          "narrower than two of them may be lost or closed, and sharp edges are cut off by up to one")
+      ->check(CLI::Range(kLeastWrapPercent, kMostWrapPercent))
+      ->type_name("PERCENT");
 }
 
 RegionRule region_rule(const std::string& rule) {

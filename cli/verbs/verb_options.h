@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,6 +37,9 @@ void add_writing_options(CLI::App& verb, WritingOptions& options);
 void add_regions_option(CLI::App& verb, std::string& rule);
 /// Returns the rule that --regions names; automatic if it is empty.
 RegionRule region_rule(const std::string& rule);
+
+/// --wrap (`FillingOptions::wrap_percent`).
+void add_wrap_option(CLI::App& verb, std::optional<double>& percent);
 
 /// --map-tolerance.
 CLI::Option* add_map_tolerance(CLI::App& verb, WritingOptions& options);

@@ -39,7 +39,7 @@ double above(double goal, double margin = kMargin) { return std::min(0.95, goal 
 }  // namespace
 
 double QualitySchedule::expected_steps() const {
-  constexpr double kLift = 10;  // most of the lift is done on patches
+  constexpr double kLift = 5;  // most of the lift is done on patches
   double steps = lift.steps > 0 ? kLift : 0;
   for (const QualityStage& stage : stages) steps += stage.steps;
   return steps;

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -225,6 +226,12 @@ std::vector<Index> carried_groups(const TriangleMesh& target, const CurvedBounda
   std::vector<Index> best = largest_shares(std::move(shares), target.face_groups.groups, num_faces);
   keep_small_groups(surface.surface, boundary, reach, best);
   return best;
+}
+
+FaceGroups groups_of_pieces(const TriangleMesh& surface, const TriangleMesh& pieces) {
+  std::vector<Index> numbers(pieces.triangles.size());
+  std::iota(numbers.begin(), numbers.end(), 0);
+  return {surface.face_groups.groups, carried_groups(surface, {pieces, numbers, 0}, numbers.size())};
 }
 
 CurvedBoundary linear_boundary(const VolumeMesh& mesh, const MeshTopology& topology) {

@@ -27,6 +27,9 @@ namespace subvol::internal {
 /// Same bits for any number of threads. Cost: about ten closest points for each face.
 std::vector<Index> carried_groups(const TriangleMesh& target, const CurvedBoundary& boundary, std::size_t num_faces);
 
+/// Returns the groups of triangles that lie on those of a surface.
+FaceGroups groups_of_pieces(const TriangleMesh& surface, const TriangleMesh& pieces);
+
 /// Returns the boundary of a mesh of linear cells as triangles: eight for a quad, four for a triangle.
 CurvedBoundary linear_boundary(const VolumeMesh& mesh, const MeshTopology& topology);
 

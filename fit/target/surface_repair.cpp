@@ -135,13 +135,6 @@ TriangleMesh Union::made(std::vector<std::string>& done) const {
   return result;
 }
 
-/// Returns the groups of triangles that lie on those of a surface.
-FaceGroups groups_of_pieces(const TriangleMesh& surface, const TriangleMesh& pieces) {
-  std::vector<Index> numbers(pieces.triangles.size());
-  std::iota(numbers.begin(), numbers.end(), 0);
-  return {surface.face_groups.groups, carried_groups(surface, {pieces, numbers, 0}, numbers.size())};
-}
-
 }  // namespace
 
 SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {

@@ -273,6 +273,8 @@ def fill(
     cells: Optional[int] = None,
     quality: float = 0.65,
     crease_angle: Optional[float] = None,
+    regions: Literal["auto", "keep", "merge"] = "auto",
+    wrap: Optional[float] = None,
     keep_groups: bool = False,
     tolerance: float = 0.02,
     max_tolerance: float = 0.5,

@@ -357,7 +357,7 @@ class VtkParser {
   void choose_references() {
     std::optional<std::size_t> chosen;
     try {
-      chosen = subvol::choose_references(arrays_, asked_, others_);
+      chosen = internal::choose_references(arrays_, asked_, others_);
     } catch (const InputError& error) {
       throw InputError(name_ + ": " + error.what());
     }

@@ -155,7 +155,7 @@ class VtuParser {
     std::erase_if(arrays_, [&](const CellNumbers& array) { return array.values.size() != num_cells_read_; });
     std::optional<std::size_t> chosen;
     try {
-      chosen = subvol::choose_references(arrays_, asked_, others_);
+      chosen = internal::choose_references(arrays_, asked_, others_);
     } catch (const InputError& error) {
       fail(error.what());
     }
