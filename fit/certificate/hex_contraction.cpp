@@ -205,14 +205,14 @@ void HexContraction::contract(const HexPart& part, HexCoefficients& result) {
   result.resize(num_u, num_w);
   for (int d = 0; d < 3; ++d) {
     const Lines<double> in{reinterpret_cast<const double*>(after_v_[d].data()), row, row, all_used_.data()};
-    subvol::contract<Of::values>(num_u, table, in, kNoMore, reinterpret_cast<double*>(result.coordinate(d)), row);
+    internal::contract<Of::values>(num_u, table, in, kNoMore, reinterpret_cast<double*>(result.coordinate(d)), row);
   }
 }
 
 void HexContraction::contract_w(const HexPart& part) {
   const LineModels& line = models(part, 2);
   const Lines<double> in{modes_.data(), row_, 3 * face_, used_.data()};
-  subvol::contract<Of::values>(line.degree() + 1, line.coefficients(line.level(part.levels[2]), part.index[2]), in,
+  internal::contract<Of::values>(line.degree() + 1, line.coefficients(line.level(part.levels[2]), part.index[2]), in,
                                kNoMore, after_w_.data(), row_);
 }
 
@@ -252,7 +252,7 @@ void HexContraction::contract(const HexPart& part, NarrowHexCoefficients& result
               others[at + LineModels::kLargest] * sizes[i];
     }
     const Lines<float> in{numbers(narrow_v_[d].data()), row, row, all_used_.data()};
-    subvol::contract<Of::values>(num_u, coefficients, in, numbers(&more), numbers(result.coordinate(d)), row);
+    internal::contract<Of::values>(num_u, coefficients, in, numbers(&more), numbers(result.coordinate(d)), row);
 
     // The two factors of each product, the product and the sums are rounded: n + 2 roundings per direction. 1e-5 covers
     // the roundings of these bounds themselves and products of roundings, about 100; 1e-33 covers underflow of up to
@@ -272,7 +272,7 @@ void HexContraction::contract_narrow_w(const HexPart& part) {
   const float* deviations = line.deviations(line.level(part.levels[2]), part.index[2]);
   const int num_w = line.degree() + 1;
   const Lines<float> in{narrow_modes_.data(), row_, 3 * face_, used_.data()};
-  subvol::contract<Of::deviations>(num_w + 1, deviations, in, kNoNarrowMore, narrow_w_.data(), row_);
+  internal::contract<Of::deviations>(num_w + 1, deviations, in, kNoNarrowMore, narrow_w_.data(), row_);
   contract_to<2, Of::deviations, true>(deviations + num_w + LineModels::kLargestDeviation, in, kNoNarrowMore,
                                        sizes_w_.data(), row_);
 }

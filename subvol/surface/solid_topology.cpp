@@ -51,7 +51,7 @@ std::vector<SurfaceEdge> edges_of(const TriangleMesh& mesh, std::span<const Inde
       for (const auto& [i, j] : pairs) edges.push_back({run[i], run[j]});
     else crowded.add(name(run[0].low), name(run[0].high), run.size());
   });
-  if (!crowded.empty()) throw InputError("surface: it bounds no solid, wrap it first (wrap): " + crowded.text());
+  if (!crowded.empty()) throw InputError("surface: it bounds no solid; wrap it first (wrap): " + crowded.text());
   return edges;
 }
 
