@@ -77,6 +77,20 @@ Cells as_chosen(Cells cells, const std::string& references) {
   return cells;
 }
 
+constexpr int kCellDimension = 3;
+
+/// Returns the number of the region with this name or number. UsageError: there is none; it begins with `option`.
+int number_of_region(std::span<const Group> regions, const std::string& name, const std::string& option) {
+  std::string known;
+  for (const Group& region : regions) {
+    const std::string number = std::to_string(region.number);
+    if (name == number || name == region.name) return region.number;
+    known += (known.empty() ? "" : ", ") + number + " (" + region.name + ")";
+  }
+  throw UsageError(option + ": there is no region " + in_quotes(name) + "; there " +
+                   (regions.empty() ? "is only one" : "are " + known));
+}
+
 }  // namespace
 
 bool is_surface_file(const std::filesystem::path& path) {
@@ -169,20 +183,22 @@ VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::strin
   return as_chosen(std::get<VolumeMesh>(std::move(content)), references);
 }
 
+std::vector<Group> regions_of(const VolumeMesh& mesh) {
+  std::vector<Group> regions;
+  for (const int reference : region_references(mesh))
+    regions.push_back({region_label(mesh, reference), reference, kCellDimension});
+  return regions;
+}
+
+void require_regions(std::span<const Output> outputs, std::span<const Group> regions) {
+  for (const Output& output : outputs)
+    if (output.part == Part::region) (void)number_of_region(regions, output.region, "-o region:" + output.region);
+}
+
 VolumeMesh cells_of_region(const VolumeMesh& mesh, const std::string& region) {
-  const std::vector<int> references = region_references(mesh);
-  const auto is_wanted = [&](int reference) {
-    return region == std::to_string(reference) || region == region_label(mesh, reference);
-  };
-  const auto wanted = std::ranges::find_if(references, is_wanted);
-  if (wanted == references.end()) {
-    std::string known;
-    for (const int reference : references)
-      known += (known.empty() ? "" : ", ") + std::to_string(reference) + " (" + region_label(mesh, reference) + ")";
-    throw UsageError("--region: the mesh has no region " + in_quotes(region) + "; it has " + known);
-  }
+  const int wanted = number_of_region(regions_of(mesh), region, "--region");
   std::vector<char> kept(mesh.num_cells());
-  for (std::size_t c = 0; c < kept.size(); ++c) kept[c] = reference_of(mesh, c) == *wanted;
+  for (std::size_t c = 0; c < kept.size(); ++c) kept[c] = reference_of(mesh, c) == wanted;
   return kept_cells(mesh, kept);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/runs/outputs.h"
 #include "cli/runs/run_options.h"
 #include "subvol/export/high_order_file.h"
 #include "subvol/fit/elements/high_order_mesh.h"
@@ -11,6 +12,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -65,6 +67,12 @@ inline constexpr const char* kNoReferences = "none";
 /// references: name of the cell data that become the references; empty: the usual ones; `kNoReferences`: none.
 VolumeMesh load_volume(const std::filesystem::path& path, std::vector<std::string>& warnings, bool check = true,
                        const std::string& references = {});
+
+/// Returns the regions of a mesh: their names and their references as numbers.
+std::vector<Group> regions_of(const VolumeMesh& mesh);
+
+/// UsageError: an output is the part of a region that is not among these; the message lists them.
+void require_regions(std::span<const Output> outputs, std::span<const Group> regions);
 
 /// Returns the cells of one region, which is given by its name or its number. UsageError: there is none; the message
 /// lists the regions.

@@ -10,7 +10,7 @@ namespace subvol::cli {
 namespace {
 
 bool holds_references(const Output& output) {
-  return output.part != Part::boundary && output.format().regions_written != Held::none;
+  return output.part != Part::boundary && output.part != Part::region && output.format().regions_written != Held::none;
 }
 bool holds_groups(const Output& output) {
   return output.part == Part::boundary ||

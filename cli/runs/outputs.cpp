@@ -29,7 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Prefix of each Part; in -o it stands before the file, separated by a colon.
-constexpr std::array<std::string_view, 5> kPartNames{"", "cage", "cutaway", "animation", "boundary"};
+constexpr std::array<std::string_view, 6> kPartNames{"", "cage", "cutaway", "animation", "boundary", "region"};
 /// Splits a text into the part that it starts with and the file. UsageError: a word and a colon that name no part.
 std::pair<Part, std::string> part_and_file(const std::string& text) {
   const std::size_t colon = text.find(':');
@@ -38,13 +38,25 @@ std::pair<Part, std::string> part_and_file(const std::string& text) {
   if (colon == std::string::npos || !std::all_of(name.begin(), name.end(), is_letter)) return {Part::result, text};
   for (std::size_t part = 1; part < kPartNames.size(); ++part)
     if (name == kPartNames[part]) return {static_cast<Part>(part), text.substr(colon + 1)};
-  throw UsageError("-o " + text + ": expected cage:, cutaway:, animation: or boundary: before a file, not '" + name +
+  throw UsageError("-o " + text +
+                   ": expected cage:, cutaway:, animation:, boundary: or region:NAME: before a file, not '" + name +
                    ":'; the file of that name is ./" + text);
+}
+
+/// Splits what stands behind `region:` into the name of the region and the file.
+std::pair<std::string, std::string> region_and_file(const std::string& text, const std::string& rest) {
+  const std::size_t colon = rest.find(':');
+  if (colon == std::string::npos || colon == 0 || colon + 1 == rest.size())
+    throw UsageError("-o " + text + ": expected region:NAME:FILE");
+  return {rest.substr(0, colon), rest.substr(colon + 1)};
 }
 
 Output parse_output(const std::string& text) {
   Output output;
-  std::tie(output.part, output.path) = part_and_file(text);
+  std::string file;
+  std::tie(output.part, file) = part_and_file(text);
+  if (output.part == Part::region) std::tie(output.region, file) = region_and_file(text, file);
+  output.path = file;
   output.extension = output.path.extension().string();
   std::transform(output.extension.begin(), output.extension.end(), output.extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

@@ -11,20 +11,22 @@
 
 namespace subvol::cli {
 
-/// Part of a result that goes to a file: `FILE`, or `PART:FILE`.
+/// Part of a result that goes to a file: `FILE`, `PART:FILE`, or `region:NAME:FILE`.
 enum class Part {
   result,     ///< the finest mesh, or its surface
   cage,       ///< the control mesh
   cutaway,    ///< a scene that shows the cells inside
   animation,  ///< the course of the fit: a scene of the surface, or a page in which the mesh can be turned
-  boundary    ///< the faces of the boundary as cells, with their groups
+  boundary,   ///< the faces of the boundary as cells, with their groups
+  region      ///< the cells of one region
 };
 
 /// One -o: the part to write, and the file.
 struct Output {
   Part part = Part::result;
-  std::filesystem::path path;
-  std::string extension;        ///< lower case, with its dot
+  std::string region{};  ///< name or number of the part's region
+  std::filesystem::path path{};
+  std::string extension{};      ///< lower case, with its dot
   bool is_new = false;          ///< no such file existed before the work
   /// Returns its format; of a page, one that holds nothing.
   const FileFormat& format() const;

@@ -201,6 +201,11 @@ void write_output(const Output& output, const VolumeMesh& cage, const VolumeMesh
 }
 
 void write_output(const Output& output, const VolumeMesh& mesh, const WritingOptions& options) {
+  if (output.part == Part::region) {
+    Output whole = output;
+    whole.part = Part::result;
+    return write_output(whole, cells_of_region(mesh, output.region), options);
+  }
   if (output.part == Part::boundary) return write_boundary_faces(output, mesh);
   if (output.is_volume()) return write_cells(output, mesh, options);
   if (output.part == Part::cutaway)

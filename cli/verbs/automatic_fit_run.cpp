@@ -71,6 +71,7 @@ void AutomaticFitRun::load() {
   target_ = std::move(repair.surface);
   regions_ = std::move(repair.regions);
   if (regions_) outer_ = outer_surface(*regions_);
+  require_regions(outputs_, regions_ ? regions_->regions : std::vector<Group>{});
   add_remarks(repair, warnings_);
   repairs_ = std::move(repair.done);
   tell_warnings();
@@ -149,7 +150,7 @@ void AutomaticFitRun::summarise() const {
 }
 
 int AutomaticFitRun::run() {
-  prepare({Part::cutaway, Part::animation, Part::boundary});
+  prepare({Part::cutaway, Part::animation, Part::boundary, Part::region});
   timed("read", &AutomaticFitRun::load);
   timed("fit", &AutomaticFitRun::fit);
   if (result_.mesh.num_cells() == 0)  // nothing has been fitted yet

@@ -128,6 +128,7 @@ void FitRun::load_template() {
     untangle_template(arguments_.template_mesh.path, arguments_.run,
                       {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
   choice_ = std::move(loaded.choice);
+  require_regions(outputs_, regions_of(template_mesh_));
   regions_ = regions_of_target(target_, template_mesh_);
   outer_ = outer_target(target_, regions_);
   if (!choice_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
@@ -242,7 +243,7 @@ void FitRun::summarise() const {
 }
 
 int FitRun::run() {
-  prepare({Part::cage, Part::cutaway, Part::animation, Part::boundary});
+  prepare({Part::cage, Part::cutaway, Part::animation, Part::boundary, Part::region});
   timed("read", &FitRun::load);
   timed("template", &FitRun::load_template);
   if (template_mesh_.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
@@ -490,7 +491,7 @@ void add_fit_command(CLI::App& app, Action& action) {
       *verb, arguments->run,
       "Finest mesh, or its surface, by extension: " + output_formats() +
           "; cage:FILE for the control cage, cutaway:FILE.glb for the cells inside, animation:FILE.glb or .html\n"
-          "for the fit as it went; may be given several times");
+          "for the fit as it went, region:NAME:FILE for the cells of one region; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   add_checkpoint_options(*verb, arguments->run);

@@ -66,6 +66,7 @@ class OptimizeRun : public LongRun {
 
 void OptimizeRun::load() {
   mesh_ = load_volume(arguments_.mesh, warnings_, true, arguments_.run.references);
+  require_regions(outputs_, regions_of(mesh_));
   warn_of_losses(marks_of(mesh_), marks_of(mesh_), outputs_, warnings_);
   if (!arguments_.target.empty()) target_ = load_surface(arguments_.target, warnings_);
   surface_ = target_ ? *target_ : fan_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
@@ -138,7 +139,7 @@ void OptimizeRun::summarise() const {
 }
 
 int OptimizeRun::run() {
-  prepare({Part::cutaway, Part::boundary});
+  prepare({Part::cutaway, Part::boundary, Part::region});
   timed("read", &OptimizeRun::load);
   timed("optimize", &OptimizeRun::optimize);
   timed("write", &OptimizeRun::write);
@@ -241,10 +242,11 @@ void add_optimize_command(CLI::App& app, Action& action) {
       ->type_name("FILE");
   add_references_option(*verb, arguments->run);
   add_options(*verb, *arguments);
-  add_output_options(*verb, arguments->run,
-                     "The mesh, or its surface, by extension: " + output_formats() +
-                         "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
-                         "their groups; may be given several times");
+  add_output_options(
+      *verb, arguments->run,
+      "The mesh, or its surface, by extension: " + output_formats() +
+          "; cutaway:FILE.glb for the cells inside, boundary:FILE.vtu for the faces of the boundary with\n"
+          "their groups, region:NAME:FILE for the cells of one region; may be given several times");
   add_writing_options(*verb, arguments->writing);
   add_long_run_options(*verb, arguments->run);
   add_checkpoint_options(*verb, arguments->run);

@@ -51,7 +51,7 @@ std::vector<SurfaceEdge> edges_of(const TriangleMesh& mesh, std::span<const Inde
       for (const auto& [i, j] : pairs) edges.push_back({run[i], run[j]});
     else crowded.add(name(run[0].low), name(run[0].high), run.size());
   });
-  if (!crowded.empty()) throw InputError("surface: it bounds no solid; wrap it first (wrap): " + crowded.text());
+  if (!crowded.empty()) throw InputError("surface: it bounds no solid unless it is wrapped: " + crowded.text());
   return edges;
 }
 
@@ -214,8 +214,7 @@ SolidBoundary solid_boundary(const TriangleMesh& surface) {
     area += (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).norm() / 2;
   }
   constexpr double kFlat = 1e-6;
-  if (!(result.volume > kFlat * area * std::sqrt(area)))
-    throw InputError("surface: it encloses no volume; wrap it first (wrap)");
+  if (!(result.volume > kFlat * area * std::sqrt(area))) throw InputError("surface: it encloses no volume");
   result.surface = std::move(mesh);
   return result;
 }

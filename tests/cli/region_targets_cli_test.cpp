@@ -52,6 +52,16 @@ TEST_CASE("A surface with sheets inside is filled region by region, with the tar
   CHECK(mesh.face_groups.groups.size() == 4);
   CHECK(place.run("check a.mesh --region 3").status == 0);
   CHECK(place.run("check a.mesh --region none").status == 2);
+  CHECK(place.run("fit slabs.off --cells 500 -o d.mesh -o region:3:third.mesh -o region:3:third.glb").status == 0);
+  const VolumeMesh third = read_volume_mesh(place / "third.mesh");
+  CHECK(region_references(third) == std::vector<int>{3});
+  CHECK(third.num_cells() < read_volume_mesh(place / "d.mesh").num_cells() / 2);
+  const Run unknown = place.run("fit slabs.off -o region:bone:bone.mesh");
+  CHECK(unknown.status == 2);
+  CHECK(has(unknown.err, "there is no region 'bone'"));
+  CHECK(has(unknown.err, "3 ("));
+  CHECK(place.run("fit slabs.off -o region:third.mesh").status == 2);
+  CHECK(place.run("fit slabs.off --regions merge -o region:1:e.mesh").status == 2);
   const Run merged = place.run("check a.mesh --references none");
   CHECK(merged.status == 0);
   CHECK(!has(merged.out, "region"));

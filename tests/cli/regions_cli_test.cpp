@@ -28,8 +28,9 @@ TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions]") {
   subvol::write_volume_mesh(place / "layers.mesh", two_layers());
   for (const char* command :
        {"subdivide layers.mesh --crease-angle 40 -o out.mesh --report r.json --force",
-        "optimize layers.mesh -o out.mesh --report r.json --force",
-        "fit layers.mesh --template layers.mesh --levels 1 --crease-angle 40 -o out.mesh --report r.json --force"}) {
+        "optimize layers.mesh -o out.mesh -o region:8:top.mesh --report r.json --force",
+        "fit layers.mesh --template layers.mesh --levels 1 --crease-angle 40 -o out.mesh -o region:8:top.mesh --report "
+        "r.json --force"}) {
     CAPTURE(command);
     const Run run = place.run(command);
     INFO(run.err);
@@ -41,6 +42,9 @@ TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions]") {
     CHECK(regions[0].at("volume").get<double>() == Approx(8).epsilon(1e-3));
     CHECK(regions[1].at("volume").get<double>() == Approx(8).epsilon(1e-3));
     REQUIRE(report.at("regions").at("interfaces").size() == 1);
+    if (std::string(command).find("region:8") != std::string::npos)
+      CHECK(subvol::read_volume_mesh(place / "top.mesh").num_cells() ==
+            subvol::read_volume_mesh(place / "out.mesh").num_cells() / 2);
     CHECK(report.at("regions").at("interfaces")[0].at("area").get<double>() == Approx(4).epsilon(1e-3));
   }
   const Run check = place.run("check layers.mesh");

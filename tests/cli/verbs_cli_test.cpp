@@ -520,7 +520,7 @@ TEST_CASE("A surface that bounds no solid is refused with the way out, and fille
              "3 3 0 4\n3 3 4 7\n3 1 5 8\n");
   const Run refused = place.run("fit fin.off -o a.mesh");
   CHECK(refused.status == 3);
-  CHECK_THAT(refused.err, Catch::Contains("wrap it first"));
+  CHECK_THAT(refused.err, Catch::Contains("it bounds no solid unless it is wrapped"));
   CHECK(place.run("fit fin.off --wrap 2 --cells 500 --crease-angle none --max-tolerance 5 -o a.mesh --report r.json")
             .status == 0);
   CHECK(place.json("r.json")["valid"] == true);
