@@ -15,6 +15,7 @@ from pathlib import Path
 SYSTEM_PYTHON = "/usr/bin/python3"  # the one that Debian's packages are for
 FORMATS = ("mesh", "vtk", "vtu", "msh", "inp", "bdf", "xdmf", "e")
 OLD_MSH = "old.msh"  # of version 2.2
+NEEDED_MODULES = {"e": "netCDF4", "xdmf": "h5py"}  # what meshio needs for some formats
 
 try:
     import meshio
@@ -44,8 +45,9 @@ def main():
         run(program, "convert", "plate.mesh", "--msh-version", "2.2", "-o", f"plate.{OLD_MSH}", "--quiet")
         wanted = hexes_of(Path(folder) / "plate.mesh")
         for name in (*FORMATS, OLD_MSH):
-            if name == "e" and not importlib.util.find_spec("netCDF4"):
-                print("plate.e: SKIPPED: no netCDF4; apt-get install python3-netcdf4")
+            module = NEEDED_MODULES.get(name)
+            if module and not importlib.util.find_spec(module):
+                print(f"plate.{name}: SKIPPED: no {module}; apt-get install python3-{module.lower()}")
                 continue
             try:
                 found = hexes_of(Path(folder) / f"plate.{name}")

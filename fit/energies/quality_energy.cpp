@@ -110,7 +110,8 @@ struct QualityEnergy::CellSums {
 };
 
 QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_direction) {
-  Points points{make_element_rule(kind, points_per_direction), {}, {}, {}};
+  Points points{make_element_rule(kind, points_per_direction), {}, {}, {}, {}};
+  points.jacobians = PointJacobians(points.rule);
   const double corner_weight = 1.0 / cell_topology(kind).num_vertices;
   for (const Vec3& at : points.rule.points) {
     const int corner = corner_at(kind, at);
@@ -223,10 +224,16 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
     energy += weight * residual * residual;
     if constexpr (kDerivatives) sums.add(points.rule.point(q), weight, residual, derivatives);
   };
+  std::array<double, PointJacobians::kMostValues> jacobians;
+  points.jacobians.evaluate(x.data(), least_length, jacobians.data());
   for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
-    const Frame frame(points.rule.point(q), x.data(), least_length);
+    constexpr double kRounding = 1e-9;
     const int corner = points.corner[q];
-    const double below = std::min(weights_.threshold, cap(cell, points, q)) - frame.s;
+    const double threshold = std::min(weights_.threshold, cap(cell, points, q));
+    const bool has_hinge_only = corner < 0 && mesh_->kinds[cell] != CellKind::tet;
+    if (has_hinge_only && jacobians[q] > threshold + kRounding) continue;
+    const Frame frame(points.rule.point(q), x.data(), least_length);
+    const double below = threshold - frame.s;
     if (below > 0) {
       std::array<Vec3, 3> derivative;
       if constexpr (kDerivatives) {
@@ -235,7 +242,7 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
       }
       add(q, weights_.hinge * points.weights[q] * emphasis(cell, corner), below, derivative);
     }
-    if (corner < 0 && mesh_->kinds[cell] != CellKind::tet) continue;
+    if (has_hinge_only) continue;
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3;
       const double cosine = frame.u[i].dot(frame.u[j]);
@@ -341,10 +348,7 @@ double QualityEnergy::least_scaled_jacobian(std::size_t cell, const Points& poin
   std::array<Vec3, kMaxCellVertices> x;
   for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
   const double least_length = kLeastLength * lengths_[cell].minCoeff();
-  double least = 1;
-  for (std::size_t q = 0; q < points.rule.num_points(); ++q)
-    least = std::min(least, Frame(points.rule.point(q), x.data(), least_length).s);
-  return least;
+  return std::min(1.0, points.jacobians.least(x.data(), least_length));
 }
 
 void QualityEnergy::least_scaled_jacobians(std::span<const Vec3> nodes, std::span<double> least) const {
@@ -359,7 +363,7 @@ std::vector<Index> QualityEnergy::poor_between_points(std::span<const Vec3> node
   for (std::size_t c = 0; c < is_poor.size(); ++c) {
     if (dense_[c] != 0 || (!caps_of_cell_.empty() && caps_of_cell_[c] != kNoIndex)) continue;
     const Points& dense = points_[static_cast<std::size_t>(mesh_->kinds[c])][1];
-    is_poor[c] = least_scaled_jacobian(c, dense, nodes) < goal && least_scaled_jacobian(c, points_of(c), nodes) >= goal;
+    is_poor[c] = least_scaled_jacobian(c, points_of(c), nodes) >= goal && least_scaled_jacobian(c, dense, nodes) < goal;
   }
   std::vector<Index> result;
   for (std::size_t c = 0; c < is_poor.size(); ++c)

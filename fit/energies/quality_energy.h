@@ -3,6 +3,7 @@
 
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/cell_blocks.h"
+#include "subvol/fit/energies/point_jacobians.h"
 #include "subvol/fit/energies/volume_term.h"
 #include "subvol/fit/features/quality_caps.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -103,6 +104,7 @@ class QualityEnergy final : public VolumeTerm {
     std::vector<int> corner;        ///< local vertex of each point that is a corner; -1 for the others
     std::vector<int> edge;          ///< local edge of each point inside one; -1 for the others
     std::vector<double> weights;    ///< a_q
+    PointJacobians jacobians;
   };
   struct CellSums;
 

@@ -26,7 +26,8 @@ struct WrapOptions {
 /// surface    its triangles must face outward for the most part; its groups arrive on the triangles that lie on them.
 /// cancelled  asked now and then, from the calling thread; if it returns true, the result is empty. Empty: never.
 /// returns    closed and outward, without triangles if cancelled.
-/// InputError: as `WindingNumber`; options out of range; no voxel is inside.
+/// InputError: no triangles, a vertex number out of range, a position that is not finite; options out of range; no voxel
+/// is inside.
 /// Same bits for any number of threads. Cost: about two seconds for a million voxels.
 TriangleMesh wrap_surface(const TriangleMesh& surface, const WrapOptions& options = {},
                           const std::function<bool()>& cancelled = {});
