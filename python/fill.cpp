@@ -43,7 +43,7 @@ class Filling {
     options_.progress = work_.progress();
     options_.cancelled = work_.cancelled();
     std::vector<std::string> warnings;
-    AutomaticFitResult found = checkpoints_.run(work_, "fit", warnings, [&](StageLog* log) {
+    AutomaticFitResult found = checkpoints_.run(work_, "fit", warnings, [&](internal::StageLog* log) {
       options_.log = log;
       return fit_automatically(target_, options_);
     });

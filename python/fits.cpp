@@ -135,7 +135,7 @@ class Fit {
   void fit_subdivision(Fitted& result) {
     subdivision_.progress = work_.progress();
     subdivision_.cancelled = work_.cancelled();
-    FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
+    FitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](internal::StageLog* log) {
       subdivision_.log = log;
       return std::visit(
           [&](const auto& target) { return fit_subdivision_volume(target, *template_, subdivision_); }, target_);
@@ -168,7 +168,7 @@ class Fit {
   void fit_curved(Fitted& result) {
     high_order_.progress = work_.progress();
     high_order_.cancelled = work_.cancelled();
-    HighOrderFitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](StageLog* log) {
+    HighOrderFitResult fit = checkpoints_.run(work_, "fit", warnings_, [&](internal::StageLog* log) {
       high_order_.log = log;
       return std::visit([&](const auto& target) { return fit_high_order(target, *template_, high_order_); }, target_);
     });
