@@ -27,10 +27,10 @@ inline constexpr std::size_t kChildren = 8;
 /// the target are given up for it.
 inline constexpr double kAcceptableQuality = 0.3;
 
-/// Estimates of the work: the portion of what is left that an attempt takes, so that the share is in the middle of its
-/// range in the middle of a fit whether it ends with its first attempt or with its second; and the portions of what is
-/// left of an attempt that its template, the coarser of two levels, a smooth fit and the first of several routings
-/// take.
+/// Portions of the work, for forecasts. An attempt takes `kAttemptPortion` of what is left: in the middle of a fit, the
+/// share is then between a quarter and three quarters, whether the first attempt is the last or the second is. Of what
+/// is left of an attempt, the other portions are those of its template, of the coarser of two levels, of a smooth fit
+/// and of the first of several routings.
 inline constexpr double kAttemptPortion = 0.62, kTemplatePortion = 0.1, kCoarsePortion = 0.25, kSmoothPortion = 0.35,
                         kRoutingPortion = 0.9;
 

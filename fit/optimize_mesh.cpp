@@ -63,7 +63,7 @@ constexpr double kExpectedUntanglingSteps = 30;
 
 /// Largest relative change of a region's volume at which interfaces may slide.
 constexpr double kMostVolumeChange = 1e-3;
-/// A relative change of the whole volume that is told.
+/// Largest relative change of a volume for which there is no warning.
 constexpr double kToldVolumeChange = 1e-4;
 
 /// State that a round has reached.
@@ -146,7 +146,11 @@ class MeshOptimizer {
   std::unique_ptr<SurfaceTerm> surface_term(bool emphasize_far) const;
   StageRecord record(std::string name) const;
   bool attempt(double least_jacobian);
-  bool keeps_volumes() const { return own_boundary_ && !options_.fixed_boundary; }
+  /// True if nothing but the start determines the volumes.
+  bool keeps_volumes() const {
+    return own_boundary_ && !options_.fixed_boundary &&
+           std::ranges::all_of(start_volumes_, [](double volume) { return volume > 0; });
+  }
   double volume_change() const;
   bool changes_volumes() const { return volume_change() > kMostVolumeChange; }
   bool untangle_all();
@@ -548,11 +552,10 @@ void MeshOptimizer::flatten(double least_jacobian) {
   flatten_sheets(mesh_, target_, std::max(least_jacobian, 0.0));
 }
 
-/// Gives all regions the volumes that they had at the start, if nothing else determines them.
+/// Gives all regions the volumes that they had at the start (`keeps_volumes`).
 void MeshOptimizer::keep_volumes() {
   constexpr double kKeptQuality = 0.99;  // share of the least scaled Jacobian that must be left
-  const bool have_volumes = std::ranges::all_of(start_volumes_, [](double volume) { return volume > 0; });
-  if (!keeps_volumes() || !have_volumes) return;
+  if (!keeps_volumes()) return;
   restore_volumes(mesh_, start_volumes_, kKeptQuality * measure_quality(mesh_).min_scaled_jacobian);
 }
 

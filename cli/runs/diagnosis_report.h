@@ -20,7 +20,7 @@ struct FileSurface {
 
 FileSurface file_surface(const PolygonMesh& polygons);
 
-/// What is done to a surface before it is filled.
+/// Says what is done to a surface before it is filled.
 struct FillingOptions {
   RegionRule rule = RegionRule::automatic;
   std::optional<double> wrap_percent{};  ///< `WrapOptions::voxel_percent`; nothing: surfaces are not wrapped

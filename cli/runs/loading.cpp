@@ -85,7 +85,8 @@ int number_of_region(std::span<const Group> regions, const std::string& name, co
   for (const Group& region : regions) {
     const std::string number = std::to_string(region.number);
     if (name == number || name == region.name) return region.number;
-    known += (known.empty() ? "" : ", ") + number + " (" + region.name + ")";
+    known += (known.empty() ? "" : ", ") + number;
+    if (!region.name.empty()) known += " (" + region.name + ")";
   }
   throw UsageError(option + ": there is no region " + in_quotes(name) + "; there " +
                    (regions.empty() ? "is only one" : "are " + known));

@@ -82,7 +82,8 @@ void add_wrap_option(CLI::App& verb, std::optional<double>& percent) {
           "cross: made of voxels this large, in percent of the diagonal; usually 0.5. What is thinner or\n"
           "narrower than two of them may be lost or closed, and sharp edges are cut off by up to one")
       ->check(CLI::Range(kLeastWrapPercent, kMostWrapPercent))
-      ->type_name("PERCENT");
+      ->type_name("PERCENT")
+      ->excludes(verb.get_option("--regions"));  // the wrap has one region
 }
 
 RegionRule region_rule(const std::string& rule) {

@@ -38,7 +38,7 @@ void add_regions_option(CLI::App& verb, std::string& rule);
 /// Returns the rule that --regions names; automatic if it is empty.
 RegionRule region_rule(const std::string& rule);
 
-/// --wrap (`FillingOptions::wrap_percent`).
+/// --wrap (`FillingOptions::wrap_percent`), of a verb that has --regions.
 void add_wrap_option(CLI::App& verb, std::optional<double>& percent);
 
 /// --map-tolerance.

@@ -20,7 +20,7 @@ class PointJacobians {
   /// The rule has at most `kMostValues` points.
   explicit PointJacobians(const ElementRule& rule);
 
-  /// Writes the values at all points to `values`, and then the last one until there are a multiple of eight.
+  /// Writes the values at all points to `values`, and repeats the last one until their number is a multiple of eight.
   ///
   /// corners  of the cell.  least_length  at least 1e-150; shorter d_k count as if they were so long.
   void evaluate(const Vec3* corners, double least_length, double* values) const;

@@ -227,7 +227,7 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
   std::array<double, PointJacobians::kMostValues> jacobians;
   points.jacobians.evaluate(x.data(), least_length, jacobians.data());
   for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
-    constexpr double kRounding = 1e-9;
+    constexpr double kRounding = 1e-9;  // more than `Frame` and `PointJacobians` differ by
     const int corner = points.corner[q];
     const double threshold = std::min(weights_.threshold, cap(cell, points, q));
     const bool has_hinge_only = corner < 0 && mesh_->kinds[cell] != CellKind::tet;

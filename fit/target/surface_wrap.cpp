@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/surface_wrap.h"
 
+#include "subvol/base/error.h"
 #include "subvol/base/option_checks.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/surface_distance.h"
@@ -17,7 +18,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -164,6 +164,7 @@ TriangleMesh wrap_surface(const TriangleMesh& surface, const WrapOptions& option
   require_in_range("WrapOptions", "voxel_percent", options.voxel_percent, kLeastWrapPercent, kMostWrapPercent);
   const ClosestPoint tree(surface);
   const double voxel = options.voxel_percent / 100 * bounding_box_diagonal(surface);
+  if (!(voxel > 0)) throw InputError("surface: it cannot be wrapped: all of it is at one point");
   InsideVoxels inside(surface, tree, voxel, cancelled);
   if (!inside.find()) return {};
   if (std::ranges::find(inside.grid().labels, 1) == inside.grid().labels.end())

@@ -7,6 +7,7 @@
 
 namespace subvol {
 
+/// Limits of `WrapOptions::voxel_percent`.
 inline constexpr double kLeastWrapPercent = 0.1, kMostWrapPercent = 10;
 
 struct WrapOptions {
@@ -26,9 +27,9 @@ struct WrapOptions {
 /// surface    its triangles must face outward for the most part; its groups arrive on the triangles that lie on them.
 /// cancelled  asked now and then, from the calling thread; if it returns true, the result is empty. Empty: never.
 /// returns    closed and outward, without triangles if cancelled.
-/// InputError: no triangles, a vertex number out of range, a position that is not finite; options out of range; no voxel
-/// is inside.
-/// Same bits for any number of threads. Cost: about two seconds for a million voxels.
+/// InputError: no triangles, a vertex number out of range, a position that is not finite; all triangles at one
+/// point; options out of range; no voxel is inside.
+/// Same bits for any number of threads. Cost: about two seconds, and a few megabytes, for a million voxels.
 TriangleMesh wrap_surface(const TriangleMesh& surface, const WrapOptions& options = {},
                           const std::function<bool()>& cancelled = {});
 

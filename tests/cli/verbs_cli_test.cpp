@@ -528,4 +528,5 @@ TEST_CASE("A surface that bounds no solid is refused with the way out, and fille
   CHECK_THAT(place.json("r.json")["repairs"][0].get<std::string>(), Catch::StartsWith("target: wrapped"));
   CHECK(place.run("template auto fin.off --wrap 2 -o b.mesh").status == 0);
   CHECK(place.run("fit fin.off --wrap 0 -o c.mesh").status == 2);
+  CHECK(place.run("fit fin.off --wrap 2 --regions keep -o c.mesh").status == 2);
 }

@@ -85,6 +85,9 @@ TEST_CASE("A wrap refuses what has no inside, and can be cancelled", "[surface_w
   for (auto& triangle : inward.triangles) std::swap(triangle[1], triangle[2]);
   CHECK_THROWS_WITH(wrap_surface(inward), Catch::Contains("nothing is inside"));
   CHECK_THROWS_AS(wrap_surface({}), InputError);
+  TriangleMesh point = test::cube_surface(2, false);
+  for (Vec3& p : point.positions) p.setZero();
+  CHECK_THROWS_WITH(wrap_surface(point), Catch::Contains("at one point"));
   CHECK_THROWS_WITH(wrap_surface(inward, {.voxel_percent = 0}), Catch::Contains("voxel_percent"));
   CHECK(wrap_surface(test::cube_surface(2, false), {}, [] { return true; }).triangles.empty());
 }
