@@ -3,7 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
-#include "subvol/fit/automatic_trials.h"
+#include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/features/crisp_edges.h"
@@ -43,6 +43,8 @@ namespace {
 constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
 constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting some of them
 constexpr int kMostRefinements = 2;         // cells of size 1 / 9 are the smallest
+/// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
+constexpr double kWorthRefining = 0.5;
 
 /// The state of the sharp edges of a target.
 struct Edges {
@@ -105,17 +107,18 @@ bool has_edges_to_follow(const TriangleMesh& target, const AutomaticFitOptions& 
   return options.follows_all_edges ? !curves.empty() : edge_crispness(target, curves).is_designed();
 }
 
-/// An automatic fit, in normalized coordinates.
-class AutomaticFit {
+/// What to follow.
+struct EdgeChoice {
+  bool sharp = false, borders = false;  ///< sharp edges; borders of groups
+  bool any() const { return sharp || borders; }
+};
+
+/// An automatic fit of one solid.
+class AutomaticFit : AutomaticDriver {
  public:
-  AutomaticFit(const TriangleMesh& target, const AutomaticFitOptions& options)
-      : options_(checked_options(options)),
-        follows_sharp_edges_(has_edges_to_follow(target, options_)),
-        follows_edges_(follows_sharp_edges_ || (options_.keeps_groups && !group_borders(target, target).empty())),
-        original_(follows_edges_ ? solid_boundary(target).surface : target),
-        target_(original_),
-        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-                 options.cancelled, options.log}) {}
+  /// target: must outlive this; if edges are followed, its triangles agree about what is inside.
+  AutomaticFit(const TriangleMesh& target, EdgeChoice follows, const AutomaticFitOptions& options)
+      : AutomaticDriver(options, target), original_(target), follows_(follows) {}
   AutomaticFitResult run();
 
  private:
@@ -127,60 +130,46 @@ class AutomaticFit {
   bool run_refined();
   void lay_out(RoutingOptions routing);
   bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
-  bool route_and_fit(AutomaticFitTrial trial);
+  bool route_and_fit(const AutomaticFitTrial& described);
   std::vector<Fault> faults_of_best() const;
   std::vector<Index> cells_that_meet(const VolumeMesh& mesh) const;
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
-  void begin_attempt() { share_at_end_ += kAttemptPortion * (1 - share_at_end_); }
-  /// Begins a part of the attempt that takes this portion of what is left of it.
-  void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
-  bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
+  bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) override;
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
   std::vector<UnfollowedCurve> unfollowed_curves() const;
-  bool judge(AutomaticFitTrial trial);
+  bool judge(AutomaticFitTrial trial) override;
   void conclude();
   bool is_worth_trying(const Attempt& attempt) const {
     // A grid without planes is the grid of the attempt before; with many of them, grids not through them are worse.
     constexpr double kMany = 0.4;
     return attempt.kind != Attempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
-  bool is_good() const;
+  bool is_worth_refining() const {
+    return !is_good() && (best_start_.kind == Attempt::Kind::smooth || best().merit > kWorthRefining);
+  }
 
-  AutomaticFitOptions options_;
-  bool follows_sharp_edges_;
-  bool follows_edges_;     ///< sharp ones, or borders of groups
-  TriangleMesh original_;  ///< the target; if edges are followed, its triangles agree about what is inside
-  FitTarget target_;
+  const TriangleMesh& original_;
+  EdgeChoice follows_;
   Edges edges_;
-  FlatFacets facets_;      ///< of `target_.mesh`, if edges are followed
-  FeatureSizes features_;  ///< of the target, in normalized coordinates
-  VolumeMesh mesh_;
-  std::vector<double> sizes_;         ///< of its cells (`SizedMesh`)
+  FlatFacets facets_;                 ///< of `target_.mesh`, if edges are followed
+  FeatureSizes features_;             ///< of the target, in normalized coordinates
+  std::vector<double> sizes_;         ///< of the present mesh's cells (`SizedMesh`)
   TrialStart start_, best_start_;     ///< of the present trial, and of the best one
   std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
-  std::string no_template_;           ///< why the last template that was asked for does not exist; empty: it does
-  AutomaticFitResult result_;
-  std::vector<FitState> states_;  ///< of the present mesh, if they are kept
-  double share_at_end_ = 0;       ///< of the attempt in progress
-  double aligned_share_ = 0;      ///< of the target's area on planes of the last grid through planes
-  double least_share_ = 1;        ///< of the goal that the last level reached, at caps of the lower goal there
-  StageRunner runner_;
+  double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
 
-/// Returns true if no other template needs to be tried.
-bool AutomaticFit::is_good() const { return !result_.trials.empty() && is_good_enough(result_.trials[result_.chosen]); }
-
 void AutomaticFit::find_edges() {
-  if (!follows_edges_) return;
+  if (!follows_.any()) return;
   edges_.mesh = {target_.surface.positions(), target_.surface.triangles()};
   constexpr double kNone = 180;  // no edge is sharper
   std::vector<std::array<Index, 2>> borders;
   if (options_.keeps_groups) borders = group_borders(edges_.mesh, original_);
-  const double angle = follows_sharp_edges_ ? *options_.crease_angle_degrees : kNone;
+  const double angle = follows_.sharp ? *options_.crease_angle_degrees : kNone;
   edges_.features = signed_features(edges_.mesh, feature_curves(edges_.mesh, angle, borders));
   facets_ = flat_facets(target_.mesh);
 }
@@ -196,19 +185,11 @@ void AutomaticFit::find_features() {
 
 /// Returns nothing if there is no such template (`no_template_` then says so), or if the fit must end.
 std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions options) {
-  begin_part(kTemplatePortion, 1);
-  options.progress = [this](double fraction) {
-    runner_.work().set(fraction);
-    return !runner_.is_to_end() &&
-           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
-  };
+  options.progress = begin_template();
   AutoTemplateResult made = auto_templates(original_, options, 1);
   result_.topology = made.wanted;
   if (made.cancelled) {
-    if (runner_.in_time("the template", result_.report)) {
-      result_.report.stop_reason = StopReason::cancelled;
-      result_.report.explanation = "cancelled in the template";
-    }
+    note_end_in_template();
     return std::nullopt;
   }
   if (made.templates.empty()) {
@@ -217,10 +198,7 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
                    "; give a --template";
     return std::nullopt;
   }
-  VolumeMesh& mesh = made.templates.front().mesh;
-  target_.normalisation.take_in(mesh);
-  if (result_.report.stages.empty())
-    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
+  take_in(made.templates.front().mesh);
   return std::move(made.templates.front());
 }
 
@@ -250,13 +228,11 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
 bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
   constexpr int kIntervals = 2;
-  constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
   const MeshTopology topology(mesh_);
-  const std::size_t faces = topology.boundary_faces().size();
   const std::vector<Vec3> lengths = wanted_lengths(topology, sizes_, mesh_.num_cells(), target_.surface.area());
   const BoundarySamples samples =
       make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
-  target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
+  sample_target(topology.boundary_faces().size());
   QualityBoundary boundary{
       .samples = samples.positions, .triangles = samples.triangles, .triangle_faces = samples.triangle_faces};
   std::function<CreaseEnergy(double)> creases;
@@ -271,21 +247,11 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
         return energy;
       };
   }
-  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
-  if (layout_) stages.energy().set_caps(layout_->caps.edges, layout_->caps.vertices);
-  if (options_.keep_states) {
-    states_ = {{"start", mesh_.positions}};
-    stages.after_stage = [this](const std::string& name, const std::vector<Vec3>& x) { states_.push_back({name, x}); };
-  }
-  StageRecord record;
-  record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
-  record.level = level;
-  record.cells = mesh_.num_cells();
-  const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
-  const QualityStages::State& state = stages.state();
-  least_share_ = state.cells.least_share;
-  start_.far = state.far_cells;
-  start_.poor = state.cells.poor;
+  const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
+    if (layout_) stages.energy().set_caps(layout_->caps.edges, layout_->caps.vertices);
+  });
+  start_.far = state_.far_cells;
+  start_.poor = state_.cells.poor;
   return going;
 }
 
@@ -303,10 +269,7 @@ std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surfac
 std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
   if (edges_.features.curves.empty()) return std::nullopt;
   const std::vector<CreaseSegment> none;
-  CreaseDistance distance =
-      crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
-  distance.farthest = target_.normalisation.from_unit({distance.farthest})[0];
-  return distance;
+  return crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
 }
 
 /// Returns the curves that the present mesh does not follow: all of them if it follows none.
@@ -324,22 +287,18 @@ std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
 /// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
 /// fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
-  if (follows_edges_) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
+  if (follows_.any()) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
   trial.feature_miss = feature_miss(surface);
   trial.mean_percent = 100 * distance.mean();
   trial.max_percent = 100 * distance.max();
-  trial.least_share = least_share_;
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
-  if (!add_trial(std::move(trial), mesh_, quality, distance_of_edges(), options_, result_)) return going;
-  result_.states = states_;
-  result_.missed_edges.clear();
-  start_.lost.clear();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
-  result_.missed_edges = missed_edges(unfollowed, edges_.features.curves, target_.normalisation);
+  if (!keep_if_best(std::move(trial), quality, distance_of_edges(), unfollowed, edges_.features.curves)) return going;
+  start_.lost.clear();
   for (const UnfollowedCurve& curve : unfollowed)
     if (curve.reason != NotFollowed::too_acute) start_.lost.push_back(curve.curve);
   best_start_ = start_;
@@ -355,19 +314,7 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
   mesh_ = std::move(*made);
   sizes_.clear();
   start_ = {};
-  AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
-  bool going = true;
-  for (int level = 0; going && level <= attempt.levels; ++level) {
-    if (level > 0) mesh_ = smooth_refinement(mesh_);
-    trial.level = level;
-    QualitySchedule schedule = attempt.levels == 0 ? single_quality_schedule(options_.quality)
-                               : level == 0        ? coarse_quality_schedule(options_.quality)
-                                                   : fine_quality_schedule(options_.quality);
-    if (level == attempt.levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    going = fit_level(level, schedule, "", level < attempt.levels ? kCoarsePortion : 1);
-  }
-  if (going || result_.trials.empty()) going = judge(trial) && going;
-  return going;
+  return fit_and_refine(attempt.levels);
 }
 
 /// Returns the cells at faces of a mesh's boundary that meet other ones, once for each pair of triangles.
@@ -411,21 +358,19 @@ void AutomaticFit::lay_out(RoutingOptions routing) {
 }
 
 /// Fits the present layout, then others while edges have to be given up. Returns false if the fit must end.
-bool AutomaticFit::route_and_fit(AutomaticFitTrial trial) {
+bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
   constexpr int kMostRoutings = 5;
   RoutingOptions routing;
   double least_merit = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kMostRoutings; ++round) {
     if (round > 0) lay_out(routing);
-    QualitySchedule schedule = single_quality_schedule(options_.quality);
-    schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    bool going = fit_level(0, schedule, ", edges", kRoutingPortion);
+    AutomaticFitTrial trial = described;
     trial.pads = layout_->pads.pads.size();
-    if (going || result_.trials.empty()) going = judge(trial) && going;
-    if (!going) return false;
+    if (!fit_edges(trial, kRoutingPortion)) return false;
     const double merit = result_.trials.back().merit;
-    if (merit >= least_merit) break;  // what was given up has not helped
-    least_merit = merit;
+    const bool helped = merit < least_merit;  // what was given up; of an invalid mesh, more is
+    if (!helped && is_valid(result_.trials.back())) break;
+    least_merit = std::min(least_merit, merit);
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults_of_cells(), routing)) break;
   }
   return true;
@@ -467,7 +412,7 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
 /// target, then those at edges without a path, the longest first, then those at small features.
 std::vector<Fault> AutomaticFit::faults_of_best() const {
   std::vector<Fault> faults;
-  if (result_.trials[result_.chosen].self_intersections != std::size_t{0})
+  if (best().self_intersections != std::size_t{0})
     for (const Index c : cells_that_meet(result_.mesh)) faults.push_back({c});
   const std::vector<double> least = measure_quality(result_.mesh).cell_minima;
   std::vector<Index> poor = best_start_.poor;
@@ -492,19 +437,19 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
 /// Cuts the cells at which the best trial is not as good as aimed at, and fits the result. Returns false if the fit
 /// must end.
 bool AutomaticFit::run_refined() {
-  const AutomaticFitTrial best = result_.trials[result_.chosen];
+  const AutomaticFitTrial before = best();
   const bool is_smooth = best_start_.kind == Attempt::Kind::smooth;
   const VolumeMesh& base = is_smooth ? result_.mesh : best_start_.grid.mesh;
   const double most_cells =
-      options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(best.cells);
-  const double room = most_cells * static_cast<double>(base.num_cells()) / static_cast<double>(best.cells);
+      options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(before.cells);
+  const double room = most_cells * static_cast<double>(base.num_cells()) / static_cast<double>(before.cells);
   std::optional<SizedMesh> refined =
       refined_at_faults(base, best_start_.grid.sizes, faults_of_best(), static_cast<std::size_t>(room));
   if (!refined) return true;
-  AutomaticFitTrial trial{.template_cells = best.template_cells,
-                          .through_planes = best.through_planes,
+  AutomaticFitTrial trial{.template_cells = before.template_cells,
+                          .through_planes = before.through_planes,
                           .refined_cells = refined->mesh.num_cells(),
-                          .level = best.level};
+                          .level = before.level};
   if (!is_smooth) {
     if (!fit_smoothly(std::move(*refined), best_start_.kind)) return false;
     if (options_.cells && mesh_.num_cells() > *options_.cells) return true;  // its pads took more room than before
@@ -514,9 +459,8 @@ bool AutomaticFit::run_refined() {
   mesh_ = std::move(refined->mesh);
   sizes_ = refined->sizes;
   start_ = {.grid = {{}, std::move(refined->sizes)}};
-  QualitySchedule schedule = fine_quality_schedule(options_.quality);
-  schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-  return fit_level(trial.level, schedule, ", refined") && judge(trial);
+  return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality)), ", refined") &&
+         judge(trial);
 }
 
 /// Returns false if the fit must end. InputError: there is no template, and there was none before.
@@ -530,24 +474,24 @@ bool AutomaticFit::run_attempt(const Attempt& attempt) {
 
 void AutomaticFit::conclude() {
   FitReport& report = result_.report;
-  const AutomaticFitTrial& best = result_.trials[result_.chosen];
+  const AutomaticFitTrial& chosen = best();
   const std::string found = formatted("least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%",
-                                      best.least_scaled_jacobian, best.mean_percent, best.max_percent);
+                                      chosen.least_scaled_jacobian, chosen.mean_percent, chosen.max_percent);
   report.explanation = found;
-  if (best.max_percent > options_.max_tolerance_percent || best.mean_percent > options_.mean_tolerance_percent ||
-      best.least_share < 1)
+  if (chosen.max_percent > options_.max_tolerance_percent || chosen.mean_percent > options_.mean_tolerance_percent ||
+      chosen.least_share < 1)
     report.warnings.push_back(
         formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%): ", options_.quality,
                   options_.mean_tolerance_percent, options_.max_tolerance_percent) +
         found);
-  if (best.feature_miss && best.feature_miss->share > kAutomaticFeatureShare) {
-    const FeatureMiss& miss = *best.feature_miss;
+  if (chosen.feature_miss && chosen.feature_miss->share > kAutomaticFeatureShare) {
+    const FeatureMiss& miss = *chosen.feature_miss;
     report.warnings.push_back(
         formatted("a feature of radius %.4g (a hole, pin, wall or slot) is missed by %.4g, "
                   "%.0f %% of its size, at (%.6g, %.6g, %.6g); more cells may hold it",
                   miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
   }
-  warn_of_missed_edges(result_.missed_edges, best.curves, "sharp edges", report);
+  warn_of_missed_edges(result_.missed_edges, chosen.curves, "sharp edges", report);
 }
 
 AutomaticFitResult AutomaticFit::run() {
@@ -565,21 +509,18 @@ AutomaticFitResult AutomaticFit::run() {
     going = run_attempt(attempt);
   }
   going = going && !result_.trials.empty();
-  for (int round = 0; going && !is_good() && round < kMostRefinements; ++round) {
+  for (int round = 0; going && is_worth_refining() && round < kMostRefinements; ++round) {
     const std::size_t before = result_.chosen;
     begin_attempt();
     going = run_refined();
     if (result_.chosen == before) break;
   }
-  if (going && !edges_.features.curves.empty() && !is_valid(result_.trials[result_.chosen])) {
+  if (going && !edges_.features.curves.empty() && !is_valid(best())) {
     begin_attempt();
     going = run_attempt({Attempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   }
   if (going) conclude();
-  result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
-  for (FitState& state : result_.states) state.positions = target_.normalisation.from_unit(std::move(state.positions));
-  result_.report.seconds = {{"total", runner_.seconds()}};
-  return std::move(result_);
+  return finish();
 }
 
 }  // namespace
@@ -587,7 +528,10 @@ AutomaticFitResult AutomaticFit::run() {
 AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options) {
   if (const std::optional<RegionSurface> regions = find_regions(target, options.regions))
     return fit_regions(*regions, options);
-  return AutomaticFit(target, options).run();
+  const EdgeChoice follows{has_edges_to_follow(target, checked_options(options)),
+                           options.keeps_groups && !group_borders(target, target).empty()};
+  if (!follows.any()) return AutomaticFit(target, follows, options).run();
+  return AutomaticFit(solid_boundary(target).surface, follows, options).run();
 }
 
 }  // namespace subvol

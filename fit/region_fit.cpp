@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/automatic_fit.h"
-#include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/sheet_layout.h"
@@ -54,17 +54,14 @@ RegionSurface normalised(RegionSurface surface, const Normalisation& normalisati
   return surface;
 }
 
-/// An automatic fit of several regions, in normalized coordinates.
-class RegionFit {
+/// An automatic fit of several regions.
+class RegionFit : AutomaticDriver {
  public:
   RegionFit(const RegionSurface& target, const AutomaticFitOptions& options)
-      : options_(checked_options(options)),
+      : AutomaticDriver(options, target),
         original_(target),
-        target_(target),
         unit_(normalised(target, target_.normalisation)),
-        tree_(unit_.mesh),
-        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
-                 options.cancelled, options.log}) {}
+        tree_(unit_.mesh) {}
   AutomaticFitResult run();
 
  private:
@@ -75,31 +72,19 @@ class RegionFit {
   std::optional<VolumeMesh> make_grid(std::size_t cells);
   VolumeMesh pillowed(const VolumeMesh& grid) const;
   bool lies_on_target(std::span<const std::array<Index, 4>> faces, const VolumeMesh& grid) const;
-  /// Begins a part of the attempt that takes this portion of what is left of it.
-  void begin_part(double portion, double forecast) {
-    runner_.work().begin_portion(portion, share_at_end_, forecast);
-  }
-  bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1);
+  bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) override;
   void group_by_pairs(QualityBoundary& boundary, const MeshTopology& topology) const;
   double volume_percent() const;
-  bool judge(AutomaticFitTrial trial);
+  bool judge(AutomaticFitTrial trial) override;
   void conclude();
 
-  AutomaticFitOptions options_;
   const RegionSurface& original_;
-  FitTarget target_;
   RegionSurface unit_;                 ///< the target in normalized coordinates
   ClosestPoint tree_;                  ///< over all its triangles
   bool follows_edges_ = false;
   SheetCurves curves_;                 ///< to follow, if edges are followed
-  VolumeMesh mesh_;
   std::optional<SheetLayout> layout_;  ///< of mesh_; none: sheets correspond as wholes
-  std::string no_template_;            ///< why the last template that was asked for does not exist; empty: it does
   RegionTemplate template_;            ///< the last one, without its mesh
-  AutomaticFitResult result_;
-  double share_at_end_ = 0;            ///< of the attempt in progress
-  double least_share_ = 1;
-  StageRunner runner_;
 };
 
 void RegionFit::find_curves() {
@@ -116,18 +101,10 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   RegionTemplateOptions options;
   options.cells = std::clamp(cells, kLeastTemplateCells, kMostTemplateCells);
   options.for_pillow = true;
-  begin_part(kTemplatePortion, 1);
-  options.progress = [this](double fraction) {
-    runner_.work().set(fraction);
-    return !runner_.is_to_end() &&
-           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
-  };
+  options.progress = begin_template();
   RegionTemplateResult made = region_template(original_, options);
   if (made.cancelled) {
-    if (runner_.in_time("the template", result_.report)) {
-      result_.report.stop_reason = StopReason::cancelled;
-      result_.report.explanation = "cancelled in the template";
-    }
+    note_end_in_template();
     return std::nullopt;
   }
   if (!made.made) {
@@ -144,9 +121,7 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   }
   VolumeMesh mesh = std::move(made.made->mesh);
   template_ = std::move(*made.made);
-  target_.normalisation.take_in(mesh);
-  if (result_.report.stages.empty())
-    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
+  take_in(mesh);
   return mesh;
 }
 
@@ -190,7 +165,6 @@ void RegionFit::group_by_pairs(QualityBoundary& boundary, const MeshTopology& to
 bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
   constexpr int kIntervals = 2;
-  constexpr std::size_t kSamplesPerQuad = 4, kMostSamplesPerQuad = 8;
   const MeshTopology topology(mesh_);
   QualityBoundary boundary;
   boundary.interfaces = find_interfaces(mesh_, topology).faces;
@@ -199,7 +173,7 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
   const std::vector<Vec3> lengths(mesh_.num_cells(), Vec3::Constant(h));
   BoundarySamples samples =
       make_sheet_samples(ElementSpace(mesh_, Basis::legendre, 1), mesh_, kIntervals, mesh_.tags.creases);
-  target_.sample(kSamplesPerQuad * faces, 1, kMostSamplesPerQuad * faces);
+  sample_target(faces);
   boundary.samples = std::move(samples.positions);
   boundary.triangles = samples.triangles;
   boundary.triangle_faces = samples.triangle_faces;
@@ -214,14 +188,7 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
   } else {
     group_by_pairs(boundary, topology);
   }
-  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
-  StageRecord record;
-  record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
-  record.level = level;
-  record.cells = mesh_.num_cells();
-  const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
-  least_share_ = stages.state().cells.least_share;
-  return going;
+  return run_stages(boundary, lengths, creases, level, schedule, what);
 }
 
 /// Returns the largest difference of a region's volume from the target's, in percent.
@@ -248,18 +215,13 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
   trial.max_percent = 100 * std::max(outer.max(), inner.max());
   trial.volume_percent = volume_percent();
-  trial.least_share = least_share_;
   trial.self_intersections = runner_.intersecting_pairs(sheet_triangles(mesh_), result_.report);
   std::optional<CreaseDistance> edges;
-  if (layout_ && !curves_.features.curves.empty()) {
+  if (layout_ && !curves_.features.curves.empty())
     edges = crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
-    edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
-  }
   const bool going = trial.self_intersections.has_value();
-  if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return going;
-  result_.missed_edges.clear();
-  if (layout_)
-    result_.missed_edges = missed_edges(layout_->routing.unfollowed, curves_.features.curves, target_.normalisation);
+  keep_if_best(std::move(trial), quality, edges, layout_ ? layout_->routing.unfollowed : std::vector<UnfollowedCurve>{},
+               curves_.features.curves);
   return going;
 }
 
@@ -286,19 +248,7 @@ bool RegionFit::run_smooth(std::size_t cells) {
     levels = 0;
     if (mesh_.num_cells() < cells / 2 && !make_template(cells)) return !no_template_.empty();
   }
-  AutomaticFitTrial trial{.template_cells = mesh_.num_cells()};
-  bool going = true;
-  for (int level = 0; going && level <= levels; ++level) {
-    if (level > 0) mesh_ = smooth_refinement(mesh_);
-    trial.level = level;
-    QualitySchedule schedule = levels == 0  ? single_quality_schedule(options_.quality)
-                               : level == 0 ? coarse_quality_schedule(options_.quality)
-                                            : fine_quality_schedule(options_.quality);
-    if (level == levels) schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    going = fit_level(level, schedule, "", level < levels ? kCoarsePortion : 1);
-  }
-  if (going || result_.trials.empty()) going = judge(trial) && going;
-  return going;
+  return fit_and_refine(levels);
 }
 
 /// Fits a grid whose sheets are routed and pillowed.
@@ -324,11 +274,7 @@ bool RegionFit::run_curves(std::size_t cells) {
     layout_ = sheet_layout(mesh_, unit_, curves_, {});
     mesh_ = std::move(padded);
     mesh_.tags = layout_->tagged_mesh.tags;
-    QualitySchedule schedule = single_quality_schedule(options_.quality);
-    schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
-    bool going = fit_level(0, schedule, ", edges");
-    if (going || result_.trials.empty()) going = judge({.template_cells = grid->num_cells()}) && going;
-    return going;
+    return fit_edges({.template_cells = grid->num_cells()}, 1);
   }
 }
 
@@ -336,19 +282,19 @@ bool RegionFit::run_curves(std::size_t cells) {
 bool RegionFit::run_count(std::size_t cells) {
   layout_.reset();
   no_template_.clear();
-  const bool going = follows_edges_ ? run_curves(cells) : run_smooth(cells);
-  return going;
+  return follows_edges_ ? run_curves(cells) : run_smooth(cells);
 }
 
 void RegionFit::conclude() {
   FitReport& report = result_.report;
-  const AutomaticFitTrial& best = result_.trials[result_.chosen];
-  report.explanation = formatted("%zu regions, least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%, "
-                                 "volumes within %.3g %%",
-                                 original_.regions.size(), best.least_scaled_jacobian, best.mean_percent,
-                                 best.max_percent, best.volume_percent);
-  if (best.max_percent > options_.max_tolerance_percent || best.mean_percent > options_.mean_tolerance_percent ||
-      best.volume_percent > kAutomaticVolumePercent || best.least_share < 1)
+  const AutomaticFitTrial& chosen = best();
+  report.explanation = formatted(
+      "%zu regions, least scaled Jacobian %.3f, mean distance %.4g %%, largest %.4g %%, "
+      "volumes within %.3g %%",
+      original_.regions.size(), chosen.least_scaled_jacobian, chosen.mean_percent, chosen.max_percent,
+      chosen.volume_percent);
+  if (chosen.max_percent > options_.max_tolerance_percent || chosen.mean_percent > options_.mean_tolerance_percent ||
+      chosen.volume_percent > kAutomaticVolumePercent || chosen.least_share < 1)
     report.warnings.push_back(formatted("not as good as aimed at (quality %.2f, distances %.3g and %.3g %%, volumes "
                                         "%.3g %%): ",
                                         options_.quality, options_.mean_tolerance_percent,
@@ -358,7 +304,7 @@ void RegionFit::conclude() {
     report.warnings.push_back(formatted("%zu interfaces or parts of the boundary have another topology than in the "
                                         "target; more --cells may mend that",
                                         template_.wrong_sheets));
-  warn_of_missed_edges(result_.missed_edges, best.curves, "curves", report);
+  warn_of_missed_edges(result_.missed_edges, chosen.curves, "curves", report);
 }
 
 AutomaticFitResult RegionFit::run() {
@@ -368,17 +314,14 @@ AutomaticFitResult RegionFit::run() {
   if (follows_edges_) counts.assign(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
   if (options_.cells) counts = {*options_.cells};
   bool going = true;
-  for (std::size_t i = 0; i < counts.size() && going; ++i) {
-    if (!result_.trials.empty() && is_good_enough(result_.trials[result_.chosen])) break;
-    share_at_end_ += kAttemptPortion * (1 - share_at_end_);
+  for (std::size_t i = 0; i < counts.size() && going && !is_good(); ++i) {
+    begin_attempt();
     going = run_count(counts[i]);
   }
   if (result_.trials.empty() && !no_template_.empty()) throw InputError(no_template_);
   if (going) conclude();
-  result_.mesh.positions = target_.normalisation.from_unit(std::move(result_.mesh.positions));
   if (result_.mesh.num_cells() > 0) add_interface_groups(result_.mesh);
-  result_.report.seconds = {{"total", runner_.seconds()}};
-  return std::move(result_);
+  return finish();
 }
 
 }  // namespace

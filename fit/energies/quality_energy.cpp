@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -315,6 +316,11 @@ double QualityEnergy::add_derivatives(std::span<const Vec3> nodes, double scale,
 }
 
 double QualityEnergy::value(std::span<const Vec3> nodes) const {
+  const std::vector<double> energies = cell_values(nodes);
+  return std::accumulate(energies.begin(), energies.end(), 0.0);
+}
+
+std::vector<double> QualityEnergy::cell_values(std::span<const Vec3> nodes) const {
   std::vector<double> energies(mesh_->num_cells());
 #pragma omp parallel
   {
@@ -322,9 +328,7 @@ double QualityEnergy::value(std::span<const Vec3> nodes) const {
 #pragma omp for schedule(static)
     for (std::size_t c = 0; c < energies.size(); ++c) energies[c] = evaluate<false>(c, nodes, unused);
   }
-  double sum = 0;
-  for (const double energy : energies) sum += energy;
-  return sum;
+  return energies;
 }
 
 double QualityEnergy::add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const {

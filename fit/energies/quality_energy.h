@@ -83,6 +83,7 @@ class QualityEnergy final : public VolumeTerm {
   std::vector<Index> poor_between_points(std::span<const Vec3> nodes, double goal) const;
 
   double value(std::span<const Vec3> nodes) const override;
+  std::vector<double> cell_values(std::span<const Vec3> nodes) const override;
   double add_gradient(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) const override;
   double linearize(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) override;
   void multiply(std::span<const Vec3> in, std::span<Vec3> out) const override { hessian_.multiply(in, out); }

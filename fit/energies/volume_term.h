@@ -47,6 +47,9 @@ class VolumeTerm {
 
   /// Returns the cells that are not certified, i.e. not proved to have det J > 0 everywhere, ascending.
   virtual std::vector<Index> uncertified(std::span<const Vec3> nodes) const = 0;
+  /// Returns the energy of each cell, whose sum is `value`. Only for terms that the Levenberg-Marquardt method
+  /// minimizes.
+  virtual std::vector<double> cell_values(std::span<const Vec3> nodes) const { return {value(nodes)}; }
   /// Returns the cells that a step from one state to another ruins, ascending, so that it must be shortened at their
   /// vertices. None for terms that limit steps by `max_step`.
   virtual std::vector<Index> ruined(std::span<const Vec3> /*before*/, std::span<const Vec3> /*after*/) const {

@@ -2,12 +2,16 @@
 #include "subvol/fit/solver/levenberg_marquardt.h"
 
 #include "subvol/base/format.h"
+#include "subvol/fit/solver/anderson.h"
 #include "subvol/fit/solver/reduced_hessian.h"
 #include "subvol/fit/solver/vector_math.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -15,9 +19,29 @@ namespace subvol::internal {
 
 namespace {
 
-constexpr double kLeastDamping = 1e-6, kMostDamping = 1e4;
+constexpr double kLeastDamping = 1e-4, kMostDamping = 1e4;
 constexpr double kLess = 0.3, kMore = 6;  // factors on mu after a step that was taken at once, and one that was not
+constexpr double kMostLocalDamping = 1e6;
 constexpr int kMostTrials = 8;
+
+/// Returns the cells whose energy rises most, as few as account for half of all rises.
+std::vector<Index> most_risen(std::span<const double> before, std::span<const double> after) {
+  constexpr double kShare = 0.5;
+  std::vector<Index> cells;
+  const auto rise = [&](Index c) { return after[c] - before[c]; };
+  double rest = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto c = static_cast<Index>(i);
+    if (!(rise(c) > 0)) continue;
+    rest += kShare * rise(c);
+    cells.push_back(c);
+  }
+  std::ranges::stable_sort(cells, std::greater{}, rise);
+  std::size_t count = 0;
+  while (count < cells.size() && rest > 0) rest -= rise(cells[count++]);
+  cells.resize(count);
+  return cells;
+}
 
 /// One minimization by the Levenberg-Marquardt method.
 class LevenbergMarquardtRun {
@@ -33,6 +57,17 @@ class LevenbergMarquardtRun {
   bool shorten_where_harmful();
   void shorten_at(std::span<const Index> cells, double factor);
   void try_nodes();
+  void evaluate_trial();
+  /// Shortens d_ at the vertices of the few cells that lose more than all else gains, until E decreases. Returns false
+  /// if it does not, or if the caller wants to stop.
+  bool shorten_until_downhill();
+  /// Raises the damping where d_ was shortened, and lowers it elsewhere.
+  void damp_where_shortened();
+  /// Takes the step that was found.
+  void take_step(IterationRecord& record);
+  /// Takes the step that follows from the last ones by Anderson acceleration instead, if it ruins no cell and E, with
+  /// correspondences found anew, is not above that of the step that was found. Returns false if it does not.
+  bool take_accelerated_step(IterationRecord& record);
   bool is_done(const IterationRecord& record);
 
   FitProblem& problem_;
@@ -40,10 +75,16 @@ class LevenbergMarquardtRun {
   const MinimizerOptions& options_;
   MinimizerResult result_{MinimizerStop::iteration_limit, "", {}};
   double damping_ = 0;
+  std::vector<double> local_damping_;    // what mu is multiplied by at each degree of freedom
+  std::vector<std::uint8_t> shortened_;  // not zero for the degrees of freedom at which d_ was shortened
   std::vector<Vec3> y_, z_, d_, dy_, dz_, y_trial_, z_trial_;
   std::vector<Mat3> inverse_diagonal_;
   Linearization linearized_;
+  AndersonMemory memory_;
+  std::vector<Vec3> step_;
+  bool is_assigned_ = false;  // true if the surface term's correspondences are those of z_
   std::vector<Index> uncertified_;
+  std::vector<double> trial_cells_;  // energy of each cell at y_trial_
   double energy_ = 0, trial_ = 0, trial_surface_ = 0, trial_volume_ = 0;
 };
 
@@ -54,6 +95,7 @@ LevenbergMarquardtRun::LevenbergMarquardtRun(FitProblem& problem, std::vector<Ve
   damping_ = damping_after(options.first_damping, result_.iterations);
   for (auto* nodes : {&y_, &dy_, &y_trial_}) nodes->resize(problem.nodes.num_rows());
   for (auto* samples : {&z_, &dz_, &z_trial_}) samples->resize(problem.samples.num_rows());
+  local_damping_.assign(x.size(), 1);
   problem.apply_nodes(x, y_);
   problem.apply_samples(x, z_);
   uncertified_ = problem.volume->uncertified(y_);
@@ -67,7 +109,7 @@ void LevenbergMarquardtRun::damp(ReducedHessian& hessian, std::span<const Mat3> 
   mean /= static_cast<double>(std::max<std::size_t>(diagonal.size(), 1));
   std::vector<Mat3> damped(diagonal.begin(), diagonal.end());
   for (std::size_t j = 0; j < added.size(); ++j) {
-    added[j] = damping_ * 0.5 * (added[j] + mean) + kRounding * mean;
+    added[j] = std::min(kMostDamping, damping_ * local_damping_[j]) * 0.5 * (added[j] + mean) + kRounding * mean;
     damped[j].diagonal().array() += added[j];
   }
   inverse_diagonal_ = inverse_blocks(damped);
@@ -83,8 +125,18 @@ void LevenbergMarquardtRun::shorten_at(std::span<const Index> cells, double fact
   std::vector<std::uint8_t> marked(d_.size(), 0);
   for (const Index node : problem_.volume->nodes_of(cells))
     for (const Index j : problem_.nodes.row_columns(node)) marked[j] = 1;
-  for (std::size_t j = 0; j < d_.size(); ++j)
-    if (marked[j]) d_[j] *= factor;
+  for (std::size_t j = 0; j < d_.size(); ++j) {
+    if (marked[j] == 0) continue;
+    d_[j] *= factor;
+    shortened_[j] = 1;
+  }
+}
+
+void LevenbergMarquardtRun::damp_where_shortened() {
+  for (std::size_t j = 0; j < local_damping_.size(); ++j) {
+    double& local = local_damping_[j];
+    local = shortened_[j] != 0 ? std::min(kMostLocalDamping, kMore * local) : std::max(1.0, kLess * local);
+  }
 }
 
 bool LevenbergMarquardtRun::shorten_where_harmful() {
@@ -104,6 +156,29 @@ bool LevenbergMarquardtRun::shorten_where_harmful() {
   return newly_failed(uncertified_, problem_.volume->uncertified(y_trial_)).empty();
 }
 
+void LevenbergMarquardtRun::evaluate_trial() {
+  problem_.multiply_samples(d_, dz_);
+  for (std::size_t i = 0; i < z_.size(); ++i) z_trial_[i] = z_[i] + dz_[i];
+  trial_surface_ = problem_.surface ? problem_.surface->value(z_trial_) : 0;
+  trial_cells_ = problem_.volume->cell_values(y_trial_);
+  trial_volume_ = std::accumulate(trial_cells_.begin(), trial_cells_.end(), 0.0);
+  trial_ = trial_surface_ + problem_.lambda * trial_volume_;
+}
+
+bool LevenbergMarquardtRun::shorten_until_downhill() {
+  constexpr int kMostShortenings = 8;
+  std::vector<double> cells;
+  for (int pass = 0; shorten_where_harmful(); ++pass) {
+    evaluate_trial();
+    if (trial_ < energy_) return true;
+    if (pass == kMostShortenings || has_ended(options_, result_)) return false;
+    if (cells.empty()) cells = problem_.volume->cell_values(y_);
+    shorten_at(most_risen(cells, trial_cells_), 0.5);
+    try_nodes();
+  }
+  return false;
+}
+
 bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
   ReducedHessian hessian(problem_);
   const std::vector<Mat3> diagonal = hessian.diagonal();
@@ -111,6 +186,7 @@ bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
     damp(hessian, diagonal);
     record.linear_iterations += conjugate_gradients(hessian, inverse_diagonal_, linearized_.gradient(), options_, d_);
     if (has_ended(options_, result_)) return false;
+    shortened_.assign(d_.size(), 0);
     try_nodes();
     double longest = 0;
     for (const Vec3& d : dy_) longest = std::max(longest, d.norm());
@@ -119,17 +195,53 @@ bool LevenbergMarquardtRun::find_step(IterationRecord& record) {
       try_nodes();
     }
     ++record.evaluations;
-    if (shorten_where_harmful()) {
-      problem_.multiply_samples(d_, dz_);
-      for (std::size_t i = 0; i < z_.size(); ++i) z_trial_[i] = z_[i] + dz_[i];
-      trial_surface_ = problem_.surface ? problem_.surface->value(z_trial_) : 0;
-      trial_volume_ = problem_.volume->value(y_trial_);
-      trial_ = trial_surface_ + problem_.lambda * trial_volume_;
-      if (trial_ < energy_) return true;
-    }
+    if (shorten_until_downhill()) return true;
+    if (result_.stop == MinimizerStop::cancelled) return false;
     damping_ = std::min(kMostDamping, kMore * damping_);
   }
   return false;
+}
+
+void LevenbergMarquardtRun::take_step(IterationRecord& record) {
+  add_scaled(1, d_, x_);
+  problem_.apply_nodes(x_, y_);
+  problem_.apply_samples(x_, z_);
+  record.surface_energy = trial_surface_;
+  record.volume_energy = trial_volume_;
+}
+
+bool LevenbergMarquardtRun::take_accelerated_step(IterationRecord& record) {
+  if (!options_.accelerates || !problem_.surface) return false;
+  memory_.add(x_, d_, linearized_.gradient());
+  if (!memory_.find_step(step_)) return false;
+  const auto accept = [&] {
+    problem_.nodes.apply(step_, dy_);
+    if (options_.longest_move > 0)
+      for (const Vec3& d : dy_)
+        if (d.norm() > options_.longest_move) return false;
+    add_scaled(1, x_, step_);
+    problem_.apply_nodes(step_, y_trial_);
+    const double volume = problem_.volume->value(y_trial_);
+    if (!(problem_.lambda * volume <= trial_)) return false;
+    if (!problem_.volume->ruined(y_, y_trial_).empty()) return false;
+    if (!newly_failed(uncertified_, problem_.volume->uncertified(y_trial_)).empty()) return false;
+    problem_.apply_samples(step_, z_trial_);
+    problem_.surface->assign(z_trial_);
+    const double surface = problem_.surface->value(z_trial_), energy = surface + problem_.lambda * volume;
+    if (!(energy <= trial_)) return false;
+    trial_ = energy;
+    record.surface_energy = surface;
+    record.volume_energy = volume;
+    return true;
+  };
+  if (!accept()) {
+    memory_.clear();
+    return false;
+  }
+  std::swap(x_, step_);
+  std::swap(y_, y_trial_);
+  std::swap(z_, z_trial_);
+  return is_assigned_ = true;
 }
 
 bool LevenbergMarquardtRun::is_done(const IterationRecord& record) {
@@ -143,7 +255,7 @@ bool LevenbergMarquardtRun::is_done(const IterationRecord& record) {
 }
 
 MinimizerResult LevenbergMarquardtRun::run() {
-  constexpr int kStepsBetweenStates = 4;
+  constexpr int kStepsBetweenStates = 8;
   const auto end = [&](MinimizerStop why, std::string explanation) {
     result_.stop = why;
     result_.explanation = std::move(explanation);
@@ -153,10 +265,14 @@ MinimizerResult LevenbergMarquardtRun::run() {
     if (iteration > 0 && iteration % kStepsBetweenStates == 0) {
       // From here on nothing but x and the result is used, so that the minimization can be resumed from them.
       if (problem_.surface) problem_.surface->forget();
+      is_assigned_ = false;
+      memory_.clear();
+      local_damping_.assign(x_.size(), 1);
       uncertified_ = problem_.volume->uncertified(y_);
       if (options_.keep) options_.keep(x_, result_);
     }
-    energy_ = linearized_.linearize(problem_, y_, z_);
+    energy_ = linearized_.linearize(problem_, y_, z_, false, is_assigned_);
+    is_assigned_ = false;
     if (!std::isfinite(energy_)) return end(MinimizerStop::infeasible_start, "the energy is not finite at the start");
     if (energy_ == 0) return end(MinimizerStop::converged, "the energy vanishes");
     IterationRecord record;
@@ -164,12 +280,9 @@ MinimizerResult LevenbergMarquardtRun::run() {
       if (result_.stop == MinimizerStop::cancelled) return std::move(result_);
       return end(MinimizerStop::no_step, "no step decreases the energy");
     }
-    add_scaled(1, d_, x_);
-    problem_.apply_nodes(x_, y_);
-    problem_.apply_samples(x_, z_);
     if (record.evaluations == 1) damping_ = std::max(kLeastDamping, kLess * damping_);
-    record.surface_energy = trial_surface_;
-    record.volume_energy = trial_volume_;
+    damp_where_shortened();
+    if (!take_accelerated_step(record)) take_step(record);
     record.step_length = 1;
     if (is_done(record)) return std::move(result_);
   }

@@ -49,8 +49,8 @@ struct MinimizerOptions {
   /// Newton's method only: steps for which the cells' Hessian is kept, 1 to 4. It changes slowly after the first steps,
   /// and what a step aims at is decided by the gradient, which is always that of the present state.
   int hessian_life = 1;
-  /// Newton's method only: steps are accelerated by what the last ones have shown (`AndersonMemory`), since frozen
-  /// correspondences make it converge linearly.
+  /// Not for L-BFGS: steps are accelerated by what the last ones have shown (`AndersonMemory`), since frozen
+  /// correspondences make the methods converge linearly.
   bool accelerates = false;
   /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
   double longest_move = 0;

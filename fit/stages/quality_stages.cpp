@@ -54,20 +54,20 @@ QualitySchedule coarse_quality_schedule(double goal) {
   const auto weights = [](double hinge, double threshold) {
     return QualityWeights{.hinge = hinge, .threshold = threshold};
   };
-  return {{{1, weights(50, 0.3), 12}, {10, weights(50, 0.5), 12}, {100, weights(100, 0.6), 12}},
+  return {{{1, weights(50, 0.3), 6}, {10, weights(50, 0.5), 5}, {100, weights(100, 0.6), 6}},
           {100, weights(200, goal), kMostCoarseLiftSteps},
           goal - kCoarseMargin};
 }
 
 QualitySchedule smooth_quality_schedule() {
-  return {{{1, {.hinge = 50, .threshold = 0.3}, 12}, {10, {.hinge = 50, .threshold = 0.4}, 10}}, {100, {}, 0}, 0.1};
+  return {{{1, {.hinge = 50, .threshold = 0.3}, 6}, {10, {.hinge = 50, .threshold = 0.4}, 4}}, {100, {}, 0}, 0.1};
 }
 
 QualitySchedule fine_quality_schedule(double goal) {
   const auto weights = [](double hinge, double threshold) {
     return QualityWeights{.hinge = hinge, .threshold = threshold};
   };
-  return {{{20, weights(50, 0.6), 8}, {100, weights(100, above(goal, 0.1)), 8}},
+  return {{{20, weights(50, 0.6), 4}, {100, weights(100, above(goal, 0.1)), 5}},
           {100, weights(200, above(goal)), kMostFineLiftSteps},
           goal};
 }
@@ -197,7 +197,8 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   problem_->lambda = lambda;
   StageRecord record = record_;
   record.name = name;
-  const Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_, damping_};
+  Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_, damping_};
+  settings.accelerates = true;
   const bool going = runner_->run(*problem_, settings, std::move(record), x, *report_, step_work_);
   damping_ = damping_after(damping_, report_->stages.back().iterations);
   if (after_stage) after_stage(name, x);
@@ -305,7 +306,7 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
 /// Raises the emphasis on poor cells and far places every two steps until none is left or patches can be made, lifts
 /// these, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
-  constexpr int kSteps = 2, kPatience = 8;
+  constexpr int kSteps = 2, kPatience = 5;
   constexpr double kNoEnd = 1e-9;  // two steps must not end a stage
   const bool is_patch = patch_mesh_ != nullptr;
   energy_->reset_emphasis();
@@ -345,7 +346,7 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
 
 bool QualityStages::run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record,
                         std::vector<Vec3>& x, FitReport& report) {
-  constexpr double kLeastDecrease = 1e-3;
+  constexpr double kLeastDecrease = 3e-3;
   runner_ = &runner;
   record_ = record;
   report_ = &report;

@@ -17,11 +17,10 @@ struct Stage {
   /// squares, which the Levenberg-Marquardt method minimizes. 0: the fit's own solver does.
   double longest_move = 0;
   double first_damping = 1e-3;  ///< of that method
-  /// Newton's method: relative tolerance of its linear systems, steps for which the cells' Hessian is kept, and whether
-  /// steps are accelerated (`MinimizerOptions`).
+  /// Newton's method: relative tolerance of its linear systems, and steps for which the cells' Hessian is kept.
   double linear_tolerance = 0.1;
   int hessian_life = 1;
-  bool accelerates = false;
+  bool accelerates = false;  ///< whether steps are accelerated (`MinimizerOptions`)
 };
 
 /// Number of L-BFGS steps that replace one Newton step of a stage.

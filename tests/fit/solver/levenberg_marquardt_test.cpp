@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/solver/levenberg_marquardt.h"
 
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/energies/quality_energy.h"
 #include "subvol/fit/quality/quality.h"
+#include "subvol/fit/target/target_surface.h"
+#include "tests/support/region_fixtures.h"
 #include "tests/support/sample_meshes.h"
 
 #include <catch2/catch.hpp>
 
-#include <memory>
 #include <omp.h>
+#include <array>
+#include <memory>
+#include <numeric>
 #include <random>
 
 using namespace subvol;
@@ -40,7 +46,39 @@ MinimizerOptions options_of(int steps) {
   return options;
 }
 
+/// A lattice whose boundary is drawn to a ball that has moved along itself: the correspondences slide.
+FitProblem ball_problem(const VolumeMesh& mesh, const TargetSurface& target) {
+  FitProblem problem = problem_of(mesh);
+  BoundarySamples samples = make_boundary_samples(ElementSpace(mesh, Basis::legendre, 1), 2, {});
+  problem.surface = std::make_unique<ClosestPointEnergy>(target, samples.triangles, samples.positions.num_rows(), 0.02,
+                                                         1, SurfacePull::straight_both_ways);
+  return FitProblem(problem.nodes, samples.positions, std::move(problem.volume), std::move(problem.surface), 1e-5);
+}
+
 }  // namespace
+
+TEST_CASE("Accelerated steps of Levenberg-Marquardt reach a lower energy in the same number of steps") {
+  const VolumeMesh mesh = test::lattice(4, 4, 4);
+  const TargetSurface target(test::ball_surface(Vec3(2, 2, 2), 2.5, 8));
+  std::array<double, 2> energies;
+  for (const bool accelerates : {false, true}) {
+    FitProblem problem = ball_problem(mesh, target);
+    std::vector<Vec3> x = mesh.positions;
+    MinimizerOptions options = options_of(8);
+    options.relative_decrease = 0;
+    options.accelerates = accelerates;
+    const MinimizerResult result = minimize_levenberg_marquardt(problem, x, options);
+    for (std::size_t i = 1; i < result.iterations.size(); ++i) {
+      const IterationRecord &before = result.iterations[i - 1], &now = result.iterations[i];
+      CHECK(now.surface_energy + 1e-5 * now.volume_energy <
+            1.01 * (before.surface_energy + 1e-5 * before.volume_energy));
+    }
+    problem.surface->assign(problem.samples.apply(x));
+    energies[accelerates] =
+        problem.surface->value(problem.samples.apply(x)) + problem.lambda * problem.volume->value(x);
+  }
+  CHECK(energies[1] < 0.99 * energies[0]);
+}
 
 TEST_CASE("Levenberg-Marquardt raises scaled Jacobians, keeps certificates, the same bits for any number of threads") {
   const VolumeMesh mesh = disturbed_lattice();
@@ -66,6 +104,24 @@ TEST_CASE("Levenberg-Marquardt raises scaled Jacobians, keeps certificates, the 
   CHECK(quality.certificate.not_certified.size() <= before.certificate.not_certified.size());
   CHECK(quality.min_scaled_jacobian > 0.6);
   CHECK(quality.mean_scaled_jacobian > before.mean_scaled_jacobian);
+}
+
+TEST_CASE("Levenberg-Marquardt shortens steps where few cells are worse before it damps all of them") {
+  const VolumeMesh mesh = disturbed_lattice();
+  FitProblem problem = problem_of(mesh);
+  std::vector<Vec3> x = mesh.positions;
+  const MinimizerResult result = minimize_levenberg_marquardt(problem, x, options_of(8));
+  REQUIRE(result.iterations.size() == 8);
+  for (const IterationRecord& step : result.iterations) CHECK(step.evaluations == 1);
+  CHECK(result.iterations.back().volume_energy < 0.1 * problem.volume->value(mesh.positions));
+}
+
+TEST_CASE("The energies of cells add up to that of the mesh") {
+  const VolumeMesh mesh = disturbed_lattice();
+  const FitProblem problem = problem_of(mesh);
+  const std::vector<double> energies = problem.volume->cell_values(mesh.positions);
+  REQUIRE(energies.size() == mesh.num_cells());
+  CHECK(std::accumulate(energies.begin(), energies.end(), 0.0) == problem.volume->value(mesh.positions));
 }
 
 TEST_CASE("Levenberg-Marquardt resumes at the same bits") {

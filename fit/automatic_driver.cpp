@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/automatic_driver.h"
+
+#include "subvol/base/format.h"
+#include "subvol/fit/fits/smooth_refinement.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
+
+#include <utility>
+
+namespace subvol::internal {
+
+std::function<bool(double)> AutomaticDriver::begin_template() {
+  begin_part(kTemplatePortion, 1);
+  return [this](double fraction) {
+    runner_.work().set(fraction);
+    return !runner_.is_to_end() &&
+           (!options_.progress || options_.progress({"template", 0, 0, fraction, runner_.work().share()}));
+  };
+}
+
+void AutomaticDriver::note_end_in_template() {
+  if (!runner_.in_time("the template", result_.report)) return;
+  result_.report.stop_reason = StopReason::cancelled;
+  result_.report.explanation = "cancelled in the template";
+}
+
+void AutomaticDriver::take_in(VolumeMesh& mesh) {
+  target_.normalisation.take_in(mesh);
+  if (result_.report.stages.empty())
+    result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
+}
+
+QualitySchedule AutomaticDriver::aiming_at_distance(QualitySchedule schedule) const {
+  schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+  return schedule;
+}
+
+bool AutomaticDriver::fit_and_refine(int levels) {
+  AutomaticFitTrial trial{.template_cells = mesh_.num_cells(), .level = levels};
+  bool going = true;
+  for (int level = 0; going && level < levels; ++level) {
+    going = fit_level(level, coarse_quality_schedule(options_.quality), "", kCoarsePortion);
+    if (going)
+      mesh_ = smooth_refinement(mesh_);
+    else
+      trial.level = level;
+  }
+  if (going)
+    going = fit_level(levels,
+                      aiming_at_distance(levels == 0 ? single_quality_schedule(options_.quality)
+                                                     : fine_quality_schedule(options_.quality)),
+                      "");
+  if (going || result_.trials.empty()) going = judge(trial) && going;
+  return going;
+}
+
+bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
+  const bool going = fit_level(0, aiming_at_distance(single_quality_schedule(options_.quality)), ", edges", portion);
+  return going || result_.trials.empty() ? judge(std::move(trial)) && going : going;
+}
+
+void AutomaticDriver::sample_target(std::size_t faces) {
+  constexpr std::size_t kSamplesPerFace = 4, kMostSamplesPerFace = 8;
+  target_.sample(kSamplesPerFace * faces, 1, kMostSamplesPerFace * faces);
+}
+
+bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<const Vec3> lengths,
+                                 const std::function<CreaseEnergy(double)>& creases, int level,
+                                 const QualitySchedule& schedule, const char* what,
+                                 const std::function<void(QualityStages&)>& prepare) {
+  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
+  if (prepare) prepare(stages);
+  if (options_.keep_states) {
+    states_ = {{"start", mesh_.positions}};
+    stages.after_stage = [this](const std::string& name, const std::vector<Vec3>& x) { states_.push_back({name, x}); };
+  }
+  StageRecord record;
+  record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
+  record.level = level;
+  record.cells = mesh_.num_cells();
+  const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
+  state_ = stages.state();
+  return going;
+}
+
+bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport& quality,
+                                   std::optional<CreaseDistance> edges, std::span<const UnfollowedCurve> unfollowed,
+                                   const FeatureCurves& curves) {
+  trial.least_share = state_.cells.least_share;
+  if (edges) edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
+  if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return false;
+  result_.states = states_;
+  result_.missed_edges = missed_edges(unfollowed, curves, target_.normalisation);
+  return true;
+}
+
+AutomaticFitResult AutomaticDriver::finish() {
+  const Normalisation& normalisation = target_.normalisation;
+  result_.mesh.positions = normalisation.from_unit(std::move(result_.mesh.positions));
+  for (FitState& state : result_.states) state.positions = normalisation.from_unit(std::move(state.positions));
+  result_.report.seconds = {{"total", runner_.seconds()}};
+  return std::move(result_);
+}
+
+}  // namespace subvol::internal

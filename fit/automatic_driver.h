@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/automatic_trials.h"
+#include "subvol/fit/features/crease_energy.h"
+#include "subvol/fit/stages/quality_stages.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/target/fit_target.h"
+#include "subvol/mesh/volume_mesh.h"
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace subvol::internal {
+
+/// What automatic fits of one solid and of several regions have in common: they make a template, fit it level by level,
+/// judge the result, and keep the best one. All in normalized coordinates.
+///
+/// Functions that return a bool return false if the fit must end.
+class AutomaticDriver {
+ protected:
+  /// target: any that a `FitTarget` is made from.
+  template <class Target>
+  AutomaticDriver(const AutomaticFitOptions& options, const Target& target)
+      : options_(checked_options(options)),
+        target_(target),
+        runner_({SolverKind::newton, options.max_iterations, options.time_limit_seconds, options.progress,
+                 options.cancelled, options.log}) {}
+  ~AutomaticDriver() = default;
+
+  const AutomaticFitTrial& best() const { return result_.trials[result_.chosen]; }
+  /// Returns true if no other template needs to be tried.
+  bool is_good() const { return !result_.trials.empty() && is_good_enough(best()); }
+
+  void begin_attempt() { share_at_end_ += kAttemptPortion * (1 - share_at_end_); }
+  /// Begins a part of the attempt that takes this portion of what is left of it.
+  void begin_part(double portion, double forecast) { runner_.work().begin_portion(portion, share_at_end_, forecast); }
+  /// Begins the part of an attempt that makes its template. Returns what to call with its share that is done.
+  std::function<bool(double)> begin_template();
+  /// Tells in the report that the fit ended in a template.
+  void note_end_in_template();
+  /// Takes a template in the target's coordinates into the fit's, and reports its distance if it is the first one.
+  void take_in(VolumeMesh& mesh);
+
+  /// Fits the present mesh at one level. what: is added to its name in the report.
+  /// portion: of the attempt's remaining work.
+  virtual bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) = 0;
+  /// Measures the present mesh, and keeps it if it is the best one.
+  virtual bool judge(AutomaticFitTrial trial) = 0;
+
+  /// Returns the schedule of a mesh that is not refined any more, which aims at the largest distance as well.
+  QualitySchedule aiming_at_distance(QualitySchedule schedule) const;
+  /// Fits the present mesh, refines it so many times, fitting it each time, and judges it.
+  bool fit_and_refine(int levels);
+  /// Fits and judges the present mesh, which follows edges and is not refined.
+  bool fit_edges(AutomaticFitTrial trial, double portion);
+  /// Minimizes (`QualityStages`).  creases  may be empty.  prepare  is called with the stages before they run; may be
+  /// empty.
+  bool run_stages(const QualityBoundary& boundary, std::span<const Vec3> lengths,
+                  const std::function<CreaseEnergy(double)>& creases, int level, const QualitySchedule& schedule,
+                  const char* what, const std::function<void(QualityStages&)>& prepare = {});
+  /// Samples the target for a boundary of so many faces.
+  void sample_target(std::size_t faces);
+  /// Adds a trial that was measured; its mesh is the present one. Returns true if it is the best one.
+  bool keep_if_best(AutomaticFitTrial trial, const QualityReport& quality, std::optional<CreaseDistance> edges,
+                    std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves);
+  /// Brings the result into the target's coordinates.
+  AutomaticFitResult finish();
+
+  AutomaticFitOptions options_;
+  FitTarget target_;
+  VolumeMesh mesh_;
+  std::string no_template_;  ///< why the last template that was asked for does not exist; empty: it does
+  QualityStages::State
+      state_;  ///< that the last level reached; its share of the goal is at caps of the lower goal there
+  AutomaticFitResult result_;
+  StageRunner runner_;
+
+ private:
+  std::vector<FitState> states_;  ///< of the present mesh, if they are kept
+  double share_at_end_ = 0;       ///< of the attempt in progress
+};
+
+}  // namespace subvol::internal
