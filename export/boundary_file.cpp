@@ -43,25 +43,37 @@ std::vector<std::int32_t> numbers_of_faces(const PolygonMesh& mesh, const std::v
   return numbers;
 }
 
-/// Appends the codes of the characters of the names, each ended by 0, as VTK writes texts.
-void append_names(std::string& text, const std::vector<Group>& groups) {
+/// How a file holds the names of groups.
+enum class NameArray {
+  texts,  ///< as VTK writes texts
+  codes   ///< bytes: meshio stops at texts
+};
+
+/// Appends the codes of the characters of the names, each name ended by 0.
+void append_names(std::string& text, const std::vector<Group>& groups, NameArray kind) {
+  std::vector<std::uint8_t> codes;
+  for (const Group& group : groups) {
+    const std::string name = label_of(group);
+    codes.insert(codes.end(), name.begin(), name.end());
+    codes.push_back(0);
+  }
+  if (kind == NameArray::codes)
+    return append_data_array<std::uint8_t>(
+        text, "Name=\"group_names\" NumberOfTuples=\"" + std::to_string(codes.size()) + '"', codes);
   text += "        <DataArray type=\"String\" Name=\"group_names\" NumberOfTuples=\"" + std::to_string(groups.size()) +
           "\" format=\"ascii\">";
-  for (const Group& group : groups) {
-    for (const char c : label_of(group)) text += std::to_string(static_cast<unsigned char>(c)) + ' ';
-    text += "0 ";
-  }
+  for (const std::uint8_t code : codes) text += std::to_string(code) + ' ';
   text += "</DataArray>\n";
 }
 
-void append_groups(std::string& text, const std::vector<Group>& groups) {
+void append_groups(std::string& text, const std::vector<Group>& groups, NameArray kind) {
   if (groups.empty()) return;
   std::vector<std::int32_t> numbers;
   for (const Group& group : groups) numbers.push_back(group.number);
   text += "    <FieldData>\n";
   const std::string size = std::to_string(groups.size());
   append_data_array<std::int32_t>(text, "Name=\"group_numbers\" NumberOfTuples=\"" + size + '"', numbers);
-  append_names(text, groups);
+  append_names(text, groups, kind);
   text += "    </FieldData>\n";
 }
 
@@ -99,7 +111,7 @@ std::vector<std::int32_t> group_numbers_of_faces(const PolygonMesh& mesh) {
 }
 
 void append_group_fields(std::string& text, const FaceGroups& groups) {
-  append_groups(text, positive_groups(groups.groups));
+  append_groups(text, positive_groups(groups.groups), NameArray::texts);
 }
 
 std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin& origin) {
@@ -131,7 +143,7 @@ std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin&
   append_data_array<std::int32_t>(text, "Name=\"group\"", numbers_of_faces(boundary, groups));
   if (!origin.cells.empty()) append_data_array<std::int32_t>(text, "Name=\"cell\"", origin.cells);
   text += "      </CellData>\n    </Piece>\n";
-  append_groups(text, groups);
+  append_groups(text, groups, NameArray::codes);
   return text + "  </UnstructuredGrid>\n</VTKFile>\n";
 }
 

@@ -19,15 +19,15 @@ struct BoundaryOrigin {
 
 /// Returns the number of each face's group, 0 for none; a number below 1 of a group is replaced by the lowest free one.
 std::vector<std::int32_t> group_numbers_of_faces(const PolygonMesh& mesh);
-/// Appends the `<FieldData>` `group_numbers` and `group_names` of the groups, with the same numbers; nothing if there
-/// are none.
+/// Appends the `<FieldData>` `group_numbers` and `group_names` (texts) of the groups, with the same numbers; nothing if
+/// there are none.
 void append_group_fields(std::string& text, const FaceGroups& groups);
 
 /// Returns the faces of a boundary as a VTK XML unstructured grid of triangles, quads and polygons (5, 9, 7).
 ///
 /// Cell data `group` holds the number of each face's group, 0 for none, and `cell` the cell behind it; point data
-/// `vertex` holds the number of each point in the volume mesh. The field data `group_numbers` and `group_names` (texts)
-/// list the groups. A negative number, or 0, of a group is replaced by the lowest free positive one.
+/// `vertex` holds the number of each point in the volume mesh. The field data `group_numbers` and `group_names` list
+/// the groups; the names are UInt8, in UTF-8, each ended by 0, since meshio stops at texts. A negative number, or 0, of a group is replaced by the lowest free positive one.
 /// InputError: no faces, indices out of range, coordinates that are not finite, lists of wrong length.
 std::string boundary_vtu_text(const PolygonMesh& boundary, const BoundaryOrigin& origin = {});
 

@@ -14,6 +14,7 @@ void add_template_options(CLI::App& verb, TemplateRun& run) {
   add_output_options(
       verb, run.run,
       "The template, or its boundary, by extension: " + output_formats() + "; may be given several times");
+  add_msh_version_option(verb, run.writing);
   verb.add_option("--report", run.run.report, "Write what was done and what is true of the result")
       ->type_name("FILE.json");
 }

@@ -146,7 +146,7 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
       ->group(group);
 }
 
-void add_writing_options(CLI::App& verb, WritingOptions& options) {
+void add_msh_version_option(CLI::App& verb, WritingOptions& options) {
   verb.add_option_function<std::string>(
           "--msh-version",
           [&options](const std::string& text) {
@@ -156,6 +156,10 @@ void add_writing_options(CLI::App& verb, WritingOptions& options) {
       ->check(CLI::IsMember({"2.2", "4.1"}))
       ->type_name("2.2|4.1")
       ->default_str("4.1");
+}
+
+void add_writing_options(CLI::App& verb, WritingOptions& options) {
+  add_msh_version_option(verb, options);
   const auto group = "Surfaces for DCC tools";
   options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,

@@ -193,7 +193,7 @@ TEST_CASE("the boundary as cells names its groups, vertices and cells") {
   const std::vector<Index> cells(boundary.num_faces(), 0);
   const std::string vtu = boundary_vtu_text(boundary, {vertices, cells});
   const std::string vtk = boundary_vtk_text(boundary, {vertices, cells});
-  CHECK_THAT(vtu, Contains("Name=\"group_names\" NumberOfTuples=\"2\""));
+  CHECK_THAT(vtu, Contains("type=\"UInt8\" Name=\"group_names\" NumberOfTuples=\"17\""));  // "floor" and quotes
   CHECK_THAT(vtk, Contains("group_numbers 1 2 int\n1\n2\ngroup_names 1 2 string\nthe%20%22floor%22\nroof\n"));
   for (const char* name : {"group", "vertex", "cell"})
     CHECK_THAT(vtk, Contains(std::string("SCALARS ") + name + " int 1"));
