@@ -248,6 +248,7 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
       };
   }
   const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
+    stages.energy().forbid_folds(layout_ ? std::span<const EdgeCap>(layout_->caps.edges) : std::span<const EdgeCap>());
     if (layout_) stages.energy().set_caps(layout_->caps.edges, layout_->caps.vertices);
   });
   start_.far = state_.far_cells;
@@ -368,9 +369,8 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
     trial.pads = layout_->pads.pads.size();
     if (!fit_edges(trial, kRoutingPortion)) return false;
     const double merit = result_.trials.back().merit;
-    const bool helped = merit < least_merit;  // what was given up; of an invalid mesh, more is
-    if (!helped && is_valid(result_.trials.back())) break;
-    least_merit = std::min(least_merit, merit);
+    if (merit >= least_merit) break;  // what was given up has not helped
+    least_merit = merit;
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults_of_cells(), routing)) break;
   }
   return true;

@@ -188,7 +188,8 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
   } else {
     group_by_pairs(boundary, topology);
   }
-  return run_stages(boundary, lengths, creases, level, schedule, what);
+  return run_stages(boundary, lengths, creases, level, schedule, what,
+                    [](QualityStages& stages) { stages.energy().forbid_folds({}); });
 }
 
 /// Returns the largest difference of a region's volume from the target's, in percent.

@@ -22,6 +22,8 @@ constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
 constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
 constexpr double kNoCap = 1;               // scaled Jacobians are at most 1
 constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this
+constexpr double kLiveEdge = 0.1;          // share of its wanted length below which an edge is poor where folds are
+constexpr double kFoldGoal = 0.5;          // residual of a fold that is good enough: 330 degrees if the limit is 300
 constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
 
 /// Canonical coordinates of a corner of a hex or a prism.
@@ -161,6 +163,9 @@ QualityEnergy::QualityEnergy(const QualityEnergy& whole, const VolumeMesh& part,
     dense_[c] = whole.dense_[cells[c]];
     if (!whole.caps_of_cell_.empty()) caps_of_cell_.push_back(whole.caps_of_cell_[cells[c]]);
   }
+  if (!whole.folds_) return;
+  folds_.emplace(*whole.folds_, cells);
+  fold_emphasis_.assign(folds_->size(), 1);
 }
 
 void QualityEnergy::set_weights(const QualityWeights& weights) {
@@ -201,6 +206,12 @@ void QualityEnergy::set_caps(std::span<const EdgeCap> edges, std::span<const Ver
     caps_of_cell_[c] = static_cast<Index>(caps_.size());
     caps_.push_back(caps);
   }
+}
+
+void QualityEnergy::forbid_folds(std::span<const EdgeCap> edges) {
+  folds_.emplace(*mesh_);
+  folds_->want(edges, *mesh_);
+  fold_emphasis_.assign(folds_->size(), 1);
 }
 
 /// Returns the cap at a point of a cell.
@@ -257,7 +268,7 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
       if (!(short_by > 0)) continue;
       derivative = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
       if constexpr (kDerivatives) derivative[i] = -frame.u[i] / least;
-      add(q, weights_.edge * points.weights[q], short_by, derivative);
+      add(q, weights_.edge * points.weights[q] * emphasis(cell, corner), short_by, derivative);
     }
   }
   const CellTopology& topology = cell_topology(mesh_->kinds[cell]);
@@ -278,6 +289,34 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
       }
   }
   return energy;
+}
+
+/// Adds to the gradient and the Hessian what folds contribute. Few edges are folded, so this is serial.
+double QualityEnergy::add_fold_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                                           BlockSparse* hessian) const {
+  if (!folds_) return 0;
+  const std::vector<double> residuals = folds_->residuals(*mesh_, nodes);
+  double sum = 0;
+  for (std::size_t e = 0; e < residuals.size(); ++e) {
+    if (!(residuals[e] > 0)) continue;
+    sum += fold_weight(e) * residuals[e] * residuals[e];
+    for (const BoundaryFolds::Side& side : folds_->linearized(e, *mesh_, nodes).sides) {
+      const auto vertices = mesh_->cell(side.cell);
+      const double twice = 2 * scale * fold_weight(e);
+      for (std::size_t i = 0; i < side.corners.size(); ++i)
+        gradient[vertices[side.corners[i]]] += (twice * residuals[e]) * side.derivative[i];
+      if (!hessian) continue;
+      const Index* slots = blocks_.of_cell(side.cell);
+      for (std::size_t i = 0; i < side.corners.size(); ++i)
+        for (std::size_t j = 0; j < side.corners.size(); ++j) {
+          // (p + q)^2 <= 2 p^2 + 2 q^2 keeps both sides in their own cells.
+          const Mat3 block = (2 * twice) * side.derivative[i] * side.derivative[j].transpose();
+          float* at = hessian->block(slots[side.corners[i] * static_cast<int>(vertices.size()) + side.corners[j]]);
+          for (int k = 0; k < 9; ++k) at[k] += static_cast<float>(block(k / 3, k % 3));
+        }
+    }
+  }
+  return sum;
 }
 
 template <bool kHessian>
@@ -310,7 +349,7 @@ double QualityEnergy::add_derivatives(std::span<const Vec3> nodes, double scale,
       }
     }
   }
-  double sum = 0;
+  double sum = add_fold_derivatives(nodes, scale, gradient, kHessian ? hessian : nullptr);
   for (const double energy : energies) sum += energy;
   return sum;
 }
@@ -327,6 +366,12 @@ std::vector<double> QualityEnergy::cell_values(std::span<const Vec3> nodes) cons
     CellSums unused;
 #pragma omp for schedule(static)
     for (std::size_t c = 0; c < energies.size(); ++c) energies[c] = evaluate<false>(c, nodes, unused);
+  }
+  if (!folds_) return energies;
+  const std::vector<double> residuals = folds_->residuals(*mesh_, nodes);
+  for (std::size_t e = 0; e < residuals.size(); ++e) {
+    if (!(residuals[e] > 0)) continue;
+    for (const Index c : folds_->cells_of(e)) energies[c] += 0.5 * fold_weight(e) * residuals[e] * residuals[e];
   }
   return energies;
 }
@@ -389,9 +434,12 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
     double inner = 1, all = 1;
     least[c] = 1;
     for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
-      const double s = Frame(points.rule.point(q), x.data(), kLeastLength * lengths_[c].minCoeff()).s;
+      const Frame frame(points.rule.point(q), x.data(), kLeastLength * lengths_[c].minCoeff());
+      const double s = frame.s;
       const double at_cap = cap(c, points, q), own_goal = at_cap < kNoCap ? std::min(goal, at_cap - kBelowCap) : goal;
-      const double share = std::min(1.0, s / own_goal);
+      double share = std::min(1.0, s / own_goal);
+      if (folds_ && points.corner[q] >= 0)
+        for (int k = 0; k < 3; ++k) share = std::min(share, frame.length[k] / (kLiveEdge * lengths_[c][k]));
       least[c] = std::min(least[c], s);
       all = std::min(all, share);
       if (points.corner[q] >= 0)
@@ -401,6 +449,14 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
     }
     update(inner, cell_emphasis_[c]);
     shares[c] = all;
+  }
+  if (folds_) {
+    const std::vector<double> folded = folds_->residuals(*mesh_, nodes);
+    for (std::size_t e = 0; e < folded.size(); ++e) {
+      const double share = std::min(1.0, (1 - folded[e]) / (1 - kFoldGoal));
+      update(share, fold_emphasis_[e]);
+      for (const Index c : folds_->cells_of(e)) shares[c] = std::min(shares[c], share);
+    }
   }
   State state;
   for (std::size_t c = 0; c < least.size(); ++c) {
@@ -414,6 +470,7 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
 void QualityEnergy::reset_emphasis() {
   std::fill(corner_emphasis_.begin(), corner_emphasis_.end(), 1.0);
   std::fill(cell_emphasis_.begin(), cell_emphasis_.end(), 1.0);
+  std::fill(fold_emphasis_.begin(), fold_emphasis_.end(), 1.0);
 }
 
 std::vector<Index> QualityEnergy::uncertified(std::span<const Vec3> nodes) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/fit/elements/element_rule.h"
+#include "subvol/fit/energies/boundary_folds.h"
 #include "subvol/fit/energies/cell_blocks.h"
 #include "subvol/fit/energies/point_jacobians.h"
 #include "subvol/fit/energies/volume_term.h"
@@ -11,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,8 +32,9 @@ struct QualityWeights {
 ///
 ///   E = sum over cells of  w_c sum over corners a_q sum over i < j cos^2(d_i, d_j)
 ///                        + w_h sum over points  a_q omega max(0, t - s)^2
-///                        + w_e sum over corners a_q sum over i max(0, 1 - |d_i| / (rho h_i))^2
+///                        + w_e sum over corners a_q omega sum over i max(0, 1 - |d_i| / (rho h_i))^2
 ///                        + w_p / (6 h^2) sum over quads |x_0 - x_1 + x_2 - x_3|^2
+///     + w_h sum over edges of the boundary  omega f^2, if folds are forbidden
 ///
 /// d_i  columns of the Jacobian in the coordinates of the ideal cell (`ElementRule`): edges, at the corners of a hex
 /// s    scaled Jacobian det(d_1, d_2, d_3) / (|d_1| |d_2| |d_3|), as `measure_quality` samples it
@@ -39,13 +42,14 @@ struct QualityWeights {
 /// t    the threshold, or the cap of the point if that is lower (`set_caps`)
 /// a_q  1 / number of corners at the corners; 1/16 at other points: the midpoints of edges, faces and cell, or more of
 ///      them in cells that were refined (`densify`). A tet has one point only, which stands for all and has a_q = 1
-/// omega >= 1: emphasis of poor corners and cells (`emphasize_poor`)
+/// f    residual of a fold (`BoundaryFolds`); its Hessian is bounded by that of two faces that turn on their own
+/// omega >= 1: emphasis of poor corners, cells and folds (`emphasize_poor`)
 ///
 /// The energy is finite for inverted cells, too: nothing limits a step but `ruined`. The Hessian is that of
 /// Gauss-Newton, 2 sum of the squared residuals' derivatives, which is positive semidefinite.
 ///
-/// Cells run in parallel color by color, and sums are made in the order of the cells: the results have the same bits for
-/// any number of threads. Nothing is allocated by the evaluations but one sum per cell.
+/// Cells run in parallel color by color, and sums are made in the order of the cells: the results have the same bits
+/// for any number of threads. Nothing is allocated by the evaluations but one sum per cell.
 class QualityEnergy final : public VolumeTerm {
  public:
   /// mesh     must outlive the energy; its positions are not read. InputError: as for `CellBlocks`.
@@ -63,14 +67,20 @@ class QualityEnergy final : public VolumeTerm {
   /// `emphasize_poor` to slightly less. Edges that are none of the mesh have no effect; replaces earlier caps.
   void set_caps(std::span<const EdgeCap> edges, std::span<const VertexCap> vertices);
 
+  /// From then on, the boundary must not fold onto itself (`BoundaryFolds`). edges: angles that are wanted, as
+  /// `set_caps`.
+  void forbid_folds(std::span<const EdgeCap> edges);
+
   /// State of the cells against a goal.
   struct State {
     double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
     double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached; <= 1
-    std::vector<Index> poor{};  ///< cells with a point below its goal, ascending
+    std::vector<Index> poor{};  ///< cells with a point below its goal, or at a fold, ascending
   };
   /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
-  /// below; elsewhere it falls back by 3 % towards 1. At most 1000.
+  /// below; elsewhere it falls back by 3 % towards 1. At most 1000. If folds are forbidden, a fold reaches its goal
+  /// halfway between its limit and 360 degrees, and a corner also needs edges of at least a tenth of their wanted
+  /// lengths: folds end where faces have shrunk to slivers.
   State emphasize_poor(std::span<const Vec3> nodes, double goal);
   /// Sets all emphasis to 1.
   void reset_emphasis();
@@ -122,6 +132,9 @@ class QualityEnergy final : public VolumeTerm {
   template <bool kHessian>
   double add_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient, BlockSparse* hessian) const;
   double least_scaled_jacobian(std::size_t cell, const Points& points, std::span<const Vec3> nodes) const;
+  double fold_weight(std::size_t edge) const { return weights_.hinge * fold_emphasis_[edge]; }
+  double add_fold_derivatives(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient,
+                              BlockSparse* hessian) const;
 
   const VolumeMesh* mesh_;
   std::vector<Vec3> lengths_;
@@ -136,6 +149,8 @@ class QualityEnergy final : public VolumeTerm {
   std::vector<Index> caps_of_cell_;                          ///< place in caps_, or kNoIndex; empty: no caps
   std::vector<CellCaps> caps_;
   std::vector<double> corner_emphasis_, cell_emphasis_;      ///< omega, per corner of each cell and per cell
+  std::optional<BoundaryFolds> folds_;                       ///< empty: they are not forbidden
+  std::vector<double> fold_emphasis_;                        ///< omega of each of its edges
   std::vector<Index> order_;                                 ///< cells by color
   std::vector<std::size_t> color_offsets_;                   ///< first cell of each color in order_, and their number
   CellBlocks blocks_;

@@ -38,9 +38,11 @@ double edge_cap(double angle, int cells) {
 std::vector<EdgeCap> edge_caps(const PatchedMesh& patched, const SignedFeatures& features) {
   const MeshTopology topology(patched.mesh);
   std::vector<EdgeCap> caps;
-  for (const CreasePath& path : patched.paths)
+  for (const CreasePath& path : patched.paths) {
+    const double angle = features.angles[path.curve];
     for (Index edge : edges_of_path(topology, path.vertices))
-      caps.push_back({topology.edge(edge), edge_cap(features.angles[path.curve], topology.num_edge_cells(edge))});
+      caps.push_back({topology.edge(edge), edge_cap(angle, topology.num_edge_cells(edge)), angle});
+  }
   std::ranges::sort(caps, {}, &EdgeCap::ends);
   return caps;
 }

@@ -13,6 +13,7 @@ namespace subvol::internal {
 struct EdgeCap {
   std::array<Index, 2> ends;  ///< the smaller number first
   double cap;                 ///< in [0, 1)
+  double angle = 0;           ///< interior angle that is wanted there, in degrees
 };
 
 /// Bound on the scaled Jacobian at a vertex, in all its cells.

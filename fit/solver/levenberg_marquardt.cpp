@@ -171,7 +171,7 @@ bool LevenbergMarquardtRun::shorten_until_downhill() {
   for (int pass = 0; shorten_where_harmful(); ++pass) {
     evaluate_trial();
     if (trial_ < energy_) return true;
-    if (pass == kMostShortenings || has_ended(options_, result_)) return false;
+    if (!options_.spares_most || pass == kMostShortenings || has_ended(options_, result_)) return false;
     if (cells.empty()) cells = problem_.volume->cell_values(y_);
     shorten_at(most_risen(cells, trial_cells_), 0.5);
     try_nodes();

@@ -55,6 +55,9 @@ struct MinimizerOptions {
   /// Levenberg-Marquardt only: longest move of a node in one step, in the target's unit; 0: no limit.
   double longest_move = 0;
   double first_damping = kFirstDamping;  ///< the same: mu of the first step, > 0
+  /// The same: if E rises, the step is first shortened at the cells whose energy rises most, and damped only then. Not
+  /// where these are the cells that have to move.
+  bool spares_most = true;
   /// Called after each step; returns false to stop.
   std::function<bool(const IterationRecord&)> progress;
   /// Asked many times within a step, which may take long. If it returns true, the step is abandoned, and the

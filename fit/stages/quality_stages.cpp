@@ -189,16 +189,18 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
   problem_->fixed_samples = fixed_part(all_samples, rows);
 }
 
-bool QualityStages::run_stage(const QualityStage& stage, const std::string& name, double relative_decrease,
-                              std::vector<Vec3>& x) {
+bool QualityStages::run_stage(const QualityStage& stage, const std::string& name, bool is_lift, std::vector<Vec3>& x) {
+  constexpr double kLeastDecrease = 3e-3, kNoEnd = 1e-9;  // the few steps of a lift must not end by themselves
   if (before_stage) before_stage();
   energy_->set_weights(stage.weights);
   const double lambda = lambda_one_ / stage.surface;
   problem_->lambda = lambda;
   StageRecord record = record_;
   record.name = name;
-  Stage settings{lambda, kQualityTangentialWeight, stage.steps, relative_decrease, mean_length_, damping_};
+  Stage settings{lambda,  kQualityTangentialWeight, stage.steps, is_lift ? kNoEnd : kLeastDecrease, mean_length_,
+                 damping_};
   settings.accelerates = true;
+  settings.spares_most = !is_lift;
   const bool going = runner_->run(*problem_, settings, std::move(record), x, *report_, step_work_);
   damping_ = damping_after(damping_, report_->stages.back().iterations);
   if (after_stage) after_stage(name, x);
@@ -307,7 +309,6 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
 /// these, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
   constexpr int kSteps = 2, kPatience = 5;
-  constexpr double kNoEnd = 1e-9;  // two steps must not end a stage
   const bool is_patch = patch_mesh_ != nullptr;
   energy_->reset_emphasis();
   far_emphasis_.assign(factors_.size(), 1);
@@ -335,9 +336,10 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
     if (passes > 0) break;
     QualityStage stage = schedule.lift;
     stage.steps = kSteps;
-    going = run_stage(stage, formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(), done / kSteps + 1,
-                                       now.cells.poor.size(), schedule.goal),
-                      kNoEnd, x);
+    going = run_stage(stage,
+                      formatted("%s, lift %d, %zu cells below %.2f", record_.name.c_str(), done / kSteps + 1,
+                                now.cells.poor.size(), schedule.goal),
+                      true, x);
   }
   if (surface_) surface_->weigh(factors_);
   x = std::move(best);
@@ -346,16 +348,16 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
 
 bool QualityStages::run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record,
                         std::vector<Vec3>& x, FitReport& report) {
-  constexpr double kLeastDecrease = 3e-3;
   runner_ = &runner;
   record_ = record;
   report_ = &report;
   damping_ = kFirstDamping;
   energy_->reset_emphasis();
   for (const QualityStage& stage : schedule.stages)
-    if (!run_stage(stage, formatted("%s, surface %g, threshold %.2f", record.name.c_str(), stage.surface,
-                                    stage.weights.threshold),
-                   kLeastDecrease, x))
+    if (!run_stage(
+            stage,
+            formatted("%s, surface %g, threshold %.2f", record.name.c_str(), stage.surface, stage.weights.threshold),
+            false, x))
       return false;
   return lift(schedule, x);
 }

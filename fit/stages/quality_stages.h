@@ -120,7 +120,7 @@ class QualityStages {
  private:
   /// The minimizations of a patch of a level, whose correspondences must be those of x.
   QualityStages(const QualityStages& whole, const QualityPatch& patch, std::span<const Vec3> x);
-  bool run_stage(const QualityStage& stage, const std::string& name, double relative_decrease, std::vector<Vec3>& x);
+  bool run_stage(const QualityStage& stage, const std::string& name, bool is_lift, std::vector<Vec3>& x);
   bool lift(const QualitySchedule& schedule, std::vector<Vec3>& x);
   bool lift_patches(const QualitySchedule& schedule, std::span<const QualityPatch> patches, std::vector<Vec3>& x);
   std::vector<QualityPatch> patches_of(const State& state, int rings) const;

@@ -17,6 +17,7 @@ struct Stage {
   /// squares, which the Levenberg-Marquardt method minimizes. 0: the fit's own solver does.
   double longest_move = 0;
   double first_damping = 1e-3;  ///< of that method
+  bool spares_most = true;      ///< the same: shortens steps at few cells first (`MinimizerOptions`)
   /// Newton's method: relative tolerance of its linear systems, and steps for which the cells' Hessian is kept.
   double linear_tolerance = 0.1;
   int hessian_life = 1;

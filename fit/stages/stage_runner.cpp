@@ -40,6 +40,7 @@ bool StageRunner::run(FitProblem& problem, const Stage& stage, StageRecord recor
   minimizer.relative_decrease = stage.relative_decrease;
   minimizer.longest_move = stage.longest_move;
   minimizer.first_damping = stage.first_damping;
+  minimizer.spares_most = stage.spares_most;
   minimizer.cg_tolerance = stage.linear_tolerance;
   minimizer.hessian_life = stage.hessian_life;
   minimizer.accelerates = stage.accelerates;
