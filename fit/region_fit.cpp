@@ -189,7 +189,7 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
     group_by_pairs(boundary, topology);
   }
   return run_stages(boundary, lengths, creases, level, schedule, what,
-                    [](QualityStages& stages) { stages.energy().forbid_folds({}); });
+                    [](QualityStages& stages) { stages.energy().forbid_folds({}, 0); });
 }
 
 /// Returns the largest difference of a region's volume from the target's, in percent.

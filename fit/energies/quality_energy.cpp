@@ -22,7 +22,6 @@ constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
 constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
 constexpr double kNoCap = 1;               // scaled Jacobians are at most 1
 constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this
-constexpr double kLiveEdge = 0.1;          // share of its wanted length below which an edge is poor where folds are
 constexpr double kFoldGoal = 0.5;          // residual of a fold that is good enough: 330 degrees if the limit is 300
 constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
 
@@ -165,6 +164,7 @@ QualityEnergy::QualityEnergy(const QualityEnergy& whole, const VolumeMesh& part,
   }
   if (!whole.folds_) return;
   folds_.emplace(*whole.folds_, cells);
+  live_edge_ = whole.live_edge_;
   fold_emphasis_.assign(folds_->size(), 1);
 }
 
@@ -208,7 +208,8 @@ void QualityEnergy::set_caps(std::span<const EdgeCap> edges, std::span<const Ver
   }
 }
 
-void QualityEnergy::forbid_folds(std::span<const EdgeCap> edges) {
+void QualityEnergy::forbid_folds(std::span<const EdgeCap> edges, double least_edge) {
+  live_edge_ = least_edge;
   folds_.emplace(*mesh_);
   folds_->want(edges, *mesh_);
   fold_emphasis_.assign(folds_->size(), 1);
@@ -438,8 +439,8 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
       const double s = frame.s;
       const double at_cap = cap(c, points, q), own_goal = at_cap < kNoCap ? std::min(goal, at_cap - kBelowCap) : goal;
       double share = std::min(1.0, s / own_goal);
-      if (folds_ && points.corner[q] >= 0)
-        for (int k = 0; k < 3; ++k) share = std::min(share, frame.length[k] / (kLiveEdge * lengths_[c][k]));
+      if (live_edge_ > 0 && points.corner[q] >= 0)
+        for (int k = 0; k < 3; ++k) share = std::min(share, frame.length[k] / (live_edge_ * lengths_[c][k]));
       least[c] = std::min(least[c], s);
       all = std::min(all, share);
       if (points.corner[q] >= 0)

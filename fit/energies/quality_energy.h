@@ -67,9 +67,11 @@ class QualityEnergy final : public VolumeTerm {
   /// `emphasize_poor` to slightly less. Edges that are none of the mesh have no effect; replaces earlier caps.
   void set_caps(std::span<const EdgeCap> edges, std::span<const VertexCap> vertices);
 
-  /// From then on, the boundary must not fold onto itself (`BoundaryFolds`). edges: angles that are wanted, as
-  /// `set_caps`.
-  void forbid_folds(std::span<const EdgeCap> edges);
+  /// From then on, the boundary must not fold onto itself (`BoundaryFolds`).
+  /// edges        angles that are wanted, as `set_caps`.
+  /// least_edge   share of its wanted length below which an edge at a corner is poor: folds end where faces have shrunk
+  ///              to slivers. 0: lengths do not matter.
+  void forbid_folds(std::span<const EdgeCap> edges, double least_edge);
 
   /// State of the cells against a goal.
   struct State {
@@ -79,8 +81,7 @@ class QualityEnergy final : public VolumeTerm {
   };
   /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
   /// below; elsewhere it falls back by 3 % towards 1. At most 1000. If folds are forbidden, a fold reaches its goal
-  /// halfway between its limit and 360 degrees, and a corner also needs edges of at least a tenth of their wanted
-  /// lengths: folds end where faces have shrunk to slivers.
+  /// halfway between its limit and 360 degrees, and a corner also needs edges of the least length.
   State emphasize_poor(std::span<const Vec3> nodes, double goal);
   /// Sets all emphasis to 1.
   void reset_emphasis();
@@ -151,6 +152,7 @@ class QualityEnergy final : public VolumeTerm {
   std::vector<double> corner_emphasis_, cell_emphasis_;      ///< omega, per corner of each cell and per cell
   std::optional<BoundaryFolds> folds_;                       ///< empty: they are not forbidden
   std::vector<double> fold_emphasis_;                        ///< omega of each of its edges
+  double live_edge_ = 0;                                     ///< share of its wanted length that an edge must have
   std::vector<Index> order_;                                 ///< cells by color
   std::vector<std::size_t> color_offsets_;                   ///< first cell of each color in order_, and their number
   CellBlocks blocks_;

@@ -111,7 +111,7 @@ TEST_CASE("The quality energy opens a fold once folds are forbidden", "[quality]
   const double before = energy.value(mesh.positions);
   const double share = energy.emphasize_poor(mesh.positions, 0.1).least_share;
   energy.reset_emphasis();
-  energy.forbid_folds({});
+  energy.forbid_folds({}, 0);
   CHECK(energy.value(mesh.positions) > before + 50);
   CHECK(energy.emphasize_poor(mesh.positions, 0.1).least_share < std::min(0.0, share));
   energy.reset_emphasis();
@@ -126,4 +126,16 @@ TEST_CASE("The quality energy opens a fold once folds are forbidden", "[quality]
       down[v][k] -= kStep;
       CHECK(gradient[v][k] == Approx((energy.value(up) - energy.value(down)) / (2 * kStep)).epsilon(1e-4).margin(1e-3));
     }
+}
+
+TEST_CASE("An edge far shorter than wanted makes its cells poor, if that is asked for", "[quality]") {
+  VolumeMesh mesh = test::lattice(2, 1, 1);
+  for (Vec3& p : mesh.positions) p.z() *= 0.05;
+  QualityEnergy energy(mesh, std::vector<Vec3>(mesh.num_cells(), Vec3::Ones()));
+  energy.forbid_folds({}, 0);
+  CHECK(energy.emphasize_poor(mesh.positions, 0.6).least_share == 1);
+  energy.forbid_folds({}, 0.1);
+  const QualityEnergy::State state = energy.emphasize_poor(mesh.positions, 0.6);
+  CHECK(state.least_share == Approx(0.5));
+  CHECK(state.poor.size() == 2);
 }
