@@ -74,9 +74,8 @@ class AutomaticDriver {
   AutomaticFitOptions options_;
   FitTarget target_;
   VolumeMesh mesh_;
-  std::string no_template_;  ///< why the last template that was asked for does not exist; empty: it does
-  QualityStages::State
-      state_;  ///< that the last level reached; its share of the goal is at caps of the lower goal there
+  std::string no_template_;     ///< why the last template that was asked for does not exist; empty: it does
+  QualityStages::State state_;  ///< that the last level reached; its share is that of the lower goal at caps
   AutomaticFitResult result_;
   StageRunner runner_;
 

@@ -110,8 +110,8 @@ struct AutomaticFitResult {
 /// Faces on flat parts of such a target are made exactly flat (`flatten_faces`). A number of cells at which less than
 /// 80 % of the edges' length finds a path is skipped if a larger one follows.
 ///
-/// The best trial is kept; no other is made once the merit is below 0.1, not counting a share of the quality of 85 % or
-/// more:
+/// The best trial is kept; no other is made once the merit is below 0.15, not counting a share of the quality of 85 %
+/// or more:
 ///
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
