@@ -4,12 +4,30 @@
 #include "subvol/base/format.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/mesh/cell_topology.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace subvol::internal {
+
+double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
+  constexpr double kLeast = 0.1;
+  constexpr double kFlat = 0.4;  // lines of grids through planes are no closer than this share of the others
+  if (grid.num_cells() == 0) return 0;
+  double shortest = kFlat;
+  for (std::size_t c = 0; c < grid.num_cells(); ++c) {
+    const CellTopology& cell = cell_topology(grid.kinds[c]);
+    const auto vertices = grid.cell(c);
+    for (int e = 0; e < cell.num_edges; ++e) {
+      const Vec3 &a = grid.positions[vertices[cell.edges[e][0]]], &b = grid.positions[vertices[cell.edges[e][1]]];
+      shortest = std::min(shortest, (b - a).norm() / lengths[c].maxCoeff());
+    }
+  }
+  return kLeast * shortest / kFlat;
+}
 
 std::function<bool(double)> AutomaticDriver::begin_template() {
   begin_part(kTemplatePortion, 1);

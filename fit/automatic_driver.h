@@ -17,6 +17,11 @@
 
 namespace subvol::internal {
 
+/// Returns the share of its wanted length that an edge must have: a tenth; less on a grid whose cells are flat, in
+/// proportion to their shortest edge. 0 without a grid.
+/// lengths  wanted, of the grid's cells, and perhaps of more.
+double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths);
+
 /// What automatic fits of one solid and of several regions have in common: they make a template, fit it level by level,
 /// judge the result, and keep the best one. All in normalized coordinates.
 ///

@@ -21,7 +21,6 @@
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/fit/target/surface_repair.h"
-#include "subvol/mesh/cell_topology.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/templates/auto_template.h"
@@ -99,25 +98,6 @@ double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) 
   for (const FeatureCurve& curve : curves.curves) all += curve.length();
   for (const CreasePath& path : routing.paths) routed += curves.curves[path.curve].length();
   return all > 0 ? routed / all : 1;
-}
-
-/// Returns the share of its wanted length that an edge must have: a tenth; less on a grid whose cells are flat, in
-/// proportion to their shortest edge. 0 without a grid.
-/// lengths  wanted, of the grid's cells, and perhaps of more.
-double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
-  constexpr double kLeast = 0.1;
-  constexpr double kFlat = 0.4;  // lines of grids through planes are no closer than this share of the others
-  if (grid.num_cells() == 0) return 0;
-  double shortest = kFlat;
-  for (std::size_t c = 0; c < grid.num_cells(); ++c) {
-    const CellTopology& cell = cell_topology(grid.kinds[c]);
-    const auto vertices = grid.cell(c);
-    for (int e = 0; e < cell.num_edges; ++e) {
-      const Vec3 &a = grid.positions[vertices[cell.edges[e][0]]], &b = grid.positions[vertices[cell.edges[e][1]]];
-      shortest = std::min(shortest, (b - a).norm() / lengths[c].maxCoeff());
-    }
-  }
-  return kLeast * shortest / kFlat;
 }
 
 /// Returns true if the target has sharp edges that the mesh is to follow.

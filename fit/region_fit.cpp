@@ -7,6 +7,7 @@
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/sheet_layout.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/local_cells.h"
 #include "subvol/fit/fits/region_volumes.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
@@ -85,6 +86,7 @@ class RegionFit : AutomaticDriver {
   SheetCurves curves_;                 ///< to follow, if edges are followed
   std::optional<SheetLayout> layout_;  ///< of mesh_; none: sheets correspond as wholes
   RegionTemplate template_;            ///< the last one, without its mesh
+  double least_edge_ = 0;              ///< share of its wanted length that an edge must have on its grid
 };
 
 void RegionFit::find_curves() {
@@ -122,6 +124,8 @@ std::optional<VolumeMesh> RegionFit::make_grid(std::size_t cells) {
   VolumeMesh mesh = std::move(made.made->mesh);
   template_ = std::move(*made.made);
   take_in(mesh);
+  least_edge_ =
+      least_edge_share(mesh, wanted_lengths(MeshTopology(mesh), {}, mesh.num_cells(), target_.surface.area()));
   return mesh;
 }
 
@@ -189,7 +193,7 @@ bool RegionFit::fit_level(int level, const QualitySchedule& schedule, const char
     group_by_pairs(boundary, topology);
   }
   return run_stages(boundary, lengths, creases, level, schedule, what,
-                    [](QualityStages& stages) { stages.energy().forbid_folds({}, 0); });
+                    [this](QualityStages& stages) { stages.energy().forbid_folds({}, least_edge_); });
 }
 
 /// Returns the largest difference of a region's volume from the target's, in percent.
