@@ -22,8 +22,8 @@ namespace subvol::internal {
 /// lengths  wanted, of the grid's cells, and perhaps of more.
 double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths);
 
-/// What automatic fits of one solid and of several regions have in common: they make a template, fit it level by level,
-/// judge the result, and keep the best one. All in normalized coordinates.
+/// The common base of the automatic fits of one solid and of several regions: it makes a template, fits it level by
+/// level, judges the result, and keeps the best one. All coordinates are normalized.
 ///
 /// Functions that return a bool return false if the fit must end.
 class AutomaticDriver {

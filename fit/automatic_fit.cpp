@@ -107,7 +107,7 @@ bool has_edges_to_follow(const TriangleMesh& target, const AutomaticFitOptions& 
   return options.follows_all_edges ? !curves.empty() : edge_crispness(target, curves).is_designed();
 }
 
-/// What to follow.
+/// Tells which curves of the target a fit follows.
 struct EdgeChoice {
   bool sharp = false, borders = false;  ///< sharp edges; borders of groups
   bool any() const { return sharp || borders; }

@@ -56,7 +56,7 @@ class BoundaryFolds {
   double angle(std::size_t edge, const VolumeMesh& mesh, std::span<const Vec3> nodes) const;
   double limit(std::size_t edge) const { return limits_[edge]; }
   double residual(std::size_t edge, const VolumeMesh& mesh, std::span<const Vec3> nodes) const;
-  /// Those of all edges.
+  /// Returns the residuals of all edges.
   std::vector<double> residuals(const VolumeMesh& mesh, std::span<const Vec3> nodes) const;
   Residual linearized(std::size_t edge, const VolumeMesh& mesh, std::span<const Vec3> nodes) const;
 

@@ -10,8 +10,7 @@
 namespace subvol::internal {
 
 /// The Levenberg-Marquardt method with frozen correspondences, for sums of squares whose Hessian is that of
-/// Gauss-Newton
-/// (`QualityEnergy`).
+/// Gauss-Newton (`QualityEnergy`).
 ///
 ///   (H + mu D) d = -g,   D_j = (mean of all t + t_j) / 2,  t_j: mean diagonal entry of block j of H
 ///
@@ -22,8 +21,9 @@ namespace subvol::internal {
 /// A few cells must not stop all others, so a step is shortened only where it does harm. Before E is looked at, it is
 /// halved at the vertices of cells that it ruins (`VolumeTerm::ruined`), up to ten times, then set to 0 there; at those
 /// of cells that would lose their certificate it is set to 0. If E rises, the step is halved at the vertices of the
-/// cells that account for half of all rises, up to eight times, before mu is raised. Where a step was shortened, mu is
-/// multiplied by 6 in the next one, and the factor decreases to 1 by 0.3 a step where it is not.
+/// cells that account for half of all rises, up to eight times, before mu is raised, unless the option
+/// `spares_most` is off. Where a step was shortened, mu has a factor that rises to 6 times its value for the next step;
+/// elsewhere the factor falls to 0.3 times its value, but not below 1.
 ///
 /// Options `accelerates`: the step that was found is replaced by an accelerated one (`AndersonMemory`) if that ruins no
 /// cell and E, with correspondences found anew, is not higher.
