@@ -51,6 +51,9 @@ void AutomaticDriver::take_in(VolumeMesh& mesh) {
 }
 
 QualitySchedule AutomaticDriver::aiming_at_distance(QualitySchedule schedule) const {
+  // As in the merit of a trial, poor cells cost more than a place that is slightly too far. With the weights of other
+  // lifts, y-belt-idler kept a scaled Jacobian of 0.28 rather than a largest distance of 0.58 % for 0.52.
+  schedule.merit = {.excess = 1, .poor = 3};
   schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
   return schedule;
 }

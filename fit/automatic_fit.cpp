@@ -42,7 +42,9 @@ namespace {
 
 constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
 constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting some of them
-constexpr int kMostRefinements = 2;         // cells of size 1 / 9 are the smallest
+/// Rounds in which some cells are cut: cells of size 1 / 9 are the smallest. A second round has never improved a fit
+/// that follows edges (i07, x-end-idler, y-belt-idler, LCD-knob), and took as long as all before.
+constexpr int kMostRefinements = 2, kMostRefinementsWithEdges = 1;
 /// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
 constexpr double kWorthRefining = 0.5;
 
@@ -510,7 +512,8 @@ AutomaticFitResult AutomaticFit::run() {
     going = run_attempt(attempt);
   }
   going = going && !result_.trials.empty();
-  for (int round = 0; going && is_worth_refining() && round < kMostRefinements; ++round) {
+  const int most_refinements = edges_.features.curves.empty() ? kMostRefinements : kMostRefinementsWithEdges;
+  for (int round = 0; going && is_worth_refining() && round < most_refinements; ++round) {
     const std::size_t before = result_.chosen;
     begin_attempt();
     going = run_refined();

@@ -20,8 +20,13 @@ namespace {
 constexpr int kPoints = 3, kDensePoints = 5;
 constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
 constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
+// The same where there are derivatives. A cell that was folded had a direction of 1e-7 at a point; its Hessian was 1e13
+// times that of other cells, and no vertex of the patch around it moved.
+constexpr double kLeastEnergyLength = 0.05;
 constexpr double kNoCap = 1;               // scaled Jacobians are at most 1
-constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this
+constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this,
+constexpr double kLeastGoal = 0.01;        // but not below this: caps are 0 where edges are flat
+constexpr double kLeastShare = -1;         // of a goal; no inverted cell is worse than another one
 constexpr double kFoldGoal = 0.5;          // residual of a fold that is good enough: 330 degrees if the limit is 300
 constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
 
@@ -54,10 +59,11 @@ int edge_at(CellKind kind, const Vec3& at) {
   return -1;
 }
 
-/// The three directions at a point, scaled to length 1, and their scaled Jacobian.
+/// The three directions at a point, divided by their lengths, and their scaled Jacobian.
 struct Frame {
-  std::array<Vec3, 3> u;
-  std::array<double, 3> length;
+  std::array<Vec3, 3> u;  ///< of length 1, less for directions shorter than the least length
+  std::array<double, 3> own_length;
+  std::array<double, 3> length;  ///< the least length for shorter ones
   Vec3 cross12;
   double s;
 
@@ -66,17 +72,23 @@ struct Frame {
     for (const ElementRule::Entry& entry : entries)
       for (int k = 0; k < 3; ++k) d[k] += entry.gradient[k] * corners[entry.vertex];
     for (int k = 0; k < 3; ++k) {
-      length[k] = std::max(d[k].norm(), least_length);
+      own_length[k] = d[k].norm();
+      length[k] = std::max(own_length[k], least_length);
       u[k] = d[k] / length[k];
     }
     cross12 = u[1].cross(u[2]);
     s = u[0].dot(cross12);
   }
 
+  /// Derivative by d_k of u_k . v, for a v that does not depend on it.
+  Vec3 derivative_along(int k, const Vec3& v) const {
+    if (own_length[k] < length[k]) return v / length[k];
+    return (v - u[k].dot(v) * u[k]) / length[k];
+  }
+
   /// ds/dd_k for k = 0, 1, 2.
   std::array<Vec3, 3> derivative() const {
-    return {(cross12 - s * u[0]) / length[0], (u[2].cross(u[0]) - s * u[1]) / length[1],
-            (u[0].cross(u[1]) - s * u[2]) / length[2]};
+    return {derivative_along(0, cross12), derivative_along(1, u[2].cross(u[0])), derivative_along(2, u[0].cross(u[1]))};
   }
 };
 
@@ -231,7 +243,7 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
   std::array<Vec3, kMaxCellVertices> x;
   for (std::size_t a = 0; a < vertices.size(); ++a) x[a] = nodes[vertices[a]];
   const Vec3& h = lengths_[cell];
-  const double least_length = kLeastLength * h.minCoeff();
+  const double least_length = kLeastEnergyLength * h.minCoeff();
   double energy = 0;
   const auto add = [&](std::size_t q, double weight, double residual, const std::array<Vec3, 3>& derivatives) {
     energy += weight * residual * residual;
@@ -261,14 +273,14 @@ double QualityEnergy::evaluate(std::size_t cell, std::span<const Vec3> nodes, Ce
       const double cosine = frame.u[i].dot(frame.u[j]);
       std::array<Vec3, 3> derivative{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
       if constexpr (kDerivatives) {
-        derivative[i] = (frame.u[j] - cosine * frame.u[i]) / frame.length[i];
-        derivative[j] = (frame.u[i] - cosine * frame.u[j]) / frame.length[j];
+        derivative[i] = frame.derivative_along(i, frame.u[j]);
+        derivative[j] = frame.derivative_along(j, frame.u[i]);
       }
       add(q, weights_.cosine * points.weights[q], cosine, derivative);
-      const double least = weights_.least_edge * h[i], short_by = 1 - frame.length[i] / least;
+      const double least = weights_.least_edge * h[i], short_by = 1 - frame.own_length[i] / least;
       if (!(short_by > 0)) continue;
       derivative = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
-      if constexpr (kDerivatives) derivative[i] = -frame.u[i] / least;
+      if constexpr (kDerivatives) derivative[i] = -frame.u[i].normalized() / least;
       add(q, weights_.edge * points.weights[q] * emphasis(cell, corner), short_by, derivative);
     }
   }
@@ -437,8 +449,9 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
     for (std::size_t q = 0; q < points.rule.num_points(); ++q) {
       const Frame frame(points.rule.point(q), x.data(), kLeastLength * lengths_[c].minCoeff());
       const double s = frame.s;
-      const double at_cap = cap(c, points, q), own_goal = at_cap < kNoCap ? std::min(goal, at_cap - kBelowCap) : goal;
-      double share = std::min(1.0, s / own_goal);
+      const double at_cap = cap(c, points, q);
+      const double own_goal = at_cap < kNoCap ? std::min(goal, std::max(kLeastGoal, at_cap - kBelowCap)) : goal;
+      double share = std::clamp(s / own_goal, kLeastShare, 1.0);
       if (live_edge_ > 0 && points.corner[q] >= 0)
         for (int k = 0; k < 3; ++k) share = std::min(share, frame.length[k] / (live_edge_ * lengths_[c][k]));
       least[c] = std::min(least[c], s);
@@ -463,7 +476,9 @@ QualityEnergy::State QualityEnergy::emphasize_poor(std::span<const Vec3> nodes, 
   for (std::size_t c = 0; c < least.size(); ++c) {
     state.least = std::min(state.least, least[c]);
     state.least_share = std::min(state.least_share, shares[c]);
-    if (shares[c] < 1) state.poor.push_back(static_cast<Index>(c));
+    if (!(shares[c] < 1)) continue;
+    state.poor.push_back(static_cast<Index>(c));
+    state.shares.push_back(shares[c]);
   }
   return state;
 }

@@ -37,7 +37,8 @@ struct QualityWeights {
 ///     + w_h sum over edges of the boundary  omega f^2, if folds are forbidden
 ///
 /// d_i  columns of the Jacobian in the coordinates of the ideal cell (`ElementRule`): edges, at the corners of a hex
-/// s    scaled Jacobian det(d_1, d_2, d_3) / (|d_1| |d_2| |d_3|), as `measure_quality` samples it
+/// s    scaled Jacobian det(d_1, d_2, d_3) / (|d_1| |d_2| |d_3|), as `measure_quality` samples it. In s and in the
+///      cosines, lengths count as 5 % of the least h_i or more: as a d_i vanishes, its derivatives stay bounded
 /// h_i  wanted lengths of the cell;  h: their geometric mean
 /// t    the threshold, or the cap of the point if that is lower (`set_caps`)
 /// a_q  1 / number of corners at the corners; 1/16 at other points: the midpoints of edges, faces and cell, or more of
@@ -76,12 +77,15 @@ class QualityEnergy final : public VolumeTerm {
   /// State of the cells against a goal.
   struct State {
     double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
-    double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached; <= 1
+    double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached;
+                             ///< in [-1, 1]
     std::vector<Index> poor{};  ///< cells with a point below its goal, or at a fold, ascending
+    std::vector<double> shares{};  ///< least share of each of these
   };
   /// Multiplies the emphasis of corners below the goal by 2.5, and that of all other points of cells with one of them
-  /// below; elsewhere it falls back by 3 % towards 1. At most 1000. If folds are forbidden, a fold reaches its goal
-  /// halfway between its limit and 360 degrees, and a corner also needs edges of the least length.
+  /// below; elsewhere it falls back by 3 % towards 1. At most 1000. The goal at a cap is lower than the cap by 0.02,
+  /// but at least 0.01; shares of it count as -1 or more. If folds are forbidden, a fold reaches its goal halfway
+  /// between its limit and 360 degrees, and a corner also needs edges of the least length.
   State emphasize_poor(std::span<const Vec3> nodes, double goal);
   /// Sets all emphasis to 1.
   void reset_emphasis();

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace subvol::internal {
@@ -22,21 +23,27 @@ constexpr double kMargin = 0.15;
 constexpr double kCoarseMargin = 0.05;
 constexpr int kMostCoarseLiftSteps = 20, kMostFineLiftSteps = 40;
 
-/// A distance that is too large by a tenth weighs as much as cells that miss the goal by a fifth: distances end at
-/// their bar, quality as high as possible.
-constexpr double kExcessWeight = 2;
-
 /// Width of the strip of surface that counts as much as a crease, in edges.
 constexpr double kCreaseEdges = 5;
 
-/// Rings of cells around poor ones that move with them, in one pass over all patches after the other; and the share of
-/// all cells up to which patches cost less than the whole mesh.
-constexpr std::array<int, 2> kPatchRings{1, 3};
+/// Rings of cells around poor ones that move with them, in one pass over all patches after the other; the share of all
+/// cells up to which patches cost less than the whole mesh; and the shares of the goal below which cells are lifted:
+/// the first for which patches are that small.
+constexpr std::array<int, 3> kPatchRings{1, 3, 2};
 constexpr double kMostPatchShare = 0.4;
+constexpr std::array<double, 4> kPatchShares{1, 0.85, 0.6, 0.3};
+
+/// Exponent of the norm of all costs of a state (`LiftMerit`).
+constexpr double kCostExponent = 4;
 
 double above(double goal, double margin = kMargin) { return std::min(0.95, goal + margin); }
 
 }  // namespace
+
+double LiftMerit::cost_of_cell(double share) const {
+  constexpr double kPoor = 0.8;
+  return 1 - share + poor * std::max(0.0, kPoor - share);
+}
 
 double QualitySchedule::expected_steps() const {
   constexpr double kLift = 5;  // most of the lift is done on patches
@@ -207,31 +214,31 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   return going;
 }
 
-/// Raises the emphasis of sample triangles that are too far from the target. Returns the largest distance.
-/// far_cells  receives the cells at triangles that are farther than what is aimed at.
-double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x,
-                                    std::vector<Index>& far_cells) {
+/// Raises the emphasis of sample triangles that are too far from the target, and notes the largest distance and the
+/// cells at triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
+double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state) {
   constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
-  const double most_distance = schedule.most_distance;
   std::vector<Vec3> samples(problem_->samples.num_rows());
   problem_->apply_samples(x, samples);
   surface_->forget();
   surface_->assign(samples);
-  const std::vector<double> distances = surface_->triangle_distances_with_corners();
+  std::vector<double> shares = surface_->triangle_distances_with_corners();
+  for (double& share : shares) share /= schedule.most_distance;
   std::vector<double> factors = factors_;
-  double largest = 0;
-  for (std::size_t t = 0; t < distances.size(); ++t) {
+  double costs = 0;
+  for (std::size_t t = 0; t < shares.size(); ++t) {
     double& emphasis = far_emphasis_[t];
-    emphasis = distances[t] > schedule.far_margin * most_distance ? std::min(kMost, kRaise * emphasis)
-                                                      : std::max(1.0, kFallBack * emphasis);
+    emphasis =
+        shares[t] > schedule.far_margin ? std::min(kMost, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
     factors[t] *= emphasis;
-    largest = std::max(largest, distances[t]);
-    if (distances[t] > most_distance && !triangle_cells_.empty()) far_cells.push_back(triangle_cells_[t]);
+    state.distance = std::max(state.distance, shares[t] * schedule.most_distance);
+    costs += std::pow(schedule.merit.cost_of_place(shares[t] - 1), kCostExponent);
+    if (shares[t] > 1 && !triangle_cells_.empty()) state.far_cells.push_back(triangle_cells_[t]);
   }
   surface_->weigh(std::move(factors));
-  std::sort(far_cells.begin(), far_cells.end());
-  far_cells.erase(std::unique(far_cells.begin(), far_cells.end()), far_cells.end());
-  return largest;
+  std::sort(state.far_cells.begin(), state.far_cells.end());
+  state.far_cells.erase(std::unique(state.far_cells.begin(), state.far_cells.end()), state.far_cells.end());
+  return costs;
 }
 
 /// Judges a state, and raises the emphasis on what is poor or too far there.
@@ -240,18 +247,19 @@ QualityStages::State QualityStages::inspect(const QualitySchedule& schedule, std
   problem_->apply_nodes(x, nodes);
   energy_->densify(energy_->poor_between_points(nodes, schedule.goal));
   State state{energy_->emphasize_poor(nodes, schedule.goal)};
-  const bool minds_distance = surface_ && schedule.most_distance > 0;
-  if (minds_distance) state.distance = emphasize_far(schedule, x, state.far_cells);
-  const double excess = minds_distance ? std::max(0.0, state.distance / schedule.most_distance - 1) : 0;
-  state.merit = state.cells.least_share - kExcessWeight * excess;
+  double costs = surface_ && schedule.most_distance > 0 ? emphasize_far(schedule, x, state) : 0;
+  for (const double share : state.cells.shares) costs += std::pow(schedule.merit.cost_of_cell(share), kCostExponent);
+  state.merit = 1 - std::pow(costs, 1 / kCostExponent);
   return state;
 }
 
-/// Returns the patches around all cells that are poor or too far from the target; none if they are most of the mesh.
-std::vector<QualityPatch> QualityStages::patches_of(const State& state, int rings) const {
-  std::vector<Index> centers;
-  std::set_union(state.cells.poor.begin(), state.cells.poor.end(), state.far_cells.begin(), state.far_cells.end(),
-                 std::back_inserter(centers));
+/// Returns the patches around all cells that reach less than this share of the goal, or are too far from the target;
+/// none if they are most of the mesh.
+std::vector<QualityPatch> QualityStages::patches_of(const State& state, double share, int rings) const {
+  std::vector<Index> poor, centers;
+  for (std::size_t i = 0; i < state.cells.poor.size(); ++i)
+    if (state.cells.shares[i] < share) poor.push_back(state.cells.poor[i]);
+  std::set_union(poor.begin(), poor.end(), state.far_cells.begin(), state.far_cells.end(), std::back_inserter(centers));
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_->num_cells()));
   return quality_patches(*mesh_, *problem_,
                          surface_ ? surface_->triangles() : std::span<const std::array<Index, 3>>{}, centers, rings,
@@ -305,10 +313,11 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
   return going;
 }
 
-/// Raises the emphasis on poor cells and far places every two steps until none is left or patches can be made, lifts
-/// these, and keeps the best state.
+/// Raises the emphasis on poor cells and far places every two steps while that helps, lifts patches around poor cells
+/// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
   constexpr int kSteps = 2, kPatience = 5;
+  constexpr double kWorthwhile = 0.7;  // of the number of poor cells: the whole mesh is lifted while it falls below it
   const bool is_patch = patch_mesh_ != nullptr;
   energy_->reset_emphasis();
   far_emphasis_.assign(factors_.size(), 1);
@@ -316,7 +325,19 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
   state_ = {};
   bool going = true;
   int since_best = 0;
-  std::size_t passes = 0;
+  std::size_t pass = 0, poor_before = std::numeric_limits<std::size_t>::max();
+  const auto next_patches = [&](const State& now) {
+    std::vector<QualityPatch> patches;
+    if (is_patch) return patches;
+    const std::size_t poor = now.cells.poor.size(), before = std::exchange(poor_before, poor);
+    const bool gains = static_cast<double>(poor) < kWorthwhile * static_cast<double>(before);
+    for (; patches.empty() && pass < kPatchRings.size(); ++pass)
+      for (std::size_t i = 0; patches.empty() && i < kPatchShares.size(); ++i) {
+        if (pass == 0 && i > 0 && gains) return patches;
+        patches = patches_of(now, kPatchShares[i], kPatchRings[pass]);
+      }
+    return patches;
+  };
   for (int done = 0;; done += kSteps) {
     State now = inspect(schedule, x);
     if (now.merit > state_.merit) {
@@ -325,15 +346,11 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
       since_best = 0;
     }
     if (!going || now.merit >= 1 || ++since_best > kPatience || done >= schedule.lift.steps) break;
-    if (!is_patch && passes < kPatchRings.size()) {
-      const std::vector<QualityPatch> patches = patches_of(now, kPatchRings[passes]);
-      if (!patches.empty()) {
-        going = lift_patches(schedule, patches, x);
-        ++passes;
-        continue;
-      }
+    if (const std::vector<QualityPatch> patches = next_patches(now); !patches.empty()) {
+      going = lift_patches(schedule, patches, x);
+      continue;
     }
-    if (passes > 0) break;
+    if (pass > 0) break;
     QualityStage stage = schedule.lift;
     stage.steps = kSteps;
     going = run_stage(stage,

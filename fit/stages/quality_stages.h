@@ -11,6 +11,7 @@
 #include "subvol/fit/target/target_surface.h"
 #include "subvol/mesh/volume_mesh.h"
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <memory>
@@ -27,6 +28,24 @@ struct QualityStage {
   int steps;         ///< at most so many
 };
 
+/// What makes one state of a lift better than another one:
+///
+///   merit = 1 - (sum over cells c_c^4 + sum over sample triangles c_t^4)^(1/4)
+///
+/// c_c  cost of a cell that misses the goal, c_t that of a place that is too far, see below; 0 where all is well
+///
+/// This is close to the cost of the worst place, but others count as well: otherwise, what is gained elsewhere would be
+/// lost with a state in which the worst place, which may be hopeless, is slightly worse.
+struct LiftMerit {
+  double excess = 2;  ///< cost of a place that is twice as far from the target as it should be
+  double poor = 0;    ///< what all of the goal costs beside 1, in cells below four fifths of it
+
+  /// share  least share of the goal that a point of the cell has reached, at most 1.
+  double cost_of_cell(double share) const;
+  /// distance_excess  distance as a share of what it should be, less 1.
+  double cost_of_place(double distance_excess) const { return excess * std::clamp(distance_excess, 0.0, 1.0); }
+};
+
 /// The minimizations of one level.
 struct QualitySchedule {
   std::vector<QualityStage> stages;
@@ -38,6 +57,7 @@ struct QualitySchedule {
   double most_distance = 0;
   /// Share of `most_distance` from which on places are emphasized.
   double far_margin = 0.5;
+  LiftMerit merit;  ///< of the states of the lift
 
   /// Number of steps of the whole mesh that the schedule is expected to take, for forecasts of work.
   double expected_steps() const;
@@ -48,16 +68,17 @@ struct QualitySchedule {
 /// `QualitySchedule::far_margin` of lifts that start from a mesh whose surface is where it should be.
 inline constexpr double kLateFarMargin = 0.9;
 
-/// A schedule for a mesh that is not refined afterwards: the stages of the first, the lift of the second of these.
-QualitySchedule single_quality_schedule(double goal);
+/// A schedule of a few steps without a lift, which brings a template near the surface, to find out what lies where.
+QualitySchedule smooth_quality_schedule();
 
 /// Schedules for a template of a few hundred cells or more at the surface's place: its cells are drawn to the surface
 /// first and are lifted then; and for the refinement of a mesh that was fitted so.
 /// goal  least scaled Jacobian wanted, in (0, 1).
-/// A schedule of a few steps without a lift brings a template near the surface, to find out what lies where.
-QualitySchedule smooth_quality_schedule();
 QualitySchedule coarse_quality_schedule(double goal);
 QualitySchedule fine_quality_schedule(double goal);
+
+/// A schedule for a mesh that is not refined afterwards: the stages of the first, the lift of the second of these.
+QualitySchedule single_quality_schedule(double goal);
 
 /// A schedule for a mesh whose surface is where it should be: a lift in which only poor cells exert a force, so that
 /// the surface moves as little as possible.
@@ -95,9 +116,7 @@ class QualityStages {
   struct State {
     QualityEnergy::State cells;
     double distance = 0;   ///< largest distance at the samples, as a share of the diagonal; 0 if none is aimed at
-    /// Least share of the goal that a cell reaches, at most 1, less a multiple of the share by which the distance is
-    /// too large. 1: all aims are reached.
-    double merit = -1e300;
+    double merit = -1e300;           ///< see `LiftMerit`. 1: all aims are reached
     std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending
   };
 
@@ -123,9 +142,9 @@ class QualityStages {
   bool run_stage(const QualityStage& stage, const std::string& name, bool is_lift, std::vector<Vec3>& x);
   bool lift(const QualitySchedule& schedule, std::vector<Vec3>& x);
   bool lift_patches(const QualitySchedule& schedule, std::span<const QualityPatch> patches, std::vector<Vec3>& x);
-  std::vector<QualityPatch> patches_of(const State& state, int rings) const;
+  std::vector<QualityPatch> patches_of(const State& state, double share, int rings) const;
   State inspect(const QualitySchedule& schedule, std::span<const Vec3> x);
-  double emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, std::vector<Index>& far_cells);
+  double emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state);
 
   std::unique_ptr<VolumeMesh> patch_mesh_;  ///< of a patch; null: a whole level
   const VolumeMesh* mesh_;
