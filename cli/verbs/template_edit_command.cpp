@@ -9,6 +9,7 @@
 #include "cli/verbs/template_command.h"
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/error.h"
+#include "subvol/base/format.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
@@ -26,6 +27,9 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 namespace subvol::cli {
 namespace {
@@ -118,9 +122,28 @@ VolumeMesh make_collapsed(EditArguments& arguments) {
                                     : collapse_sheet(mesh, a, b);
 }
 
+/// Warns of names that both of two meshes have, and of names that get another number beside those of the first.
+void warn_of_same_names(std::span<const Group> first, std::span<const Group> second, const char* what,
+                        std::vector<std::string>& warnings) {
+  for (const Group& b : second) {
+    const auto same = std::ranges::find(first, b);
+    if (same != first.end()) {
+      warnings.push_back(formatted("both meshes have the %s %s: in the result it is one", what, label_of(b).c_str()));
+    } else if (std::ranges::find(first, b.number, &Group::number) != first.end()) {
+      warnings.push_back(formatted("the %s %s of the second mesh gets another number: the first mesh has another %s %d",
+                                   what, label_of(b).c_str(), what, b.number));
+    }
+  }
+}
+
 VolumeMesh make_merged(EditArguments& arguments) {
   VolumeMesh mesh = load_edited(arguments, arguments.mesh);
-  if (!arguments.other.empty()) mesh = joined(mesh, load_edited(arguments, arguments.other));
+  if (!arguments.other.empty()) {
+    const VolumeMesh other = load_edited(arguments, arguments.other);
+    warn_of_same_names(mesh.face_groups.groups, other.face_groups.groups, "group", arguments.warnings);
+    warn_of_same_names(mesh.regions, other.regions, "region", arguments.warnings);
+    mesh = joined(mesh, other);
+  }
   Eigen::AlignedBox3d box;
   for (const Index v : mesh.cell_vertices) box.extend(mesh.positions[v]);
   return glue(mesh, arguments.tolerance / 100 * box.diagonal().norm());

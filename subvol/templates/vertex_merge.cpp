@@ -105,6 +105,26 @@ VolumeFaceGroups merged_groups(const VolumeFaceGroups& groups, std::span<const I
   return merged;
 }
 
+/// Adds the regions of b to those of the joined mesh. Returns the new numbers of those that had to get one.
+std::map<int, int> append_regions(VolumeMesh& result, const VolumeMesh& b) {
+  std::vector<Group> taken = result.regions;
+  for (const VolumeMesh* mesh : {static_cast<const VolumeMesh*>(&result), &b})
+    for (const int reference : mesh->references) taken.push_back({"", reference, 3});
+  std::map<int, int> renumbered;
+  for (Group region : b.regions) {
+    const auto has_number = [&](const Group& other) { return other.number == region.number; };
+    const auto same = std::ranges::find_if(result.regions, has_number);
+    if (same != result.regions.end() && same->name == region.name) continue;
+    if (same != result.regions.end()) {
+      const int number = free_number(taken);
+      renumbered[std::exchange(region.number, number)] = number;
+      taken.push_back(region);
+    }
+    result.regions.push_back(std::move(region));
+  }
+  return renumbered;
+}
+
 }  // namespace
 
 VolumeMesh merge_vertices(const VolumeMesh& mesh, std::span<const Index> target, const std::string& name) {
@@ -149,17 +169,18 @@ VolumeMesh joined(const VolumeMesh& a, const VolumeMesh& b) {
     for (Index v : b.cell(c)) corners.push_back(first + v);
     result.add_cell(b.kinds[c], corners);
   }
+  const std::map<int, int> renumbered = append_regions(result, b);
   if (!a.references.empty() || !b.references.empty()) {
     result.references.clear();
     for (std::size_t c = 0; c < a.num_cells(); ++c) result.references.push_back(reference_of(a, c));
-    for (std::size_t c = 0; c < b.num_cells(); ++c) result.references.push_back(reference_of(b, c));
+    for (std::size_t c = 0; c < b.num_cells(); ++c) {
+      const auto at = renumbered.find(reference_of(b, c));
+      result.references.push_back(at == renumbered.end() ? reference_of(b, c) : at->second);
+    }
   }
   for (const CreaseEdge& c : b.tags.creases) result.tags.creases.push_back({first + c.v0, first + c.v1, c.sharpness});
   for (const CornerVertex& c : b.tags.corners) result.tags.corners.push_back({first + c.vertex, c.sharpness});
   append_groups(result.face_groups, b.face_groups, first);
-  for (const Group& region : b.regions)
-    if (std::find(result.regions.begin(), result.regions.end(), region) == result.regions.end())
-      result.regions.push_back(region);
   return result;
 }
 

@@ -445,6 +445,9 @@ TEST_CASE("Templates are made, edited and fitted from the command line", "[cli][
   CHECK(subvol::read_volume_mesh(place / "refined.mesh").num_cells() == 27 + 3 * 22 + 3 * 11 + 4);
   CHECK(place.run("template refine box.mesh -o x.mesh").status == 2);
   CHECK(place.run("template merge box.mesh -o merged.mesh").status == 0);
+  CHECK(place.run("template grid --box 2 0 0 4 2 2 --counts 2 2 2 -o beside.mesh").status == 0);
+  CHECK(place.run("template merge box.mesh beside.mesh -o both.mesh").status == 0);
+  CHECK(subvol::read_volume_mesh(place / "both.mesh").num_cells() == 16);
   CHECK(place.run("template extrude target.off --thickness 0.01 -o extruded.mesh").status == 0);
 
   CHECK(place.run("template").status == 2);

@@ -200,6 +200,20 @@ TEST_CASE("Merging glues coincident faces and keeps tags that stay on the bounda
   CHECK_THROWS_AS(glue(joined(left, left), 1e-9), InputError);  // the same cells twice
 }
 
+TEST_CASE("Regions of two meshes stay apart if their names differ", "[templates]") {
+  VolumeMesh wall = test::lattice(1, 1, 1), far = test::lattice(1, 1, 2);
+  wall.references = {1};
+  wall.regions = {{"wall", 1, 3}};
+  far.references = {1, 2};
+  far.regions = {{"air", 1, 3}, {"water", 2, 3}};
+  const VolumeMesh both = joined(wall, far);
+  CHECK(both.references == std::vector<int>{1, 3, 2});
+  CHECK(both.regions == std::vector<Group>{{"wall", 1, 3}, {"air", 3, 3}, {"water", 2, 3}});
+  CHECK(joined(wall, wall).references == std::vector<int>{1, 1});
+  far.regions.clear();  // numbers without names mean the same in both
+  CHECK(joined(wall, far).references == std::vector<int>{1, 1, 2});
+}
+
 TEST_CASE("Merging refuses a distance at which cells would go or change their kind", "[templates]") {
   VolumeMesh thin = test::lattice(1, 1, 1), apart = test::lattice(2, 2, 2);
   for (Vec3& p : thin.positions) p.z() *= 0.005;
