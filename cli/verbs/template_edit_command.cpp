@@ -128,10 +128,12 @@ void warn_of_same_names(std::span<const Group> first, std::span<const Group> sec
   for (const Group& b : second) {
     const auto same = std::ranges::find(first, b);
     if (same != first.end()) {
-      warnings.push_back(formatted("both meshes have the %s %s: in the result it is one", what, label_of(b).c_str()));
+      warnings.push_back(
+          internal::formatted("both meshes have the %s %s: in the result it is one", what, label_of(b).c_str()));
     } else if (std::ranges::find(first, b.number, &Group::number) != first.end()) {
-      warnings.push_back(formatted("the %s %s of the second mesh gets another number: the first mesh has another %s %d",
-                                   what, label_of(b).c_str(), what, b.number));
+      warnings.push_back(
+          internal::formatted("the %s %s of the second mesh gets another number: the first mesh has another %s %d",
+                              what, label_of(b).c_str(), what, b.number));
     }
   }
 }

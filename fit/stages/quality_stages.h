@@ -37,7 +37,7 @@ struct QualityStage {
 /// This is close to the cost of the worst place, but others count as well: otherwise, what is gained elsewhere would be
 /// lost with a state in which the worst place, which may be hopeless, is slightly worse.
 struct LiftMerit {
-  double excess = 2;  ///< cost of a place that is twice as far from the target as it should be
+  double excess = 2;  ///< cost of a place that is twice as far from the target as it should be, or farther
   double poor = 0;    ///< what all of the goal costs beside 1, in cells below four fifths of it
 
   /// share  least share of the goal that a point of the cell has reached, at most 1.

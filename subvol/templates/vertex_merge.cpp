@@ -108,8 +108,9 @@ VolumeFaceGroups merged_groups(const VolumeFaceGroups& groups, std::span<const I
 /// Adds the regions of b to those of the joined mesh. Returns the new numbers of those that had to get one.
 std::map<int, int> append_regions(VolumeMesh& result, const VolumeMesh& b) {
   std::vector<Group> taken = result.regions;
-  for (const VolumeMesh* mesh : {static_cast<const VolumeMesh*>(&result), &b})
-    for (const int reference : mesh->references) taken.push_back({"", reference, 3});
+  for (const int reference : result.references) taken.push_back({"", reference, 3});
+  for (const int reference : b.references) taken.push_back({"", reference, 3});
+  for (const Group& region : b.regions) taken.push_back(region);
   std::map<int, int> renumbered;
   for (Group region : b.regions) {
     const auto has_number = [&](const Group& other) { return other.number == region.number; };
