@@ -72,3 +72,26 @@ TEST_CASE("the cage of a mesh with regions is sharp where interfaces reach its b
   REQUIRE(place.run("convert layers.mesh -o cage.usda").status == 0);
   CHECK(content_of(place / "cage.usda").find("creaseIndices") != std::string::npos);
 }
+
+TEST_CASE("merge keeps regions of two meshes apart and warns of numbers and names that both have", "[cli][regions]") {
+  const Workplace place;
+  subvol::VolumeMesh below = subvol::test::lattice(1, 1, 1), above = below;
+  below.references = above.references = {1};
+  below.regions = {{"steel", 1, 3}};
+  above.regions = {{"air", 1, 3}};
+  for (subvol::Vec3& p : above.positions) p.z() += 1;
+  subvol::write_volume_mesh(place / "below.mesh", below);
+  subvol::write_volume_mesh(place / "above.mesh", above);
+  const Run run = place.run("template merge below.mesh above.mesh -o both.mesh");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  CHECK(run.err.find("the region air of the second mesh gets another number") != std::string::npos);
+  const subvol::VolumeMesh both = subvol::read_volume_mesh(place / "both.mesh");
+  CHECK(both.references == std::vector<int>{1, 2});
+  above.regions = below.regions;
+  subvol::write_volume_mesh(place / "above.mesh", above);
+  const Run same = place.run("template merge below.mesh above.mesh -o both.mesh --force");
+  REQUIRE(same.status == 0);
+  CHECK(same.err.find("both meshes have the region steel") != std::string::npos);
+  CHECK(subvol::read_volume_mesh(place / "both.mesh").references == std::vector<int>{1, 1});
+}
