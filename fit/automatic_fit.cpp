@@ -42,8 +42,8 @@ namespace {
 
 constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
 constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting some of them
-/// Rounds in which some cells are cut: cells of size 1 / 9 are the smallest. A second round has never improved a fit
-/// that follows edges (i07, x-end-idler, y-belt-idler, LCD-knob), and took as long as all before.
+/// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest. The fits with edges that
+/// had a second round (i07 twice, fan-shroud) gained nothing by it.
 constexpr int kMostRefinements = 2, kMostRefinementsWithEdges = 1;
 /// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
 constexpr double kWorthRefining = 0.5;

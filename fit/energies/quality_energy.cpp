@@ -20,8 +20,8 @@ namespace {
 constexpr int kPoints = 3, kDensePoints = 5;
 constexpr double kInnerWeight = 1.0 / 16;  // a_q of points that are no corners
 constexpr double kLeastLength = 1e-9;      // lengths of directions are not below this share of the cell's
-// The same where there are derivatives. A cell that was folded had a direction of 1e-7 at a point; its Hessian was 1e13
-// times that of other cells, and no vertex of the patch around it moved.
+// The energy uses a larger share, which bounds its derivatives. A folded cell had a direction of length 1e-7 at a
+// point; its Hessian was 1e13 times that of other cells, and no vertex of the patch around it moved.
 constexpr double kLeastEnergyLength = 0.05;
 constexpr double kNoCap = 1;               // scaled Jacobians are at most 1
 constexpr double kBelowCap = 0.02;         // goals at caps are lower than the caps by this,

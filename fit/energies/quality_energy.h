@@ -77,8 +77,8 @@ class QualityEnergy final : public VolumeTerm {
   /// State of the cells against a goal.
   struct State {
     double least = 1;        ///< least scaled Jacobian at the points of all cells; 1 without cells
-    double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached;
-                             ///< in [-1, 1]
+    double least_share = 1;  ///< least share of the goal, or of the lower goal at caps, that a point has reached; at
+                             ///< most 1, and at least -1 but at folds
     std::vector<Index> poor{};  ///< cells with a point below its goal, or at a fold, ascending
     std::vector<double> shares{};  ///< least share of each of these
   };

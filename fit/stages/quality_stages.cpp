@@ -214,8 +214,8 @@ bool QualityStages::run_stage(const QualityStage& stage, const std::string& name
   return going;
 }
 
-/// Raises the emphasis of sample triangles that are too far from the target, and notes the largest distance and the
-/// cells at triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
+/// Raises the emphasis of sample triangles that are too far from the target, and notes the cells at
+/// triangles that are farther than what is aimed at. Returns the sum of c_t^4 (`LiftMerit`).
 double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state) {
   constexpr double kRaise = 3, kFallBack = 0.97, kMost = 1000;
   std::vector<Vec3> samples(problem_->samples.num_rows());
@@ -231,7 +231,6 @@ double QualityStages::emphasize_far(const QualitySchedule& schedule, std::span<c
     emphasis =
         shares[t] > schedule.far_margin ? std::min(kMost, kRaise * emphasis) : std::max(1.0, kFallBack * emphasis);
     factors[t] *= emphasis;
-    state.distance = std::max(state.distance, shares[t] * schedule.most_distance);
     costs += std::pow(schedule.merit.cost_of_place(shares[t] - 1), kCostExponent);
     if (shares[t] > 1 && !triangle_cells_.empty()) state.far_cells.push_back(triangle_cells_[t]);
   }
@@ -317,7 +316,7 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
 /// then, and keeps the best state.
 bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) {
   constexpr int kSteps = 2, kPatience = 5;
-  constexpr double kWorthwhile = 0.7;  // of the number of poor cells: the whole mesh is lifted while it falls below it
+  constexpr double kWorthwhile = 0.7;  // a round of the whole mesh must leave less than this share of the poor cells
   const bool is_patch = patch_mesh_ != nullptr;
   energy_->reset_emphasis();
   far_emphasis_.assign(factors_.size(), 1);

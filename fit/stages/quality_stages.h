@@ -28,7 +28,7 @@ struct QualityStage {
   int steps;         ///< at most so many
 };
 
-/// What makes one state of a lift better than another one:
+/// Judges the states of a lift; the one with the highest merit is kept:
 ///
 ///   merit = 1 - (sum over cells c_c^4 + sum over sample triangles c_t^4)^(1/4)
 ///
@@ -38,7 +38,7 @@ struct QualityStage {
 /// lost with a state in which the worst place, which may be hopeless, is slightly worse.
 struct LiftMerit {
   double excess = 2;  ///< cost of a place that is twice as far from the target as it should be, or farther
-  double poor = 0;    ///< what all of the goal costs beside 1, in cells below four fifths of it
+  double poor = 0;    ///< additional cost of a cell for each share of the goal that it lacks to four fifths of the goal
 
   /// share  least share of the goal that a point of the cell has reached, at most 1.
   double cost_of_cell(double share) const;
@@ -115,7 +115,6 @@ class QualityStages {
   /// A state that the lift reached.
   struct State {
     QualityEnergy::State cells;
-    double distance = 0;   ///< largest distance at the samples, as a share of the diagonal; 0 if none is aimed at
     double merit = -1e300;           ///< see `LiftMerit`. 1: all aims are reached
     std::vector<Index> far_cells{};  ///< cells at the boundary that are farther than what is aimed at, ascending
   };

@@ -32,7 +32,8 @@ VolumeMesh glue(const VolumeMesh& mesh, double distance);
 
 /// Returns two meshes as one, with the second's vertices and cells after the first's. Nothing is glued. Groups and
 /// regions of the same name and number become one. A named region of b whose number is taken by another one of a gets
-/// the lowest positive number that is free, and so do its cells; for groups see `append_groups`.
+/// the lowest positive number that is free, and so do its cells; numbers without names mean the same in both meshes.
+/// For groups see `append_groups`.
 VolumeMesh joined(const VolumeMesh& a, const VolumeMesh& b);
 
 }  // namespace subvol
