@@ -54,18 +54,18 @@ set(entry_points
   fit/geometry/surface_distance.h
   fit/high_order_fit.h
   fit/mesh_check.h
+  fit/mending/mend_surface.h
+  fit/mending/surface_repair.h
   fit/optimize_mesh.h
   fit/quality/quality.h
   fit/subdivision_fit.h
   fit/target/surface_diagnosis.h
-  fit/target/surface_repair.h
   fit/target/surface_wrap.h
   fit/template_choice.h
   fit/untangle_before_fit.h
   # Shells
   shell/curved_shell.h
   shell/extrude.h
-  shell/mend_surface.h
   shell/partial_surface.h
   shell/shell.h
   # Files of results

@@ -2,8 +2,8 @@
 #include "subvol/shell/extrude.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/mending/visible_normals.h"
 #include "subvol/shell/shell_layers.h"
-#include "subvol/shell/visible_normals.h"
 #include "subvol/templates/template_edit.h"
 
 #include <cmath>

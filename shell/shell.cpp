@@ -4,11 +4,11 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/mending/surface_faults.h"
+#include "subvol/fit/mending/visible_normals.h"
 #include "subvol/fit/solver/free_nodes.h"
 #include "subvol/fit/solver/newton.h"
-#include "subvol/shell/surface_faults.h"
 #include "subvol/shell/thickness.h"
-#include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
 
 #include <Eigen/Geometry>
@@ -149,7 +149,7 @@ void ShellMaker::timed(const char* part, void (ShellMaker::*work)()) {
 }
 
 void ShellMaker::require_no_faults(const PolygonMesh& surface) const {
-  const SurfaceFaults faults = find_faults(surface, options_.cancelled);
+  const SurfaceFaults faults = find_faults(surface, MendingGoal::layers, options_.cancelled);
   const std::string text = to_text(faults, surface, {options_.vertex_numbers, options_.face_numbers});
   if (!text.empty()) throw InputError(text);
 }

@@ -3,8 +3,8 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/mending/visible_normals.h"
 #include "subvol/mesh/features.h"
-#include "subvol/shell/visible_normals.h"
 
 #include <Eigen/Geometry>
 

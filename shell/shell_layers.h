@@ -2,9 +2,9 @@
 #pragma once
 
 #include "subvol/fit/elements/cell_reference.h"
+#include "subvol/fit/mending/surface_faults.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/shell/border_planes.h"
-#include "subvol/shell/surface_faults.h"
 #include "subvol/surface/surface_topology.h"
 #include "subvol/surface/triangle_mesh.h"
 

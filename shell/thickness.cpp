@@ -4,9 +4,9 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/mending/surface_faults.h"
+#include "subvol/fit/mending/visible_normals.h"
 #include "subvol/shell/ray_gap.h"
-#include "subvol/shell/surface_faults.h"
-#include "subvol/shell/visible_normals.h"
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>

@@ -40,6 +40,7 @@ const std::vector<Room> kRooms{
     {"fit/quality", {"subvol", "fit/elements", "fit/certificate"}},
     {"fit/geometry", {"subvol", "fit/simd"}},
     {"fit/target", {"subvol", "fit/geometry"}},
+    {"fit/mending", {"subvol", "fit/geometry", "fit/target"}},
     {"fit/features", {"subvol", "fit/geometry"}},
     {"fit/energies",
      {"subvol", "fit/simd", "fit/elements", "fit/certificate", "fit/geometry", "fit/target", "fit/features"}},

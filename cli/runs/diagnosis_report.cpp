@@ -33,14 +33,19 @@ Json numbers_json(const std::array<Index, 2>& numbers) {
 const char* measure_of(SurfaceFault fault) {
   switch (fault) {
     case SurfaceFault::open_rim:
-    case SurfaceFault::pinhole: return "length";
+    case SurfaceFault::pinhole:
+      return "length";
     case SurfaceFault::thin_wall:
-    case SurfaceFault::thin_gap: return "width";
-    case SurfaceFault::sharp_angle: return "degrees";
+    case SurfaceFault::thin_gap:
+      return "width";
+    case SurfaceFault::sharp_angle:
+      return "degrees";
     case SurfaceFault::wall_outward:
     case SurfaceFault::part_inward:
-    case SurfaceFault::part_in_void: return "volume";
-    default: return nullptr;
+    case SurfaceFault::part_in_void:
+      return "volume";
+    default:
+      return nullptr;
   }
 }
 
@@ -90,6 +95,17 @@ SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, st
   return result;
 }
 
+/// Repairs a surface with the copies of triangles that the reader drops, if these tell more: two that face each other
+/// are a sheet between two regions, or walls of zero width where solids touch.
+void consider_copies(const std::filesystem::path& path, RegionRule rule, SurfaceRepair& repair) {
+  if (repair.regions) return;
+  const TriangleMesh surface = triangulate(read_polygon_mesh(path));
+  if (repair.done.empty() && rule == RegionRule::automatic) repair.regions = find_regions(surface, rule);
+  if (repair.regions || repair.is_fillable) return;
+  SurfaceRepair with_copies = repair_surface(surface, interrupted, rule);
+  if (with_copies.is_fillable) repair = std::move(with_copies);
+}
+
 }  // namespace
 
 FileSurface file_surface(const PolygonMesh& polygons) {
@@ -118,9 +134,7 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
     const std::size_t told = warnings.size();
     SurfaceRepair repair = repair_surface(load_surface(path, warnings), interrupted, rule);
     const bool may_have_copies = warnings.size() > told && is_surface_file(path);
-    if (repair.regions || !repair.done.empty() || rule != RegionRule::automatic || !may_have_copies) return repair;
-    // The reader drops copies of triangles, which tell that a solid lies on either side of them.
-    repair.regions = find_regions(triangulate(read_polygon_mesh(path)), rule);
+    if (may_have_copies && !interrupted()) consider_copies(path, rule, repair);
     return repair;
   }
   LabelGrid grid = read_label_grid(path);
@@ -178,14 +192,10 @@ Json diagnosis_json(const SurfaceDiagnosis& diagnosis) {
                                           {"prevents_filling", prevents_filling(finding.fault)},
                                           {"first", std::move(places)}};
   }
-  Json json{{"fillable", diagnosis.is_fillable()},
-            {"triangles", diagnosis.num_triangles},
-            {"vertices", diagnosis.num_vertices},
-            {"diagonal", diagnosis.diagonal},
-            {"volume", diagnosis.volume},
-            {"num_parts", diagnosis.parts.size()},
-            {"parts", parts_json(diagnosis.parts)},
-            {"findings", std::move(findings)}};
+  Json json{{"fillable", diagnosis.is_fillable()},  {"triangles", diagnosis.num_triangles},
+            {"vertices", diagnosis.num_vertices},   {"diagonal", diagnosis.diagonal},
+            {"volume", diagnosis.volume},           {"num_parts", diagnosis.parts.size()},
+            {"parts", parts_json(diagnosis.parts)}, {"findings", std::move(findings)}};
   if (diagnosis.is_cancelled) json["ended_early"] = true;
   return json;
 }
@@ -202,8 +212,10 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
     for (std::size_t i = 1; i < finding.places.size(); ++i) text << place_line(finding.places[i]);
     if (prevents_filling(finding.fault)) reasons += (reasons.empty() ? "" : ", ") + to_string(finding.fault);
   }
-  if (reasons.empty()) text << "can be filled as it is\n";
-  else text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
+  if (reasons.empty())
+    text << "can be filled as it is\n";
+  else
+    text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
   return text.str();
 }
 

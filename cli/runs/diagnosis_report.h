@@ -2,8 +2,8 @@
 #pragma once
 
 #include "cli/runs/run_options.h"
+#include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/target/surface_diagnosis.h"
-#include "subvol/fit/target/surface_repair.h"
 
 #include <filesystem>
 #include <optional>

@@ -87,7 +87,8 @@ ShellSurface prepared_surface(const TaggedPolygons& given, const ShellSurfaceOpt
     result.vertex_numbers = std::move(part.vertex_numbers);
     result.face_numbers = std::move(part.face_numbers);
   }
-  MendedSurface mended = mend_surface(result.polygons, result.tags, options.repair_distance, options.cancelled);
+  MendedSurface mended =
+      mend_surface(result.polygons, result.tags, options.repair_distance, MendingGoal::layers, options.cancelled);
   result.is_cancelled = mended.is_cancelled;
   if (mended.is_mended()) {
     for (BorderPlane& plane : result.border_planes) {

@@ -3,8 +3,8 @@
 
 #include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
+#include "subvol/fit/mending/mend_surface.h"
 #include "subvol/shell/border_planes.h"
-#include "subvol/shell/mend_surface.h"
 #include "subvol/shell/shell.h"
 
 #include <cstddef>

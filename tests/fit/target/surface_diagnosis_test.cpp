@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/target/surface_diagnosis.h"
-#include "subvol/fit/target/surface_repair.h"
+#include "subvol/base/error.h"
+#include "subvol/fit/mending/surface_repair.h"
 #include "subvol/surface/solid_topology.h"
 #include "tests/support/surface_fixtures.h"
 

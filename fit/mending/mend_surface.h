@@ -11,11 +11,17 @@
 
 namespace subvol {
 
-/// Default distance within which a surface may be mended for a shell, as a share of its bounding box's diagonal: what a
-/// file of eight digits loses in a few operations of a CAD program, and less than what any shell resolves.
+/// Default distance within which a surface may be mended, as a share of its bounding box's diagonal: what a file of
+/// eight digits loses in a few operations of a CAD program, and less than what any shell or fit resolves.
 inline constexpr double kMendingShare = 2e-4;
 
-/// A surface on which layers can stand, and what was done to it.
+/// What a surface is mended for.
+enum class MendingGoal {
+  layers,  ///< layers of cells are to stand on it: a vertex from which no direction sees all faces around is a fault
+  solid    ///< it is to bound a solid: such a vertex is none
+};
+
+/// A surface that was mended, and what was done to it.
 struct MendedSurface {
   PolygonMesh surface;
   FeatureTags tags;                   ///< those of the given surface, by the new numbers
@@ -34,26 +40,28 @@ struct MendedSurface {
   }
 };
 
-/// Removes what keeps layers from standing on a surface of triangles, if that is possible by changes within a distance:
-/// faces without area, vertices and edges at which several fans of faces touch, small crossings and contacts, and
-/// vertices from which no direction sees all faces around.
+/// Removes what keeps a surface of triangles from its goal, if that is possible by changes within a distance: faces
+/// without area, vertices and edges at which several fans of faces touch, small crossings and contacts, and, for
+/// layers, vertices from which no direction sees all faces around.
 ///
 /// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one.
+/// - Of faces on the same vertices, those of equal orientation become one, and two that face each other vanish. For a
+///   solid, these may be of any size, since they enclose nothing.
 /// - Where several fans of faces have a vertex or an edge in common, each gets its own copy of it, and the copies move
 ///   apart, each toward its fan.
 /// - At each fault (`find_faults`) the smallest change is made that leaves the fewest: an edge shorter than the
-/// distance collapses,
-///   an edge is exchanged for the other diagonal of its two triangles if these are as close, or a vertex moves by up to
-///   the distance. If no change helps, two are tried together.
+///   distance collapses, an edge is exchanged for the other diagonal of its two triangles if these are as close, or a
+///   vertex moves by up to the distance. If no change helps, two are tried together.
 ///
 /// surface   a surface without faults, and one with polygons of more than three corners, is returned bit by bit.
 /// distance  in the surface's unit, >= 0; 0: the surface is returned as it is.
-/// returns   a surface that is farther than `distance` from the given one nowhere. Faults that could not be removed are
-///           still there, and what `make_layers` rejects may be, too.
+/// returns   a surface that is farther than `distance` from the given one nowhere (for a solid: from the given one
+///           without the faces that vanish). Faults that could not be removed are still there, and what `make_layers`
+///           rejects may be, too.
 /// InputError: a vertex number that is out of range, a position that is not finite.
 /// Deterministic. Cost: that of `find_faults` if there are none; else up to a second for some hundred faults.
 MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, double distance,
-                           const std::function<bool()>& cancelled = {});
+                           MendingGoal goal = MendingGoal::layers, const std::function<bool()>& cancelled = {});
 
 /// Returns a sentence that tells what was done, such as "mended within 0.003 (0.004 % of the diagonal): 2 faces
 /// dropped"; empty if nothing was.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/shell/surface_faults.h"
+#include "subvol/fit/mending/surface_faults.h"
 
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/triangle_meeting.h"
+#include "subvol/fit/mending/visible_normals.h"
 #include "subvol/fit/target/surface_diagnosis.h"
-#include "subvol/shell/visible_normals.h"
 
 #include <algorithm>
 
@@ -53,7 +53,7 @@ Vec3 meeting_place(const PolygonMesh& surface, const std::array<Index, 2>& faces
 
 }  // namespace
 
-SurfaceFaults find_faults(const PolygonMesh& surface, const std::function<bool()>& cancelled) {
+SurfaceFaults find_faults(const PolygonMesh& surface, MendingGoal goal, const std::function<bool()>& cancelled) {
   SurfaceFaults faults;
   std::vector<Index> face;
   const SelfIntersections found = self_intersections(fan_triangles(surface, &face), cancelled);
@@ -65,7 +65,7 @@ SurfaceFaults find_faults(const PolygonMesh& surface, const std::function<bool()
   faults.flat.erase(std::unique(faults.flat.begin(), faults.flat.end()), faults.flat.end());
   std::sort(faults.meeting.begin(), faults.meeting.end());
   faults.meeting.erase(std::unique(faults.meeting.begin(), faults.meeting.end()), faults.meeting.end());
-  faults.hidden = visible_normals(surface).hidden;
+  if (goal == MendingGoal::layers) faults.hidden = visible_normals(surface).hidden;
   return faults;
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/shell/mend_surface.h"
+#include "subvol/fit/mending/mend_surface.h"
 
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/surface_distance.h"
+#include "subvol/fit/mending/surface_faults.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/shell/shell.h"
-#include "subvol/shell/surface_faults.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/require_data.h"
 #include "tests/support/shell_fixtures.h"
@@ -52,7 +52,7 @@ void check_mended(const MendedSurface& mended, double distance) {
 
 }  // namespace
 
-TEST_CASE("A surface without faults is not mended, nor is one of quads", "[shell]") {
+TEST_CASE("A surface without faults is not mended, nor is one of quads", "[mending]") {
   const PolygonMesh cube = as_polygons(cube_surface(4, false));
   const MendedSurface same = mend_surface(cube, {{{0, 1}}, {}}, 0.01);
   CHECK_FALSE(same.is_mended());
@@ -66,7 +66,7 @@ TEST_CASE("A surface without faults is not mended, nor is one of quads", "[shell
   CHECK_FALSE(mend_surface(folded, {}, 0.1).is_mended());
 }
 
-TEST_CASE("A face without area between two others goes, whichever way its edges run", "[shell]") {
+TEST_CASE("A face without area between two others goes, whichever way its edges run", "[mending]") {
   TriangleMesh cube = cube_surface(4, false);
   const auto [a, b, c] = cube.triangles[5];
   const auto next = std::find_if(cube.triangles.begin(), cube.triangles.end(), [&](const auto& t) {
@@ -89,7 +89,7 @@ TEST_CASE("A face without area between two others goes, whichever way its edges 
   CHECK(to_text(mended, 3).find("mended within") == 0);
 }
 
-TEST_CASE("Solids that share a vertex or an edge get one each, a little apart", "[shell]") {
+TEST_CASE("Solids that share a vertex or an edge get one each, a little apart", "[mending]") {
   for (const Vec3& way : {Vec3(2, 2, 2), Vec3(2, 2, 0)}) {
     const PolygonMesh given = as_polygons(two_cubes(way));
     const bool share_vertex = way.z() > 0;
@@ -104,7 +104,7 @@ TEST_CASE("Solids that share a vertex or an edge get one each, a little apart", 
   }
 }
 
-TEST_CASE("A vertex that lies beyond its neighbor by less than the distance does not fold the surface", "[shell]") {
+TEST_CASE("A vertex that lies beyond its neighbor by less than the distance does not fold the surface", "[mending]") {
   TriangleMesh cube = cube_surface(4, true);
   const auto [a, b, c] = cube.triangles[40];
   const Vec3 center = (cube.positions[a] + cube.positions[b] + cube.positions[c]) / 3;
@@ -121,7 +121,7 @@ TEST_CASE("A vertex that lies beyond its neighbor by less than the distance does
   CHECK(mend_surface(given, {}, 0).surface.positions == given.positions);
 }
 
-TEST_CASE("Vertices of a soup that differ by rounding become one", "[shell]") {
+TEST_CASE("Vertices of a soup that differ by rounding become one", "[mending]") {
   const TriangleMesh cube = cube_surface(3, false);
   TriangleMesh soup;
   RandomPoints random(4);
@@ -136,7 +136,7 @@ TEST_CASE("Vertices of a soup that differ by rounding become one", "[shell]") {
   CHECK(mended.merged_vertices == soup.positions.size() - cube.positions.size());
 }
 
-TEST_CASE("What crosses deeply stays, and is told with its number and places", "[shell][slow]") {
+TEST_CASE("What crosses deeply stays, and is told with its number and places", "[mending][slow]") {
   TriangleMesh two = cube_surface(2, false);
   const auto n = static_cast<Index>(two.positions.size());
   const TriangleMesh one = two;
@@ -149,7 +149,7 @@ TEST_CASE("What crosses deeply stays, and is told with its number and places", "
                         Catch::Contains(" in all)"));
 }
 
-TEST_CASE("Messages name vertices by the numbers that the caller gives, and their coordinates", "[shell]") {
+TEST_CASE("Messages name vertices by the numbers that the caller gives, and their coordinates", "[mending]") {
   const PolygonMesh surface = plane(Faces::triangles);
   std::vector<Index> vertices(surface.positions.size()), faces(surface.num_faces());
   std::iota(vertices.begin(), vertices.end(), 100);
@@ -164,7 +164,7 @@ TEST_CASE("Messages name vertices by the numbers that the caller gives, and thei
         "around from their front at 2 vertices: vertex 100 at (0, 0, 0), vertex 101 at (0.166667, 0, 0)");
 }
 
-TEST_CASE("Real parts that were refused get shells after a repair", "[shell][slow]") {
+TEST_CASE("Real parts that were refused get shells after a repair", "[mending][slow]") {
   const auto data = require_data();
   if (!data) return;
   for (const char* name : {"reported/50-angle_block.stl", "reported/50-z-axis-top.stl",

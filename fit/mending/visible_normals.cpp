@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/shell/visible_normals.h"
+#include "subvol/fit/mending/visible_normals.h"
 
 #include "subvol/base/error.h"
 

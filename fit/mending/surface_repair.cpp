@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/fit/target/surface_repair.h"
+#include "subvol/fit/mending/surface_repair.h"
 
 #include "subvol/base/error.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/surface_union.h"
 #include "subvol/fit/geometry/triangle_meeting.h"
+#include "subvol/fit/mending/mend_surface.h"
 #include "subvol/fit/target/carried_groups.h"
+#include "subvol/surface/boundary.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <exception>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -105,11 +109,13 @@ TriangleMesh Union::united_group(std::size_t group) const {
       TriangleMesh next = part(p);
       if (voids)
         for (auto& t : next.triangles) std::swap(t[1], t[2]);
-      if (!whole) whole = std::move(next);
-      else whole = voids ? without(*whole, next) : united(*whole, next);
+      if (!whole)
+        whole = std::move(next);
+      else
+        whole = voids ? without(*whole, next) : united(*whole, next);
       if (whole) continue;
-      const auto meeting = std::find_if(meetings_.begin(), meetings_.end(),
-                                        [&](const Meeting& m) { return m.a == p || m.b == p; });
+      const auto meeting =
+          std::find_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return m.a == p || m.b == p; });
       throw InputError("target: " + text_of(meeting == meetings_.end() ? meetings_.front() : *meeting) +
                        " and cannot be united: a part meets itself, or parts also touch along an edge or at a vertex");
     }
@@ -120,27 +126,34 @@ TriangleMesh Union::made(std::vector<std::string>& done) const {
   TriangleMesh result;
   for (std::size_t p = 0; p < group_.size(); ++p) {
     if (root(p) != p) continue;
-    const auto members = std::count_if(meetings_.begin(), meetings_.end(),
-                                       [&](const Meeting& m) { return root(m.a) == p; });
+    const auto members =
+        std::count_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return root(m.a) == p; });
     TriangleMesh one = members == 0 ? part(p) : united_group(p);
     const auto first = static_cast<Index>(result.positions.size());
     result.positions.insert(result.positions.end(), one.positions.begin(), one.positions.end());
     for (const auto& [a, b, c] : one.triangles) result.triangles.push_back({first + a, first + b, first + c});
     if (members == 0) continue;
-    const auto meeting = std::find_if(meetings_.begin(), meetings_.end(),
-                                      [&](const Meeting& m) { return root(m.a) == p; });
+    const auto meeting =
+        std::find_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return root(m.a) == p; });
     done.push_back("target: " + text_of(*meeting) + "; " + std::to_string(members + 1) +
                    " parts that cross or overlap are united");
   }
   return result;
 }
 
-}  // namespace
+/// The number of places at which a surface cannot be filled as it is.
+std::size_t num_obstacles(const SurfaceDiagnosis& diagnosis) {
+  std::size_t count = 0;
+  for (const SurfaceFinding& finding : diagnosis.findings)
+    if (prevents_filling(finding.fault)) count += finding.count;
+  return count;
+}
 
-SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
-  const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
+/// Repairs what needs no change of a triangle's place: unites and turns parts, leaves sheets out.
+SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
+                         const std::function<bool()>& cancelled, RegionRule rule) {
   TriangleMesh surface = given;
-  SurfaceRepair repair{surface, {}, {}, {}};
+  SurfaceRepair repair{.surface = surface};
   if (diagnosis.is_cancelled) return repair;
   const auto words = [&](SurfaceFault fault) {
     const SurfaceFinding* found = diagnosis.find(fault);
@@ -151,16 +164,18 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
     repair.regions = find_regions(surface, rule);
     if (repair.regions) {
       for (const std::string& note : repair.regions->notes) repair.notes.push_back("target: " + note);
+      repair.is_fillable = true;
       return repair;
     }
   }
   if (const std::string sheets = words(SurfaceFault::interface); !sheets.empty()) {
     const std::optional<RegionSurface> regions = find_regions(surface, RegionRule::keep);
     if (crosses)
-      throw InputError(sheets + ", and " + words(diagnosis.find(SurfaceFault::crossing) ? SurfaceFault::crossing
-                                                                                         : SurfaceFault::face_contact)
-                                               .substr(std::string("target: ").size()) +
-                       ": sheets must meet along edges that they share");
+      throw InputError(
+          sheets + ", and " +
+          words(diagnosis.find(SurfaceFault::crossing) ? SurfaceFault::crossing : SurfaceFault::face_contact)
+              .substr(std::string("target: ").size()) +
+          ": sheets must meet along edges that they share");
     if (!regions) throw InputError(sheets + ", but an edge of one triangle leaves them open");
     surface = outer_surface(*regions);
     repair.surface = surface;
@@ -177,6 +192,7 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
       repair.surface = std::move(made);
     }
   }
+  repair.is_fillable = diagnosis.is_fillable() || !repair.done.empty();
   const bool united = repair.done.size() > (turned.empty() ? 0u : 1u);
   for (const SurfaceFault fault : {SurfaceFault::crossing, SurfaceFault::face_contact})
     if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": left as it is");
@@ -184,6 +200,46 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
     if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": what touches stays apart");
   if (diagnosis.find(SurfaceFault::pinhole)) repair.notes.push_back(words(SurfaceFault::pinhole) + ": closed");
   return repair;
+}
+
+/// Returns the surface with small faults removed, and a sentence about it; nothing if that brings no improvement.
+/// Sheets that divide the inside are left alone: what meets there is meant to meet.
+std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiagnosis& before,
+                                    const std::function<bool()>& cancelled, RegionRule rule) {
+  constexpr std::array<SurfaceFault, 4> kMendable{SurfaceFault::crossing, SurfaceFault::face_contact, SurfaceFault::fin,
+                                                  SurfaceFault::repeated_triangle};
+  const bool is_mendable =
+      std::any_of(kMendable.begin(), kMendable.end(), [&](SurfaceFault f) { return before.find(f); });
+  if (!is_mendable || before.find(SurfaceFault::interface)) return std::nullopt;
+  const MendedSurface mending =
+      mend_surface(as_polygons(given), {}, kMendingShare * before.diagonal, MendingGoal::solid, cancelled);
+  if (mending.is_cancelled || !mending.is_mended()) return std::nullopt;
+  const TriangleMesh surface = triangulate(mending.surface);
+  if (surface.triangles.empty()) return std::nullopt;
+  const SurfaceDiagnosis after = diagnose(surface, cancelled);
+  if (after.is_cancelled || num_obstacles(after) >= num_obstacles(before)) return std::nullopt;
+  SurfaceRepair repair = rearranged(surface, after, cancelled, rule);
+  repair.done.insert(repair.done.begin(), "target: " + to_text(mending, before.diagonal));
+  return repair;
+}
+
+}  // namespace
+
+SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+  const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
+  if (diagnosis.is_cancelled) return {.surface = given};
+  std::optional<SurfaceRepair> repair;
+  std::exception_ptr error;
+  try {
+    repair = rearranged(given, diagnosis, cancelled, rule);
+    if (repair->is_fillable) return std::move(*repair);
+  } catch (const InputError&) {
+    error = std::current_exception();
+  }
+  std::optional<SurfaceRepair> better = mended(given, diagnosis, cancelled, rule);
+  if (better) return std::move(*better);
+  if (error) std::rethrow_exception(error);
+  return std::move(*repair);
 }
 
 std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted,

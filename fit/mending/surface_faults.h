@@ -2,6 +2,7 @@
 #pragma once
 
 #include "subvol/base/types.h"
+#include "subvol/fit/mending/mend_surface.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -15,7 +16,7 @@ namespace subvol {
 /// Largest number of places that a message lists.
 inline constexpr std::size_t kMostNamedPlaces = 10;
 
-/// What keeps layers from standing on a surface that `make_layers` accepts.
+/// What keeps layers from standing on a surface that `make_layers` accepts, or a surface from bounding a solid.
 struct SurfaceFaults {
   std::vector<Index> flat;                      ///< faces with a triangle without area, ascending
   std::vector<std::array<Index, 2>> meeting;    ///< pairs of faces that intersect or touch, smaller first, ascending
@@ -30,11 +31,12 @@ struct SurfaceNames {
 };
 
 /// Returns the places at which a surface intersects itself (quads as their `fan_triangles`), has no area, or cannot be
-/// extruded (`visible_normals`).
+/// extruded (`visible_normals`; only if the goal is layers).
 ///
 /// surface  triangles and quads; every vertex is used.
 /// Cost: that of `self_intersections`.
-SurfaceFaults find_faults(const PolygonMesh& surface, const std::function<bool()>& cancelled = {});
+SurfaceFaults find_faults(const PolygonMesh& surface, MendingGoal goal = MendingGoal::layers,
+                          const std::function<bool()>& cancelled = {});
 
 /// Returns a sentence for people with the number of faults of each kind and the first `kMostNamedPlaces` of them, with
 /// coordinates; empty if there are none.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/shell/local_mending.h"
+#include "subvol/fit/mending/local_mending.h"
 
 #include "subvol/fit/geometry/self_intersection.h"
-#include "subvol/shell/surface_faults.h"
-#include "subvol/shell/visible_normals.h"
+#include "subvol/fit/mending/surface_faults.h"
+#include "subvol/fit/mending/visible_normals.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/corner_fans.h"
 #include "subvol/surface/triangle_geometry.h"
@@ -121,7 +121,7 @@ struct Rating {
   }
 };
 
-Rating rating_of(const Patch& patch, double distance) {
+Rating rating_of(const Patch& patch, double distance, MendingGoal goal) {
   constexpr double kEdgeOn = 0.1;  // cosine between a direction and a normal: 6 degrees
   TriangleMesh alive{patch.mesh.positions, {}};
   std::vector<std::vector<Vec3>> normals(patch.mesh.positions.size());
@@ -140,7 +140,7 @@ Rating rating_of(const Patch& patch, double distance) {
         std::any_of(normals[v].begin(), normals[v].end(), [](const Vec3& n) { return !(n.norm() > 0.5); });
     const std::optional<Vec3> direction = is_flat ? std::nullopt : most_visible_direction(normals[v]);
     if (!direction) {
-      ++rating.faults;
+      rating.faults += goal == MendingGoal::layers;
       least = 0;
       continue;
     }
@@ -153,8 +153,8 @@ Rating rating_of(const Patch& patch, double distance) {
 /// Mends one surface.
 class LocalMender {
  public:
-  LocalMender(TriangleMesh& mesh, double distance, const std::function<bool()>& cancelled)
-      : mesh_(mesh), distance_(distance), cancelled_(cancelled), given_(mesh.positions) {
+  LocalMender(TriangleMesh& mesh, double distance, MendingGoal goal, const std::function<bool()>& cancelled)
+      : mesh_(mesh), distance_(distance), goal_(goal), cancelled_(cancelled), given_(mesh.positions) {
     done_.is_dropped.assign(mesh.triangles.size(), 0);
     around_.resize(mesh.positions.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -176,6 +176,7 @@ class LocalMender {
 
   TriangleMesh& mesh_;
   double distance_;
+  MendingGoal goal_;
   const std::function<bool()>& cancelled_;
   std::vector<Vec3> given_;
   std::vector<std::vector<Index>> around_;  ///< triangles at each vertex
@@ -201,7 +202,7 @@ std::vector<std::vector<Index>> LocalMender::faults() const {
     alive.triangles.push_back(corners);
     triangle.push_back(static_cast<Index>(t));
   }
-  const SurfaceFaults found = find_faults(as_polygons(alive), cancelled_);
+  const SurfaceFaults found = find_faults(as_polygons(alive), goal_, cancelled_);
   std::vector<std::vector<Index>> seeds;
   for (const Index f : found.flat) seeds.push_back({triangle[f]});
   for (const auto& [f, g] : found.meeting) seeds.push_back({triangle[f], triangle[g]});
@@ -349,7 +350,7 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
   constexpr int kMostPairSearches = 20;  // each takes up to a second on large patches
   std::vector<Index> triangles, vertices, seed_vertices;
   const Patch patch = patch_around(seeds, triangles, vertices, seed_vertices);
-  const Rating before = rating_of(patch, 0);
+  const Rating before = rating_of(patch, 0, goal_);
   struct Trial {
     Rating rating;
     Patch patch;
@@ -365,7 +366,7 @@ bool LocalMender::mend(const std::vector<Index>& seeds) {
       all.push_back(change);
       double distance = 0;
       for (const Change& one : all) distance += one.distance;
-      const Rating rating = rating_of(changed, distance);
+      const Rating rating = rating_of(changed, distance, goal_);
       trials.push_back({rating, std::move(changed), std::move(all)});
     }
   };
@@ -454,8 +455,9 @@ void move_toward_fans(TriangleMesh& mesh, std::span<const Index> vertices, doubl
   for (const auto& [v, position] : moved) mesh.positions[v] = position;
 }
 
-LocalMending mend_locally(TriangleMesh& mesh, double distance, const std::function<bool()>& cancelled) {
-  return LocalMender(mesh, distance, cancelled).run();
+LocalMending mend_locally(TriangleMesh& mesh, double distance, MendingGoal goal,
+                          const std::function<bool()>& cancelled) {
+  return LocalMender(mesh, distance, goal, cancelled).run();
 }
 
 }  // namespace subvol::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/mending/mend_surface.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -31,9 +32,10 @@ struct LocalMending {
 ///
 /// mesh      changed in place; dropped triangles keep some numbers.
 /// distance  largest change, in the mesh's unit: length of edges that collapse, distance of the diagonals of a flip,
-/// way
-///           of a vertex from where it was.
+///           way of a vertex from where it was.
+/// goal      decides what is a fault.
 /// Faults for which no change helps are left, and if there are more than a thousand, all are.
-LocalMending mend_locally(TriangleMesh& mesh, double distance, const std::function<bool()>& cancelled);
+LocalMending mend_locally(TriangleMesh& mesh, double distance, MendingGoal goal,
+                          const std::function<bool()>& cancelled);
 
 }  // namespace subvol::internal

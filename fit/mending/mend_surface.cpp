@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/shell/mend_surface.h"
+#include "subvol/fit/mending/mend_surface.h"
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/geometry/surface_distance.h"
-#include "subvol/shell/local_mending.h"
-#include "subvol/shell/partial_surface.h"
-#include "subvol/shell/surface_faults.h"
+#include "subvol/fit/mending/local_mending.h"
+#include "subvol/fit/mending/surface_faults.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/surface/by_number.h"
 #include "subvol/surface/corner_fans.h"
 #include "subvol/surface/welded_surface.h"
 
@@ -65,8 +65,8 @@ std::vector<Index> merged_numbers(std::span<const Vec3> positions, double distan
 /// A surface of triangles on which the steps of the mending work, one after the other.
 class Mender {
  public:
-  Mender(const PolygonMesh& surface, double distance, const std::function<bool()>& cancelled)
-      : given_(surface), distance_(distance), cancelled_(cancelled) {
+  Mender(const PolygonMesh& surface, double distance, MendingGoal goal, const std::function<bool()>& cancelled)
+      : given_(surface), distance_(distance), goal_(goal), cancelled_(cancelled) {
     mesh_.positions = surface.positions;
     for (std::size_t f = 0; f < surface.num_faces(); ++f) {
       const std::size_t h = surface.face_offsets[f];
@@ -77,10 +77,13 @@ class Mender {
     face_numbers_.resize(surface.num_faces());
     std::iota(face_numbers_.begin(), face_numbers_.end(), 0);
     diagonal_ = bounding_box_diagonal(mesh_);
+    reference_ = mesh_;
   }
 
   void merge_vertices();
   void drop_repeated_faces();
+  /// From here on, the surface as it is now counts as the given one when the distance is measured.
+  void compare_with_present() { reference_ = mesh_; }
   void split_fans();
   /// Returns false if cancelled.
   bool mend_locally();
@@ -91,8 +94,9 @@ class Mender {
 
   const PolygonMesh& given_;
   double distance_, diagonal_ = 0;
+  MendingGoal goal_;
   const std::function<bool()>& cancelled_;
-  TriangleMesh mesh_;
+  TriangleMesh mesh_, reference_;  ///< of the reference, only the places count
   std::vector<Index> vertex_numbers_, face_numbers_;
   MendedSurface counts_;
 };
@@ -182,7 +186,7 @@ void Mender::split_fans() {
 }
 
 bool Mender::mend_locally() {
-  const LocalMending done = subvol::mend_locally(mesh_, distance_, cancelled_);
+  const LocalMending done = subvol::mend_locally(mesh_, distance_, goal_, cancelled_);
   if (done.is_cancelled) return false;
   counts_.flipped_edges += done.flipped_edges;
   counts_.moved_vertices += done.moved_vertices;
@@ -210,7 +214,7 @@ MendedSurface Mender::result(const FeatureTags& tags) {
   result.surface = as_polygons(mesh_);
   result.surface.face_groups = groups_by_number(given_.face_groups, face_numbers_);
   result.tags = tags_by_number(tags, result.surface, vertex_numbers_);
-  if (!mesh_.triangles.empty()) result.distance = surface_distance(mesh_, triangulate(given_)).max();
+  if (!mesh_.triangles.empty()) result.distance = surface_distance(mesh_, reference_).max();
   result.vertex_numbers = std::move(vertex_numbers_);
   result.face_numbers = std::move(face_numbers_);
   return result;
@@ -237,7 +241,7 @@ bool has_one_fan_at_each_vertex(const PolygonMesh& surface) {
 
 }  // namespace
 
-MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, double distance,
+MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, double distance, MendingGoal goal,
                            const std::function<bool()>& cancelled) {
   require_valid(surface);
   const auto ended = [&](MendedSurface result) {
@@ -245,11 +249,13 @@ MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, 
     return result;
   };
   if (!(distance > 0) || surface.num_faces() == 0 || !has_only_triangles(surface)) return unchanged(surface, tags);
-  if (has_one_fan_at_each_vertex(surface) && find_faults(surface, cancelled).none()) return unchanged(surface, tags);
+  if (has_one_fan_at_each_vertex(surface) && find_faults(surface, goal, cancelled).none())
+    return unchanged(surface, tags);
   if (cancelled && cancelled()) return ended(unchanged(surface, tags));
-  Mender mender(surface, distance, cancelled);
+  Mender mender(surface, distance, goal, cancelled);
   mender.merge_vertices();
   mender.drop_repeated_faces();
+  if (goal == MendingGoal::solid) mender.compare_with_present();
   mender.split_fans();
   if (!mender.mend_locally()) return ended(unchanged(surface, tags));
   MendedSurface result = mender.result(tags);

@@ -20,13 +20,18 @@ struct SurfaceRepair {
   std::optional<RegionSurface> regions;  ///< of the surface, if there are several; it is as it was given then
   std::vector<std::string> done;   ///< a sentence for each repair; empty: the surface is as it was given
   std::vector<std::string> notes;  ///< a sentence for each fault that was left: contacts, pinholes, crossings
+  bool is_fillable = false;        ///< nothing is known that prevents filling (`prevents_filling`)
 };
 
-/// Unites the parts of a surface that cross or overlap, and turns parts whose orientation disagrees with their nesting.
+/// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting, and
+/// removes small faults.
 ///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
 /// points inward beside others that do not. A solid part in a void stays a part of its own.
+///
+/// What remains of crossings, contacts of faces, repeated triangles and edges of three triangles is mended if that is
+/// possible within `kMendingShare` of the diagonal (`mend_surface`) and leaves fewer places that prevent filling.
 ///
 /// Where there are several regions by the rule (`find_regions`) and nothing crosses, there is nothing to repair. With
 /// RegionRule::merge, sheets inside a solid are left out.
