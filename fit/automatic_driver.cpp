@@ -4,11 +4,15 @@
 #include "subvol/base/format.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/target/surface_diagnosis.h"
 #include "subvol/mesh/cell_topology.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace subvol::internal {
@@ -27,6 +31,23 @@ double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
     }
   }
   return kLeast * shortest / kFlat;
+}
+
+TriangleMesh sheet_triangles(const VolumeMesh& mesh, const MeshTopology& topology,
+                             std::vector<Index>* face_of_triangle) {
+  std::vector<Index> faces(topology.boundary_faces().begin(), topology.boundary_faces().end());
+  const std::vector<Index> inner = find_interfaces(mesh, topology).faces;
+  faces.insert(faces.end(), inner.begin(), inner.end());
+  PolygonMesh polygons{.positions = mesh.positions};
+  for (const Index f : faces) {
+    const auto corners = topology.face(f);
+    polygons.face_vertices.insert(polygons.face_vertices.end(), corners.begin(), corners.end());
+    polygons.face_offsets.push_back(polygons.face_vertices.size());
+  }
+  TriangleMesh triangles = fan_triangles(polygons, face_of_triangle);
+  if (face_of_triangle)
+    for (Index& polygon : *face_of_triangle) polygon = faces[polygon];
+  return triangles;
 }
 
 std::function<bool(double)> AutomaticDriver::begin_template() {
@@ -74,7 +95,7 @@ bool AutomaticDriver::fit_and_refine(int levels) {
                                                      : fine_quality_schedule(options_.quality)),
                       "");
   if (going || result_.trials.empty()) going = judge(trial) && going;
-  return going;
+  return going && move_apart();
 }
 
 bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
@@ -101,9 +122,52 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
   record.cells = mesh_.num_cells();
-  const bool going = stages.run(schedule, runner_, record, mesh_.positions, result_.report);
+  const bool going = (!is_moving_apart_ || part_faces(stages, record)) &&
+                     stages.run(schedule, runner_, record, mesh_.positions, result_.report);
   state_ = stages.state();
   return going;
+}
+
+std::vector<Index> AutomaticDriver::cells_that_meet(const VolumeMesh& mesh) const {
+  const MeshTopology topology(mesh);
+  std::vector<Index> face_of_triangle, cells;
+  const TriangleMesh sheets = sheet_triangles(mesh, topology, &face_of_triangle);
+  for (const auto& pair : self_intersections(sheets, [this] { return runner_.is_to_end(); }).pairs)
+    for (const Index t : pair) cells.push_back(topology.face_cells(face_of_triangle[t])[0]);
+  return cells;
+}
+
+/// Relaxes the mesh around faces that meet, each time with less weight of the surface and, every other time, one ring
+/// of cells farther out, until none do: there the cells take the room that they want, as on the grid. Returns false if
+/// the fit must end.
+bool AutomaticDriver::part_faces(QualityStages& stages, const StageRecord& record) {
+  constexpr int kMostRounds = 12, kSteps = 6;
+  constexpr double kFirst = 10, kLess = 0.1;  // weight of the surface, and what is left of it in the next round
+  const QualityWeights weights{.hinge = 50, .threshold = 0.5};
+  double surface = kFirst;
+  for (int round = 0; round < kMostRounds; ++round, surface *= kLess) {
+    std::vector<Index> cells = cells_that_meet(mesh_);
+    if (runner_.is_to_end()) return false;
+    if (cells.empty()) break;
+    if (!met_at_) met_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells.front())[0]]})[0];
+    std::ranges::sort(cells);
+    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+    const int rings = 1 + round / 2;
+    if (!stages.relax(cells, rings, {surface, weights, kSteps}, runner_, record, mesh_.positions, result_.report))
+      return false;
+  }
+  return true;
+}
+
+bool AutomaticDriver::move_apart() {
+  AutomaticFitTrial trial = result_.trials.back();
+  if (trial.self_intersections.value_or(0) == 0 || merit_if_apart(trial) >= best().merit) return true;
+  met_at_.reset();
+  is_moving_apart_ = true;
+  const bool going = fit_level(trial.level, {{}, {}, 0.1}, ", moved apart");
+  is_moving_apart_ = false;
+  trial.moved_apart_at = met_at_;
+  return judge(std::move(trial)) && going;
 }
 
 bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport& quality,
@@ -118,6 +182,11 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
 }
 
 AutomaticFitResult AutomaticDriver::finish() {
+  if (!result_.trials.empty() && best().moved_apart_at)
+    result_.report.warnings.push_back(
+        "the mesh met itself where walls or gaps of the target are narrower than its "
+        "cells, and was moved apart there, the first time at " +
+        to_text(*best().moved_apart_at) + "; more cells may follow the target");
   const Normalisation& normalisation = target_.normalisation;
   result_.mesh.positions = normalisation.from_unit(std::move(result_.mesh.positions));
   for (FitState& state : result_.states) state.positions = normalisation.from_unit(std::move(state.positions));

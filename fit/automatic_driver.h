@@ -7,7 +7,9 @@
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/target/fit_target.h"
+#include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <functional>
 #include <optional>
@@ -21,6 +23,11 @@ namespace subvol::internal {
 /// proportion to their shortest edge. 0 without a grid.
 /// lengths  wanted, of the grid's cells, and perhaps of more.
 double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths);
+
+/// The faces of a mesh's boundary and of its interfaces as one surface, on its vertices.
+/// face_of_triangle  if not null, receives the face of each triangle, by `topology`.
+TriangleMesh sheet_triangles(const VolumeMesh& mesh, const MeshTopology& topology,
+                             std::vector<Index>* face_of_triangle = nullptr);
 
 /// The common base of the automatic fits of one solid and of several regions: it makes a template, fits it level by
 /// level, judges the result, and keeps the best one. All coordinates are normalized.
@@ -63,6 +70,12 @@ class AutomaticDriver {
   bool fit_and_refine(int levels);
   /// Fits and judges the present mesh, which follows edges and is not refined.
   bool fit_edges(AutomaticFitTrial trial, double portion);
+  /// Returns a cell at each face of a mesh's boundary and interfaces that meets another one, once for each pair of
+  /// their triangles.
+  std::vector<Index> cells_that_meet(const VolumeMesh& mesh) const;
+  /// Moves the present mesh apart where its boundary meets itself, and judges it as another trial, if the last one was
+  /// kept from being the best by that alone.
+  bool move_apart();
   /// Minimizes (`QualityStages`).  creases  may be empty.  prepare  is called with the stages before they run; may be
   /// empty.
   bool run_stages(const QualityBoundary& boundary, std::span<const Vec3> lengths,
@@ -85,6 +98,10 @@ class AutomaticDriver {
   StageRunner runner_;
 
  private:
+  bool part_faces(QualityStages& stages, const StageRecord& record);
+
+  bool is_moving_apart_ = false;  ///< `part_faces` precedes the stages
+  std::optional<Vec3> met_at_;    ///< a place that `part_faces` has moved apart, in the target's coordinates
   std::vector<FitState> states_;  ///< of the present mesh, if they are kept
   double share_at_end_ = 0;       ///< of the attempt in progress
 };

@@ -134,7 +134,6 @@ class AutomaticFit : AutomaticDriver {
   bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
   bool route_and_fit(const AutomaticFitTrial& described);
   std::vector<Fault> faults_of_best() const;
-  std::vector<Index> cells_that_meet(const VolumeMesh& mesh) const;
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
   std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
@@ -321,16 +320,6 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
   return fit_and_refine(attempt.levels);
 }
 
-/// Returns the cells at faces of a mesh's boundary that meet other ones, once for each pair of triangles.
-std::vector<Index> AutomaticFit::cells_that_meet(const VolumeMesh& mesh) const {
-  const MeshTopology topology(mesh);
-  std::vector<Index> face_of_triangle, cells;
-  const TriangleMesh surface = fan_triangles(boundary_surface(mesh, topology), &face_of_triangle);
-  for (const auto& pair : self_intersections(surface, [this] { return runner_.is_to_end(); }).pairs)
-    for (const Index t : pair) cells.push_back(topology.face_cells(topology.boundary_faces()[face_of_triangle[t]])[0]);
-  return cells;
-}
-
 /// Returns how poor each cell of the present mesh is, 0 for good ones.
 std::vector<double> AutomaticFit::faults_of_cells() const {
   constexpr double kMeets = 1;
@@ -372,9 +361,11 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
     trial.pads = layout_->pads.pads.size();
     if (!fit_edges(trial, kRoutingPortion)) return false;
     const double merit = result_.trials.back().merit;
+    const std::vector<double> faults = faults_of_cells();
+    if (!move_apart()) return false;
     if (merit >= least_merit) break;  // what was given up has not helped
     least_merit = merit;
-    if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults_of_cells(), routing)) break;
+    if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults, routing)) break;
   }
   return true;
 }
@@ -463,7 +454,7 @@ bool AutomaticFit::run_refined() {
   sizes_ = refined->sizes;
   start_ = {.grid = {{}, std::move(refined->sizes)}};
   return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality)), ", refined") &&
-         judge(trial);
+         judge(trial) && move_apart();
 }
 
 /// Returns false if the fit must end. InputError: there is no template, and there was none before.

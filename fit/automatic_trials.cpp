@@ -14,6 +14,9 @@ namespace {
 /// No other template is tried below it: 95 % of the edges are followed within 0.1 %, if nothing else is missed.
 constexpr double kGoodMerit = 0.15;
 constexpr double kQualityWeight = 5;  // of the share of the quality in the merit
+/// Cost of a boundary that meets itself, and of cells that are not certified: so much that a valid trial wins, however
+/// many edges an invalid one follows.
+constexpr double kNotValid = 10;
 
 }  // namespace
 
@@ -35,7 +38,6 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
 
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options) {
   constexpr double kEdgeWeight = 3, kMostMiss = 3;
-  constexpr double kNotValid = 10;  // so much that a valid trial wins, however many edges an invalid one follows
   const auto excess = [](double value, double aim) { return std::max(0.0, value / aim - 1); };
   const double least_acceptable = std::min(kAcceptableQuality, options.quality);
   const bool counts_misses = trial.feature_miss && trial.curves > 0;
@@ -47,6 +49,10 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
          kEdgeWeight * (1 - trial.within_share) + (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) +
          (trial.uncertified > 0 ? kNotValid : 0);
+}
+
+double merit_if_apart(const AutomaticFitTrial& trial) {
+  return trial.merit - (trial.self_intersections == std::size_t{0} ? 0 : kNotValid);
 }
 
 bool is_valid(const AutomaticFitTrial& trial) {

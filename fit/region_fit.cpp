@@ -36,19 +36,6 @@ using namespace internal;
 
 namespace {
 
-/// The faces of all sheets of a mesh as one surface, on its vertices.
-TriangleMesh sheet_triangles(const VolumeMesh& mesh) {
-  const MeshTopology topology(mesh);
-  PolygonMesh polygons{.positions = mesh.positions};
-  const auto add = [&](std::span<const Index> face) {
-    polygons.face_vertices.insert(polygons.face_vertices.end(), face.begin(), face.end());
-    polygons.face_offsets.push_back(polygons.face_vertices.size());
-  };
-  for (const Index f : topology.boundary_faces()) add(topology.face(f));
-  for (const Index f : find_interfaces(mesh, topology).faces) add(topology.face(f));
-  return fan_triangles(polygons);
-}
-
 RegionSurface normalised(RegionSurface surface, const Normalisation& normalisation) {
   surface.mesh.positions = normalisation.to_unit(std::move(surface.mesh.positions));
   for (double& volume : surface.volumes) volume /= std::pow(normalisation.diagonal, 3);
@@ -220,7 +207,7 @@ bool RegionFit::judge(AutomaticFitTrial trial) {
   trial.mean_percent = 100 * std::max(outer.mean(), inner.mean());
   trial.max_percent = 100 * std::max(outer.max(), inner.max());
   trial.volume_percent = volume_percent();
-  trial.self_intersections = runner_.intersecting_pairs(sheet_triangles(mesh_), result_.report);
+  trial.self_intersections = runner_.intersecting_pairs(sheet_triangles(mesh_, MeshTopology(mesh_)), result_.report);
   std::optional<CreaseDistance> edges;
   if (layout_ && !curves_.features.curves.empty())
     edges = crease_distance(curves_.features.curves, mesh_.positions, layout_->segments, 1);
@@ -279,7 +266,7 @@ bool RegionFit::run_curves(std::size_t cells) {
     layout_ = sheet_layout(mesh_, unit_, curves_, {});
     mesh_ = std::move(padded);
     mesh_.tags = layout_->tagged_mesh.tags;
-    return fit_edges({.template_cells = grid->num_cells()}, 1);
+    return fit_edges({.template_cells = grid->num_cells()}, 1) && move_apart();
   }
 }
 

@@ -6,9 +6,11 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
@@ -87,10 +89,10 @@ const std::vector<Library> kLibraries{
 };
 
 struct Source {
-  std::string path;                        ///< from the root of the project
-  std::vector<std::string> includes;       ///< of files of ours: "..."
-  std::vector<std::string> libraries{};    ///< of others' files: <...>
-  std::vector<std::string> namespaces{};   ///< named ones that are opened at the beginning of a line
+  std::string path;                       ///< from the root of the project
+  std::vector<std::string> includes;      ///< of files of ours: "..."
+  std::vector<std::string> libraries{};   ///< of others' files: <...>
+  std::vector<std::string> namespaces{};  ///< named ones that are opened at the beginning of a line
 };
 
 /// Path from the root of the project of a header of the library, which is included as it is installed.
@@ -314,6 +316,19 @@ TEST_CASE("What is not public is in subvol::internal", "[includes]") {
 
 TEST_CASE("Every file that is included is named from the root", "[includes]") {
   CHECK(unknown_files(all_sources()) == Strings{});
+}
+
+TEST_CASE("No source uses ranges that Clang 14 does not compile", "[includes]") {
+  const std::string ranges = "std::ranges::", views = "std::views";
+  const std::array returning_subranges{"unique(", "remove(", "remove_if(",   "partition(", "stable_partition(",
+                                       "rotate(", "search(", "equal_range(", "find_end(",  "find_last("};
+  for (const Source& source : all_sources()) {
+    std::ifstream stream(fs::path(subvol::test::source_dir()) / source.path);
+    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    INFO(source.path);
+    CHECK(text.find(views + "::") == std::string::npos);
+    for (const char* algorithm : returning_subranges) CHECK(text.find(ranges + algorithm) == std::string::npos);
+  }
 }
 
 TEST_CASE("Every source says its licence in the first line", "[includes]") {

@@ -500,8 +500,7 @@ class Router {
       if (!front || !back) routing.joined.push_back(c);
     }
     std::ranges::sort(routing.corners, {}, &PlacedCorner::vertex);
-    const auto repeated = std::ranges::unique(routing.corners);
-    routing.corners.erase(repeated.begin(), repeated.end());
+    routing.corners.erase(std::unique(routing.corners.begin(), routing.corners.end()), routing.corners.end());
     return routing;
   }
 

@@ -49,8 +49,8 @@ std::vector<OrientedSide> sorted_sides(const TriangleMesh& mesh) {
 
 std::span<const OrientedSide> sides_at(std::span<const OrientedSide> sides, Index v, Index w) {
   const std::array<Index, 2> ends = {std::min(v, w), std::max(v, w)};
-  const auto found = std::ranges::equal_range(sides, ends, {}, &OrientedSide::ends);
-  return {found.begin(), found.end()};
+  return {std::ranges::lower_bound(sides, ends, {}, &OrientedSide::ends),
+          std::ranges::upper_bound(sides, ends, {}, &OrientedSide::ends)};
 }
 
 double interior_angle(const TriangleMesh& mesh, std::span<const OrientedSide> pair) {

@@ -36,8 +36,7 @@ std::size_t choose(std::span<const Fault> faults, double most, std::vector<char>
 
 std::vector<Index> ascending(std::vector<Index> cells) {
   std::ranges::sort(cells);
-  const auto repeated = std::ranges::unique(cells);
-  cells.erase(repeated.begin(), repeated.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
   return cells;
 }
 

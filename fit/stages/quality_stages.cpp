@@ -252,6 +252,13 @@ QualityStages::State QualityStages::inspect(const QualitySchedule& schedule, std
   return state;
 }
 
+/// Returns the patches around some cells; none if they are most of the mesh.
+std::vector<QualityPatch> QualityStages::patches_around(std::span<const Index> centers, int rings) const {
+  const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_->num_cells()));
+  return quality_patches(*mesh_, *problem_, surface_ ? surface_->triangles() : std::span<const std::array<Index, 3>>{},
+                         centers, rings, most);
+}
+
 /// Returns the patches around all cells that reach less than this share of the goal, or are too far from the target;
 /// none if they are most of the mesh.
 std::vector<QualityPatch> QualityStages::patches_of(const State& state, double share, int rings) const {
@@ -259,15 +266,12 @@ std::vector<QualityPatch> QualityStages::patches_of(const State& state, double s
   for (std::size_t i = 0; i < state.cells.poor.size(); ++i)
     if (state.cells.shares[i] < share) poor.push_back(state.cells.poor[i]);
   std::set_union(poor.begin(), poor.end(), state.far_cells.begin(), state.far_cells.end(), std::back_inserter(centers));
-  const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(mesh_->num_cells()));
-  return quality_patches(*mesh_, *problem_,
-                         surface_ ? surface_->triangles() : std::span<const std::array<Index, 3>>{}, centers, rings,
-                         most);
+  return patches_around(centers, rings);
 }
 
-/// Lifts patches one after the other. Returns false if the fit must end.
-bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<const QualityPatch> patches,
-                                 std::vector<Vec3>& x) {
+/// Runs a schedule on patches, one after the other. Returns false if the fit must end.
+bool QualityStages::run_patches(const QualitySchedule& of_patch, std::span<const QualityPatch> patches,
+                                const std::string& name, std::vector<Vec3>& x) {
   const StageRunner quiet = runner_->without_log();  // this can be done again from x, which the log has
   const double begin = runner_->seconds();
   if (before_stage) before_stage();
@@ -278,9 +282,6 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
     surface_->forget();
     surface_->assign(samples);
   }
-  QualitySchedule of_patch = schedule;
-  of_patch.stages.clear();
-  of_patch.far_margin = kLateFarMargin;
   std::size_t reached = 0, unknowns = 0;
   bool going = true;
   for (const QualityPatch& patch : patches) {
@@ -300,7 +301,7 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
     break;
   }
   StageRecord record = record_;
-  record.name = formatted("%s, lift of %zu patches", record_.name.c_str(), patches.size());
+  record.name = formatted("%s, %s of %zu patches", record_.name.c_str(), name.c_str(), patches.size());
   record.lambda = problem_->lambda;
   record.tangential_weight = kQualityTangentialWeight;
   record.unknowns = unknowns;
@@ -310,6 +311,19 @@ bool QualityStages::lift_patches(const QualitySchedule& schedule, std::span<cons
   if (after_stage) after_stage(record.name, x);
   report_->stages.push_back(std::move(record));
   return going;
+}
+
+bool QualityStages::relax(std::span<const Index> centers, int rings, const QualityStage& stage,
+                          const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x,
+                          FitReport& report) {
+  constexpr double kNoGoal = 0.1;
+  runner_ = &runner;
+  record_ = record;
+  report_ = &report;
+  energy_->reset_emphasis();
+  const std::vector<QualityPatch> patches = patches_around(centers, rings);
+  return patches.empty() || run_patches({{stage}, {stage.surface, stage.weights, 0}, kNoGoal}, patches,
+                                        formatted("relaxation at surface %g", stage.surface), x);
 }
 
 /// Raises the emphasis on poor cells and far places every two steps while that helps, lifts patches around poor cells
@@ -346,7 +360,10 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
     }
     if (!going || now.merit >= 1 || ++since_best > kPatience || done >= schedule.lift.steps) break;
     if (const std::vector<QualityPatch> patches = next_patches(now); !patches.empty()) {
-      going = lift_patches(schedule, patches, x);
+      QualitySchedule of_patch = schedule;
+      of_patch.stages.clear();
+      of_patch.far_margin = kLateFarMargin;
+      going = run_patches(of_patch, patches, "lift", x);
       continue;
     }
     if (pass > 0) break;

@@ -126,6 +126,14 @@ class QualityStages {
   bool run(const QualitySchedule& schedule, const StageRunner& runner, const StageRecord& record, std::vector<Vec3>& x,
            FitReport& report);
 
+  /// Minimizes patches around some cells, the rest held fixed, so that their quality counts more than the surface.
+  ///
+  /// centers  cells, ascending.  rings  as in `quality_patches`.  stage  how each patch is minimized.
+  /// record   name of the stage in the report, level and number of cells are set.
+  /// returns  as `run`. Nothing is done if the patches are most of the mesh.
+  bool relax(std::span<const Index> centers, int rings, const QualityStage& stage, const StageRunner& runner,
+             const StageRecord& record, std::vector<Vec3>& x, FitReport& report);
+
   /// Called before each minimization; x then holds the state that it starts from. Empty: nothing is called.
   std::function<void()> before_stage;
   /// Called with the name and the result of each minimization of the whole mesh, and after the lift of patches. May be
@@ -140,8 +148,10 @@ class QualityStages {
   QualityStages(const QualityStages& whole, const QualityPatch& patch, std::span<const Vec3> x);
   bool run_stage(const QualityStage& stage, const std::string& name, bool is_lift, std::vector<Vec3>& x);
   bool lift(const QualitySchedule& schedule, std::vector<Vec3>& x);
-  bool lift_patches(const QualitySchedule& schedule, std::span<const QualityPatch> patches, std::vector<Vec3>& x);
+  bool run_patches(const QualitySchedule& of_patch, std::span<const QualityPatch> patches, const std::string& name,
+                   std::vector<Vec3>& x);
   std::vector<QualityPatch> patches_of(const State& state, double share, int rings) const;
+  std::vector<QualityPatch> patches_around(std::span<const Index> centers, int rings) const;
   State inspect(const QualitySchedule& schedule, std::span<const Vec3> x);
   double emphasize_far(const QualitySchedule& schedule, std::span<const Vec3> x, State& state);
 

@@ -6,6 +6,7 @@
 #include "subvol/base/fingerprint.h"
 #include "subvol/export/curved_file.h"
 #include "subvol/fit/stages/checkpoint.h"
+#include "subvol/io/label_grid_io.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/validate.h"
@@ -60,6 +61,14 @@ void read_cells(const std::filesystem::path& file) {
   require(mesh.coefficients.size() == mesh.space.num_nodes());
 }
 
+void read_labels(const std::filesystem::path& file) {
+  const subvol::LabelGrid grid = subvol::read_label_grid(file);
+  std::size_t voxels = 1;
+  for (const int n : grid.counts) voxels *= static_cast<std::size_t>(n);
+  require(grid.labels.size() == voxels);
+  for (const int label : grid.labels) require(label >= 0);
+}
+
 void read(const std::filesystem::path& file) {
   if (kExtension == ".mesh" || kExtension == ".vtk") {
     std::vector<std::string> warnings;
@@ -67,6 +76,8 @@ void read(const std::filesystem::path& file) {
     for (const subvol::MeshDefect& defect : validate(mesh))
       require(defect.kind == subvol::MeshDefect::Kind::inverted_cell ||
               defect.kind == subvol::MeshDefect::Kind::unused_vertex);
+  } else if (subvol::is_label_grid_file(file)) {
+    read_labels(file);
   } else if (subvol::is_nodal_extension(file)) {
     read_cells(file);
   } else if (subvol::is_point_cloud_file(file)) {
@@ -79,14 +90,15 @@ void read(const std::filesystem::path& file) {
 
 /// The format's line and the fingerprint are made right: they would keep everything else from being looked at.
 void read_checkpoint_of(std::string_view bytes) {
-  const std::string name = "checkpoint", sample = subvol::checkpoint_bytes({}, {});
+  const std::string name = "checkpoint", sample = subvol::internal::checkpoint_bytes({}, {});
   const std::string head = sample.substr(0, sample.find('\n') + 1);
   const std::string_view content = bytes.substr(std::min(bytes.size(), head.size() + 17));
-  const std::string whole = head + subvol::Fingerprint().add(content).text() + '\n' + std::string(content);
-  const subvol::Checkpoint read = subvol::parse_checkpoint(whole, name);
-  const std::string written = subvol::checkpoint_bytes(read.identity, read.stages);
-  const subvol::Checkpoint again = subvol::parse_checkpoint(written, name);
-  require(written.size() == whole.size() && subvol::checkpoint_bytes(again.identity, again.stages) == written);
+  const std::string whole = head + subvol::internal::Fingerprint().add(content).text() + '\n' + std::string(content);
+  const subvol::internal::Checkpoint read = subvol::internal::parse_checkpoint(whole, name);
+  const std::string written = subvol::internal::checkpoint_bytes(read.identity, read.stages);
+  const subvol::internal::Checkpoint again = subvol::internal::parse_checkpoint(written, name);
+  require(written.size() == whole.size() &&
+          subvol::internal::checkpoint_bytes(again.identity, again.stages) == written);
 }
 
 }  // namespace

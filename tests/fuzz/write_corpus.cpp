@@ -3,11 +3,14 @@
 
 #include "samples/shapes.h"
 #include "subvol/base/atomic_file.h"
+#include "subvol/export/gltf_writer.h"
 #include "subvol/export/high_order_file.h"
 #include "subvol/export/obj_writer.h"
+#include "subvol/export/surface_writer.h"
 #include "subvol/export/volume_writer.h"
 #include "subvol/fit/stages/checkpoint.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/surface/boundary.h"
 
 #include <cstdio>
 #include <cstring>
@@ -92,6 +95,14 @@ void write_surfaces(const fs::path& folder) {
   const TriangleMesh tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
                                  {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
   write(folder / "off", "tetrahedron", samples::off_text(tetrahedron));
+  PolygonMesh grouped = as_polygons(tetrahedron);
+  grouped.face_groups = {{{"wall", 4}, {"", 7}}, {0, 0, 1, kNoIndex}};
+  for (const char* extension : {"stl", "ply", "vtp", "3mf"})
+    write(folder / extension, "grouped", surface_bytes(std::string(".") + extension, grouped));
+  Scene scene;
+  scene.nodes.push_back(
+      {"tetrahedron", {.positions = tetrahedron.positions, .indices = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2}}});
+  write(folder / "glb", "tetrahedron", gltf_bytes(scene, GltfContainer::glb));
   write(folder / "off", "colours", "STCOFF\n# a comment\n3 1 0\n0 0 0 1 1 1 1 .5 .5\n"
                                    "1 0 0 1 1 1 1 0 0\n0 1 0 0 0 0 1 1 1\n3 0 1 2 9\n");
   write(folder / "obj", "slashes", "mtllib a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -125,6 +136,28 @@ void write_surfaces(const fs::path& folder) {
     for (const int v : {0, 1, 2}) put(&v, sizeof v);
     write(folder / "ply", little ? "little" : "big", bytes);
   }
+}
+
+/// Segmentations of two voxels in each direction.
+void write_label_grids(const fs::path& folder) {
+  const std::string labels("\0\1\2\0\1\1\0\2", 8);
+  const std::string npy = "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2, 2), }\n";
+  write(folder / "npy", "bytes", std::string("\x93NUMPY\1\0", 8) + static_cast<char>(npy.size()) + '\0' + npy + labels);
+  const std::string nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\n";
+  write(folder / "nrrd", "raw", nrrd + "encoding: raw\n\n" + labels);
+  write(folder / "nrrd", "text",
+        nrrd +
+            "space directions: (1,0,0) (0,2,0) (0,0,1)\nspace origin: (1,2,3)\n"
+            "encoding: ascii\n\n0 1 2 0 1 1 0 2\n");
+  std::string nii(352, '\0');
+  const auto put = [&](std::size_t at, const auto& value) { std::memcpy(nii.data() + at, &value, sizeof value); };
+  put(0, std::int32_t{348});
+  put(40, std::array<std::int16_t, 8>{3, 2, 2, 2, 1, 1, 1, 1});  // dim
+  put(70, std::array<std::int16_t, 2>{2, 8});                    // datatype: uint8, bits
+  put(76, std::array<float, 8>{1, 1, 2, 1, 1, 1, 1, 1});         // pixdim
+  put(108, std::array<float, 2>{352, 1});                        // vox_offset, scl_slope
+  std::memcpy(nii.data() + 344, "n+1", 4);
+  write(folder / "nii", "bytes", nii + labels);
 }
 
 void write_checkpoints(const fs::path& folder) {
@@ -189,6 +222,7 @@ int main(int argc, char** argv) try {
   write_volumes(folder);
   write_variants(folder);
   write_surfaces(folder);
+  write_label_grids(folder);
   write_points(folder);
   write_checkpoints(folder);
   write_program_files(folder);
