@@ -168,3 +168,26 @@ TEST_CASE("exodus: damaged files are refused", "[export]") {
   std::vector<std::string> warnings;
   CHECK(read_nodal_mesh(changed("HEX8", "SPH8")).warnings.size() == 1);
 }
+
+TEST_CASE("exodus: a header that claims more than the file holds is refused before memory is taken", "[export]") {
+  if (is_missing()) return;
+  const TemporaryFolder folder;
+  const std::string bytes = exodus_bytes(nodal_mesh(exodus_cells()));
+  const std::size_t header = bytes.find("connect1");  // all of the header but some of its variables
+  REQUIRE(header != std::string::npos);
+  std::size_t refused = 0;
+  for (std::size_t at = 4; at < header; at += 4) {
+    std::string text = bytes;
+    text.replace(at, 4, "\x7f\xff\xff\xf0");  // 2 GB
+    try {
+      read_nodal_mesh(folder.file("a.e", text));
+    } catch (const InputError&) {
+      ++refused;
+    }
+  }
+  CHECK(refused > header / 8);
+  std::string text = bytes;
+  text.replace(4, 8, std::string("\0\0\0\0\0\0\0\x0a", 8)).replace(12, 4, "\x7f\xff\xff\xf0");
+  CHECK_THROWS_WITH(read_nodal_mesh(folder.file("b.e", text)),
+                    Contains("netCDF header: claims more than the file holds"));
+}
