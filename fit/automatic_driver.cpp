@@ -44,7 +44,7 @@ TriangleMesh sheet_triangles(const VolumeMesh& mesh, const MeshTopology& topolog
     polygons.face_vertices.insert(polygons.face_vertices.end(), corners.begin(), corners.end());
     polygons.face_offsets.push_back(polygons.face_vertices.size());
   }
-  TriangleMesh triangles = fan_triangles(polygons, face_of_triangle);
+  TriangleMesh triangles = refined_triangles(polygons, face_of_triangle);
   if (face_of_triangle)
     for (Index& polygon : *face_of_triangle) polygon = faces[polygon];
   return triangles;

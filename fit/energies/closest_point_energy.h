@@ -56,8 +56,7 @@ class ClosestPointEnergy final : public SurfaceTerm {
   ///
   /// triangles    of the whole, ascending.
   /// numbers      number in the part of each sample of the whole; kNoIndex for those outside. Corners of `triangles`
-  /// and
-  ///              ends of creases must be inside.
+  ///              and the samples that `CreaseEnergy::mark_moving_curves` marks must be inside.
   /// is_free      one entry per sample of the part: 1 if it moves; all its triangles must belong to the part.
   ClosestPointEnergy(const ClosestPointEnergy& whole, std::span<const Index> triangles, std::span<const Index> numbers,
                      const std::vector<std::uint8_t>& is_free);
@@ -78,9 +77,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// Lets only parts of the same group correspond: patches of the fitted surface, and the regions of the target between
   /// sharp edges that they are to reproduce.
   /// of_triangle, of_target  group of each sample triangle and of each of the target's triangles, >= 0; parts of a
-  /// group
-  ///                         that the other surface lacks correspond to all of it. InputError: other numbers of them,
-  ///                         or a cloud.
+  ///                         group that the other surface lacks correspond to all of it. InputError: other numbers of
+  ///                         them, or a cloud.
   void set_groups(std::vector<Index> of_triangle, std::span<const Index> of_target);
 
   /// Uses six points, including the corners, on each sample triangle with a nonzero entry, instead of

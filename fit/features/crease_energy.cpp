@@ -48,22 +48,41 @@ CreaseEnergy::CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegmen
   }
 }
 
-CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const {
-  CreaseEnergy result = *this;
-  result.links_.clear();
-  result.link_numbers_.clear();
-  result.offsets_.assign(is_free.size() + 1, 0);
-  const std::size_t num_samples = is_free.size();
-  result.is_free_ = std::move(is_free);
-  for (CreaseSegment& segment : result.segments_)
-    for (Index& end : segment.ends) end = numbers[end];
-  if (!factors_.empty()) {
-    result.factors_.assign(num_samples, 1);
-    for (const CreaseSegment& segment : segments_)
-      for (const Index end : segment.ends) result.factors_[numbers[end]] = factors_[end];
+void CreaseEnergy::mark_moving_curves(const std::function<bool(Index)>& moves,
+                                      std::vector<std::uint8_t>& is_used) const {
+  for (const Curve& curve : curves_) {
+    const bool is_moving = std::ranges::any_of(
+        curve.segments, [&](Index s) { return moves(segments_[s].ends[0]) || moves(segments_[s].ends[1]); });
+    if (!is_moving) continue;
+    for (const Index s : curve.segments)
+      for (const Index end : segments_[s].ends) is_used[end] = 1;
   }
-  for (Curve& curve : result.curves_)
-    for (Index& end : curve.ends) end = numbers[end];
+}
+
+CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const {
+  CreaseEnergy result;
+  result.width_ = width_;
+  result.tau_ = tau_;
+  result.offsets_.assign(is_free.size() + 1, 0);
+  if (!factors_.empty()) result.factors_.assign(is_free.size(), 1);
+  const auto moves = [&](Index sample) { return numbers[sample] != kNoIndex && is_free[numbers[sample]] != 0; };
+  for (const Curve& curve : curves_) {
+    if (std::ranges::none_of(curve.segments,
+                             [&](Index s) { return moves(segments_[s].ends[0]) || moves(segments_[s].ends[1]); }))
+      continue;
+    const auto number = static_cast<Index>(result.curves_.size());
+    Curve own{curve.points, curve.tree, curve.closed, {}, {}};
+    for (const Index s : curve.segments) {
+      const auto [a, b] = segments_[s].ends;
+      own.segments.push_back(static_cast<Index>(result.segments_.size()));
+      result.segments_.push_back({{numbers[a], numbers[b]}, number});
+      if (factors_.empty()) continue;
+      for (const Index end : segments_[s].ends) result.factors_[numbers[end]] = factors_[end];
+    }
+    for (const Index end : curve.ends) own.ends.push_back(numbers[end]);
+    result.curves_.push_back(std::move(own));
+  }
+  result.is_free_ = std::move(is_free);
   return result;
 }
 

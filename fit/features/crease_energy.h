@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -43,10 +44,16 @@ class CreaseEnergy {
   CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegment> segments, std::size_t num_samples, double width,
                double tangential_weight);
 
-  /// Returns the same energy over other samples, some of which are fixed. Segments between two of these are known to
-  /// the correspondences, but have none themselves.
+  /// Marks the ends of all segments of each curve on which at least one end may move.
   ///
-  /// numbers  new number of each sample that is an end of a segment.
+  /// moves    called with the number of a sample; true if it may move.
+  /// is_used  one entry per sample; set to 1 at these ends, left as it is elsewhere.
+  void mark_moving_curves(const std::function<bool(Index sample)>& moves, std::vector<std::uint8_t>& is_used) const;
+
+  /// Returns the same energy over other samples, some of which are fixed. Curves on which none moves are left out. On
+  /// the others, segments between two fixed samples are known to the correspondences, but have none themselves.
+  ///
+  /// numbers  new number of each sample; kNoIndex if it has none. Those that `mark_moving_curves` marks must have one.
   /// is_free  of each new sample: 1 if it moves.
   CreaseEnergy part(std::span<const Index> numbers, std::vector<std::uint8_t> is_free) const;
 
@@ -69,6 +76,8 @@ class CreaseEnergy {
   }
 
  private:
+  CreaseEnergy() = default;
+
   struct Curve {
     std::vector<Vec3> points;  ///< vertices of T's polyline
     ClosestPoint tree;         ///< tree over its segments
@@ -89,7 +98,7 @@ class CreaseEnergy {
 
   std::vector<Curve> curves_;
   std::vector<CreaseSegment> segments_;
-  double width_, tau_;
+  double width_ = 0, tau_ = 0;
   std::vector<double> factors_;        ///< per sample; empty: all 1
   std::vector<std::uint8_t> is_free_;  ///< of each sample; empty: all are
   std::vector<Link> links_;

@@ -166,7 +166,7 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
     return part;
   };
 
-  std::vector<Index> rows;  // samples of the patch: those of its triangles, and all on creases
+  std::vector<Index> rows;  // samples of the patch: those of its triangles, and all on creases that move
   std::unique_ptr<ClosestPointEnergy> surface;
   SparseMap samples{patch.unknowns.size(), {0}, {}, {}};
   if (whole.surface_ && !patch.triangles.empty()) {
@@ -174,8 +174,12 @@ QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& pat
     for (const Index t : patch.triangles)
       for (const Index sample : whole.surface_->triangles()[t]) is_used[sample] = 1;
     if (whole.surface_->creases())
-      for (const CreaseSegment& segment : whole.surface_->creases()->segments())
-        for (const Index sample : segment.ends) is_used[sample] = 1;
+      whole.surface_->creases()->mark_moving_curves(
+          [&](Index sample) {
+            return std::ranges::any_of(problem.samples.row_columns(sample),
+                                       [&](Index j) { return std::ranges::binary_search(patch.unknowns, j); });
+          },
+          is_used);
     std::vector<Index> numbers(all_samples.size(), kNoIndex);
     for (std::size_t i = 0; i < is_used.size(); ++i) {
       if (!is_used[i]) continue;

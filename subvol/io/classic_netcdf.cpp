@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace subvol::internal {
 
@@ -21,18 +22,10 @@ class ClassicHeader {
     skip(count_size_);  // records
     for (std::uint64_t left = list(kDimension); left > 0; --left) {
       skip_name();
-      skip(count_size_);
+      lengths_.push_back(number(count_size_));
     }
     skip_attributes();
-    for (std::uint64_t left = list(kVariable); left > 0; --left) {
-      constexpr std::uint64_t kMostDimensions = 1024;  // NC_MAX_VAR_DIMS
-      skip_name();
-      const std::uint64_t dimensions = count(count_size_);
-      if (dimensions > kMostDimensions) fail("a variable has more than 1024 dimensions");
-      skip(dimensions * count_size_);
-      skip_attributes();
-      skip(4 + count_size_ + (version_ == 1 ? 4 : 8));  // type, size, place
-    }
+    for (std::uint64_t left = list(kVariable); left > 0; --left) skip_variable();
   }
 
   static constexpr std::size_t kMagic = 4;
@@ -70,18 +63,40 @@ class ClassicHeader {
   void skip_name() { skip_padded(count(1)); }
   void skip_attributes() {
     for (std::uint64_t left = list(kAttribute); left > 0; --left) {
-      constexpr std::array<std::size_t, 12> kSizes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // by type
       skip_name();
-      const std::uint64_t type = number(4);
-      if (type == 0 || type >= kSizes.size()) fail("has an unknown type");
-      skip_padded(kSizes[type] * count(kSizes[type]));
+      const std::size_t size = size_of_type();
+      skip_padded(size * count(size));
     }
+  }
+  /// Reads a type, and returns the size of its values.
+  std::size_t size_of_type() {
+    constexpr std::array<std::size_t, 12> kSizes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // by type
+    const std::uint64_t type = number(4);
+    if (type == 0 || type >= kSizes.size()) fail("has an unknown type");
+    return kSizes[type];
+  }
+
+  /// The dimension of length 0, which is that of the records, may only be a variable's first one.
+  void skip_variable() {
+    constexpr std::uint64_t kMostDimensions = 1024;  // NC_MAX_VAR_DIMS
+    skip_name();
+    const std::uint64_t dimensions = count(count_size_);
+    if (dimensions > kMostDimensions) fail("a variable has more than 1024 dimensions");
+    for (std::uint64_t k = 0; k < dimensions; ++k) {
+      const std::uint64_t dimension = number(count_size_);
+      if (dimension >= lengths_.size()) fail("a variable names a dimension that is not there");
+      if (k > 0 && lengths_[dimension] == 0) fail("a variable has a later dimension of length 0");
+    }
+    skip_attributes();
+    size_of_type();
+    skip(count_size_ + (version_ == 1 ? 4 : 8));  // size, place
   }
 
   std::string name_;
   std::string_view rest_;
   int version_;
   std::size_t count_size_;
+  std::vector<std::uint64_t> lengths_;  ///< of the dimensions
 };
 
 }  // namespace

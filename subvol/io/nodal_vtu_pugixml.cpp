@@ -74,7 +74,7 @@ class VtuParser {
   static VtkXmlArray described(const pugi::xml_node& node) { return VtkXmlFile::described(node); }
 
   void read_piece(const pugi::xml_node& piece) {
-    const std::size_t num_cells = VtkXmlFile::claimed(piece, "NumberOfCells");
+    const std::size_t num_cells = file_.claimed(piece, "NumberOfCells");
     if (num_cells == 0) return;
     const std::size_t first_point = mesh_.positions.size();
     file_.append_points(piece, mesh_.positions);

@@ -40,14 +40,13 @@ class VtpParser {
  private:
   void read_piece(const pugi::xml_node& piece) {
     const std::size_t first = mesh_.positions.size(), num_points = file_.append_points(piece, mesh_.positions);
-    const std::size_t before =
-        VtkXmlFile::claimed(piece, "NumberOfVerts") + VtkXmlFile::claimed(piece, "NumberOfLines");
+    const std::size_t before = file_.claimed(piece, "NumberOfVerts") + file_.claimed(piece, "NumberOfLines");
     if (before > 0) left_out_.add("vertices and lines", before);
     cells_.clear();
-    add_faces(piece.child("Polys"), VtkXmlFile::claimed(piece, "NumberOfPolys"), before, first, num_points, false);
-    const std::size_t num_polygons = VtkXmlFile::claimed(piece, "NumberOfPolys");
-    add_faces(piece.child("Strips"), VtkXmlFile::claimed(piece, "NumberOfStrips"), before + num_polygons, first,
-              num_points, true);
+    const std::size_t num_polygons = file_.claimed(piece, "NumberOfPolys");
+    add_faces(piece.child("Polys"), num_polygons, before, first, num_points, false);
+    add_faces(piece.child("Strips"), file_.claimed(piece, "NumberOfStrips"), before + num_polygons, first, num_points,
+              true);
     read_cell_data(piece);
   }
 

@@ -42,8 +42,9 @@ class VtkXmlFile {
   /// Appends the points of a piece and returns their number. InputError: not as many as the piece claims, numbers that
   /// are not finite, more points than an index can tell.
   std::size_t append_points(const pugi::xml_node& piece, std::vector<Vec3>& points) const;
-  /// The number that an attribute claims; nothing is allocated for it.
-  static std::size_t claimed(const pugi::xml_node& piece, const char* attribute);
+  /// The number that an attribute claims, 0 if there is none; nothing is allocated for it. InputError: more than an
+  /// index can tell, so that sums of a few of them are numbers, too.
+  std::size_t claimed(const pugi::xml_node& piece, const char* attribute) const;
 
  private:
   std::string name_, type_, text_;

@@ -95,8 +95,11 @@ std::size_t VtkXmlFile::append_points(const pugi::xml_node& piece, std::vector<V
   return count;
 }
 
-std::size_t VtkXmlFile::claimed(const pugi::xml_node& piece, const char* attribute) {
-  return static_cast<std::size_t>(piece.attribute(attribute).as_ullong());
+std::size_t VtkXmlFile::claimed(const pugi::xml_node& piece, const char* attribute) const {
+  const unsigned long long count = piece.attribute(attribute).as_ullong();
+  if (count > static_cast<unsigned long long>(std::numeric_limits<Index>::max()))
+    fail(std::string(attribute) + ": expected at most 2^31 - 1, found " + piece.attribute(attribute).value());
+  return static_cast<std::size_t>(count);
 }
 
 }  // namespace subvol::internal

@@ -190,4 +190,12 @@ TEST_CASE("exodus: a header that claims more than the file holds is refused befo
   text.replace(4, 8, std::string("\0\0\0\0\0\0\0\x0a", 8)).replace(12, 4, "\x7f\xff\xff\xf0");
   CHECK_THROWS_WITH(read_nodal_mesh(folder.file("b.e", text)),
                     Contains("netCDF header: claims more than the file holds"));
+  // A dimension of length 0 beside that of the records: netCDF would divide by it.
+  const std::size_t nodes = bytes.find("num_nodes");
+  text = bytes;
+  text.replace(text.find("num_dim") + 8, 4, std::string(4, '\0'));
+  CHECK_THROWS_AS(read_nodal_mesh(folder.file("c.e", text)), InputError);
+  text = bytes;
+  text.replace(nodes + 12, 4, std::string(4, '\0'));
+  CHECK_THROWS_AS(read_nodal_mesh(folder.file("d.e", text)), InputError);
 }

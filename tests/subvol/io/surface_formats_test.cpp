@@ -180,6 +180,8 @@ format="ascii">4</DataArray></Strips><CellData><DataArray type="Int32" Name="mat
   };
   CHECK_THAT(format_refusal("b.vtp", changed("0 1 2</", "0 1 5</")), Contains("names point 5 of 5"));
   CHECK_THAT(format_refusal("b.vtp", changed(">3<", ">4<")), Contains("beyond the connectivity"));
+  CHECK_THAT(format_refusal("b.vtp", changed("NumberOfVerts=\"1\"", "NumberOfVerts=\"18446744073709551615\"")),
+             Contains("NumberOfVerts: expected at most 2^31 - 1"));
   CHECK_THAT(format_refusal("b.vtp", changed("PolyData\" v", "ImageData\" v")), Contains("expected the type PolyData"));
 }
 
