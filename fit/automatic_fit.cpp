@@ -290,7 +290,8 @@ std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
 /// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
 /// fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
-  if (follows_.any()) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
+  // What was moved apart must not meet again; the rest of that mesh is flat from the trial before.
+  if (follows_.any() && !trial.moved_apart_at) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);

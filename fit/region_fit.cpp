@@ -197,7 +197,7 @@ double RegionFit::volume_percent() const {
 bool RegionFit::judge(AutomaticFitTrial trial) {
   constexpr double kLeastAfterFlattening = 0.3;  // a cell may become as poor, for what is exact
 
-  if (follows_edges_) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
+  if (follows_edges_ && !trial.moved_apart_at) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
   restore_volumes(mesh_, unit_.volumes, kLeastAfterFlattening);
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance outer =
