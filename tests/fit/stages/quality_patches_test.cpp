@@ -2,7 +2,11 @@
 #include "subvol/fit/stages/quality_patches.h"
 
 #include "subvol/fit/energies/quality_energy.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/stages/quality_stages.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
 #include "tests/support/sample_meshes.h"
 #include "tests/support/surface_fixtures.h"
 
@@ -130,4 +134,41 @@ TEST_CASE("A patch of the surface has the correspondences that it has in the who
     ++compared;
   }
   CHECK(compared > 20);
+}
+
+TEST_CASE("Relaxing the cells at faces that meet moves them apart, and nothing else", "[quality]") {
+  const VolumeMesh block = test::lattice(kLength, kWidth, kWidth);
+  VolumeMesh slotted{.positions = block.positions};  // the slot is one cell wide and half as deep as the bar
+  for (std::size_t c = 0; c < block.num_cells(); ++c) {
+    Vec3 center = Vec3::Zero();
+    for (const Index v : block.cell(c)) center += block.positions[v] / 8;
+    const bool in_slot = center.x() > 4 && center.x() < 5 && center.z() > kWidth / 2;
+    if (!in_slot) slotted.add_cell(CellKind::hex, block.cell(c));
+  }
+  std::vector<Vec3> x = slotted.positions;
+  for (const double y : {1.0, 2.0, 3.0}) x[vertex_at(slotted, Vec3(4, y, kWidth))].x() += 1.2;
+  const std::vector<Vec3> start = x;
+  const auto cells_that_meet = [&] {
+    VolumeMesh mesh = slotted;
+    mesh.positions = x;
+    const MeshTopology topology(mesh);
+    std::vector<Index> face, cells;
+    for (const auto& pair : self_intersections(refined_triangles(boundary_surface(mesh, topology), &face)).pairs)
+      for (const Index t : pair) cells.push_back(topology.face_cells(topology.boundary_faces()[face[t]])[0]);
+    std::ranges::sort(cells);
+    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+    return cells;
+  };
+  const std::vector<Index> cells = cells_that_meet();
+  REQUIRE_FALSE(cells.empty());
+
+  const std::vector<Vec3> lengths(slotted.num_cells(), Vec3::Ones());
+  const TargetSurface target(test::cube_surface(2, false));
+  QualityStages stages(slotted, lengths, identity_map(x.size()), {}, {}, target);
+  FitReport report;
+  REQUIRE(stages.relax(cells, 1, {1, {}, 6}, StageRunner({}), {}, x, report));
+  CHECK(report.stages.size() == 1);
+  CHECK(cells_that_meet().empty());
+  for (std::size_t v = 0; v < x.size(); ++v)
+    if (start[v].x() > 10) CHECK(x[v] == start[v]);
 }
