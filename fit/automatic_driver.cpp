@@ -182,6 +182,10 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
 }
 
 AutomaticFitResult AutomaticDriver::finish() {
+  if (options_.cells && result_.mesh.num_cells() > *options_.cells)
+    result_.report.warnings.push_back(formatted("the result has %zu cells, more than the %zu allowed: no template with "
+                                                "fewer was found for the target",
+                                                result_.mesh.num_cells(), *options_.cells));
   if (!result_.trials.empty() && best().moved_apart_at)
     result_.report.warnings.push_back(
         "the mesh met itself where walls or gaps of the target are narrower than its "

@@ -7,6 +7,9 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <string>
+
 using namespace subvol;
 
 TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slow]") {
@@ -38,6 +41,15 @@ TEST_CASE("An automatic fit that ends early gives what it has, or nothing") {
   options.progress = {};
   options.time_limit_seconds = 1e-6;
   CHECK(fit_automatically(ball, options).report.stop_reason == StopReason::time_limit);
+}
+
+TEST_CASE("An automatic fit says so if it needs more cells than allowed") {
+  constexpr std::size_t kTooFew = 10;
+  const AutomaticFitResult result = fit_automatically(test::cube_surface(4, true), {.cells = kTooFew});
+  REQUIRE(result.mesh.num_cells() > kTooFew);
+  CHECK(std::ranges::any_of(result.report.warnings, [](const std::string& warning) {
+    return warning.find("more than the 10 allowed") != std::string::npos;
+  }));
 }
 
 TEST_CASE("An automatic fit refuses options out of range") {
