@@ -5,6 +5,7 @@
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
+#include "subvol/fit/quality/quality.h"
 #include "subvol/fit/target/surface_diagnosis.h"
 #include "subvol/mesh/cell_topology.h"
 #include "subvol/mesh/interfaces.h"
@@ -16,6 +17,12 @@
 #include <utility>
 
 namespace subvol::internal {
+
+namespace {
+/// Least scaled Jacobian of a cell below which what it is drawn to is given up.
+double hopeless_quality(const AutomaticFitOptions& options) { return std::min(kAcceptableQuality, options.quality); }
+
+}  // namespace
 
 double least_edge_share(const VolumeMesh& grid, std::span<const Vec3> lengths) {
   constexpr double kLeast = 0.1;
@@ -95,7 +102,7 @@ bool AutomaticDriver::fit_and_refine(int levels) {
                                                      : fine_quality_schedule(options_.quality)),
                       "");
   if (going || result_.trials.empty()) going = judge(trial) && going;
-  return going && move_apart();
+  return going && relax_last_trial();
 }
 
 bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
@@ -122,7 +129,7 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
   record.name = formatted("%zu cells, level %d%s", mesh_.num_cells(), level, what);
   record.level = level;
   record.cells = mesh_.num_cells();
-  const bool going = (!is_moving_apart_ || part_faces(stages, record)) &&
+  const bool going = (!is_relaxing_ || relax_hopeless_cells(stages, record)) &&
                      stages.run(schedule, runner_, record, mesh_.positions, result_.report);
   state_ = stages.state();
   return going;
@@ -137,21 +144,30 @@ std::vector<Index> AutomaticDriver::cells_that_meet(const VolumeMesh& mesh) cons
   return cells;
 }
 
-/// Relaxes the mesh around faces that meet, each time with less weight of the surface and, every other time, one ring
-/// of cells farther out, until none do: there the cells take the room that they want, as on the grid. Returns false if
-/// the fit must end.
-bool AutomaticDriver::part_faces(QualityStages& stages, const StageRecord& record) {
+/// Returns the cells at faces that meet and those below the hopeless quality, ascending.
+std::vector<Index> AutomaticDriver::hopeless_cells() const {
+  std::vector<Index> cells = cells_that_meet(mesh_);
+  const std::vector<double> least = measure_quality(mesh_).cell_minima;
+  for (std::size_t c = 0; c < least.size(); ++c)
+    if (least[c] < hopeless_quality(options_)) cells.push_back(static_cast<Index>(c));
+  std::ranges::sort(cells);
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  return cells;
+}
+
+/// Relaxes the mesh around hopeless cells, each time with less weight of the surface and, every other time, one ring of
+/// cells farther out, until there are none: there the cells take the room that they want, as on the grid. Returns false
+/// if the fit must end.
+bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
   constexpr int kMostRounds = 12, kSteps = 6;
   constexpr double kFirst = 10, kLess = 0.1;  // weight of the surface, and what is left of it in the next round
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
   double surface = kFirst;
   for (int round = 0; round < kMostRounds; ++round, surface *= kLess) {
-    std::vector<Index> cells = cells_that_meet(mesh_);
+    const std::vector<Index> cells = hopeless_cells();
     if (runner_.is_to_end()) return false;
     if (cells.empty()) break;
-    if (!met_at_) met_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells.front())[0]]})[0];
-    std::ranges::sort(cells);
-    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+    if (!relaxed_at_) relaxed_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
     const int rings = 1 + round / 2;
     if (!stages.relax(cells, rings, {surface, weights, kSteps}, runner_, record, mesh_.positions, result_.report))
       return false;
@@ -159,14 +175,16 @@ bool AutomaticDriver::part_faces(QualityStages& stages, const StageRecord& recor
   return true;
 }
 
-bool AutomaticDriver::move_apart() {
+bool AutomaticDriver::relax_last_trial() {
   AutomaticFitTrial trial = result_.trials.back();
-  if (trial.self_intersections.value_or(0) == 0 || merit_if_apart(trial) >= best().merit) return true;
-  met_at_.reset();
-  is_moving_apart_ = true;
-  const bool going = fit_level(trial.level, {{}, {}, 0.1}, ", moved apart");
-  is_moving_apart_ = false;
-  trial.moved_apart_at = met_at_;
+  const bool is_hopeless =
+      trial.self_intersections.value_or(0) > 0 || trial.least_scaled_jacobian < hopeless_quality(options_);
+  if (!is_hopeless || merit_if_relaxed(trial, options_) >= best().merit) return true;
+  relaxed_at_.reset();
+  is_relaxing_ = true;
+  const bool going = fit_level(trial.level, {{}, {}, 0.1}, ", relaxed");
+  is_relaxing_ = false;
+  trial.relaxed_at = relaxed_at_;
   return judge(std::move(trial)) && going;
 }
 
@@ -183,14 +201,16 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
 
 AutomaticFitResult AutomaticDriver::finish() {
   if (options_.cells && result_.mesh.num_cells() > *options_.cells)
-    result_.report.warnings.push_back(formatted("the result has %zu cells, more than the %zu allowed: no template with "
-                                                "fewer was found for the target",
-                                                result_.mesh.num_cells(), *options_.cells));
-  if (!result_.trials.empty() && best().moved_apart_at)
     result_.report.warnings.push_back(
-        "the mesh met itself where walls or gaps of the target are narrower than its "
-        "cells, and was moved apart there, the first time at " +
-        to_text(*best().moved_apart_at) + "; more cells may follow the target");
+        formatted("the result has %zu cells, more than the %zu allowed: no template with "
+                  "fewer was found for the target",
+                  result_.mesh.num_cells(), *options_.cells));
+  if (!result_.trials.empty() && best().relaxed_at)
+    result_.report.warnings.push_back(
+        "where walls, gaps or details of the target are narrower than the mesh's cells, the mesh met itself or had "
+        "flat "
+        "cells; it was relaxed there and follows the target less closely, first at " +
+        to_text(*best().relaxed_at) + "; more cells may hold what is there");
   const Normalisation& normalisation = target_.normalisation;
   result_.mesh.positions = normalisation.from_unit(std::move(result_.mesh.positions));
   for (FitState& state : result_.states) state.positions = normalisation.from_unit(std::move(state.positions));

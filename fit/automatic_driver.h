@@ -73,9 +73,9 @@ class AutomaticDriver {
   /// Returns a cell at each face of a mesh's boundary and interfaces that meets another one, once for each pair of
   /// their triangles.
   std::vector<Index> cells_that_meet(const VolumeMesh& mesh) const;
-  /// Moves the present mesh apart where its boundary meets itself, and judges it as another trial, if the last one was
-  /// kept from being the best by that alone.
-  bool move_apart();
+  /// Relaxes the present mesh where its boundary meets itself or cells are hopeless, and judges it as another
+  /// trial, if the last one was kept from being the best by that alone.
+  bool relax_last_trial();
   /// Minimizes (`QualityStages`).  creases  may be empty.  prepare  is called with the stages before they run; may be
   /// empty.
   bool run_stages(const QualityBoundary& boundary, std::span<const Vec3> lengths,
@@ -98,10 +98,11 @@ class AutomaticDriver {
   StageRunner runner_;
 
  private:
-  bool part_faces(QualityStages& stages, const StageRecord& record);
+  std::vector<Index> hopeless_cells() const;
+  bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);
 
-  bool is_moving_apart_ = false;  ///< `part_faces` precedes the stages
-  std::optional<Vec3> met_at_;    ///< a place that `part_faces` has moved apart, in the target's coordinates
+  bool is_relaxing_ = false;        ///< `relax_hopeless_cells` precedes the stages
+  std::optional<Vec3> relaxed_at_;  ///< its first place, in the target's coordinates
   std::vector<FitState> states_;  ///< of the present mesh, if they are kept
   double share_at_end_ = 0;       ///< of the attempt in progress
 };

@@ -290,8 +290,8 @@ std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
 /// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
 /// fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
-  // What was moved apart must not meet again; the rest of that mesh is flat from the trial before.
-  if (follows_.any() && !trial.moved_apart_at) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
+  // What was relaxed must not meet or flatten again; the rest of that mesh is flat from the trial before.
+  if (follows_.any() && !trial.relaxed_at) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   const SurfaceDistance distance = target_.distance(surface);
@@ -363,7 +363,7 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
     if (!fit_edges(trial, kRoutingPortion)) return false;
     const double merit = result_.trials.back().merit;
     const std::vector<double> faults = faults_of_cells();
-    if (!move_apart()) return false;
+    if (!relax_last_trial()) return false;
     if (merit >= least_merit) break;  // what was given up has not helped
     least_merit = merit;
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults, routing)) break;
@@ -455,7 +455,7 @@ bool AutomaticFit::run_refined() {
   sizes_ = refined->sizes;
   start_ = {.grid = {{}, std::move(refined->sizes)}};
   return fit_level(trial.level, aiming_at_distance(fine_quality_schedule(options_.quality)), ", refined") &&
-         judge(trial) && move_apart();
+         judge(trial) && relax_last_trial();
 }
 
 /// Returns false if the fit must end. InputError: there is no template, and there was none before.

@@ -80,8 +80,9 @@ struct AutomaticFitTrial {
   std::size_t uncertified = 0;
   double volume_percent = 0;  ///< largest difference of a region's volume from the target's, if it has regions
   std::optional<std::size_t> self_intersections;  ///< pairs of triangles; empty: the search was interrupted
-  /// A place at which the boundary met itself and was moved apart, in the target's coordinates; empty: there was none.
-  std::optional<Vec3> moved_apart_at;
+  /// A place at which the boundary met itself or cells were poor, and the mesh was relaxed, in the target's
+  /// coordinates; empty: there was none.
+  std::optional<Vec3> relaxed_at;
   double merit = 0;                               ///< 0: all aims are reached; lower is better
 };
 
@@ -123,9 +124,9 @@ struct AutomaticFitResult {
 ///
 /// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.
 ///
-/// A trial that would be the best one but for a boundary that meets itself is moved apart there and judged again: the
-/// cells around are minimized with less and less weight of the surface, until they take the room that they had on the
-/// grid.
+/// A trial that would be the best one but for a boundary that meets itself or for cells below 0.3 is relaxed there and
+/// judged again: the cells around are minimized with less and less weight of the surface, until they take the room that
+/// they had on the grid.
 ///
 /// If no trial is good, cells of the best one are cut in 27 where it meets itself, where it is too far from the target,
 /// where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the result is

@@ -51,8 +51,12 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          (trial.uncertified > 0 ? kNotValid : 0);
 }
 
-double merit_if_apart(const AutomaticFitTrial& trial) {
-  return trial.merit - (trial.self_intersections == std::size_t{0} ? 0 : kNotValid);
+double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& options) {
+  const double acceptable = std::min(kAcceptableQuality, options.quality);
+  trial.self_intersections = 0;
+  trial.least_scaled_jacobian = std::max(trial.least_scaled_jacobian, acceptable);
+  trial.least_share = std::max(trial.least_share, acceptable / options.quality);
+  return merit_of(trial, options);
 }
 
 bool is_valid(const AutomaticFitTrial& trial) {

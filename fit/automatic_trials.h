@@ -40,8 +40,9 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options);
 /// Returns how far a trial is from its aims: the formula in `fit_automatically`.
 double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& options);
 
-/// Returns the merit that a trial would have if its boundary did not meet itself.
-double merit_if_apart(const AutomaticFitTrial& trial);
+/// Returns the merit that a trial would have if its boundary did not meet itself and no cell were worse than
+/// acceptable.
+double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& options);
 
 /// Returns true if all cells are certified and the boundary is found not to meet itself.
 bool is_valid(const AutomaticFitTrial& trial);

@@ -197,7 +197,7 @@ double RegionFit::volume_percent() const {
 bool RegionFit::judge(AutomaticFitTrial trial) {
   constexpr double kLeastAfterFlattening = 0.3;  // a cell may become as poor, for what is exact
 
-  if (follows_edges_ && !trial.moved_apart_at) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
+  if (follows_edges_ && !trial.relaxed_at) flatten_sheets(mesh_, target_, kLeastAfterFlattening);
   restore_volumes(mesh_, unit_.volumes, kLeastAfterFlattening);
   const QualityReport quality = measure_quality(mesh_);
   const SurfaceDistance outer =
@@ -266,7 +266,7 @@ bool RegionFit::run_curves(std::size_t cells) {
     layout_ = sheet_layout(mesh_, unit_, curves_, {});
     mesh_ = std::move(padded);
     mesh_.tags = layout_->tagged_mesh.tags;
-    return fit_edges({.template_cells = grid->num_cells()}, 1) && move_apart();
+    return fit_edges({.template_cells = grid->num_cells()}, 1) && relax_last_trial();
   }
 }
 
