@@ -19,7 +19,8 @@
 namespace subvol::internal {
 
 namespace {
-/// Least scaled Jacobian of a cell below which what it is drawn to is given up.
+
+/// A cell with a lower scaled Jacobian than this is hopeless where it is: the surface gives way to it.
 double hopeless_quality(const AutomaticFitOptions& options) { return std::min(kAcceptableQuality, options.quality); }
 
 }  // namespace
@@ -169,8 +170,10 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
     if (cells.empty()) break;
     if (!relaxed_at_) relaxed_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
     const int rings = 1 + round / 2;
+    const std::vector<Vec3> before = mesh_.positions;
     if (!stages.relax(cells, rings, {surface, weights, kSteps}, runner_, record, mesh_.positions, result_.report))
       return false;
+    if (mesh_.positions == before) break;  // the patches would be most of the mesh
   }
   return true;
 }
@@ -207,10 +210,9 @@ AutomaticFitResult AutomaticDriver::finish() {
                   result_.mesh.num_cells(), *options_.cells));
   if (!result_.trials.empty() && best().relaxed_at)
     result_.report.warnings.push_back(
-        "where walls, gaps or details of the target are narrower than the mesh's cells, the mesh met itself or had "
-        "flat "
-        "cells; it was relaxed there and follows the target less closely, first at " +
-        to_text(*best().relaxed_at) + "; more cells may hold what is there");
+        "details of the target are narrower than the mesh's cells: the mesh met itself or had poor cells there; it was "
+        "relaxed and follows the target less closely, first at " +
+        to_text(*best().relaxed_at) + "; more cells may hold the details");
   const Normalisation& normalisation = target_.normalisation;
   result_.mesh.positions = normalisation.from_unit(std::move(result_.mesh.positions));
   for (FitState& state : result_.states) state.positions = normalisation.from_unit(std::move(state.positions));

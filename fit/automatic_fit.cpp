@@ -290,7 +290,7 @@ std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
 /// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
 /// fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
-  // What was relaxed must not meet or flatten again; the rest of that mesh is flat from the trial before.
+  // Flattening a relaxed place could make its faces meet again. The rest of that mesh is flat from the trial before.
   if (follows_.any() && !trial.relaxed_at) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));

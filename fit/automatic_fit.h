@@ -150,8 +150,8 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
 /// curves, and faces on flat parts become exactly flat. Else the template has about an eighth of the cells and is
 /// refined once, unless the regions need more.
 ///
-/// Larger templates are tried as by `fit_automatically`; distances are the largest of the outer surface's and of all
-/// interfaces', and the merit also counts
+/// Larger templates are tried, and trials relaxed, as by `fit_automatically`; distances are the largest of the outer
+/// surface's and of all interfaces', and the merit also counts
 ///
 ///   min(3, max(0, largest difference of a region's volume / 0.1 % - 1))
 ///

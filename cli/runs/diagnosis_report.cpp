@@ -33,19 +33,14 @@ Json numbers_json(const std::array<Index, 2>& numbers) {
 const char* measure_of(SurfaceFault fault) {
   switch (fault) {
     case SurfaceFault::open_rim:
-    case SurfaceFault::pinhole:
-      return "length";
+    case SurfaceFault::pinhole: return "length";
     case SurfaceFault::thin_wall:
-    case SurfaceFault::thin_gap:
-      return "width";
-    case SurfaceFault::sharp_angle:
-      return "degrees";
+    case SurfaceFault::thin_gap: return "width";
+    case SurfaceFault::sharp_angle: return "degrees";
     case SurfaceFault::wall_outward:
     case SurfaceFault::part_inward:
-    case SurfaceFault::part_in_void:
-      return "volume";
-    default:
-      return nullptr;
+    case SurfaceFault::part_in_void: return "volume";
+    default: return nullptr;
   }
 }
 
@@ -97,13 +92,21 @@ SurfaceRepair wrap_to_fill(const std::filesystem::path& path, double percent, st
 
 /// Repairs a surface with the copies of triangles that the reader drops, if these tell more: two that face each other
 /// are a sheet between two regions, or walls of zero width where solids touch.
-void consider_copies(const std::filesystem::path& path, RegionRule rule, SurfaceRepair& repair) {
-  if (repair.regions) return;
-  const TriangleMesh surface = triangulate(read_polygon_mesh(path));
+///
+/// repair    of the surface without the copies; replaced if the copies tell more.
+/// warnings  those of the reader from `told` on are replaced with it: no copy was dropped then.
+void consider_copies(const std::filesystem::path& path, RegionRule rule, std::size_t told, SurfaceRepair& repair,
+                     std::vector<std::string>& warnings) {
+  if (repair.regions || interrupted()) return;
+  std::vector<std::string> own_warnings;
+  const TriangleMesh surface = triangulate(read_polygon_mesh(path, &own_warnings));
   if (repair.done.empty() && rule == RegionRule::automatic) repair.regions = find_regions(surface, rule);
   if (repair.regions || repair.is_fillable) return;
   SurfaceRepair with_copies = repair_surface(surface, interrupted, rule);
-  if (with_copies.is_fillable) repair = std::move(with_copies);
+  if (!with_copies.is_fillable) return;
+  repair = std::move(with_copies);
+  warnings.resize(told);
+  warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
 }
 
 }  // namespace
@@ -134,7 +137,7 @@ SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptio
     const std::size_t told = warnings.size();
     SurfaceRepair repair = repair_surface(load_surface(path, warnings), interrupted, rule);
     const bool may_have_copies = warnings.size() > told && is_surface_file(path);
-    if (may_have_copies && !interrupted()) consider_copies(path, rule, repair);
+    if (may_have_copies) consider_copies(path, rule, told, repair, warnings);
     return repair;
   }
   LabelGrid grid = read_label_grid(path);
@@ -192,10 +195,14 @@ Json diagnosis_json(const SurfaceDiagnosis& diagnosis) {
                                           {"prevents_filling", prevents_filling(finding.fault)},
                                           {"first", std::move(places)}};
   }
-  Json json{{"fillable", diagnosis.is_fillable()},  {"triangles", diagnosis.num_triangles},
-            {"vertices", diagnosis.num_vertices},   {"diagonal", diagnosis.diagonal},
-            {"volume", diagnosis.volume},           {"num_parts", diagnosis.parts.size()},
-            {"parts", parts_json(diagnosis.parts)}, {"findings", std::move(findings)}};
+  Json json{{"fillable", diagnosis.is_fillable()},
+            {"triangles", diagnosis.num_triangles},
+            {"vertices", diagnosis.num_vertices},
+            {"diagonal", diagnosis.diagonal},
+            {"volume", diagnosis.volume},
+            {"num_parts", diagnosis.parts.size()},
+            {"parts", parts_json(diagnosis.parts)},
+            {"findings", std::move(findings)}};
   if (diagnosis.is_cancelled) json["ended_early"] = true;
   return json;
 }
@@ -212,10 +219,8 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
     for (std::size_t i = 1; i < finding.places.size(); ++i) text << place_line(finding.places[i]);
     if (prevents_filling(finding.fault)) reasons += (reasons.empty() ? "" : ", ") + to_string(finding.fault);
   }
-  if (reasons.empty())
-    text << "can be filled as it is\n";
-  else
-    text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
+  if (reasons.empty()) text << "can be filled as it is\n";
+  else text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
   return text.str();
 }
 

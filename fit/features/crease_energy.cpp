@@ -48,12 +48,16 @@ CreaseEnergy::CreaseEnergy(const FeatureCurves& curves, std::vector<CreaseSegmen
   }
 }
 
+template <class Moves>
+bool CreaseEnergy::is_moving(const Curve& curve, const Moves& moves) const {
+  return std::ranges::any_of(curve.segments,
+                             [&](Index s) { return moves(segments_[s].ends[0]) || moves(segments_[s].ends[1]); });
+}
+
 void CreaseEnergy::mark_moving_curves(const std::function<bool(Index)>& moves,
                                       std::vector<std::uint8_t>& is_used) const {
   for (const Curve& curve : curves_) {
-    const bool is_moving = std::ranges::any_of(
-        curve.segments, [&](Index s) { return moves(segments_[s].ends[0]) || moves(segments_[s].ends[1]); });
-    if (!is_moving) continue;
+    if (!is_moving(curve, moves)) continue;
     for (const Index s : curve.segments)
       for (const Index end : segments_[s].ends) is_used[end] = 1;
   }
@@ -65,11 +69,9 @@ CreaseEnergy CreaseEnergy::part(std::span<const Index> numbers, std::vector<std:
   result.tau_ = tau_;
   result.offsets_.assign(is_free.size() + 1, 0);
   if (!factors_.empty()) result.factors_.assign(is_free.size(), 1);
-  const auto moves = [&](Index sample) { return numbers[sample] != kNoIndex && is_free[numbers[sample]] != 0; };
+  const auto moves_there = [&](Index sample) { return numbers[sample] != kNoIndex && is_free[numbers[sample]] != 0; };
   for (const Curve& curve : curves_) {
-    if (std::ranges::none_of(curve.segments,
-                             [&](Index s) { return moves(segments_[s].ends[0]) || moves(segments_[s].ends[1]); }))
-      continue;
+    if (!is_moving(curve, moves_there)) continue;
     const auto number = static_cast<Index>(result.curves_.size());
     Curve own{curve.points, curve.tree, curve.closed, {}, {}};
     for (const Index s : curve.segments) {

@@ -86,6 +86,10 @@ class CreaseEnergy {
     std::vector<Index> ends;      ///< samples at which exactly one of these segments ends: two if the curve is open
   };
 
+  /// Returns true if an end of one of the curve's segments may move.
+  template <class Moves>
+  bool is_moving(const Curve& curve, const Moves& moves) const;
+
   void link_target(const Curve& curve, std::span<const Vec3> samples);
   void link_creases(const Curve& curve, std::span<const Vec3> samples);
   void link_ends(const Curve& curve, std::span<const Vec3> samples);

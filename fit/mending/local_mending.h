@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/fit/mending/mend_surface.h"
+#include "subvol/fit/mending/mending_goal.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>

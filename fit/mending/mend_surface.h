@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/mending/mending_goal.h"
 #include "subvol/mesh/feature_tags.h"
 #include "subvol/surface/triangle_mesh.h"
 
@@ -14,12 +15,6 @@ namespace subvol {
 /// Default distance within which a surface may be mended, as a share of its bounding box's diagonal: what a file of
 /// eight digits loses in a few operations of a CAD program, and less than what any shell or fit resolves.
 inline constexpr double kMendingShare = 2e-4;
-
-/// What a surface is mended for.
-enum class MendingGoal {
-  layers,  ///< layers of cells are to stand on it: a vertex from which no direction sees all faces around is a fault
-  solid    ///< it is to bound a solid: such a vertex is none
-};
 
 /// A surface that was mended, and what was done to it.
 struct MendedSurface {

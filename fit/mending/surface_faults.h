@@ -2,7 +2,7 @@
 #pragma once
 
 #include "subvol/base/types.h"
-#include "subvol/fit/mending/mend_surface.h"
+#include "subvol/fit/mending/mending_goal.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -16,7 +16,7 @@ namespace subvol {
 /// Largest number of places that a message lists.
 inline constexpr std::size_t kMostNamedPlaces = 10;
 
-/// What keeps layers from standing on a surface that `make_layers` accepts, or a surface from bounding a solid.
+/// Faults that keep layers from standing on a surface that `make_layers` accepts, or the surface from bounding a solid.
 struct SurfaceFaults {
   std::vector<Index> flat;                      ///< faces with a triangle without area, ascending
   std::vector<std::array<Index, 2>> meeting;    ///< pairs of faces that intersect or touch, smaller first, ascending

@@ -182,18 +182,26 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
     repair.done.push_back(sheets + "; they are left out, and the regions are one");
   }
   const std::string turned = words(SurfaceFault::wall_outward);
+  bool united = false;
   if (diagnosis.parts.size() > 1 && !diagnosis.find(SurfaceFault::fin) && (crosses || !turned.empty())) {
     Union parts(surface_parts(surface), cancelled);
     if (!parts.group()) return repair;
+    const std::size_t before = repair.done.size();
     TriangleMesh made = parts.made(repair.done);
+    united = repair.done.size() > before;
     if (!turned.empty()) repair.done.push_back(turned + "; turned");
     if (!repair.done.empty()) {
       made.face_groups = groups_of_pieces(surface, made);
       repair.surface = std::move(made);
     }
   }
-  repair.is_fillable = diagnosis.is_fillable() || !repair.done.empty();
-  const bool united = repair.done.size() > (turned.empty() ? 0u : 1u);
+  const auto is_repaired = [&](SurfaceFault fault) {
+    if (fault == SurfaceFault::crossing || fault == SurfaceFault::face_contact) return united;
+    return fault == SurfaceFault::wall_outward ? !repair.done.empty() : fault == SurfaceFault::pinhole;
+  };
+  repair.is_fillable = std::ranges::all_of(diagnosis.findings, [&](const SurfaceFinding& finding) {
+    return !prevents_filling(finding.fault) || is_repaired(finding.fault);
+  });
   for (const SurfaceFault fault : {SurfaceFault::crossing, SurfaceFault::face_contact})
     if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": left as it is");
   for (const SurfaceFault fault : {SurfaceFault::edge_contact, SurfaceFault::vertex_contact})

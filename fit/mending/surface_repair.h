@@ -20,7 +20,7 @@ struct SurfaceRepair {
   std::optional<RegionSurface> regions;  ///< of the surface, if there are several; it is as it was given then
   std::vector<std::string> done;   ///< a sentence for each repair; empty: the surface is as it was given
   std::vector<std::string> notes;  ///< a sentence for each fault that was left: contacts, pinholes, crossings
-  bool is_fillable = false;        ///< nothing is known that prevents filling (`prevents_filling`)
+  bool is_fillable = false;        ///< no fault that `prevents_filling` is left but pinholes, which filling closes
 };
 
 /// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting, and
@@ -30,7 +30,7 @@ struct SurfaceRepair {
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
 /// points inward beside others that do not. A solid part in a void stays a part of its own.
 ///
-/// What remains of crossings, contacts of faces, repeated triangles and edges of three triangles is mended if that is
+/// Crossings, contacts of faces, repeated triangles and edges of three triangles that remain are mended if that is
 /// possible within `kMendingShare` of the diagonal (`mend_surface`) and leaves fewer places that prevent filling.
 ///
 /// Where there are several regions by the rule (`find_regions`) and nothing crosses, there is nothing to repair. With

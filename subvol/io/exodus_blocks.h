@@ -10,7 +10,7 @@
 
 namespace subvol::internal {
 
-// What the reader and the writer of Exodus files have in common.
+// These constants and functions serve both the reader and the writer of Exodus files.
 
 inline constexpr const char* kNoNetcdf =
     "Exodus: this program was built without netCDF; install libnetcdf-dev and build it again, or take another format";
@@ -21,8 +21,8 @@ std::mutex& netcdf_lock();
 /// The name that a second block of a reference has after that of the first: Exodus has one kind of cell in a block.
 const char* kind_suffix(CellKind kind);
 
-inline constexpr std::string_view kReferenceBlock =
-    "reference ";  ///< begins the name of the block of a reference without a name
+/// The name of the block of a reference without a name begins so.
+inline constexpr std::string_view kReferenceBlock = "reference ";
 
 /// Places in an element of Exodus of the nodes of `NodeOrdering::vtk`: Exodus has upright edges before those of the
 /// top, and of a hex the nodes of the cell, the bottom and the top before those of the other faces.

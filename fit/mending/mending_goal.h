@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+namespace subvol {
+
+/// The purpose for which a surface is mended decides what is a fault.
+enum class MendingGoal {
+  layers,  ///< layers of cells are to stand on it: a vertex from which no direction sees all faces around is a fault
+  solid    ///< it is to bound a solid: such a vertex is none
+};
+
+}  // namespace subvol
