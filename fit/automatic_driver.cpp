@@ -79,11 +79,11 @@ void AutomaticDriver::take_in(VolumeMesh& mesh) {
     result_.report.note_start(target_.compare_start(refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))));
 }
 
-QualitySchedule AutomaticDriver::aiming_at_distance(QualitySchedule schedule) const {
+QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule schedule) {
   // As in the merit of a trial, poor cells cost more than a place that is slightly too far. With the weights of other
   // lifts, y-belt-idler kept a scaled Jacobian of 0.28 rather than a largest distance of 0.58 % for 0.52.
   schedule.merit = {.excess = 1, .poor = 3};
-  schedule.most_distance = kMaxMargin * options_.max_tolerance_percent / 100;
+  schedule.most_distance = kMaxMargin * max_percent / 100;
   return schedule;
 }
 
@@ -188,6 +188,26 @@ bool AutomaticDriver::relax_last_trial() {
   const bool going = fit_level(trial.level, {{}, {}, 0.1}, ", relaxed");
   is_relaxing_ = false;
   trial.relaxed_at = relaxed_at_;
+  return judge(std::move(trial)) && going;
+}
+
+bool AutomaticDriver::polish() {
+  constexpr double kStep = 0.05;
+  // Share of the largest distance that it may grow to, and of the tolerance that is always allowed.
+  constexpr double kGrowth = 1.2, kLeast = 0.02;
+  if (!is_good() || result_.chosen + 1 != result_.trials.size()) return true;
+  AutomaticFitTrial trial = best();
+  trial.is_polished = true;
+  const double tolerance = options_.max_tolerance_percent;
+  const double most = std::clamp(kGrowth * trial.max_percent, kLeast * tolerance, tolerance);
+  bool going = true, reached = true;
+  for (int i = 1; going && reached && options_.quality + i * kStep < kMostQuality + kStep / 2; ++i) {
+    const double goal = std::min(options_.quality + i * kStep, kMostQuality);
+    going = fit_level(trial.level, aiming_at(most, late_quality_schedule(goal)), ", polished");
+    reached = state_.merit >= 1;
+  }
+  // The share of the quality that is reached is the one of the quality aimed at.
+  going = going && fit_level(trial.level, {{}, {}, options_.quality}, ", polished");
   return judge(std::move(trial)) && going;
 }
 

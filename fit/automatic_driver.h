@@ -15,6 +15,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace subvol::internal {
@@ -64,8 +65,11 @@ class AutomaticDriver {
   /// Measures the present mesh, and keeps it if it is the best one.
   virtual bool judge(AutomaticFitTrial trial) = 0;
 
-  /// Returns the schedule of a mesh that is not refined any more, which aims at the largest distance as well.
-  QualitySchedule aiming_at_distance(QualitySchedule schedule) const;
+  /// Returns the schedule of a mesh that is not refined any more, which aims at a largest distance, the one allowed, as
+  /// well.
+  QualitySchedule aiming_at_distance(QualitySchedule schedule) const {
+    return aiming_at(options_.max_tolerance_percent, std::move(schedule));
+  }
   /// Fits the present mesh, refines it so many times, fitting it each time, and judges it.
   bool fit_and_refine(int levels);
   /// Fits and judges the present mesh, which follows edges and is not refined.
@@ -76,6 +80,9 @@ class AutomaticDriver {
   /// Relaxes the present mesh where its boundary meets itself or cells are hopeless, and judges it as another
   /// trial, if the last one was kept from being the best by that alone.
   bool relax_last_trial();
+  /// Lifts the best trial beyond the quality aimed at, and judges the result as another trial, if it is the present
+  /// mesh and good: by a step as long as the last one was reached, while its surface stays about where it is.
+  bool polish();
   /// Minimizes (`QualityStages`).  creases  may be empty.  prepare  is called with the stages before they run; may be
   /// empty.
   bool run_stages(const QualityBoundary& boundary, std::span<const Vec3> lengths,
@@ -98,6 +105,7 @@ class AutomaticDriver {
   StageRunner runner_;
 
  private:
+  static QualitySchedule aiming_at(double max_percent, QualitySchedule schedule);
   std::vector<Index> hopeless_cells() const;
   bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);
 

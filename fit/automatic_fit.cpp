@@ -515,6 +515,7 @@ AutomaticFitResult AutomaticFit::run() {
     begin_attempt();
     going = run_attempt({Attempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   }
+  if (going) going = polish();
   if (going) conclude();
   return finish();
 }

@@ -68,6 +68,16 @@ bool is_good_enough(const AutomaticFitTrial& trial) {
   return trial.merit - excused < kGoodMerit;
 }
 
+namespace {
+
+/// Returns true if a trial is better than the best one before. Among good ones, the quality decides.
+bool is_better(const AutomaticFitTrial& trial, const AutomaticFitTrial& best) {
+  if (is_good_enough(trial) && is_good_enough(best)) return trial.least_scaled_jacobian > best.least_scaled_jacobian;
+  return trial.merit < best.merit;
+}
+
+}  // namespace
+
 bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityReport& quality,
                const std::optional<CreaseDistance>& edges, const AutomaticFitOptions& options,
                AutomaticFitResult& result) {
@@ -82,7 +92,7 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
   }
   trial.merit = merit_of(trial, options);
   result.trials.push_back(trial);
-  if (result.trials.size() > 1 && trial.merit >= result.trials[result.chosen].merit) return false;
+  if (result.trials.size() > 1 && !is_better(trial, result.trials[result.chosen])) return false;
   result.chosen = result.trials.size() - 1;
   result.mesh = mesh;
   result.report.creases = edges;

@@ -311,6 +311,7 @@ AutomaticFitResult RegionFit::run() {
     going = run_count(counts[i]);
   }
   if (result_.trials.empty() && !no_template_.empty()) throw InputError(no_template_);
+  if (going) going = polish();
   if (going) conclude();
   if (result_.mesh.num_cells() > 0) add_interface_groups(result_.mesh);
   return finish();

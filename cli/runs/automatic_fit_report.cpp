@@ -35,6 +35,7 @@ Json trials_json(const AutomaticFitResult& result) {
                       {"min_scaled_jacobian", trial.least_scaled_jacobian},
                       {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
                       {"self_intersections", trial.self_intersections ? Json(*trial.self_intersections) : Json()},
+                      {"polished", trial.is_polished},
                       {"relaxed_at", trial.relaxed_at ? point_json(*trial.relaxed_at) : Json()},
                       {"uncertified_cells", trial.uncertified},
                       {"merit", trial.merit}});

@@ -25,6 +25,20 @@ TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slo
   CHECK(result.trials[result.chosen].cells == result.mesh.num_cells());
 }
 
+TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow]") {
+  const TriangleMesh ball = test::cube_surface(12, true);
+  const AutomaticFitResult result = fit_automatically(ball, {.cells = 3000, .quality = 0.6});
+  REQUIRE(result.trials.size() >= 2);
+  const AutomaticFitTrial &polished = result.trials.back(), &before = result.trials[result.trials.size() - 2];
+  REQUIRE(polished.is_polished);
+  CHECK_FALSE(before.is_polished);
+  CHECK(result.chosen + 1 == result.trials.size());
+  CHECK(polished.least_scaled_jacobian > before.least_scaled_jacobian);
+  CHECK(polished.least_scaled_jacobian > 0.7);
+  CHECK(polished.max_percent <= kAutomaticMaxPercent);
+  CHECK(check_mesh(result.mesh, &ball, {}).valid());
+}
+
 TEST_CASE("An automatic fit that ends early gives what it has, or nothing") {
   const TriangleMesh ball = test::cube_surface(6, true);
   AutomaticFitOptions options{.cells = 1000};
