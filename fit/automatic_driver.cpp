@@ -87,15 +87,22 @@ QualitySchedule AutomaticDriver::aiming_at(double max_percent, QualitySchedule s
   return schedule;
 }
 
+void AutomaticDriver::begin_cage() {
+  cage_.emplace(std::move(mesh_));
+  mesh_ = cage_->mesh();
+}
+
 bool AutomaticDriver::fit_and_refine(int levels) {
   AutomaticFitTrial trial{.template_cells = mesh_.num_cells(), .level = levels};
   bool going = true;
   for (int level = 0; going && level < levels; ++level) {
     going = fit_level(level, coarse_quality_schedule(options_.quality), "", kCoarsePortion);
-    if (going)
-      mesh_ = smooth_refinement(mesh_);
-    else
+    if (!going)
       trial.level = level;
+    else if (options_.makes_cage && level + 1 == levels)
+      begin_cage();
+    else
+      mesh_ = smooth_refinement(mesh_);
   }
   if (going)
     going = fit_level(levels,
@@ -107,7 +114,19 @@ bool AutomaticDriver::fit_and_refine(int levels) {
 }
 
 bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
-  const bool going = fit_level(0, aiming_at_distance(single_quality_schedule(options_.quality)), ", edges", portion);
+  bool going = true;
+  if (options_.makes_cage) {
+    going = fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion);
+    if (going) {
+      begin_cage();
+      trial.level = 1;
+    }
+  }
+  if (going) {
+    const QualitySchedule schedule =
+        cage_ ? fine_quality_schedule(options_.quality) : single_quality_schedule(options_.quality);
+    going = fit_level(trial.level, aiming_at_distance(schedule), ", edges", portion);
+  }
   return going || result_.trials.empty() ? judge(std::move(trial)) && going : going;
 }
 
@@ -120,10 +139,11 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
                                  const std::function<CreaseEnergy(double)>& creases, int level,
                                  const QualitySchedule& schedule, const char* what,
                                  const std::function<void(QualityStages&)>& prepare) {
-  QualityStages stages(mesh_, lengths, identity_map(mesh_.num_vertices()), {}, boundary, target_.surface, creases);
+  QualityStages stages(mesh_, lengths, cage_ ? cage_->level().nodes : identity_map(mesh_.num_vertices()), {}, boundary,
+                       target_.surface, creases);
   if (prepare) prepare(stages);
   if (options_.keep_states) {
-    states_ = {{"start", mesh_.positions}};
+    states_ = {{"start", unknowns()}};
     stages.after_stage = [this](const std::string& name, const std::vector<Vec3>& x) { states_.push_back({name, x}); };
   }
   StageRecord record;
@@ -131,7 +151,8 @@ bool AutomaticDriver::run_stages(const QualityBoundary& boundary, std::span<cons
   record.level = level;
   record.cells = mesh_.num_cells();
   const bool going = (!is_relaxing_ || relax_hopeless_cells(stages, record)) &&
-                     stages.run(schedule, runner_, record, mesh_.positions, result_.report);
+                     stages.run(schedule, runner_, record, unknowns(), result_.report);
+  follow_cage();
   state_ = stages.state();
   return going;
 }
@@ -170,10 +191,12 @@ bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRec
     if (cells.empty()) break;
     if (!relaxed_at_) relaxed_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
     const int rings = 1 + round / 2;
-    const std::vector<Vec3> before = mesh_.positions;
-    if (!stages.relax(cells, rings, {surface, weights, kSteps}, runner_, record, mesh_.positions, result_.report))
-      return false;
-    if (mesh_.positions == before) break;  // the patches would be most of the mesh
+    const std::vector<Vec3> before = unknowns();
+    const bool going =
+        stages.relax(cells, rings, {surface, weights, kSteps}, runner_, record, unknowns(), result_.report);
+    follow_cage();
+    if (!going) return false;
+    if (unknowns() == before) break;  // the patches would be most of the mesh
   }
   return true;
 }
@@ -195,17 +218,27 @@ bool AutomaticDriver::polish() {
   constexpr double kStep = 0.05;
   // Share of the largest distance that it may grow to, and of the tolerance that is always allowed.
   constexpr double kGrowth = 1.2, kLeast = 0.02;
+  // If more than this share of the cells is below a quality, lifting them moves most of the mesh. A vertex of a cage
+  // moves more cells.
+  constexpr double kMostPoor = 0.1, kMostPoorOfCage = 0.05;
+  constexpr int kPointsPerDirection = 3;
   if (!is_good() || result_.chosen + 1 != result_.trials.size()) return true;
   AutomaticFitTrial trial = best();
   trial.is_polished = true;
   const double tolerance = options_.max_tolerance_percent;
-  const double most = std::clamp(kGrowth * trial.max_percent, kLeast * tolerance, tolerance);
-  bool going = true, reached = true;
+  const double most_percent = std::clamp(kGrowth * trial.max_percent, kLeast * tolerance, tolerance);
+  bool going = true, reached = true, is_lifted = false;
   for (int i = 1; going && reached && options_.quality + i * kStep < kMostQuality + kStep / 2; ++i) {
     const double goal = std::min(options_.quality + i * kStep, kMostQuality);
-    going = fit_level(trial.level, aiming_at(most, late_quality_schedule(goal)), ", polished");
+    const std::vector<double> least = measure_quality(mesh_, kPointsPerDirection).cell_minima;
+    const auto poor = std::ranges::count_if(least, [goal](double quality) { return quality < goal; });
+    const double most = (cage_ ? kMostPoorOfCage : kMostPoor) * static_cast<double>(least.size());
+    if (static_cast<double>(poor) > most) break;
+    going = fit_level(trial.level, aiming_at(most_percent, late_quality_schedule(goal)), ", polished");
     reached = state_.merit >= 1;
+    is_lifted = true;
   }
+  if (!is_lifted) return going;
   // The share of the quality that is reached is the one of the quality aimed at.
   going = going && fit_level(trial.level, {{}, {}, options_.quality}, ", polished");
   return judge(std::move(trial)) && going;
@@ -217,6 +250,7 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
   trial.least_share = state_.cells.least_share;
   if (edges) edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
   if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return false;
+  result_.cage = cage_ ? cage_->cage : VolumeMesh();
   result_.states = states_;
   result_.missed_edges = missed_edges(unfollowed, curves, target_.normalisation);
   return true;
@@ -235,6 +269,7 @@ AutomaticFitResult AutomaticDriver::finish() {
         to_text(*best().relaxed_at) + "; more cells may hold the details");
   const Normalisation& normalisation = target_.normalisation;
   result_.mesh.positions = normalisation.from_unit(std::move(result_.mesh.positions));
+  result_.cage.positions = normalisation.from_unit(std::move(result_.cage.positions));
   for (FitState& state : result_.states) state.positions = normalisation.from_unit(std::move(state.positions));
   result_.report.seconds = {{"total", runner_.seconds()}};
   return std::move(result_);

@@ -4,6 +4,7 @@
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/features/crease_energy.h"
+#include "subvol/fit/fits/fitted_cage.h"
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/target/fit_target.h"
@@ -59,6 +60,8 @@ class AutomaticDriver {
   /// Takes a template in the target's coordinates into the fit's, and reports its distance if it is the first one.
   void take_in(VolumeMesh& mesh);
 
+  /// Makes the present mesh the cage of the mesh that it is subdivided to, which is then the present one.
+  virtual void begin_cage();
   /// Fits the present mesh at one level. what: is added to its name in the report.
   /// portion: of the attempt's remaining work.
   virtual bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) = 0;
@@ -70,9 +73,10 @@ class AutomaticDriver {
   QualitySchedule aiming_at_distance(QualitySchedule schedule) const {
     return aiming_at(options_.max_tolerance_percent, std::move(schedule));
   }
-  /// Fits the present mesh, refines it so many times, fitting it each time, and judges it.
+  /// Fits the present mesh, refines it so many times, fitting it each time, and judges it. If a cage is made, the last
+  /// mesh is fitted by the vertices of the one before.
   bool fit_and_refine(int levels);
-  /// Fits and judges the present mesh, which follows edges and is not refined.
+  /// Fits and judges the present mesh, which follows edges and is not refined, or the mesh whose cage it is.
   bool fit_edges(AutomaticFitTrial trial, double portion);
   /// Returns a cell at each face of a mesh's boundary and interfaces that meets another one, once for each pair of
   /// their triangles.
@@ -99,12 +103,19 @@ class AutomaticDriver {
   AutomaticFitOptions options_;
   FitTarget target_;
   VolumeMesh mesh_;
+  std::optional<FittedCage> cage_;  ///< of the present mesh; none: its own vertices are the unknowns
   std::string no_template_;     ///< why the last template that was asked for does not exist; empty: it does
   QualityStages::State state_;  ///< that the last level reached; its share is that of the lower goal at caps
   AutomaticFitResult result_;
   StageRunner runner_;
 
+  /// Brings the mesh of the cage, if there is one, to where the cage is.
+  void follow_cage() {
+    if (cage_) mesh_.positions = cage_->nodes();
+  }
+
  private:
+  std::vector<Vec3>& unknowns() { return cage_ ? cage_->cage.positions : mesh_.positions; }
   static QualitySchedule aiming_at(double max_percent, QualitySchedule schedule);
   std::vector<Index> hopeless_cells() const;
   bool relax_hopeless_cells(QualityStages& stages, const StageRecord& record);

@@ -67,14 +67,25 @@ struct Attempt {
   bool is_last_count = true;  ///< no attempt with more cells follows
 };
 
+/// Returns the number of cells of a mesh that has a number of them after it was subdivided so many times.
+std::size_t cells_before(std::size_t cells, int levels) {
+  for (int level = 0; level < levels; ++level) cells /= kChildren;
+  return std::max(cells, kLeastTemplateCells);
+}
+
 std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
   using Kind = Attempt::Kind;
   std::vector<Attempt> attempts;
   if (has_edges) {
     std::vector<std::size_t> counts(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
-    if (options.cells) counts = {*options.cells};
+    if (options.cells) counts = {options.makes_cage ? cells_before(*options.cells, 1) : *options.cells};
     for (const std::size_t cells : counts)
       for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0, cells == counts.back()});
+  } else if (options.makes_cage) {
+    std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+    if (options.cells) counts = {*options.cells};
+    for (const std::size_t cells : counts)
+      attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});
   } else if (options.cells) {
     if (*options.cells >= kChildren * kLeastTemplateCells)
       attempts.push_back({Kind::smooth, *options.cells / kChildren, 1});
@@ -93,6 +104,34 @@ struct TrialStart {
   std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
   std::vector<Index> lost;       ///< curves without a path
 };
+
+/// What an edge layout is on the mesh that is fitted: on that of the layout, or on the one whose cage it is.
+struct OnMesh {
+  std::vector<Index> group_of_face;
+  QualityCaps caps;
+  FollowedCreases creases;
+};
+
+/// The samples of a surface that is fitted.
+struct LevelSamples {
+  SparseMap positions;  ///< degrees of freedom -> samples
+  std::vector<std::array<Index, 3>> triangles;
+  std::vector<Index> faces;  ///< of the mesh, for each triangle
+  std::vector<std::array<Index, 2>> crease_edges;
+};
+
+LevelSamples samples_of(const VolumeMesh& mesh) {
+  constexpr int kIntervals = 2;
+  BoundarySamples samples =
+      make_boundary_samples(ElementSpace(mesh, Basis::legendre, 1), kIntervals, mesh.tags.creases);
+  return {std::move(samples.positions), std::move(samples.triangles), std::move(samples.triangle_faces),
+          std::move(samples.crease_edges)};
+}
+
+LevelSamples samples_of(const FittedCage& cage) {
+  const FitLevel& level = cage.level();
+  return {level.samples, level.sample_triangles, level.sample_faces, level.crease_edges};
+}
 
 /// Returns the share of the curves' length that paths follow.
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
@@ -131,6 +170,7 @@ class AutomaticFit : AutomaticDriver {
   bool run_edges(const Attempt& attempt);
   bool run_refined();
   void lay_out(RoutingOptions routing);
+  void begin_cage() override;
   bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
   bool route_and_fit(const AutomaticFitTrial& described);
   std::vector<Fault> faults_of_best() const;
@@ -148,8 +188,10 @@ class AutomaticFit : AutomaticDriver {
     constexpr double kMany = 0.4;
     return attempt.kind != Attempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
+  /// The irregular edges of cut cells are poor control meshes: cages come out worse.
   bool is_worth_refining() const {
-    return !is_good() && (best_start_.kind == Attempt::Kind::smooth || best().merit > kWorthRefining);
+    return !options_.makes_cage && !is_good() &&
+           (best_start_.kind == Attempt::Kind::smooth || best().merit > kWorthRefining);
   }
 
   const TriangleMesh& original_;
@@ -159,7 +201,8 @@ class AutomaticFit : AutomaticDriver {
   FeatureSizes features_;             ///< of the target, in normalized coordinates
   std::vector<double> sizes_;         ///< of the present mesh's cells (`SizedMesh`)
   TrialStart start_, best_start_;     ///< of the present trial, and of the best one
-  std::optional<EdgeLayout> layout_;  ///< of mesh_; none: it follows no edges
+  std::optional<EdgeLayout> layout_;  ///< of mesh_, or of its cage; none: it follows no edges
+  OnMesh on_mesh_;                    ///< what the layout is on mesh_
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
@@ -225,33 +268,45 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
   }
 }
 
+/// Makes the present mesh, with the tags that its subdivision surface needs, a cage.
+void AutomaticFit::begin_cage() {
+  if (layout_) layout_->creases.keep_from_folding(mesh_);
+  AutomaticDriver::begin_cage();
+  if (!layout_) return;
+  on_mesh_ = {cage_->groups_of_parts(layout_->group_of_face), cage_->caps_of_parts(layout_->caps), layout_->creases};
+  on_mesh_.creases.refine(cage_->level().parent_creases);
+}
+
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
 bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const char* what, double portion) {
   begin_part(portion, schedule.expected_steps());
-  constexpr int kIntervals = 2;
   const MeshTopology topology(mesh_);
-  const std::vector<Vec3> lengths = wanted_lengths(topology, sizes_, mesh_.num_cells(), target_.surface.area());
-  const BoundarySamples samples =
-      make_boundary_samples(ElementSpace(mesh_, Basis::legendre, 1), kIntervals, mesh_.tags.creases);
+  const std::vector<double> sizes = cage_ ? cage_->of_children(sizes_) : sizes_;
+  const std::vector<Vec3> lengths = wanted_lengths(topology, sizes, mesh_.num_cells(), target_.surface.area());
+  const LevelSamples samples = cage_ ? samples_of(*cage_) : samples_of(mesh_);
   sample_target(topology.boundary_faces().size());
   QualityBoundary boundary{
-      .samples = samples.positions, .triangles = samples.triangles, .triangle_faces = samples.triangle_faces};
+      .samples = samples.positions, .triangles = samples.triangles, .triangle_faces = samples.faces};
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
-    boundary.group_of_face = layout_->group_of_face;
+    boundary.group_of_face = on_mesh_.group_of_face;
     boundary.group_of_triangle = layout_->group_of_triangle;
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
-        CreaseEnergy energy =
-            layout_->creases.energy(samples.crease_edges, samples.points.size(), width, kQualityTangentialWeight);
-        if (!sizes_.empty()) energy.weigh(crease_factors(mesh_, topology, sizes_, samples.positions));
+        CreaseEnergy energy = on_mesh_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
+                                                      kQualityTangentialWeight);
+        const VolumeMesh& of_unknowns = cage_ ? cage_->cage : mesh_;
+        if (!sizes_.empty())
+          energy.weigh(crease_factors(of_unknowns, MeshTopology(of_unknowns), sizes_, samples.positions));
         return energy;
       };
   }
   const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
-    stages.energy().forbid_folds(layout_ ? std::span<const EdgeCap>(layout_->caps.edges) : std::span<const EdgeCap>(),
-                                 least_edge_share(start_.grid.mesh, lengths));
-    if (layout_) stages.energy().set_caps(layout_->caps.edges, layout_->caps.vertices);
+    const std::span<const EdgeCap> edges =
+        layout_ ? std::span<const EdgeCap>(on_mesh_.caps.edges) : std::span<const EdgeCap>();
+    const double least_edge = cage_ ? 0 : least_edge_share(start_.grid.mesh, lengths);
+    stages.energy().forbid_folds(edges, least_edge);
+    if (layout_) stages.energy().set_caps(edges, on_mesh_.caps.vertices);
   });
   start_.far = state_.far_cells;
   start_.poor = state_.cells.poor;
@@ -271,6 +326,7 @@ std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surfac
 /// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
 std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
   if (edges_.features.curves.empty()) return std::nullopt;
+  if (cage_ && layout_) return on_mesh_.creases.distance(cage_->limit(), cage_->limit_surface().positions, 1);
   const std::vector<CreaseSegment> none;
   return crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
 }
@@ -290,14 +346,22 @@ std::vector<UnfollowedCurve> AutomaticFit::unfollowed_curves() const {
 /// Makes flat faces of the present mesh exactly so, measures it and keeps it if it is the best. Returns false if the
 /// fit must end.
 bool AutomaticFit::judge(AutomaticFitTrial trial) {
+  if (options_.makes_cage && !cage_) begin_cage();  // the fit ended before it came to that
   // Flattening a relaxed place could make its faces meet again. The rest of that mesh is flat from the trial before.
-  if (follows_.any() && !trial.relaxed_at) flatten_faces(mesh_, target_.mesh, *target_.tree, facets_);
+  if (follows_.any() && !trial.relaxed_at) {
+    flatten_faces(cage_ ? cage_->cage : mesh_, target_.mesh, *target_.tree, facets_);
+    follow_cage();
+  }
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
-  const SurfaceDistance distance = target_.distance(surface);
+  std::vector<TriangleMesh> surfaces = {surface};
+  if (cage_) surfaces.push_back(cage_->limit_surface());
+  for (const TriangleMesh& s : surfaces) {
+    const SurfaceDistance distance = target_.distance(s);
+    trial.mean_percent = std::max(trial.mean_percent, 100 * distance.mean());
+    trial.max_percent = std::max(trial.max_percent, 100 * distance.max());
+  }
   trial.feature_miss = feature_miss(surface);
-  trial.mean_percent = 100 * distance.mean();
-  trial.max_percent = 100 * distance.max();
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();
   const std::vector<UnfollowedCurve> unfollowed = unfollowed_curves();
@@ -311,9 +375,10 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
 
 /// Fits a pillowed template. Returns false if the fit must end.
 bool AutomaticFit::run_smooth(const Attempt& attempt) {
+  cage_.reset();
   std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
   if (!made) return !no_template_.empty();
-  const bool another_follows = options_.cells && attempt.levels > 0;
+  const bool another_follows = options_.cells && attempt.levels > 0 && !options_.makes_cage;
   if (another_follows && made->num_cells() > attempt.template_cells) return true;
   mesh_ = std::move(*made);
   sizes_.clear();
@@ -321,19 +386,20 @@ bool AutomaticFit::run_smooth(const Attempt& attempt) {
   return fit_and_refine(attempt.levels);
 }
 
-/// Returns how poor each cell of the present mesh is, 0 for good ones.
+/// Returns how poor each cell of the present mesh, or of its cage, is, 0 for good ones.
 std::vector<double> AutomaticFit::faults_of_cells() const {
   constexpr double kMeets = 1;
   std::vector<double> faults;
   for (const double least : measure_quality(mesh_).cell_minima)
     faults.push_back(std::max(0.0, kAcceptableQuality - least));
   for (const Index c : cells_that_meet(mesh_)) faults[c] += kMeets;
-  return faults;
+  return cage_ ? cage_->sums_of_parts(faults) : faults;
 }
 
 /// Brings a grid near the target and lays out the edges on it. Returns false if the fit must end.
 bool AutomaticFit::fit_smoothly(SizedMesh grid, Attempt::Kind kind) {
   layout_.reset();
+  cage_.reset();
   mesh_ = grid.mesh;
   sizes_ = grid.sizes;
   start_ = {.kind = kind, .grid = std::move(grid)};
@@ -347,7 +413,9 @@ bool AutomaticFit::fit_smoothly(SizedMesh grid, Attempt::Kind kind) {
 void AutomaticFit::lay_out(RoutingOptions routing) {
   routing.sizes = vertex_sizes(start_.grid.mesh, start_.grid.sizes);
   layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
+  cage_.reset();
   mesh_ = layout_->tagged_mesh;
+  on_mesh_ = {layout_->group_of_face, layout_->caps, layout_->creases};
   sizes_ = padded_sizes(mesh_, start_.grid.sizes);
 }
 
@@ -523,8 +591,13 @@ AutomaticFitResult AutomaticFit::run() {
 }  // namespace
 
 AutomaticFitResult fit_automatically(const TriangleMesh& target, const AutomaticFitOptions& options) {
-  if (const std::optional<RegionSurface> regions = find_regions(target, options.regions))
+  if (const std::optional<RegionSurface> regions = find_regions(target, options.regions)) {
+    if (options.makes_cage)
+      throw InputError(
+          "AutomaticFitOptions::makes_cage: the target has several regions; give a template with these to "
+          "fit_subdivision_volume");
     return fit_regions(*regions, options);
+  }
   const EdgeChoice follows{has_edges_to_follow(target, checked_options(options)),
                            options.keeps_groups && !group_borders(target, target).empty()};
   if (!follows.any()) return AutomaticFit(target, follows, options).run();

@@ -47,6 +47,11 @@ struct AutomaticFitOptions {
   RegionRule regions = RegionRule::automatic;  ///< how targets with several regions are taken (`find_regions`)
   /// Borders between groups of the target's faces are followed like sharp edges, also where the surface is smooth.
   bool keeps_groups = false;
+  /// The result is a subdivision volume: a control mesh, the cage, whose vertices are the only unknowns, and the mesh
+  /// that it is subdivided to once. `cells` are then those of that mesh. Only for targets of one region.
+  bool makes_cage = false;
+  /// Number of times that the template of a cage is subdivided to the mesh, in [1, 6]; once if edges are followed.
+  int levels = 1;
   double mean_tolerance_percent = kAutomaticMeanPercent, max_tolerance_percent = kAutomaticMaxPercent;  ///< > 0
   int max_iterations = 0;                            ///< per stage; 0: as the schedule says
   double time_limit_seconds = 0;                     ///< 0: no limit
@@ -88,6 +93,7 @@ struct AutomaticFitTrial {
 };
 
 struct AutomaticFitResult {
+  VolumeMesh cage;  ///< with its tags; its limit surface is the fitted surface; empty unless asked for
   VolumeMesh mesh;  ///< hexes, with tags on the creases that follow edges of the target
   FitReport report;
   BettiNumbers topology;                 ///< of the solid

@@ -30,6 +30,7 @@ AutomaticFitOptions checked_options(AutomaticFitOptions options) {
   in_range("mean_tolerance_percent", options.mean_tolerance_percent, 1e-9, 100);
   in_range("max_tolerance_percent", options.max_tolerance_percent, 1e-9, 100);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
+  in_range("levels", options.levels, 1, 6);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   if (options.cells) in_range("cells", static_cast<double>(*options.cells), kLeastTemplateCells, 1e9);
   options.quality = std::max(options.quality, kLeastQuality);

@@ -20,9 +20,6 @@ inline constexpr double kMaxMargin = 0.8;
 /// the goal: larger templates have the same angles at sharp edges and irregular vertices.
 inline constexpr double kEnoughQuality = 0.85;
 
-/// Number of hexes that a hex is subdivided into.
-inline constexpr std::size_t kChildren = 8;
-
 /// Scaled Jacobian below which a cell is poor even at an acute corner, where less than the goal is asked for: edges of
 /// the target are given up for it.
 inline constexpr double kAcceptableQuality = 0.3;

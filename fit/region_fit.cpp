@@ -320,6 +320,7 @@ AutomaticFitResult RegionFit::run() {
 }  // namespace
 
 AutomaticFitResult fit_regions(const RegionSurface& target, const AutomaticFitOptions& options) {
+  if (options.makes_cage) throw InputError("AutomaticFitOptions::makes_cage: fits of several regions make none");
   return RegionFit(target, options).run();
 }
 

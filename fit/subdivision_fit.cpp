@@ -11,6 +11,7 @@
 #include "subvol/fit/features/followed_creases.h"
 #include "subvol/fit/fits/fit_level.h"
 #include "subvol/fit/fits/fit_schedule.h"
+#include "subvol/fit/fits/fitted_cage.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/quality/quality.h"
@@ -288,21 +289,9 @@ bool SubdivisionFit::start_level() {
   return false;
 }
 
-/// Returns the limit surface, refined twice beyond the finite element mesh: its chord error is a sixteenth of that
-/// mesh's.
 TriangleMesh SubdivisionFit::limit_triangles() {
-  constexpr int kRefinements = 2;
-  if (!limit_check_) limit_check_ = refine_sheets(level_.mesh, kRefinements);
-  TriangleMesh limit;
-  limit.positions = limit_check_->positions.apply(level_.refine.apply(from_unknowns_.apply(unknowns_)));
-  const auto num_boundary_faces = static_cast<Index>(limit_check_->faces.size() - level_.interfaces.size());
-  for (std::size_t k = 0; k < limit_check_->quads.size(); ++k) {
-    if (limit_check_->face_of_quad[k] >= num_boundary_faces) break;  // the rest are interfaces
-    const auto& q = limit_check_->quads[k];
-    limit.triangles.push_back({q[0], q[1], q[2]});
-    limit.triangles.push_back({q[0], q[2], q[3]});
-  }
-  return limit;
+  if (!limit_check_) limit_check_ = refine_sheets(level_.mesh, kLimitRefinements);
+  return internal::limit_triangles(level_, *limit_check_, from_unknowns_.apply(unknowns_));
 }
 
 /// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite

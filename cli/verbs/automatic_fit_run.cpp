@@ -11,13 +11,14 @@
 #include "cli/runs/loading.h"
 #include "cli/runs/report.h"
 #include "cli/runs/written_result.h"
-#include "cli/verbs/long_run.h"
+#include "cli/verbs/cage_run.h"
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/format.h"
 #include "subvol/base/version.h"
 #include "subvol/io/label_grid_io.h"
 #include "subvol/io/nodal_mesh.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/subdivision/audit.h"
 #include "subvol/surface/solid_topology.h"
 
 #include <algorithm>
@@ -32,11 +33,11 @@ using namespace internal;
 namespace {
 
 /// One run, from its input file to its output files.
-class AutomaticFitRun : public LongRun {
+class AutomaticFitRun : public CageRun {
  public:
   AutomaticFitRun(const AutomaticFitArguments& arguments, const CLI::App& verb)
-      : LongRun(arguments.run, verb), arguments_(arguments) {}
-  int run();
+      : CageRun(arguments.run, verb), arguments_(arguments) {}
+  std::optional<int> run();
 
  private:
   void load();
@@ -46,6 +47,7 @@ class AutomaticFitRun : public LongRun {
   void check();
   Json report() const;
   void summarise() const;
+  bool has_cage() const { return result_.cage.num_cells() > 0; }
 
   const AutomaticFitArguments& arguments_;
   TriangleMesh target_;                ///< repaired
@@ -74,7 +76,6 @@ void AutomaticFitRun::load() {
   require_regions(outputs_, regions_ ? regions_->regions : std::vector<Group>{});
   add_remarks(repair, warnings_);
   repairs_ = std::move(repair.done);
-  tell_warnings();
 }
 
 /// Returns the number of cubes of an edge length that fill a volume. UsageError: there are too many.
@@ -101,6 +102,7 @@ void AutomaticFitRun::fit() {
   checkpointing_->finish(result_.report.warnings);
   add_warnings(result_.report.warnings);
   groups_ = carry_groups(surface(), result_.mesh);
+  if (has_cage()) carry_groups(surface(), result_.cage);
   add_warnings(groups_.warnings);
 }
 
@@ -108,6 +110,7 @@ void AutomaticFitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
+  if (has_cage()) return write_cage(result_.cage, result_.mesh, result_.states, writing);
   write_each([&](const Output& output) {
     if (output.part == Part::animation)
       write_animation(output, result_.mesh, result_.mesh, result_.states, writing);
@@ -120,6 +123,11 @@ void AutomaticFitRun::check() {
   const std::optional<VolumeMesh> written = written_cells(outputs_);
   const VolumeMesh& mesh = written ? *written : result_.mesh;
   mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &surface(), {.progress = progress}); });
+  if (has_cage()) {
+    measure_limit(result_.cage, surface(), arguments_.writing);
+    hold_to(arguments_.mean_tolerance_percent, "the limit surface's mean",
+            limit_mean_percent(mesh_check_.target_diagonal), result_.report);
+  }
   hold_to({arguments_.mean_tolerance_percent, arguments_.max_tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.least_quality, mesh_check_, result_.report);
 }
@@ -137,6 +145,10 @@ Json AutomaticFitRun::report() const {
     const RegionReport wanted = measure_regions(*regions_);
     json["regions"] = regions_json(*mesh_check_.regions, &wanted, "target");
   }
+  if (has_cage()) {
+    json.update(cage_json(result_.cage, mesh_check_.target_diagonal));
+    json["audit"] = audit_json(audit(result_.cage));
+  }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   checkpointing_->describe(json);
   return json;
@@ -145,13 +157,16 @@ Json AutomaticFitRun::report() const {
 void AutomaticFitRun::summarise() const {
   std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
             << to_text(mesh_check_);
+  if (has_cage()) std::cerr << limit_text(mesh_check_.target_diagonal);
   if (result_.report.creases) std::cerr << to_text(*result_.report.creases);
   tell_outputs();
 }
 
-int AutomaticFitRun::run() {
-  prepare({Part::cutaway, Part::animation, Part::boundary, Part::region});
+std::optional<int> AutomaticFitRun::run() {
+  prepare({Part::cage, Part::cutaway, Part::animation, Part::boundary, Part::region});
   timed("read", &AutomaticFitRun::load);
+  if (regions_ && arguments_.fit.makes_cage) return std::nullopt;
+  tell_warnings();
   timed("fit", &AutomaticFitRun::fit);
   if (result_.mesh.num_cells() == 0)  // nothing has been fitted yet
     throw EndedEarly("nothing to write: " + result_.report.explanation,
@@ -166,7 +181,7 @@ int AutomaticFitRun::run() {
 
 }  // namespace
 
-int run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb) {
+std::optional<int> run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb) {
   return AutomaticFitRun(arguments, verb).run();
 }
 

@@ -17,7 +17,7 @@ namespace subvol::cli {
 /// Largest number of cells that a fit may be asked for.
 inline constexpr std::size_t kMostCells = 8 * kMostTemplateCells;
 
-/// Arguments of `fit` without a template, for a mesh whose vertices are all free.
+/// Arguments of `fit` without a template, for a mesh whose vertices are all free, or for a cage and its mesh.
 struct AutomaticFitArguments {
   RunOptions run;
   WritingOptions writing;
@@ -30,7 +30,8 @@ struct AutomaticFitArguments {
   std::optional<double> size;           ///< edge length of the cells, in the target's unit; takes the place of fit.cells
 };
 
-/// Fills a surface with hexes from files to files; returns an ExitStatus.
-int run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb);
+/// Fills a surface with hexes from files to files; returns an ExitStatus. Returns nothing, and has done nothing, if a
+/// cage is asked for and the target has several regions.
+std::optional<int> run_automatic_fit(const AutomaticFitArguments& arguments, const CLI::App& verb);
 
 }  // namespace subvol::cli

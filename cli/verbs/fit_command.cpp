@@ -11,9 +11,9 @@
 #include "cli/runs/writing.h"
 #include "cli/runs/written_result.h"
 #include "cli/verbs/automatic_fit_run.h"
+#include "cli/verbs/cage_run.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/high_order_fit_run.h"
-#include "cli/verbs/long_run.h"
 #include "cli/verbs/verb_options.h"
 #include "subvol/base/version.h"
 #include "subvol/fit/stages/fit_report.h"
@@ -34,10 +34,9 @@ namespace {
 
 constexpr const char *kAutomaticAngle = "auto", *kNoAngle = "none";
 
-/// Options that ask for a subdivision volume.
-constexpr std::array kSubdivisionOptions{"--levels",    "--surface",        "--boundary",
-                                         "--cage-only", "--lambda-far",     "--lambda-close",
-                                         "--solver",    "--correspondence", "--energy"};
+/// Options of the method by which a subdivision volume is fitted to a template.
+constexpr std::array kMethodOptions{"--surface",      "--boundary", "--cage-only",      "--lambda-far",
+                                    "--lambda-close", "--solver",   "--correspondence", "--energy"};
 
 struct FitArguments {
   RunOptions run;
@@ -81,9 +80,9 @@ std::optional<double> crease_angle(const FitArguments& arguments, std::optional<
 }
 
 /// One run of `fit` that makes a subdivision volume, from its input files to its output files.
-class FitRun : public LongRun {
+class FitRun : public CageRun {
  public:
-  FitRun(const FitArguments& arguments, const CLI::App& verb) : LongRun(arguments.run, verb), arguments_(arguments) {}
+  FitRun(const FitArguments& arguments, const CLI::App& verb) : CageRun(arguments.run, verb), arguments_(arguments) {}
   int run();
 
  private:
@@ -105,8 +104,6 @@ class FitRun : public LongRun {
   FitResult result_;
   GroupsFound groups_;
   MeshCheck mesh_check_;
-  TessellatedSurface limit_;
-  SurfaceDistance limit_distance_;
 };
 
 void FitRun::load() {
@@ -169,44 +166,27 @@ void FitRun::write() {
   WritingOptions writing = arguments_.writing;
   writing.source = arguments_.target;
   writing.options = options_of_result(verb_);
-  const auto write = [&](bool with_limit) {
-    write_each(
-        [&](const Output& output) {
-          if (output.part == Part::animation)
-            write_animation(output, result_.cage, result_.mesh, result_.states, writing);
-          else
-            write_output(output, result_.cage, result_.mesh, &limit_, writing);
-        },
-        [&](const Output& output) { return shows_surface(output) == with_limit; });
-  };
-  write(false);  // written first: if memory is short, it is the limit surface that may not fit
-  limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, writing, progress); });
-  write(true);
+  write_cage(result_.cage, result_.mesh, result_.states, writing);
 }
 
 void FitRun::check() {
-  WritingOptions fine;
-  fine.chord_percent = measured_chord_percent(arguments_.writing);
-  if (fine.chord_percent < arguments_.writing.chord_percent)
-    limit_ = watched([&](auto progress) { return tessellated_limit(result_.cage, fine, progress); });
   const std::optional<VolumeMesh> written = written_cells(outputs_);
   const VolumeMesh& mesh = written ? *written : result_.mesh;
   std::visit(
       [&](const auto& target) {
         mesh_check_ = watched([&](auto progress) { return check_mesh(mesh, &target, {.progress = progress}); });
-        limit_distance_ = surface_distance(triangles_of(limit_), target);
       },
       outer_);
+  measure_limit(result_.cage, outer_, arguments_.writing);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
   if (arguments_.surface == "limit")
     hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
-            100 * limit_distance_.mean() / mesh_check_.target_diagonal, result_.report);
+            limit_mean_percent(mesh_check_.target_diagonal), result_.report);
 }
 
 Json FitRun::report() const {
   const FitReport& report = result_.report;
-  const double diagonal = mesh_check_.target_diagonal;
   Json json{{"subvol", version()},
             {"command", "fit"},
             {"options", options_in_force(verb_)},
@@ -221,10 +201,8 @@ Json FitRun::report() const {
     json["regions"] = regions_json(*mesh_check_.regions, &wanted, regions_ ? "target" : "start");
   }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
-  json["limit_surface_distance"] = distance_json(limit_distance_, diagonal);
-  json["limit_surface_distance"]["chord_error_percent"] = 100 * limit_.chord_error / diagonal;
   if (report.creases) json["creases"] = creases_json(*report.creases);
-  json["cage"] = describe("", result_.cage);
+  json.update(cage_json(result_.cage, mesh_check_.target_diagonal));
   checkpointing_->describe(json);
   json["audit"] = audit_json(audit(template_mesh_));
   return json;
@@ -232,12 +210,8 @@ Json FitRun::report() const {
 
 void FitRun::summarise() const {
   const FitReport& report = result_.report;
-  const double percent = 100 / mesh_check_.target_diagonal;
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
-            << to_text(mesh_check_)
-            << (limit_distance_.one_sided ? "points to limit surface: mean " : "limit surface to target: mean ")
-            << limit_distance_.mean() * percent << " %, max " << limit_distance_.max() * percent
-            << " % of the diagonal\n";
+            << to_text(mesh_check_) << limit_text(mesh_check_.target_diagonal);
   if (report.creases) std::cerr << to_text(*report.creases);
   tell_outputs();
 }
@@ -258,7 +232,10 @@ int FitRun::run() {
 
 void add_method_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
-  verb.add_option("--levels", fit.levels, "Times the template is subdivided")
+  verb.add_option("--levels", fit.levels,
+                  "Times the template is subdivided; without --template, the result is then a cage and its mesh (1 if "
+                  "a cage is an "
+                  "output)")
       ->check(CLI::Range(1, 6))
       ->type_name("L")
       ->capture_default_str();
@@ -330,25 +307,29 @@ std::optional<std::size_t> template_cells(const FitArguments& arguments, int lev
   return std::clamp(*arguments.cells >> (3 * levels), kLeastTemplateCells, kMostTemplateCells);
 }
 
-/// True if nothing on the command line asks for a template, a cage or curved elements: then every vertex is free.
+/// True if nothing on the command line asks for a template, curved elements or a certain method.
 bool is_automatic(const FitArguments& arguments, const CLI::App& verb) {
   if (!arguments.template_mesh.path.empty() || arguments.order > 0) return false;
-  for (const char* option : kSubdivisionOptions)
-    if (verb.count(option) > 0) return false;
-  const std::vector<std::string>& outputs = arguments.run.outputs;
-  return std::none_of(outputs.begin(), outputs.end(), [](const std::string& output) {
-    return output.starts_with("cage:") || (output.starts_with("animation:") && !output.ends_with(".html"));
-  });
+  return std::ranges::none_of(kMethodOptions, [&](const char* option) { return verb.count(option) > 0; });
+}
+
+/// True if the result of an automatic fit is to be a subdivision volume; if not, every vertex is free.
+bool makes_cage(const FitArguments& arguments, const CLI::App& verb) {
+  return verb.count("--levels") > 0 || std::ranges::any_of(arguments.run.outputs, [](const std::string& output) {
+           return output.starts_with("cage:") || (output.starts_with("animation:") && !output.ends_with(".html"));
+         });
 }
 
 /// UsageError: an option was given that has a meaning only for automatic fits.
 void refuse_automatic_options(const CLI::App& verb) {
   for (const std::string option : {"--max-tolerance", "--size", "--regions", "--wrap"})
     if (verb.count(option) > 0)
-      throw UsageError(option + ": only fits without a template, --order, a cage or --levels aim at it");
+      throw UsageError(option +
+                       ": only fits without a template, --order and options of the method aim at it, and none "
+                       "that makes a cage with several regions");
 }
 
-AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
+AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const CLI::App& verb) {
   AutomaticFitArguments result{arguments.run,
                                arguments.writing,
                                {},
@@ -365,6 +346,8 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments) {
   fit.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
   fit.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
   fit.keeps_groups = arguments.fit.keeps_groups;
+  fit.makes_cage = makes_cage(arguments, verb);
+  if (verb.count("--levels") > 0) fit.levels = arguments.fit.levels;
   fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
   fit.max_tolerance_percent = arguments.max_tolerance_percent.value_or(kAutomaticMaxPercent);
   fit.max_iterations = arguments.fit.max_iterations;
@@ -392,7 +375,8 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
 }
 
 int run_fit(const FitArguments& given, const CLI::App& verb) {
-  if (is_automatic(given, verb)) return run_automatic_fit(automatic_arguments(given), verb);
+  if (is_automatic(given, verb))
+    if (const std::optional<int> status = run_automatic_fit(automatic_arguments(given, verb), verb)) return *status;
   refuse_automatic_options(verb);
   FitArguments arguments = given;
   arguments.fit.crease_angle_degrees = crease_angle(given, std::nullopt);
@@ -470,7 +454,7 @@ void add_fit_command(CLI::App& app, Action& action) {
                        "Coarse mesh to start from: " + volume_mesh_formats() + " (default: made from the target)")
           ->type_name("MESH");
   verb->add_option("--cells", arguments->cells,
-                   "How many cells the result has at most; about so many with --levels, --order or a cage\n"
+                   "How many cells the result has at most; about so many with --order or options of the method\n"
                    "(default: as many as it needs)")
       ->check(CLI::Range(kLeastTemplateCells, kMostCells))
       ->type_name("N")

@@ -86,9 +86,7 @@ void FollowedCreases::keep_interfaces(VolumeMesh& mesh, double angle_degrees, In
     curves_.curves.push_back(curve);
   }
   mesh.tags = merge_tags(mesh.tags, tags);
-  unfold(mesh);
-  curve_of_crease_.clear();
-  find_curves_of_creases(mesh);
+  keep_from_folding(mesh);
 }
 
 void FollowedCreases::find_curves_of_creases(const VolumeMesh& mesh) {
@@ -105,6 +103,12 @@ void FollowedCreases::find_curves_of_creases(const VolumeMesh& mesh) {
 void FollowedCreases::tag(VolumeMesh& template_mesh) const {
   template_mesh.tags = merge_tags(template_mesh.tags, tags_of_paths(paths_, curves_));
   unfold(template_mesh);
+}
+
+void FollowedCreases::keep_from_folding(VolumeMesh& mesh) {
+  unfold(mesh);
+  curve_of_crease_.clear();
+  find_curves_of_creases(mesh);
 }
 
 bool FollowedCreases::hold_the_surface() const {

@@ -35,6 +35,9 @@ class FollowedCreases {
   /// With paths that are known: tags the mesh along them, with no other tags.
   FollowedCreases(FeatureCurves curves, std::vector<CreasePath> paths, VolumeMesh& mesh);
 
+  /// Adds tags to the mesh that was tagged that keep its subdivision surface from folding (`unfolding_tags`).
+  void keep_from_folding(VolumeMesh& mesh);
+
   /// Says what the sharp edges of interfaces are drawn to.
   enum class InnerCurves {
     nothing,              ///< the sheets alone draw them: the target has interfaces of its own

@@ -56,6 +56,9 @@ TEST_CASE("A surface with sheets inside is filled region by region, with the tar
   const VolumeMesh third = read_volume_mesh(place / "third.mesh");
   CHECK(region_references(third) == std::vector<int>{3});
   CHECK(third.num_cells() < read_volume_mesh(place / "d.mesh").num_cells() / 2);
+  REQUIRE(place.run("fit slabs.off --cells 4000 --levels 1 -o cage:cage.mesh -o fine.mesh --report c.json").status ==
+          0);
+  CHECK(place.json("c.json")["regions"]["cells"].size() == 5);
   const Run unknown = place.run("fit slabs.off -o region:bone:bone.mesh");
   CHECK(unknown.status == 2);
   CHECK(has(unknown.err, "there is no region 'bone'"));

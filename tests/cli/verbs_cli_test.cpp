@@ -471,17 +471,35 @@ TEST_CASE("A fit without a template fills the surface and says how good the cell
   CHECK(trials.at(report.at("template").at("chosen").get<std::size_t>()).at("cells") <= 1500);
   CHECK(place.run("fit target.off --cells 300 --quality-floor 0.99 -o x.mesh").status == 4);
   CHECK(place.run("fit target.off --crease-angle sharp -o x.mesh").status == 2);
-  CHECK(place.run("fit target.off --levels 1 --max-tolerance 1 -o x.mesh").status == 2);
+  CHECK(place.run("fit target.off --cage-only --max-tolerance 1 -o x.mesh").status == 2);
   CHECK(place.run("fit target.off --quality 0.95 -o x.mesh").status == 2);
-  CHECK(place.run("fit target.off --levels 1 --size 1 -o tiny.mesh").status == 2);
+  CHECK(place.run("fit target.off --cage-only --size 1 -o tiny.mesh").status == 2);
   const Run too_small = place.run("fit target.off --size 1e-9 -o tiny.mesh");
   CHECK(too_small.status == 2);
   CHECK(too_small.err.find("--size 1e-09: the target would need") != std::string::npos);
 }
 
+TEST_CASE("A fit without a template makes a cage if one is asked for", "[cli][templates][slow]") {
+  const Workplace place;
+  const Run run = place.run(
+      "fit target.off --cells 4000 -o cage:cage.mesh -o cage:cage.usda -o out.mesh -o out.glb "
+      "-o animation:steps.glb --report report.json");
+  INFO(run.err);
+  REQUIRE(run.status == 0);
+  const auto report = place.json("report.json");
+  CHECK(report.at("valid") == true);
+  CHECK(report.at("quality").at("min_scaled_jacobian") > 0.5);
+  CHECK(report.at("limit_surface_distance").at("max_percent") < 0.5);
+  CHECK(report.at("cage").at("cells").get<std::size_t>() * 8 == report.at("quality").at("cells").get<std::size_t>());
+  CHECK(report.at("audit").contains("warnings"));
+  CHECK(run.err.find("limit surface to target") != std::string::npos);
+  CHECK(subvol::read_volume_mesh(place / "cage.mesh").num_cells() == report.at("cage").at("cells"));
+  for (const char* name : {"cage.usda", "out.glb", "steps.glb"}) CHECK(place.has(name));
+}
+
 TEST_CASE("A surface alone is enough for a fit", "[cli][templates][slow]") {
   const Workplace place;
-  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 216\nlevels = 1\n");
+  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 400\nlevels = 1\n");
   const Run run = place.run("fit target.off --config options.toml -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);

@@ -3,6 +3,8 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/mesh_check.h"
+#include "subvol/subdivision/limit_surface.h"
+#include "subvol/subdivision/subdivision.h"
 #include "tests/support/surface_fixtures.h"
 
 #include <catch2/catch.hpp>
@@ -27,7 +29,8 @@ TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slo
 
 TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow]") {
   const TriangleMesh ball = test::cube_surface(12, true);
-  const AutomaticFitResult result = fit_automatically(ball, {.cells = 3000, .quality = 0.6});
+  const AutomaticFitResult result =
+      fit_automatically(ball, {.cells = 3000, .quality = 0.6, .mean_tolerance_percent = 0.1});
   REQUIRE(result.trials.size() >= 2);
   const AutomaticFitTrial &polished = result.trials.back(), &before = result.trials[result.trials.size() - 2];
   REQUIRE(polished.is_polished);
@@ -37,6 +40,55 @@ TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow
   CHECK(polished.least_scaled_jacobian > 0.7);
   CHECK(polished.max_percent <= kAutomaticMaxPercent);
   CHECK(check_mesh(result.mesh, &ball, {}).valid());
+}
+
+TEST_CASE("An automatic fit makes a cage whose mesh is well shaped", "[slow]") {
+  const TriangleMesh ball = test::cube_surface(12, true);
+  const AutomaticFitResult result = fit_automatically(ball, {.cells = 3000, .makes_cage = true});
+  CHECK(result.mesh.num_cells() <= 3000);
+  CHECK(result.mesh.num_cells() == 8 * result.cage.num_cells());
+  const MeshCheck check = check_mesh(result.mesh, &ball, {});
+  CHECK(check.valid());
+  CHECK(check.quality->min_scaled_jacobian > 0.6);
+  CHECK(check.max_distance_percent() < kAutomaticMaxPercent);
+  // The mesh is the one that anyone gets who subdivides the cage.
+  const SubdivisionLevel level = subdivide(result.cage);
+  const std::vector<Vec3> nodes = limit_map(level.fine).apply(level.fine.positions);
+  double farthest = 0;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    farthest = std::max(farthest, (nodes[i] - result.mesh.positions[i]).norm());
+  CHECK(farthest < 1e-12);
+}
+
+TEST_CASE("The cage of a part has creases along its sharp edges", "[slow]") {
+  const TriangleMesh cube = test::cube_surface(6, false);
+  const AutomaticFitResult result = fit_automatically(cube, {.cells = 4000, .makes_cage = true});
+  REQUIRE(result.cage.num_cells() > 0);
+  REQUIRE(result.report.creases);
+  CHECK(result.report.creases->num_followed == 12);
+  CHECK(result.cage.tags.creases.size() >= 12);
+  const MeshCheck check = check_mesh(result.mesh, &cube, {});
+  CHECK(check.valid());
+  CHECK(check.quality->min_scaled_jacobian > 0.9);
+  CHECK(check.max_distance_percent() < 1e-9);
+}
+
+TEST_CASE("The template of a cage is subdivided as often as asked for", "[slow]") {
+  const TriangleMesh ball = test::cube_surface(12, true);
+  const AutomaticFitResult result = fit_automatically(ball, {.cells = 6000, .makes_cage = true, .levels = 2});
+  const AutomaticFitTrial& chosen = result.trials[result.chosen];
+  CHECK(chosen.level == 2);
+  CHECK(result.mesh.num_cells() == 64 * chosen.template_cells);
+  CHECK(result.mesh.num_cells() == 8 * result.cage.num_cells());
+  CHECK(check_mesh(result.mesh, &ball, {}).valid());
+}
+
+TEST_CASE("An automatic fit with a cage that ends early has a cage") {
+  AutomaticFitOptions options{.cells = 3000, .makes_cage = true};
+  options.progress = [](const FitProgress& progress) { return std::string(progress.stage) == "template"; };
+  const AutomaticFitResult result = fit_automatically(test::cube_surface(6, true), options);
+  REQUIRE(result.mesh.num_cells() > 0);
+  CHECK(result.mesh.num_cells() == 8 * result.cage.num_cells());
 }
 
 TEST_CASE("An automatic fit that ends early gives what it has, or nothing") {
@@ -71,5 +123,6 @@ TEST_CASE("An automatic fit refuses options out of range") {
   CHECK_THROWS_AS(fit_automatically(ball, {.cells = 5}), InputError);
   CHECK_THROWS_AS(fit_automatically(ball, {.quality = 0.95}), InputError);
   CHECK_THROWS_AS(fit_automatically(ball, {.crease_angle_degrees = 200}), InputError);
+  CHECK_THROWS_AS(fit_automatically(ball, {.makes_cage = true, .levels = 7}), InputError);
   CHECK_THROWS_AS(fit_automatically({}, {}), InputError);
 }
