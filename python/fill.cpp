@@ -5,12 +5,14 @@
 #include "cli/runs/report.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
+#include "python/limit.h"
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/target/surface_wrap.h"
+#include "subvol/subdivision/audit.h"
 
 namespace subvol::python {
 namespace {
@@ -28,10 +30,13 @@ class Filling {
     std::optional<double> wrap_percent;
     keywords_.take("wrap", wrap_percent);
     keywords_.take("keep_groups", options_.keeps_groups);
+    keywords_.take("cage", options_.makes_cage);
+    keywords_.take("levels", options_.levels);
     keywords_.take("tolerance", options_.mean_tolerance_percent);
     keywords_.take("max_tolerance", options_.max_tolerance_percent);
     keywords_.take("max_iterations", options_.max_iterations);
     keywords_.take("time_limit", options_.time_limit_seconds);
+    take_chord(keywords_, writing_);
     keywords_.finish();
     target_ = triangles_from(target, "target");
     if (wrap_percent)
@@ -52,6 +57,8 @@ class Filling {
     const TriangleMesh outer = regions ? outer_surface(*regions) : target_;
     const cli::GroupsFound groups = work_.run("groups", [&] { return cli::carry_groups(outer, found.mesh); });
     const MeshCheck checked = work_.run("check", [&] { return check_mesh(found.mesh, &outer); });
+    const bool has_cage = found.cage.num_cells() > 0;
+    if (has_cage) cli::carry_groups(outer, found.cage);
     Json json{{"input", {{"target", cli::describe("", target_)}}}};
     json.update(cli::automatic_fit_json(found));
     json.update(cli::fit_json(found.report));
@@ -60,12 +67,18 @@ class Filling {
       const RegionReport wanted = measure_regions(*regions);
       json["regions"] = cli::regions_json(*checked.regions, &wanted, "target");
     }
+    if (has_cage) {
+      const cli::MeasuredLimit limit = measured_limit(found.cage, outer, writing_, work_);
+      json.update(cli::cage_json(found.cage, limit, checked.target_diagonal));
+      json["audit"] = cli::audit_json(audit(found.cage));
+    }
     if (!groups.groups.empty()) json["groups"] = cli::groups_json(groups.groups);
     checkpoints_.describe(json);
     warnings.insert(warnings.end(), found.report.warnings.begin(), found.report.warnings.end());
     warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
     const auto result = std::make_shared<Filled>();
     result->report = make_report("fill", json, keywords_, work_, warnings);
+    if (has_cage) result->cage = std::make_shared<VolumeMesh>(std::move(found.cage));
     result->mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));
     return result;
   }
@@ -84,12 +97,14 @@ class Filling {
   Work work_;
   Checkpoints checkpoints_;
   AutomaticFitOptions options_;
+  cli::WritingOptions writing_;
   TriangleMesh target_;
 };
 
 constexpr const char* kFillHelp =
     R"(fill(target, *, cells=None, quality=0.65, crease_angle=None, regions='auto', wrap=None, keep_groups=False,
-    tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, checkpoint=None, every=60.0, resume=None, progress=None, threads=None)
+    cage=False, levels=1, tolerance=0.02, max_tolerance=0.5, max_iterations=0, time_limit=0.0, checkpoint=None,
+    every=60.0, resume=None, chord=0.005, progress=None, threads=None)
 --
 
 Fills a surface with hexes that one can compute on, without a template: FillResult.
@@ -103,16 +118,20 @@ regions        what becomes of closed parts inside others and of sheets inside a
 wrap           fill a closed surface that follows the target, for targets with holes or with parts that cross: made of
                voxels this large, in per cent of the diagonal; usually 0.5
 keep_groups    follow borders between groups of the target's faces like sharp edges
+cage           make a subdivision volume: a cage, whose points are the only unknowns, and the mesh it is subdivided to
+levels         times the template of a cage is subdivided to the mesh, 1 .. 6; always once if edges are followed
 tolerance      mean distance to aim at, per cent of the diagonal of the target's bounding box
 max_tolerance  the same for the largest distance
 
-max_iterations, time_limit, checkpoint, every, resume, progress and threads as of `fit`.)";
+max_iterations, time_limit, checkpoint, every, resume, chord, progress and threads as of `fit`.)";
 
 }  // namespace
 
 void add_fill(py::module_& module) {
   using Type = py::class_<Filled, Reported, std::shared_ptr<Filled>>;
   Type type(module, "FillResult", "What `fill` returns.");
+  type.def_property_readonly("cage", [](const Filled& filled) { return filled.cage; },
+                             "The control mesh whose limit surface is fitted: VolumeMesh; None unless asked for.");
   type.def_property_readonly("mesh", [](const Filled& filled) { return filled.mesh; }, "The mesh, a VolumeMesh.");
   module.def(
       "fill", [](const py::object& target, const py::kwargs& given) { return Filling(target, given).run(); },

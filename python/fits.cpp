@@ -8,6 +8,7 @@
 #include "python/arrays.h"
 #include "python/checkpoints.h"
 #include "python/fit_options.h"
+#include "python/limit.h"
 #include "python/module.h"
 #include "python/results.h"
 #include "subvol/base/error.h"
@@ -143,21 +144,14 @@ class Fit {
     const MeshCheck found = work_.run("check", [&] {
       return std::visit([&](const auto& target) { return check_mesh(fit.mesh, &target); }, target_);
     });
-    const TessellatedSurface limit = work_.run("limit", [&] { return cli::tessellated_limit(fit.cage, writing_); });
-    const SurfaceDistance distance =
-        work_.run("distance", [&] {
-          return std::visit([&](const auto& target) { return surface_distance(triangles_of(limit), target); }, target_);
-        });
-    const double diagonal = found.target_diagonal;
+    const cli::MeasuredLimit limit = measured_limit(fit.cage, target_, writing_, work_);
     const cli::GroupsFound groups = work_.run("groups", [&] {
       cli::carry_groups(target_, fit.cage);
       return cli::carry_groups(target_, fit.mesh);
     });
     Json json = report_of(fit.report, found, groups);
-    json["limit_surface_distance"] = cli::distance_json(distance, diagonal);
-    json["limit_surface_distance"]["chord_error_percent"] = 100 * limit.chord_error / diagonal;
     if (fit.report.creases) json["creases"] = cli::creases_json(*fit.report.creases);
-    json["cage"] = cli::describe("", fit.cage);
+    json.update(cli::cage_json(fit.cage, limit, found.target_diagonal));
     json["audit"] = cli::audit_json(audit(*template_));
     finish(result, json, fit.report);
     result.states = std::move(fit.states);

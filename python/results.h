@@ -26,6 +26,7 @@ struct Fitted : Reported {
 
 /// Result of `fill`.
 struct Filled : Reported {
+  std::shared_ptr<VolumeMesh> cage;  ///< null unless asked for
   std::shared_ptr<VolumeMesh> mesh;
 };
 

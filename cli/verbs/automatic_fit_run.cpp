@@ -126,7 +126,7 @@ void AutomaticFitRun::check() {
   if (has_cage()) {
     measure_limit(result_.cage, surface(), arguments_.writing);
     hold_to(arguments_.mean_tolerance_percent, "the limit surface's mean",
-            limit_mean_percent(mesh_check_.target_diagonal), result_.report);
+            limit_.mean_percent(mesh_check_.target_diagonal), result_.report);
   }
   hold_to({arguments_.mean_tolerance_percent, arguments_.max_tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.least_quality, mesh_check_, result_.report);
@@ -146,7 +146,7 @@ Json AutomaticFitRun::report() const {
     json["regions"] = regions_json(*mesh_check_.regions, &wanted, "target");
   }
   if (has_cage()) {
-    json.update(cage_json(result_.cage, mesh_check_.target_diagonal));
+    json.update(cage_json(result_.cage, limit_, mesh_check_.target_diagonal));
     json["audit"] = audit_json(audit(result_.cage));
   }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
@@ -157,7 +157,7 @@ Json AutomaticFitRun::report() const {
 void AutomaticFitRun::summarise() const {
   std::cerr << to_string(result_.report.stop_reason) << ": " << result_.report.explanation << '\n'
             << to_text(mesh_check_);
-  if (has_cage()) std::cerr << limit_text(mesh_check_.target_diagonal);
+  if (has_cage()) std::cerr << to_text(limit_, mesh_check_.target_diagonal);
   if (result_.report.creases) std::cerr << to_text(*result_.report.creases);
   tell_outputs();
 }

@@ -182,7 +182,7 @@ void FitRun::check() {
   hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
   if (arguments_.surface == "limit")
     hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
-            limit_mean_percent(mesh_check_.target_diagonal), result_.report);
+            limit_.mean_percent(mesh_check_.target_diagonal), result_.report);
 }
 
 Json FitRun::report() const {
@@ -202,7 +202,7 @@ Json FitRun::report() const {
   }
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   if (report.creases) json["creases"] = creases_json(*report.creases);
-  json.update(cage_json(result_.cage, mesh_check_.target_diagonal));
+  json.update(cage_json(result_.cage, limit_, mesh_check_.target_diagonal));
   checkpointing_->describe(json);
   json["audit"] = audit_json(audit(template_mesh_));
   return json;
@@ -211,7 +211,7 @@ Json FitRun::report() const {
 void FitRun::summarise() const {
   const FitReport& report = result_.report;
   std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n'
-            << to_text(mesh_check_) << limit_text(mesh_check_.target_diagonal);
+            << to_text(mesh_check_) << to_text(limit_, mesh_check_.target_diagonal);
   if (report.creases) std::cerr << to_text(*report.creases);
   tell_outputs();
 }

@@ -211,6 +211,8 @@ class FitResult(Result):
 
 class FillResult(Result):
     @property
+    def cage(self) -> Optional[VolumeMesh]: ...
+    @property
     def mesh(self) -> VolumeMesh: ...
 
 class OptimizeResult(Result):
@@ -276,6 +278,8 @@ def fill(
     regions: Literal["auto", "keep", "merge"] = "auto",
     wrap: Optional[float] = None,
     keep_groups: bool = False,
+    cage: bool = False,
+    levels: int = 1,
     tolerance: float = 0.02,
     max_tolerance: float = 0.5,
     max_iterations: int = 0,
@@ -283,6 +287,7 @@ def fill(
     checkpoint: Optional[Path] = None,
     every: float = 60.0,
     resume: Optional[Path] = None,
+    chord: float = 0.005,
     progress: Optional[Callback] = None,
     threads: Optional[int] = None,
 ) -> FillResult: ...

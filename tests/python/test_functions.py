@@ -73,6 +73,15 @@ class Filling(InFolder):
         self.run_program("fit", "ball_target.off", "--cells", "800", "--max-iterations", "4", "-o", "a.mesh")
         self.assert_same_file("a.mesh", "b.mesh")
 
+    def test_a_cage_is_made_as_with_the_program(self):
+        result = subvol.fill("ball_target.off", cells=1600, cage=True, max_iterations=3)
+        self.assertEqual(8 * len(result.cage.hexes), len(result.mesh.hexes))
+        self.assertIn("max_percent", result.report["limit_surface_distance"])
+        subvol.write("b.mesh", result.cage)
+        self.run_program("fit", "ball_target.off", "--cells", "1600", "--max-iterations", "3", "-o", "cage:a.mesh")
+        self.assert_same_file("a.mesh", "b.mesh")
+        self.assertIsNone(subvol.fill("ball_target.off", cells=100, max_iterations=1).cage)
+
     def test_options_out_of_range(self):
         with self.assertRaisesRegex(subvol.InputError, "quality must be in"):
             subvol.fill("ball_target.off", quality=0.95)
