@@ -41,12 +41,10 @@ void require_valid(const PolygonMesh& surface) {
       throw InputError("a face names vertex " + std::to_string(v) + " of " + std::to_string(surface.positions.size()));
 }
 
-/// Returns for each vertex the smallest number of a vertex that it is to become: one within a distance, directly or
-/// through others.
-std::vector<Index> merged_numbers(std::span<const Vec3> positions, double distance) {
+/// Returns for each vertex the smallest number of a vertex that it is to become: of those given, one within a distance,
+/// directly or through others.
+std::vector<Index> merged_numbers(std::span<const Vec3> positions, std::vector<Index> order, double distance) {
   DisjointSets sets(positions.size());
-  std::vector<Index> order(positions.size());
-  std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](Index a, Index b) {
     return positions[a].x() != positions[b].x() ? positions[a].x() < positions[b].x() : a < b;
   });
@@ -60,6 +58,15 @@ std::vector<Index> merged_numbers(std::span<const Vec3> positions, double distan
   std::vector<Index> numbers(positions.size());
   for (std::size_t v = 0; v < numbers.size(); ++v) numbers[v] = sets.of(static_cast<Index>(v));
   return numbers;
+}
+
+/// Returns the vertices at edges of one triangle, ascending.
+std::vector<Index> vertices_at_rims(const TriangleMesh& mesh) {
+  std::set<Index> vertices;
+  for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> edge) {
+    if (edge.size() == 1) vertices.insert({edge[0].low, edge[0].high});
+  });
+  return {vertices.begin(), vertices.end()};
 }
 
 /// A surface of triangles on which the steps of the mending work, one after the other.
@@ -81,6 +88,7 @@ class Mender {
   }
 
   void merge_vertices();
+  void close_rims() { merge(vertices_at_rims(mesh_), distance_); }
   void drop_repeated_faces();
   /// From here on, the surface as it is now counts as the given one when the distance is measured.
   void compare_with_present() { reference_ = mesh_; }
@@ -91,6 +99,7 @@ class Mender {
 
  private:
   void drop(const std::vector<char>& is_dropped);
+  void merge(std::vector<Index> vertices, double distance);
 
   const PolygonMesh& given_;
   double distance_, diagonal_ = 0;
@@ -114,7 +123,14 @@ void Mender::drop(const std::vector<char>& is_dropped) {
 }
 
 void Mender::merge_vertices() {
-  const std::vector<Index> number = merged_numbers(mesh_.positions, std::min(distance_, kRounding * diagonal_));
+  std::vector<Index> all(mesh_.positions.size());
+  std::iota(all.begin(), all.end(), 0);
+  merge(std::move(all), std::min(distance_, kRounding * diagonal_));
+}
+
+/// Merges those of some vertices that are within a distance.
+void Mender::merge(std::vector<Index> vertices, double distance) {
+  const std::vector<Index> number = merged_numbers(mesh_.positions, std::move(vertices), distance);
   std::set<Index> merged;
   std::vector<char> is_dropped(mesh_.triangles.size(), 0);
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -125,7 +141,7 @@ void Mender::merge_vertices() {
     }
     is_dropped[t] = corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
   }
-  counts_.merged_vertices = merged.size();
+  counts_.merged_vertices += merged.size();
   drop(is_dropped);
 }
 
@@ -249,11 +265,13 @@ MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, 
     return result;
   };
   if (!(distance > 0) || surface.num_faces() == 0 || !has_only_triangles(surface)) return unchanged(surface, tags);
-  if (has_one_fan_at_each_vertex(surface) && find_faults(surface, goal, cancelled).none())
+  const bool has_rims = goal == MendingGoal::solid && !vertices_at_rims(triangulate(surface)).empty();
+  if (!has_rims && has_one_fan_at_each_vertex(surface) && find_faults(surface, goal, cancelled).none())
     return unchanged(surface, tags);
   if (cancelled && cancelled()) return ended(unchanged(surface, tags));
   Mender mender(surface, distance, goal, cancelled);
   mender.merge_vertices();
+  if (has_rims) mender.close_rims();
   mender.drop_repeated_faces();
   if (goal == MendingGoal::solid) mender.compare_with_present();
   mender.split_fans();

@@ -39,7 +39,8 @@ struct MendedSurface {
 /// without area, vertices and edges at which several fans of faces touch, small crossings and contacts, and, for
 /// layers, vertices from which no direction sees all faces around.
 ///
-/// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one.
+/// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one. For a solid, so
+///   do those at rims that are closer than the distance: cracks between the faces of a part close.
 /// - Of faces on the same vertices, those of equal orientation become one, and two that face each other vanish. For a
 ///   solid, these may be of any size, since they enclose nothing.
 /// - Where several fans of faces have a vertex or an edge in common, each gets its own copy of it, and the copies move
@@ -48,9 +49,9 @@ struct MendedSurface {
 ///   distance collapses, an edge is exchanged for the other diagonal of its two triangles if these are as close, or a
 ///   vertex moves by up to the distance. If no change helps, two are tried together.
 ///
-/// surface   a surface without faults, and one with polygons of more than three corners, is returned bit by bit.
-/// distance  in the surface's unit, >= 0; 0: the surface is returned as it is.
-/// returns   a surface that is farther than `distance` from the given one nowhere (for a solid: from the given one
+/// surface   a surface without faults (for a solid, also without rims), and one with polygons of more than three
+/// corners, is returned bit by bit. distance  in the surface's unit, >= 0; 0: the surface is returned as it is. returns
+/// a surface that is farther than `distance` from the given one nowhere (for a solid: from the given one
 ///           without the faces that vanish). Faults that could not be removed are still there, and what `make_layers`
 ///           rejects may be, too.
 /// InputError: a vertex number that is out of range, a position that is not finite.

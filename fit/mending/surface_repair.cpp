@@ -214,8 +214,8 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
 /// Sheets that divide the inside are left alone: what meets there is meant to meet.
 std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiagnosis& before,
                                     const std::function<bool()>& cancelled, RegionRule rule) {
-  constexpr std::array<SurfaceFault, 4> kMendable{SurfaceFault::crossing, SurfaceFault::face_contact, SurfaceFault::fin,
-                                                  SurfaceFault::repeated_triangle};
+  constexpr std::array<SurfaceFault, 5> kMendable{SurfaceFault::crossing, SurfaceFault::face_contact, SurfaceFault::fin,
+                                                  SurfaceFault::repeated_triangle, SurfaceFault::open_rim};
   const bool is_mendable =
       std::any_of(kMendable.begin(), kMendable.end(), [&](SurfaceFault f) { return before.find(f); });
   if (!is_mendable || before.find(SurfaceFault::interface)) return std::nullopt;

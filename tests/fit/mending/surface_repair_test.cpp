@@ -69,6 +69,27 @@ TEST_CASE("Walls of zero width between two triangles that face each other are re
   CHECK(repair.surface.triangles.size() == cube.triangles.size() - 2);
 }
 
+TEST_CASE("Cracks between the faces of a part close before it is filled", "[mending]") {
+  // Each triangle has corners of its own, off by up to a quarter of the distance within which surfaces are mended.
+  TriangleMesh cube = cube_surface(4, false), cracked;
+  RandomPoints random(7);
+  const double diagonal = bounding_box_diagonal(cube);
+  for (const auto& t : cube.triangles) {
+    const auto first = static_cast<Index>(cracked.positions.size());
+    for (const Index v : t) cracked.positions.push_back(cube.positions[v] + random.point(kMendingShare * diagonal / 8));
+    cracked.triangles.push_back({first, first + 1, first + 2});
+  }
+  REQUIRE_FALSE(diagnose(cracked).is_fillable());
+  const SurfaceRepair repair = repair_surface(cracked);
+  CHECK(repair.is_fillable);
+  CHECK(internal::welded(repair.surface).mesh.positions.size() == cube.positions.size());
+  CHECK(std::abs(internal::signed_volume_of(repair.surface)) == Approx(8).epsilon(1e-3));
+  // A hole is none.
+  TriangleMesh open = cube;
+  open.triangles.resize(open.triangles.size() - 20);
+  CHECK(repair_surface(open).surface.triangles == open.triangles);
+}
+
 TEST_CASE("A surface that can be filled as it is is not mended", "[mending]") {
   const TriangleMesh cube = cube_surface(4, false);
   const SurfaceRepair repair = repair_surface(cube);
