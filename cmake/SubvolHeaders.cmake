@@ -61,7 +61,7 @@ set(entry_points
   fit/subdivision_fit.h
   fit/target/surface_diagnosis.h
   fit/target/surface_wrap.h
-  fit/template_choice.h
+  fit/template_fit.h
   fit/untangle_before_fit.h
   # Shells
   shell/curved_shell.h

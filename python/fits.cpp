@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "cli/runs/automatic_template.h"
+#include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
@@ -15,7 +15,7 @@
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/stages/fit_report.h"
-#include "subvol/fit/template_choice.h"
+#include "subvol/fit/template_fit.h"
 #include "subvol/fit/untangle_before_fit.h"
 
 #include <algorithm>
@@ -60,7 +60,7 @@ class Fit {
     target_ = target_from(target, "target");
     refuse_for_points(template_mesh.is_none());
     double& time_limit = curved_ ? high_order_.time_limit_seconds : subdivision_.time_limit_seconds;
-    choice_options_.time_limit_seconds = kTrialsShareOfTime * time_limit;
+    template_options_.time_limit_seconds = kTemplateShareOfTime * time_limit;
     template_ = template_mesh.is_none() ? made_template() : volume_from(template_mesh, "template");
     untangle_template(time_limit);
     // Making the template may have used part of the time limit.
@@ -82,19 +82,21 @@ class Fit {
     if (has_template)
       keywords_.refuse({"cells"}, "does not go with a template");
     else
-      keywords_.take("cells", choice_options_.cells);
+      keywords_.take("cells", template_options_.cells);
     if (curved_) {
       keywords_.refuse(
           {"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far", "quality"},
           "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
-      choice_options_.order = high_order_.order;
-      choice_options_.basis = high_order_.basis;
     } else {
       keywords_.refuse({"order", "basis", "adaptive"}, "goes with order only");
       subdivision_ = subdivision_options(keywords_);
-      choice_options_.crease_angle_degrees = subdivision_.crease_angle_degrees;
+      if (subdivision_.crease_angle_degrees) {
+        template_options_.crease_angle_degrees = subdivision_.crease_angle_degrees;
+        template_options_.follows_all_edges = true;
+      }
+      template_options_.keeps_groups = subdivision_.keeps_groups;
     }
     take_chord(keywords_, writing_);
     keywords_.finish();
@@ -125,12 +127,11 @@ class Fit {
   }
 
   std::shared_ptr<const VolumeMesh> made_template() {
-    choice_options_.progress = work_.progress();
-    choice_options_.cancelled = work_.cancelled();
-    choice_ = work_.run("template", [&] { return choose_template(std::get<TriangleMesh>(target_), choice_options_); });
-    if (choice_->cancelled) throw InputError("fit: ended before there was a template");
-    warnings_ = choice_->warnings;
-    return std::make_shared<const VolumeMesh>(choice_->mesh);
+    template_options_.progress = work_.progress();
+    template_options_.cancelled = work_.cancelled();
+    made_ = work_.run("template", [&] { return fit_template(std::get<TriangleMesh>(target_), template_options_); });
+    if (made_->mesh.num_cells() == 0) throw InputError("fit: ended before there was a template");
+    return std::make_shared<const VolumeMesh>(made_->mesh);
   }
 
   void fit_subdivision(Fitted& result) {
@@ -182,7 +183,7 @@ class Fit {
 
   Json report_of(const FitReport& report, const MeshCheck& found, const cli::GroupsFound& groups) {
     Json json{{"input", {{"target", cli::describe("", target_)}, {"template", cli::describe("", *template_)}}}};
-    if (choice_) json["template"] = cli::choice_json(*choice_);
+    if (made_) json["template"] = cli::automatic_fit_json(*made_).at("template");
     json.update(cli::fit_json(report));
     json.update(cli::check_json(found));
     if (!groups.groups.empty()) json["groups"] = cli::groups_json(groups.groups);
@@ -202,11 +203,11 @@ class Fit {
   bool curved_ = false;
   FitOptions subdivision_;
   HighOrderFitOptions high_order_;
-  TemplateChoiceOptions choice_options_;
+  AutomaticFitOptions template_options_;
   cli::WritingOptions writing_;
   cli::Target target_;
   std::shared_ptr<const VolumeMesh> template_;
-  std::optional<TemplateChoice> choice_;
+  std::optional<AutomaticFitResult> made_;
   std::vector<std::string> warnings_;
 };
 

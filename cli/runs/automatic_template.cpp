@@ -4,21 +4,15 @@
 #include "cli/runs/exit_status.h"
 #include "cli/runs/interrupt.h"
 #include "cli/runs/progress.h"
-#include "subvol/fit/automatic_fit.h"
-#include "subvol/surface/region_surface.h"
+#include "subvol/base/format.h"
 
-#include <sstream>
+#include <utility>
 
 namespace subvol::cli {
 
-namespace {
+using namespace internal;
 
-/// Number of cells of a template for several regions, if none is given: those of curved cells are large.
-constexpr std::size_t kRegionTemplateCells = 1500;
-
-}  // namespace
-
-LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
+LoadedTemplate load_template(const TemplateSource& source, const Target& target, AutomaticFitOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings) {
   if (!source.path.empty()) return {load_volume(source.path, warnings, true, run.references), std::nullopt};
   if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
@@ -32,48 +26,20 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
     return !interrupted();
   };
   options.cancelled = interrupted;
-  if (const std::optional<RegionSurface> regions = find_regions(std::get<TriangleMesh>(target))) {
-    AutomaticFitOptions fit{.cells = source.cells.value_or(kRegionTemplateCells)};
-    fit.crease_angle_degrees = options.crease_angle_degrees.value_or(kUsualCreaseAngle);
-    fit.time_limit_seconds = options.time_limit_seconds;
-    fit.progress = options.progress;
-    fit.cancelled = options.cancelled;
-    AutomaticFitResult made = fit_regions(*regions, fit);
-    teller.finish();
-    warnings.insert(warnings.end(), made.report.warnings.begin(), made.report.warnings.end());
-    return {std::move(made.mesh), std::nullopt};
-  }
-  TemplateChoice choice = choose_template(std::get<TriangleMesh>(target), options);
+  AutomaticFitResult made = fit_template(std::get<TriangleMesh>(target), options);
   teller.finish();
-  warnings.insert(warnings.end(), choice.warnings.begin(), choice.warnings.end());
-  VolumeMesh mesh = choice.mesh;
-  return {std::move(mesh), std::move(choice)};
+  if (interrupted()) return {};
+  if (made.mesh.num_cells() == 0) throw EndedEarly("nothing to write: " + made.report.explanation, kNotConverged);
+  VolumeMesh mesh = made.mesh;
+  return {std::move(mesh), std::move(made)};
 }
 
-Json choice_json(const TemplateChoice& choice) {
-  Json trials = Json::array();
-  for (const TemplateTrial& trial : choice.trials)
-    trials.push_back({{"cells", trial.cells},
-                      {"pillowed", trial.pillowed},
-                      {"mean_percent", trial.mean_percent},
-                      {"max_percent", trial.max_percent},
-                      {"mean_scaled_jacobian", trial.mean_scaled_jacobian},
-                      {"self_intersections", trial.self_intersections},
-                      {"merit", trial.merit}});
-  return {{"components", choice.topology.components},
-          {"handles", choice.topology.handles},
-          {"cavities", choice.topology.cavities},
-          {"trials", std::move(trials)},
-          {"chosen", choice.chosen}};
-}
-
-std::string to_text(const TemplateChoice& choice) {
-  if (choice.trials.empty()) return "no template was chosen\n";
-  const TemplateTrial& trial = choice.trials[choice.chosen];
-  std::ostringstream text;
-  text << "template made: " << trial.cells << " cells" << (trial.pillowed ? ", pillowed" : "") << ", "
-       << to_string(choice.topology) << "; best of " << choice.trials.size() << " tried\n";
-  return text.str();
+std::string template_text(const AutomaticFitResult& made) {
+  const AutomaticFitTrial& trial = made.trials[made.chosen];
+  return formatted(
+      "template made: %zu cells, least scaled Jacobian %.3f, mean distance %.3g %%, largest %.3g %%; best "
+      "of %zu tried\n",
+      trial.cells, trial.least_scaled_jacobian, trial.mean_percent, trial.max_percent, made.trials.size());
 }
 
 }  // namespace subvol::cli

@@ -3,7 +3,7 @@
 
 #include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
-#include "subvol/fit/template_choice.h"
+#include "subvol/fit/template_fit.h"
 
 #include <optional>
 #include <string>
@@ -16,23 +16,20 @@ struct TemplateSource {
   std::optional<std::size_t> cells;   ///< approximate number of cells, if the template is made
 };
 
-/// A fit's template, and how it was chosen if it was made.
+/// A fit's template, and how it was made, if it was.
 struct LoadedTemplate {
-  VolumeMesh mesh;                    ///< no cells: interrupted while it was being made
-  std::optional<TemplateChoice> choice;
+  VolumeMesh mesh;  ///< no cells: interrupted while it was being made
+  std::optional<AutomaticFitResult> made;
 };
 
 /// Reads a template, or makes one and reports the progress.
 ///
 /// options  how the template is made; `cells` is taken from the source instead.
-/// UsageError: a template would have to be made from points.
-LoadedTemplate load_template(const TemplateSource& source, const Target& target, TemplateChoiceOptions options,
+/// UsageError: a template would have to be made from points. EndedEarly: the time limit ended it before there was one.
+LoadedTemplate load_template(const TemplateSource& source, const Target& target, AutomaticFitOptions options,
                              const RunOptions& run, std::vector<std::string>& warnings);
 
-/// The report's entry about the choice: the topology, every trial, and the one that was chosen.
-Json choice_json(const TemplateChoice& choice);
-
-/// Summary of the choice in one line, for people.
-std::string to_text(const TemplateChoice& choice);
+/// Summary of how a template was made in one line, for people.
+std::string template_text(const AutomaticFitResult& made);
 
 }  // namespace subvol::cli

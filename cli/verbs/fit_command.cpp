@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/automatic_template.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
@@ -99,7 +100,7 @@ class FitRun : public CageRun {
   std::optional<RegionSurface> regions_;  ///< of the target, if the template has the same
   Target outer_;                          ///< what the boundary is compared with: the outer surface of regions
   VolumeMesh template_mesh_;
-  std::optional<TemplateChoice> choice_;  ///< if the template was made
+  std::optional<AutomaticFitResult> made_;  ///< if the template was made
   std::optional<Checkpointing> checkpointing_;
   FitResult result_;
   GroupsFound groups_;
@@ -115,22 +116,23 @@ void FitRun::load() {
 }
 
 void FitRun::load_template() {
-  LoadedTemplate loaded =
-      cli::load_template(arguments_.template_mesh, target_,
-                         {.crease_angle_degrees = arguments_.fit.crease_angle_degrees,
-                          .time_limit_seconds = kTrialsShareOfTime * arguments_.fit.time_limit_seconds},
-                         arguments_.run, warnings_);
+  AutomaticFitOptions options;
+  options.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.time_limit_seconds;
+  options.crease_angle_degrees = crease_angle(arguments_, kUsualCreaseAngle);
+  options.follows_all_edges = arguments_.crease_angle != kAutomaticAngle;
+  options.keeps_groups = arguments_.fit.keeps_groups;
+  LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, options, arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))
     untangle_template(arguments_.template_mesh.path, arguments_.run,
                       {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
-  choice_ = std::move(loaded.choice);
+  made_ = std::move(loaded.made);
   require_regions(outputs_, regions_of(template_mesh_));
   regions_ = regions_of_target(target_, template_mesh_);
   outer_ = outer_target(target_, regions_);
-  if (!choice_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
+  if (!made_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
   tell_warnings();
-  if (choice_ && !arguments_.run.quiet) std::cerr << to_text(*choice_);
+  if (made_ && !arguments_.run.quiet) std::cerr << template_text(*made_);
 }
 
 void FitRun::fit() {
@@ -193,7 +195,7 @@ Json FitRun::report() const {
             {"input",
              {{"target", describe(arguments_.target, target_)},
               {"template", describe(arguments_.template_mesh.path, template_mesh_)}}}};
-  if (choice_) json["template"] = choice_json(*choice_);
+  if (made_) json["template"] = automatic_fit_json(*made_).at("template");
   json.update(fit_json(report));
   json.update(check_json(mesh_check_));
   if (mesh_check_.regions) {
@@ -375,13 +377,16 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
 }
 
 int run_fit(const FitArguments& given, const CLI::App& verb) {
-  if (is_automatic(given, verb))
-    if (const std::optional<int> status = run_automatic_fit(automatic_arguments(given, verb), verb)) return *status;
-  refuse_automatic_options(verb);
   FitArguments arguments = given;
+  if (is_automatic(given, verb)) {
+    const AutomaticFitArguments automatic = automatic_arguments(given, verb);
+    if (const std::optional<int> status = run_automatic_fit(automatic, verb)) return *status;
+    arguments.fit.levels = automatic.fit.levels;
+  }
+  refuse_automatic_options(verb);
   arguments.fit.crease_angle_degrees = crease_angle(given, std::nullopt);
   arguments.fit.quality = given.quality;
-  arguments.template_mesh.cells = template_cells(given, given.order > 0 ? 0 : given.fit.levels);
+  arguments.template_mesh.cells = template_cells(given, given.order > 0 ? 0 : arguments.fit.levels);
   return given.order > 0 ? run_high_order_fit(high_order_arguments(arguments, verb), verb)
                          : FitRun(arguments, verb).run();
 }

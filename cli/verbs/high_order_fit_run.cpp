@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/verbs/high_order_fit_run.h"
 
+#include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
 #include "cli/runs/exit_status.h"
@@ -127,15 +128,13 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   }
   const Clock::time_point template_start = Clock::now();
   LoadedTemplate loaded = load_template(arguments.template_mesh, target,
-                                        {.order = arguments.fit.order,
-                                         .basis = arguments.fit.basis,
-                                         .time_limit_seconds = kTrialsShareOfTime * arguments.fit.time_limit_seconds},
+                                        {.time_limit_seconds = kTemplateShareOfTime * arguments.fit.time_limit_seconds},
                                         arguments.run, warnings);
   const double template_seconds = seconds_since(template_start);
   VolumeMesh& template_mesh = loaded.mesh;
-  if (!loaded.choice) warn_of_losses(marks_of(template_mesh), marks_of(template_mesh), outputs, warnings, true);
+  if (!loaded.made) warn_of_losses(marks_of(template_mesh), marks_of(template_mesh), outputs, warnings, true);
   tell_warnings();
-  if (loaded.choice && !arguments.run.quiet) std::cerr << to_text(*loaded.choice);
+  if (loaded.made && !arguments.run.quiet) std::cerr << template_text(*loaded.made);
   if (template_mesh.num_cells() == 0) return kInterrupted;  // nothing has been fitted yet
   refuse_impossible(outputs, arguments, template_mesh);
   const double read_seconds = seconds_since(start) - template_seconds;
@@ -213,7 +212,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     if (linear) json["linear_cells"] = check_json(*linear);
     if (!polynomials.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials);
     if (arguments.untangles) json["not_certified_cells"] = not_certified_cells(mesh_check);
-    if (loaded.choice) json["template"] = choice_json(*loaded.choice);
+    if (loaded.made) json["template"] = automatic_fit_json(*loaded.made).at("template");
     checkpointing.describe(json);
     json["warnings"] = warnings_json(warnings, failures);
     Json seconds{{"read", read_seconds},

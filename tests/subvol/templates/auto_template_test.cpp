@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/auto_template.h"
 #include "samples/shapes.h"
 #include "subvol/base/error.h"
-#include "subvol/fit/template_choice.h"
 #include "subvol/io/surface_io.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/solid_topology.h"
-#include "subvol/templates/auto_template.h"
 #include "subvol/templates/solid_fraction.h"
 #include "subvol/templates/template_frames.h"
 #include "tests/support/require_data.h"
@@ -308,35 +307,6 @@ TEST_CASE("Automatic templates do not depend on chance, and can be cancelled", "
   CHECK(auto_templates(comb(), options).cancelled);
   CHECK_THROWS_AS(auto_templates(comb(), {.cells = 1}), InputError);
   CHECK_THROWS_AS(auto_templates(comb(), {.cells = 100}, 0), InputError);
-}
-
-TEST_CASE("Of several templates the one that fits best is chosen", "[templates][slow]") {
-  const TemplateChoice choice = choose_template(test::cube_surface(6, true), {.cells = 27});
-  REQUIRE(choice.mesh.num_cells() > 0);
-  REQUIRE(!choice.trials.empty());
-  CHECK(choice.trials[choice.chosen].cells == choice.mesh.num_cells());
-  for (const TemplateTrial& trial : choice.trials) CHECK(trial.merit >= choice.trials[choice.chosen].merit);
-  CHECK(choice.trials[choice.chosen].max_percent < 3);
-  TemplateChoiceOptions options{.cells = 27};
-  options.order = -1;
-  CHECK_THROWS_AS(choose_template(test::cube_surface(4, true), options), InputError);
-  options.order = 2;
-  const TemplateChoice curved = choose_template(test::cube_surface(6, true), options);
-  REQUIRE(curved.mesh.num_cells() > 0);
-  CHECK(curved.trials.size() == choice.trials.size());
-  for (const TemplateTrial& trial : curved.trials) CHECK(trial.merit >= curved.trials[curved.chosen].merit);
-  CHECK(curved.trials[curved.chosen].max_percent < 3);
-  // The trials are of what is asked for.
-  CHECK(curved.trials.front().mean_percent != choice.trials.front().mean_percent);
-  options.time_limit_seconds = 1e-6;  // one trial, and that ends at once
-  const TemplateChoice hasty = choose_template(test::cube_surface(6, true), options);
-  CHECK(hasty.mesh.num_cells() > 0);
-  CHECK(hasty.trials.size() == 1);
-  CHECK_FALSE(hasty.cancelled);
-  options.progress = [](const FitProgress&) { return false; };
-  CHECK(choose_template(test::cube_surface(4, true), options).cancelled);
-  options.time_limit_seconds = -1;
-  CHECK_THROWS_AS(choose_template(test::cube_surface(4, true), options), InputError);
 }
 
 TEST_CASE("Real targets get templates of their topology", "[templates][data]") {

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/template_fit.h"
+
+#include "subvol/fit/automatic_trials.h"
+#include "subvol/fit/features/followed_creases.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace subvol {
+
+using namespace internal;
+
+AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions options) {
+  constexpr double kLeastTime = 1e-3;  // seconds
+  const auto begin = std::chrono::steady_clock::now();
+  options.mean_tolerance_percent = std::max(options.mean_tolerance_percent, kTemplateMeanPercent);
+  options.max_tolerance_percent = std::max(options.max_tolerance_percent, kTemplateMaxPercent);
+  options.makes_cage = false;
+  std::vector<std::size_t> counts(kTemplateCells.begin(), kTemplateCells.end());
+  if (find_regions(target, options.regions)) counts = {kRegionTemplateCells};
+  if (options.cells) counts = {*options.cells};
+  std::optional<AutomaticFitResult> best;
+  const double limit = options.time_limit_seconds;
+  for (const std::size_t cells : counts) {
+    options.cells = cells;
+    if (limit > 0) {
+      const std::chrono::duration<double> used = std::chrono::steady_clock::now() - begin;
+      options.time_limit_seconds = std::max(kLeastTime, limit - used.count());
+    }
+    AutomaticFitResult made = fit_automatically(target, options);
+    const bool is_ended = made.report.stop_reason != StopReason::converged;
+    const auto merit = [](const AutomaticFitResult& result) { return result.trials[result.chosen].merit; };
+    const bool is_made = !made.trials.empty();
+    if (!best || (is_made && (best->trials.empty() || merit(made) < merit(*best)))) best = std::move(made);
+    if (is_ended || (is_made && is_good_enough(best->trials[best->chosen]))) break;
+  }
+  if (best->mesh.num_cells() > 0) FollowedCreases().keep_from_folding(best->mesh);
+  return std::move(*best);
+}
+
+}  // namespace subvol
