@@ -354,13 +354,14 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   }
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
-  std::vector<TriangleMesh> surfaces = {surface};
-  if (cage_) surfaces.push_back(cage_->limit_surface());
-  for (const TriangleMesh& s : surfaces) {
-    const SurfaceDistance distance = target_.distance(s);
+  trial.mean_percent = trial.max_percent = 0;  // those of another state, perhaps
+  const auto measure = [&](const TriangleMesh& fitted) {
+    const SurfaceDistance distance = target_.distance(fitted);
     trial.mean_percent = std::max(trial.mean_percent, 100 * distance.mean());
     trial.max_percent = std::max(trial.max_percent, 100 * distance.max());
-  }
+  };
+  measure(surface);
+  if (cage_) measure(cage_->limit_surface());
   trial.feature_miss = feature_miss(surface);
   trial.self_intersections = runner_.intersecting_pairs(surface, result_.report);
   const bool going = trial.self_intersections.has_value();

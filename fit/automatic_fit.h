@@ -142,8 +142,13 @@ struct AutomaticFitResult {
 /// If no trial is valid, a pillowed template is fitted without edges: a valid mesh with round edges is worth more.
 ///
 /// The good trial is polished: it is lifted by steps of 0.05 beyond the quality aimed at, up to 0.8, as long as they
-/// are reached while the largest distance grows by a fifth at most. The result is another trial; among good ones, the
-/// one with the higher least scaled Jacobian is kept.
+/// are reached while the largest distance grows by a fifth at most. The result is another trial; if it is good, too,
+/// the one with the higher least scaled Jacobian is kept.
+///
+/// With `makes_cage`, the mesh that comes before the last subdivision, or the padded mesh, is fitted by the schedule of
+/// meshes that are refined. Then it is the cage (`FittedCage`): its vertices are the unknowns of all that follows, and
+/// the mesh that it is subdivided to is lifted and judged; distances are the larger ones of its faces' and of the limit
+/// surface's. No cells are cut.
 ///
 /// A target with several regions (`find_regions`) is filled as `fit_regions` says.
 ///

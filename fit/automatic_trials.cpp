@@ -71,9 +71,10 @@ bool is_good_enough(const AutomaticFitTrial& trial) {
 
 namespace {
 
-/// Returns true if a trial is better than the best one before. Among good ones, the quality decides.
+/// Returns true if a trial is better than the best one before. If it is that one polished and still good, the quality
+/// decides.
 bool is_better(const AutomaticFitTrial& trial, const AutomaticFitTrial& best) {
-  if (is_good_enough(trial) && is_good_enough(best)) return trial.least_scaled_jacobian > best.least_scaled_jacobian;
+  if (trial.is_polished && is_good_enough(trial)) return trial.least_scaled_jacobian > best.least_scaled_jacobian;
   return trial.merit < best.merit;
 }
 

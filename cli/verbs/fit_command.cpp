@@ -235,9 +235,8 @@ int FitRun::run() {
 void add_method_options(CLI::App& verb, FitArguments& arguments) {
   FitOptions& fit = arguments.fit;
   verb.add_option("--levels", fit.levels,
-                  "Times the template is subdivided; without --template, the result is then a cage and its mesh (1 if "
-                  "a cage is an "
-                  "output)")
+                  "Times the template is subdivided. Without --template, the result is then a cage and its mesh\n"
+                  "(1 if only an output asks for a cage)")
       ->check(CLI::Range(1, 6))
       ->type_name("L")
       ->capture_default_str();
