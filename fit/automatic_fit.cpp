@@ -5,13 +5,13 @@
 #include "subvol/base/format.h"
 #include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/certificate/certificate.h"
-#include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/edge_layout.h"
 #include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/features/flat_facets.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/level_samples.h"
 #include "subvol/fit/fits/local_cells.h"
 #include "subvol/fit/fits/smooth_refinement.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
@@ -67,7 +67,7 @@ struct Attempt {
   bool is_last_count = true;  ///< no attempt with more cells follows
 };
 
-/// Returns the number of cells of a mesh that has a number of them after it was subdivided so many times.
+/// Returns the number of cells from which a mesh gets about this many if it is subdivided so many times.
 std::size_t cells_before(std::size_t cells, int levels) {
   for (int level = 0; level < levels; ++level) cells /= kChildren;
   return std::max(cells, kLeastTemplateCells);
@@ -105,33 +105,13 @@ struct TrialStart {
   std::vector<Index> lost;       ///< curves without a path
 };
 
-/// What an edge layout is on the mesh that is fitted: on that of the layout, or on the one whose cage it is.
-struct OnMesh {
+/// This is what a level needs of an edge layout. The layout belongs to a mesh; if that mesh is a cage, the faces and
+/// edges here are the parts of its own on the mesh that it is subdivided to.
+struct LevelLayout {
   std::vector<Index> group_of_face;
   QualityCaps caps;
   FollowedCreases creases;
 };
-
-/// The samples of a surface that is fitted.
-struct LevelSamples {
-  SparseMap positions;  ///< degrees of freedom -> samples
-  std::vector<std::array<Index, 3>> triangles;
-  std::vector<Index> faces;  ///< of the mesh, for each triangle
-  std::vector<std::array<Index, 2>> crease_edges;
-};
-
-LevelSamples samples_of(const VolumeMesh& mesh) {
-  constexpr int kIntervals = 2;
-  BoundarySamples samples =
-      make_boundary_samples(ElementSpace(mesh, Basis::legendre, 1), kIntervals, mesh.tags.creases);
-  return {std::move(samples.positions), std::move(samples.triangles), std::move(samples.triangle_faces),
-          std::move(samples.crease_edges)};
-}
-
-LevelSamples samples_of(const FittedCage& cage) {
-  const FitLevel& level = cage.level();
-  return {level.samples, level.sample_triangles, level.sample_faces, level.crease_edges};
-}
 
 /// Returns the share of the curves' length that paths follow.
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
@@ -188,7 +168,7 @@ class AutomaticFit : AutomaticDriver {
     constexpr double kMany = 0.4;
     return attempt.kind != Attempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
-  /// The irregular edges of cut cells are poor control meshes: cages come out worse.
+  /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
   bool is_worth_refining() const {
     return !options_.makes_cage && !is_good() &&
            (best_start_.kind == Attempt::Kind::smooth || best().merit > kWorthRefining);
@@ -202,7 +182,7 @@ class AutomaticFit : AutomaticDriver {
   std::vector<double> sizes_;         ///< of the present mesh's cells (`SizedMesh`)
   TrialStart start_, best_start_;     ///< of the present trial, and of the best one
   std::optional<EdgeLayout> layout_;  ///< of mesh_, or of its cage; none: it follows no edges
-  OnMesh on_mesh_;                    ///< what the layout is on mesh_
+  LevelLayout level_layout_;          ///< of mesh_, from layout_
   std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
@@ -273,8 +253,9 @@ void AutomaticFit::begin_cage() {
   if (layout_) layout_->creases.keep_from_folding(mesh_);
   AutomaticDriver::begin_cage();
   if (!layout_) return;
-  on_mesh_ = {cage_->groups_of_parts(layout_->group_of_face), cage_->caps_of_parts(layout_->caps), layout_->creases};
-  on_mesh_.creases.refine(cage_->level().parent_creases);
+  level_layout_ = {cage_->groups_of_parts(layout_->group_of_face), cage_->caps_of_parts(layout_->caps),
+                   layout_->creases};
+  level_layout_.creases.refine(cage_->level().parent_creases);
 }
 
 /// Fits the present mesh. portion: of the attempt's remaining work. Returns false if the fit must end.
@@ -289,12 +270,12 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
       .samples = samples.positions, .triangles = samples.triangles, .triangle_faces = samples.faces};
   std::function<CreaseEnergy(double)> creases;
   if (layout_) {
-    boundary.group_of_face = on_mesh_.group_of_face;
+    boundary.group_of_face = level_layout_.group_of_face;
     boundary.group_of_triangle = layout_->group_of_triangle;
     if (!mesh_.tags.creases.empty())
       creases = [&](double width) {
-        CreaseEnergy energy = on_mesh_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
-                                                      kQualityTangentialWeight);
+        CreaseEnergy energy = level_layout_.creases.energy(samples.crease_edges, samples.positions.num_rows(), width,
+                                                           kQualityTangentialWeight);
         const VolumeMesh& of_unknowns = cage_ ? cage_->cage : mesh_;
         if (!sizes_.empty())
           energy.weigh(crease_factors(of_unknowns, MeshTopology(of_unknowns), sizes_, samples.positions));
@@ -303,10 +284,10 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
   }
   const bool going = run_stages(boundary, lengths, creases, level, schedule, what, [&](QualityStages& stages) {
     const std::span<const EdgeCap> edges =
-        layout_ ? std::span<const EdgeCap>(on_mesh_.caps.edges) : std::span<const EdgeCap>();
+        layout_ ? std::span<const EdgeCap>(level_layout_.caps.edges) : std::span<const EdgeCap>();
     const double least_edge = cage_ ? 0 : least_edge_share(start_.grid.mesh, lengths);
     stages.energy().forbid_folds(edges, least_edge);
-    if (layout_) stages.energy().set_caps(edges, on_mesh_.caps.vertices);
+    if (layout_) stages.energy().set_caps(edges, level_layout_.caps.vertices);
   });
   start_.far = state_.far_cells;
   start_.poor = state_.cells.poor;
@@ -326,7 +307,7 @@ std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surfac
 /// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
 std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
   if (edges_.features.curves.empty()) return std::nullopt;
-  if (cage_ && layout_) return on_mesh_.creases.distance(cage_->limit(), cage_->limit_surface().positions, 1);
+  if (cage_ && layout_) return level_layout_.creases.distance(cage_->limit(), cage_->limit_surface().positions, 1);
   const std::vector<CreaseSegment> none;
   return crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
 }
@@ -354,7 +335,7 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
   }
   const QualityReport quality = measure_quality(mesh_);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
-  trial.mean_percent = trial.max_percent = 0;  // those of another state, perhaps
+  trial.mean_percent = trial.max_percent = 0;  // the trial may have those of another state
   const auto measure = [&](const TriangleMesh& fitted) {
     const SurfaceDistance distance = target_.distance(fitted);
     trial.mean_percent = std::max(trial.mean_percent, 100 * distance.mean());
@@ -416,7 +397,7 @@ void AutomaticFit::lay_out(RoutingOptions routing) {
   layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
   cage_.reset();
   mesh_ = layout_->tagged_mesh;
-  on_mesh_ = {layout_->group_of_face, layout_->caps, layout_->creases};
+  level_layout_ = {layout_->group_of_face, layout_->caps, layout_->creases};
   sizes_ = padded_sizes(mesh_, start_.grid.sizes);
 }
 

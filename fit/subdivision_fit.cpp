@@ -11,7 +11,6 @@
 #include "subvol/fit/features/followed_creases.h"
 #include "subvol/fit/fits/fit_level.h"
 #include "subvol/fit/fits/fit_schedule.h"
-#include "subvol/fit/fits/fitted_cage.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/quality/quality.h"

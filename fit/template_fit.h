@@ -14,7 +14,7 @@ namespace subvol {
 inline constexpr std::array<std::size_t, 3> kTemplateCells{300, 1000, 3000};
 inline constexpr double kTemplateMeanPercent = 0.3, kTemplateMaxPercent = 2;
 
-/// The same of a target with several regions.
+/// Number of cells of the template if the target has several regions and no number is given.
 inline constexpr std::size_t kRegionTemplateCells = 1500;
 
 /// Largest share of a fit's time limit that the template may take if the fit makes it itself.

@@ -137,4 +137,17 @@ FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknown
   return level;
 }
 
+TriangleMesh limit_triangles(const FitLevel& level, const BoundaryRefinement& limit, std::span<const Vec3> control) {
+  TriangleMesh surface;
+  surface.positions = limit.positions.apply(level.refine.apply(control));
+  const auto num_boundary_faces = static_cast<Index>(limit.faces.size() - level.interfaces.size());
+  for (std::size_t k = 0; k < limit.quads.size(); ++k) {
+    if (limit.face_of_quad[k] >= num_boundary_faces) break;  // the rest are interfaces
+    const auto& q = limit.quads[k];
+    surface.triangles.push_back({q[0], q[1], q[2]});
+    surface.triangles.push_back({q[0], q[2], q[3]});
+  }
+  return surface;
+}
+
 }  // namespace subvol::internal

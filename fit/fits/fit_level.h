@@ -3,10 +3,13 @@
 
 #include "subvol/fit/stages/fit_options.h"
 #include "subvol/mesh/volume_mesh.h"
+#include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/sparse_map.h"
+#include "subvol/surface/triangle_mesh.h"
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace subvol::internal {
@@ -49,5 +52,15 @@ struct FitLevel {
 /// finest             true for the last level.
 FitLevel make_fit_level(const VolumeMesh& control, const SparseMap& from_unknowns, const SparseMap& previous_nodes,
                         const FitOptions& options, std::size_t min_samples, bool finest);
+
+/// Returns the limit surface of a level, as a tessellation whose chord error is far below that of its mesh.
+///
+/// limit    refinement of `level.mesh` by `refine_sheets`.
+/// control  positions of the vertices of the control mesh.
+TriangleMesh limit_triangles(const FitLevel& level, const BoundaryRefinement& limit, std::span<const Vec3> control);
+
+/// Number of refinements beyond a level's mesh by which its limit surface is measured: its chord error is then a
+/// sixteenth of the mesh's.
+inline constexpr int kLimitRefinements = 2;
 
 }  // namespace subvol::internal

@@ -16,16 +16,6 @@ namespace subvol::internal {
 /// Number of hexes that a hex is subdivided into; they follow each other (`subdivide`).
 inline constexpr std::size_t kChildren = 8;
 
-/// Returns the limit surface of a level, as a tessellation whose chord error is far below that of its mesh.
-///
-/// limit    refinement of `level.mesh` by `refine_sheets`.
-/// control  positions of the vertices of the control mesh.
-TriangleMesh limit_triangles(const FitLevel& level, const BoundaryRefinement& limit, std::span<const Vec3> control);
-
-/// Number of refinements beyond a level's mesh by which its limit surface is measured: its chord error is then a
-/// sixteenth of the mesh's.
-inline constexpr int kLimitRefinements = 2;
-
 /// A subdivision volume while it is fitted: the vertices of a cage of hexes are the unknowns, and the mesh that it is
 /// subdivided to once, its boundary vertices at limit positions, is what is judged.
 class FittedCage {

@@ -24,7 +24,8 @@ namespace subvol::internal {
 /// cell would lose its certificate, or become poorer than the poorest cell of the mesh was, the vertices of that cell
 /// stay, too.
 ///
-/// mesh    passes `validate` except for unused vertices; its boundary lies close to the target.
+/// mesh    passes `validate` except for unused vertices and inverted cells; its boundary lies close to the target. If it
+///         is a cage, the subdivision surface becomes flat where its control vertices are.
 /// target  oriented outward or inward as a whole; tree and facets: its own.
 /// returns the number of vertices that lie on planes afterwards. Same bits for any number of threads.
 /// Cost: five closest points for each boundary face, and the quality of the mesh some times.
