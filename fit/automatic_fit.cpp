@@ -537,6 +537,7 @@ void AutomaticFit::conclude() {
                   miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
   }
   warn_of_missed_edges(result_.missed_edges, chosen.curves, "sharp edges", report);
+  mark_if_far_off(result_, options_, target_.normalisation.diagonal, "sharp edges");
 }
 
 AutomaticFitResult AutomaticFit::run() {

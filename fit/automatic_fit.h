@@ -30,6 +30,15 @@ inline constexpr double kAutomaticMeanPercent = 0.02, kAutomaticMaxPercent = 0.5
 inline constexpr double kAutomaticFeatureShare = 0.1;
 /// Largest difference of a region's volume that an automatic fit aims at, in percent of that volume.
 inline constexpr double kAutomaticVolumePercent = 0.1;
+/// A result that is this many times farther from the target than the largest distance aimed at is far off, and its stop
+/// reason says so.
+inline constexpr double kFarOffFactor = 2;
+/// So is one that does not follow a sharp edge longer than this, in percent of the diagonal, or that misses a feature by
+/// more than its radius, if the radius is at least this, in percent of the diagonal: noise of a triangulation looks
+/// like smaller ones.
+inline constexpr double kLongEdgePercent = 10, kLostFeaturePercent = 0.2;
+/// So is one of which a region's volume differs by this many times what is aimed at.
+inline constexpr double kFarOffVolumeFactor = 10;
 /// Numbers of cells that are tried if none is given, in this order until a fit is good: of surfaces without sharp
 /// edges, and of parts with them.
 inline constexpr std::array<std::size_t, 3> kAutomaticCells{5000, 15000, 40000};
@@ -149,6 +158,8 @@ struct AutomaticFitResult {
 /// meshes that are refined. Then it is the cage (`FittedCage`): its vertices are the unknowns of all that follows, and
 /// the mesh that it is subdivided to is lifted and judged; distances are the larger ones of its faces' and of the limit
 /// surface's. No cells are cut.
+///
+/// The stop reason is `tolerance_missed` if the result is far off: by the constants above, which the explanation names.
 ///
 /// A target with several regions (`find_regions`) is filled as `fit_regions` says.
 ///

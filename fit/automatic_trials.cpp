@@ -123,4 +123,27 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
                 longest.place.z(), to_string(longest.reason).c_str()));
 }
 
+void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& options, double diagonal,
+                     const char* name) {
+  const AutomaticFitTrial& chosen = result.trials[result.chosen];
+  std::vector<std::string> reasons;
+  const double most = kFarOffFactor * options.max_tolerance_percent;
+  if (chosen.max_percent > most)
+    reasons.push_back(formatted("the largest distance is above %.3g %% of the diagonal", most));
+  const auto is_long = [](const MissedEdge& edge) { return edge.length_percent > kLongEdgePercent; };
+  const auto num_long = std::count_if(result.missed_edges.begin(), result.missed_edges.end(), is_long);
+  if (num_long > 0)
+    reasons.push_back(formatted("%s longer than %.3g %% of the diagonal that are not followed: %td", name,
+                                kLongEdgePercent, num_long));
+  if (const auto& miss = chosen.feature_miss;
+      miss && miss->share > 1 && 100 * miss->size > kLostFeaturePercent * diagonal)
+    reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", miss->size, miss->distance));
+  const double most_volume = kFarOffVolumeFactor * kAutomaticVolumePercent;
+  if (chosen.volume_percent > most_volume)
+    reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", most_volume));
+  if (reasons.empty()) return;
+  result.report.stop_reason = StopReason::tolerance_missed;
+  for (const std::string& reason : reasons) result.report.explanation += "; " + reason;
+}
+
 }  // namespace subvol::internal

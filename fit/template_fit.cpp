@@ -32,7 +32,8 @@ AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions 
       options.time_limit_seconds = std::max(kLeastTime, limit - used.count());
     }
     AutomaticFitResult made = fit_automatically(target, options);
-    const bool is_ended = made.report.stop_reason != StopReason::converged;
+    const StopReason reason = made.report.stop_reason;
+    const bool is_ended = reason != StopReason::converged && reason != StopReason::tolerance_missed;
     const auto merit = [](const AutomaticFitResult& result) { return result.trials[result.chosen].merit; };
     const bool is_made = !made.trials.empty();
     if (!best || (is_made && (best->trials.empty() || merit(made) < merit(*best)))) best = std::move(made);

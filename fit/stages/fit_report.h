@@ -26,7 +26,7 @@ struct FitProgress {
 /// Reason why a solve ended. Invalid input throws instead, and so does memory that runs out before there is a result.
 enum class StopReason {
   converged,  ///< all stages ended by their stop tests or step counts; the tolerance, if any, is met
-  tolerance_missed,  ///< all stages are done, but the requested distance was not reached
+  tolerance_missed,  ///< all stages are done, but the requested distance was not reached, or a result is far off
   iteration_limit,   ///< the last stage used all the steps allowed, and no tolerance was given
   time_limit,
   memory_limit,  ///< the next level or order would exceed the memory limit, or memory ran out

@@ -2,6 +2,7 @@
 #include "subvol/fit/automatic_fit.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/subdivision/limit_surface.h"
 #include "subvol/subdivision/subdivision.h"
@@ -116,6 +117,28 @@ TEST_CASE("An automatic fit says so if it needs more cells than allowed") {
   CHECK(std::ranges::any_of(result.report.warnings, [](const std::string& warning) {
     return warning.find("more than the 10 allowed") != std::string::npos;
   }));
+}
+
+TEST_CASE("A result that is far off says so, and why") {
+  constexpr double kDiagonal = 200;
+  const AutomaticFitOptions options;
+  const auto marked = [&](const AutomaticFitTrial& trial, std::vector<MissedEdge> missed) {
+    AutomaticFitResult result;
+    result.trials = {trial};
+    result.missed_edges = std::move(missed);
+    result.report.stop_reason = StopReason::converged;
+    internal::mark_if_far_off(result, options, kDiagonal, "sharp edges");
+    CHECK(result.report.explanation.empty() == (result.report.stop_reason == StopReason::converged));
+    return result.report.explanation;
+  };
+  CHECK(marked({.max_percent = 0.99}, {{NotFollowed::no_path_nearby, {}, 9.9}}).empty());
+  CHECK(marked({.max_percent = 1.01}, {}) == "; the largest distance is above 1 % of the diagonal");
+  CHECK(marked({}, {{NotFollowed::no_path_nearby, {}, 10.1}}) ==
+        "; sharp edges longer than 10 % of the diagonal that are not followed: 1");
+  CHECK(marked({.feature_miss = FeatureMiss{.share = 1.2, .distance = 0.6, .size = 0.5}}, {}) ==
+        "; a feature of radius 0.5 is missed by 0.6");
+  CHECK(marked({.feature_miss = FeatureMiss{.share = 2, .distance = 0.6, .size = 0.3}}, {}).empty());
+  CHECK_FALSE(marked({.volume_percent = 1.1}, {}).empty());
 }
 
 TEST_CASE("An automatic fit refuses options out of range") {
