@@ -114,19 +114,13 @@ bool AutomaticDriver::fit_and_refine(int levels) {
 }
 
 bool AutomaticDriver::fit_edges(AutomaticFitTrial trial, double portion) {
-  bool going = true;
   if (options_.makes_cage) {
-    going = fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion);
-    if (going) {
-      begin_cage();
-      trial.level = 1;
-    }
+    begin_cage();
+    trial.level = 1;
   }
-  if (going) {
-    const QualitySchedule schedule =
-        cage_ ? fine_quality_schedule(options_.quality) : single_quality_schedule(options_.quality);
-    going = fit_level(trial.level, aiming_at_distance(schedule), ", edges", portion);
-  }
+  const QualitySchedule schedule =
+      cage_ ? fine_quality_schedule(options_.quality) : single_quality_schedule(options_.quality);
+  const bool going = fit_level(trial.level, aiming_at_distance(schedule), ", edges", portion);
   return going || result_.trials.empty() ? judge(std::move(trial)) && going : going;
 }
 
@@ -208,7 +202,8 @@ bool AutomaticDriver::relax_last_trial() {
   if (!is_hopeless || merit_if_relaxed(trial, options_) >= best().merit) return true;
   relaxed_at_.reset();
   is_relaxing_ = true;
-  const bool going = fit_level(trial.level, {{}, {}, 0.1}, ", relaxed");
+  // Without stages and lift, the level is only judged by the quality and the distance aimed at.
+  const bool going = fit_level(trial.level, aiming_at_distance({{}, {}, options_.quality}), ", relaxed");
   is_relaxing_ = false;
   trial.relaxed_at = relaxed_at_;
   return judge(std::move(trial)) && going;

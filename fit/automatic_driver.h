@@ -76,7 +76,8 @@ class AutomaticDriver {
   /// Fits the present mesh, refines it so many times, fitting it each time, and judges it. If a cage is made, the last
   /// mesh is fitted by the vertices of the one before.
   bool fit_and_refine(int levels);
-  /// Fits and judges the present mesh, which follows edges and is not refined, or the mesh whose cage it is.
+  /// Fits and judges the present mesh, which follows edges and is not refined. If a cage is made, that mesh is near the
+  /// target and becomes the cage.
   bool fit_edges(AutomaticFitTrial trial, double portion);
   /// Returns a cell at each face of a mesh's boundary and interfaces that meets another one, once for each pair of
   /// their triangles.

@@ -29,6 +29,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -45,6 +46,8 @@ constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting
 /// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest. The fits with edges that
 /// had a second round (i07 twice, fan-shroud) gained nothing by it.
 constexpr int kMostRefinements = 2, kMostRefinementsWithEdges = 1;
+/// Largest number of routings of one grid. Each gives up edges at which the one before left poor cells.
+constexpr int kMostRoutings = 5;
 /// Merit above which a fit that follows edges is worth a refinement, which takes at least as long as the fit did.
 constexpr double kWorthRefining = 0.5;
 
@@ -152,6 +155,7 @@ class AutomaticFit : AutomaticDriver {
   void lay_out(RoutingOptions routing);
   void begin_cage() override;
   bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
+  bool fit_future_cage(RoutingOptions& routing);
   bool route_and_fit(const AutomaticFitTrial& described);
   std::vector<Fault> faults_of_best() const;
   std::vector<double> faults_of_cells() const;
@@ -401,14 +405,33 @@ void AutomaticFit::lay_out(RoutingOptions routing) {
   sizes_ = padded_sizes(mesh_, start_.grid.sizes);
 }
 
+/// Brings the present layout near the target, to be a cage, then others while edges have to be given up. The mesh that
+/// the cage is subdivided to would tell the same, but has eight times as many cells. Returns false if the fit must end.
+bool AutomaticFit::fit_future_cage(RoutingOptions& routing) {
+  double least_faults = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < kMostRoutings; ++round) {
+    if (round > 0) lay_out(routing);
+    if (!fit_level(0, coarse_quality_schedule(options_.quality), ", edges", kCoarsePortion)) return false;
+    const std::vector<double> faults = faults_of_cells();
+    const double sum = std::accumulate(faults.begin(), faults.end(), 0.0);
+    if (sum >= least_faults) break;  // what was given up has not helped
+    least_faults = sum;
+    if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults, routing)) break;
+  }
+  return true;
+}
+
 /// Fits the present layout, then others while edges have to be given up. Returns false if the fit must end.
 bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
-  constexpr int kMostRoutings = 5;
   RoutingOptions routing;
   double least_merit = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kMostRoutings; ++round) {
     if (round > 0) lay_out(routing);
     AutomaticFitTrial trial = described;
+    if (options_.makes_cage && !fit_future_cage(routing)) {
+      if (result_.trials.empty()) judge(std::move(trial));
+      return false;
+    }
     trial.pads = layout_->pads.pads.size();
     if (!fit_edges(trial, kRoutingPortion)) return false;
     const double merit = result_.trials.back().merit;

@@ -1,56 +1,112 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/energies/cell_group.h"
 
+#include "subvol/fit/elements/shape_functions.h"
+
+#include <map>
+#include <utility>
+
 namespace subvol::internal {
 
-/// Fills the quadrature points and weights, and the values and gradients of the functions there.
+/// For each line function N, the means of N^2, N N' and N'^2.
+struct CellGroup::LineProducts {
+  std::vector<double> vv, vd, dd;
+};
+
 void CellGroup::make_tables(Basis basis, QuadratureRule rule) {
-  const int n = points_per_direction, m = order + 1;
-  Quadrature quadrature = make_quadrature(kind, rule, n);
+  Quadrature quadrature = make_quadrature(kind, rule, points_per_direction);
   points = std::move(quadrature.points);
   weights = std::move(quadrature.weights);
-  if (kind == CellKind::hex) {
-    const std::size_t num_columns = static_cast<std::size_t>(n) * n;
-    const Quadrature by_layers{points, weights};
-    for (std::size_t q = 0; q < num_points(); ++q) {
-      const std::size_t column = q / n, layer = q % n;
-      points[q] = by_layers.points[layer * num_columns + column];
-      weights[q] = by_layers.weights[layer * num_columns + column];
-    }
-  } else {
-    num_modes = modes.size();
-    ShapeFunctions functions(kind, basis, order);
-    products.assign(num_modes, {});
-    for (std::size_t q = 0; q < num_points(); ++q) {
-      functions.set_point(points[q]);
-      for (std::size_t a = 0; a < num_modes; ++a) {
-        Vec3 gradient;
-        functions.value(modes[a], gradient);
-        gradients.push_back(gradient);
-        for (int p = 0; p < 6; ++p) products[a][p] += weights[q] * gradient[kPairs[p][0]] * gradient[kPairs[p][1]];
-      }
-    }
-    return;
-  }
-  num_modes = static_cast<std::size_t>(m) * m * m;
+  if (kind == CellKind::tet) return make_tet_tables(basis);
+  const LineProducts line = make_line(basis, rule);
+  if (kind == CellKind::prism)
+    make_prism_tables(basis, rule, line);
+  else
+    make_hex_tables(line);
+}
+
+CellGroup::LineProducts CellGroup::make_line(Basis basis, QuadratureRule rule) {
+  const int n = points_per_direction, m = order + 1;
   values.resize(n * m);
   derivatives.resize(n * m);
-  std::vector<double> vv(m, 0.0), vd(m, 0.0), dd(m, 0.0);
+  LineProducts products{std::vector<double>(m), std::vector<double>(m), std::vector<double>(m)};
   const LineRule line = rule == QuadratureRule::trapezoidal ? trapezoidal_rule(n) : gauss_lobatto_rule(n);
   for (int q = 0; q < n; ++q) {
     line_functions(basis, order, line.points[q], &values[q * m], &derivatives[q * m]);
     const double w = line.weights[q];
     for (int i = 0; i < m; ++i) {
-      vv[i] += w * values[q * m + i] * values[q * m + i];
-      vd[i] += w * values[q * m + i] * derivatives[q * m + i];
-      dd[i] += w * derivatives[q * m + i] * derivatives[q * m + i];
+      products.vv[i] += w * values[q * m + i] * values[q * m + i];
+      products.vd[i] += w * values[q * m + i] * derivatives[q * m + i];
+      products.dd[i] += w * derivatives[q * m + i] * derivatives[q * m + i];
     }
   }
+  return products;
+}
+
+void CellGroup::make_hex_tables(const LineProducts& line) {
+  const int n = points_per_direction, m = order + 1;
+  const std::size_t num_columns = static_cast<std::size_t>(n) * n;
+  const Quadrature by_layers{points, weights};
+  for (std::size_t q = 0; q < num_points(); ++q) {
+    const std::size_t column = q / n, layer = q % n;
+    points[q] = by_layers.points[layer * num_columns + column];
+    weights[q] = by_layers.weights[layer * num_columns + column];
+  }
+  num_modes = static_cast<std::size_t>(m) * m * m;
+  const auto& [vv, vd, dd] = line;
   for (int k = 0; k < m; ++k)
     for (int j = 0; j < m; ++j)
       for (int i = 0; i < m; ++i)
         products.push_back({dd[i] * vv[j] * vv[k], vv[i] * dd[j] * vv[k], vv[i] * vv[j] * dd[k], vd[i] * vd[j] * vv[k],
                             vv[i] * vd[j] * vd[k], vd[i] * vv[j] * vd[k]});
+}
+
+void CellGroup::make_prism_tables(Basis basis, QuadratureRule rule, const LineProducts& line) {
+  num_modes = modes.size();
+  std::map<LocalMode, std::size_t> numbers;
+  for (LocalMode mode : modes) {
+    mode.k = 0;  // N_0 is 1 at w = 0
+    triangle_function.push_back(numbers.try_emplace(mode, numbers.size()).first->second);
+  }
+  num_triangle_functions = numbers.size();
+  const Quadrature layer = make_triangle_quadrature(rule, points_per_direction);
+  triangle_functions.resize(layer.points.size() * num_triangle_functions);
+  std::vector<std::array<double, 6>> means(num_triangle_functions, std::array<double, 6>{});  // by kPairs
+  ShapeFunctions functions(kind, basis, order);
+  for (std::size_t q = 0; q < layer.points.size(); ++q) {
+    functions.set_point(layer.points[q]);
+    for (const auto& [mode, number] : numbers) {
+      Vec3& f = triangle_functions[q * num_triangle_functions + number];
+      const double value = functions.value(mode, f);
+      f[2] = value;
+      for (int p = 0; p < 6; ++p) means[number][p] += layer.weights[q] * f[kPairs[p][0]] * f[kPairs[p][1]];
+    }
+  }
+  const auto& [vv, vd, dd] = line;
+  products.resize(num_modes);
+  for (std::size_t a = 0; a < num_modes; ++a) {
+    const std::array<double, 6>& mean = means[triangle_function[a]];
+    for (int p = 0; p < 6; ++p) {
+      const int along_w = (kPairs[p][0] == 2) + (kPairs[p][1] == 2);
+      const std::vector<double>& factor = along_w == 0 ? vv : along_w == 1 ? vd : dd;
+      products[a][p] = mean[p] * factor[modes[a].k];
+    }
+  }
+}
+
+void CellGroup::make_tet_tables(Basis basis) {
+  num_modes = modes.size();
+  ShapeFunctions functions(kind, basis, order);
+  products.assign(num_modes, {});
+  for (std::size_t q = 0; q < num_points(); ++q) {
+    functions.set_point(points[q]);
+    for (std::size_t a = 0; a < num_modes; ++a) {
+      Vec3 gradient;
+      functions.value(modes[a], gradient);
+      gradients.push_back(gradient);
+      for (int p = 0; p < 6; ++p) products[a][p] += weights[q] * gradient[kPairs[p][0]] * gradient[kPairs[p][1]];
+    }
+  }
 }
 
 }  // namespace subvol::internal

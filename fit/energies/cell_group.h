@@ -16,12 +16,17 @@ namespace subvol::internal {
 struct CellGroup {
   CellKind kind;
   int order, points_per_direction;
-  std::vector<Vec3> points;  ///< hex: column by column (w fastest, then u, then v)
+  std::vector<Vec3> points;  ///< hex: column by column (w fastest, then u, then v); prism: layer by layer (w slowest)
   std::vector<double> weights;
   std::size_t num_modes = 0;
-  std::vector<double> values, derivatives;  ///< hex: the order + 1 line functions at every point of a line
+  std::vector<double> values, derivatives;  ///< hex, prism: the order + 1 line functions at every point of a line
   std::vector<LocalMode> modes;             ///< prism, tet: union of the cells' modes, ascending
-  std::vector<Vec3> gradients;              ///< prism, tet: gradient of every mode at every point
+  std::vector<Vec3> gradients;              ///< tet: gradient of every mode at every point
+  /// Prism: each mode's function of the triangle, and the derivatives along u and v and the value of each of these
+  /// functions at every point of a layer.
+  std::vector<std::size_t> triangle_function;
+  std::vector<Vec3> triangle_functions;
+  std::size_t num_triangle_functions = 0;
   std::vector<std::array<double, 6>> products;  ///< per mode: mean of d_c N d_d N, by kPairs
 
   std::vector<std::array<Index, kLanes>> batches;  ///< cell numbers; the last batch is padded with repeats
@@ -47,7 +52,15 @@ struct CellGroup {
     if (kind == CellKind::hex) return (mode.k * (order + 1) + mode.j) * (order + 1) + mode.i;
     return std::lower_bound(modes.begin(), modes.end(), mode) - modes.begin();
   }
+  /// Fills the quadrature points and weights, and the values and gradients of the functions there.
   void make_tables(Basis basis, QuadratureRule rule);
+
+ private:
+  struct LineProducts;
+  LineProducts make_line(Basis basis, QuadratureRule rule);
+  void make_hex_tables(const LineProducts& line);
+  void make_prism_tables(Basis basis, QuadratureRule rule, const LineProducts& line);
+  void make_tet_tables(Basis basis);
 };
 
 }  // namespace subvol::internal

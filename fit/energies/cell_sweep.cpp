@@ -45,12 +45,12 @@ void CellSweep::from_dense(std::size_t first, const Wide (*j)[9]) {
     for (int e = 0; e < 9; ++e) own[n][e] = j[n][e];
   for (std::size_t a = 0; a < group_.num_modes; ++a) {
     Wide sums[3];
-    for (int r = 0; r < 3; ++r) sums[r] = dense_sums_[3 * a + r];
+    for (int r = 0; r < 3; ++r) sums[r] = sums_[3 * a + r];
     for (int n = 0; n < kCount; ++n) {
       const Vec3& g = gradients[n * group_.num_modes + a];
       for (int r = 0; r < 3; ++r) sums[r] += g[0] * own[n][3 * r] + g[1] * own[n][3 * r + 1] + g[2] * own[n][3 * r + 2];
     }
-    put(sums, &dense_sums_[3 * a]);
+    put(sums, &sums_[3 * a]);
   }
 }
 
@@ -58,6 +58,73 @@ template void CellSweep::to_dense<1>(std::size_t, Wide (*)[9]) const;
 template void CellSweep::to_dense<CellSweep::kPoints>(std::size_t, Wide (*)[9]) const;
 template void CellSweep::from_dense<1>(std::size_t, const Wide (*)[9]);
 template void CellSweep::from_dense<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
+
+void CellSweep::to_layer(int layer) {
+  std::fill(layer_.begin(), layer_.end(), Wide{});
+  const double *values = &group_.values[layer * m_], *derivatives = &group_.derivatives[layer * m_];
+  for (std::size_t a = 0; a < group_.num_modes; ++a) {
+    const int k = group_.modes[a].k;
+    Wide* to = &layer_[6 * group_.triangle_function[a]];
+    for (int r = 0; r < 3; ++r) {
+      to[r] += values[k] * coefficients_[3 * a + r];
+      to[3 + r] += derivatives[k] * coefficients_[3 * a + r];
+    }
+  }
+}
+
+void CellSweep::from_layer(int layer) {
+  const double *values = &group_.values[layer * m_], *derivatives = &group_.derivatives[layer * m_];
+  for (std::size_t a = 0; a < group_.num_modes; ++a) {
+    const int k = group_.modes[a].k;
+    const Wide* from = &layer_sums_[6 * group_.triangle_function[a]];
+    for (int r = 0; r < 3; ++r) sums_[3 * a + r] += values[k] * from[r] + derivatives[k] * from[3 + r];
+  }
+}
+
+template <int kCount>
+void CellSweep::to_triangle(std::size_t first, Wide (*j)[9]) const {
+  const std::size_t num = group_.num_triangle_functions;
+  const Vec3* functions = group_.triangle_functions.data() + first * num;
+  Wide sums[kCount][9] = {};
+  for (std::size_t t = 0; t < num; ++t) {
+    const Wide* c = &layer_[6 * t];
+    for (int n = 0; n < kCount; ++n) {
+      const Vec3& f = functions[n * num + t];
+      for (int r = 0; r < 3; ++r) {
+        sums[n][3 * r] += f[0] * c[r];
+        sums[n][3 * r + 1] += f[1] * c[r];
+        sums[n][3 * r + 2] += f[2] * c[3 + r];
+      }
+    }
+  }
+  for (int n = 0; n < kCount; ++n) put(sums[n], j[n]);
+}
+
+template <int kCount>
+void CellSweep::from_triangle(std::size_t first, const Wide (*j)[9]) {
+  const std::size_t num = group_.num_triangle_functions;
+  const Vec3* functions = group_.triangle_functions.data() + first * num;
+  Wide own[kCount][9];
+  for (int n = 0; n < kCount; ++n)
+    for (int e = 0; e < 9; ++e) own[n][e] = j[n][e];
+  for (std::size_t t = 0; t < num; ++t) {
+    Wide sums[6];
+    for (int r = 0; r < 6; ++r) sums[r] = layer_sums_[6 * t + r];
+    for (int n = 0; n < kCount; ++n) {
+      const Vec3& f = functions[n * num + t];
+      for (int r = 0; r < 3; ++r) {
+        sums[r] += f[0] * own[n][3 * r] + f[1] * own[n][3 * r + 1];
+        sums[3 + r] += f[2] * own[n][3 * r + 2];
+      }
+    }
+    put(sums, &layer_sums_[6 * t]);
+  }
+}
+
+template void CellSweep::to_triangle<1>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::to_triangle<CellSweep::kPoints>(std::size_t, Wide (*)[9]) const;
+template void CellSweep::from_triangle<1>(std::size_t, const Wide (*)[9]);
+template void CellSweep::from_triangle<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
 
 void CellSweep::to_lines() {
   for (int kj = 0; kj < m_ * m_; ++kj)

@@ -16,7 +16,9 @@ class CellSweep {
   explicit CellSweep(const CellGroup& group)
       : group_(group), m_(group.order + 1), n_(group.points_per_direction), coefficients_(3 * group.num_modes) {
     if (group.kind != CellKind::hex) {
-      dense_sums_.resize(coefficients_.size());
+      sums_.resize(coefficients_.size());
+      layer_.resize(6 * group.num_triangle_functions);
+      layer_sums_.resize(layer_.size());
       return;
     }
     const std::size_t lines = static_cast<std::size_t>(m_) * m_ * n_ * 6, planes = 9 * m_ * num_columns();
@@ -34,6 +36,8 @@ class CellSweep {
   void run(Op&& op) {
     if (group_.kind == CellKind::hex)
       run_tensor<kBack>(op);
+    else if (group_.kind == CellKind::prism)
+      run_layers<kBack>(op);
     else
       run_dense<kBack>(op);
   }
@@ -49,7 +53,7 @@ class CellSweep {
 
   template <bool kBack, class Op>
   void run_dense(Op&& op) {
-    if constexpr (kBack) std::fill(dense_sums_.begin(), dense_sums_.end(), Wide{});
+    if constexpr (kBack) std::fill(sums_.begin(), sums_.end(), Wide{});
     const std::size_t num_points = group_.num_points();
     for (std::size_t first = 0; first < num_points; first += kPoints) {
       const bool all = first + kPoints <= num_points;
@@ -58,7 +62,27 @@ class CellSweep {
       op(first, all ? kPoints : 1, j);
       if constexpr (kBack) all ? from_dense<kPoints>(first, j) : from_dense<1>(first, j);
     }
-    if constexpr (kBack) coefficients_.swap(dense_sums_);
+    if constexpr (kBack) coefficients_.swap(sums_);
+  }
+
+  /// Works on one layer of a prism's points at a time: coefficients -> functions of the triangle -> points.
+  template <bool kBack, class Op>
+  void run_layers(Op&& op) {
+    if constexpr (kBack) std::fill(sums_.begin(), sums_.end(), Wide{});
+    const std::size_t size = group_.num_points() / n_;
+    for (int layer = 0; layer < n_; ++layer) {
+      to_layer(layer);
+      if constexpr (kBack) std::fill(layer_sums_.begin(), layer_sums_.end(), Wide{});
+      for (std::size_t first = 0; first < size; first += kPoints) {
+        const bool all = first + kPoints <= size;
+        Wide j[kPoints][9];
+        all ? to_triangle<kPoints>(first, j) : to_triangle<1>(first, j);
+        op(layer * size + first, all ? kPoints : 1, j);
+        if constexpr (kBack) all ? from_triangle<kPoints>(first, j) : from_triangle<1>(first, j);
+      }
+      if constexpr (kBack) from_layer(layer);
+    }
+    if constexpr (kBack) coefficients_.swap(sums_);
   }
 
   /// Works on one direction at a time: coefficients (k, j, i) -> lines (k, j, q1) -> planes (k, q2, q1) -> points. The
@@ -80,7 +104,17 @@ class CellSweep {
     }
   }
 
-  /// `to_dense` computes J at kCount points of a prism or tet; `from_dense` sums back into its modes.
+  /// Fills layer_: for each function of the triangle, its coefficient's value, then its derivative along w.
+  void to_layer(int layer);
+  void from_layer(int layer);
+
+  /// `to_triangle` computes J at kCount points of the layer; `from_triangle` sums back into its functions.
+  template <int kCount>
+  void to_triangle(std::size_t first, Wide (*j)[9]) const;
+  template <int kCount>
+  void from_triangle(std::size_t first, const Wide (*j)[9]);
+
+  /// `to_dense` computes J at kCount points of a tet; `from_dense` sums back into its modes.
   template <int kCount>
   void to_dense(std::size_t first, Wide (*j)[9]) const;
   template <int kCount>
@@ -102,7 +136,8 @@ class CellSweep {
 
   const CellGroup& group_;
   int m_, n_;
-  std::vector<Wide> coefficients_, dense_sums_;
+  std::vector<Wide> coefficients_, sums_;        // sums_: prism, tet
+  std::vector<Wide> layer_, layer_sums_;         // prism
   std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not initialized with zeros
   std::unique_ptr<Wide[][9]> points_;
 };

@@ -265,15 +265,15 @@ MendedSurface mend_surface(const PolygonMesh& surface, const FeatureTags& tags, 
     return result;
   };
   if (!(distance > 0) || surface.num_faces() == 0 || !has_only_triangles(surface)) return unchanged(surface, tags);
-  const bool has_rims = goal == MendingGoal::solid && !vertices_at_rims(triangulate(surface)).empty();
-  if (!has_rims && has_one_fan_at_each_vertex(surface) && find_faults(surface, goal, cancelled).none())
+  const bool has_cracks = goal == MendingGoal::solid_with_cracks && !vertices_at_rims(triangulate(surface)).empty();
+  if (!has_cracks && has_one_fan_at_each_vertex(surface) && find_faults(surface, goal, cancelled).none())
     return unchanged(surface, tags);
   if (cancelled && cancelled()) return ended(unchanged(surface, tags));
   Mender mender(surface, distance, goal, cancelled);
   mender.merge_vertices();
-  if (has_rims) mender.close_rims();
+  if (has_cracks) mender.close_rims();
   mender.drop_repeated_faces();
-  if (goal == MendingGoal::solid) mender.compare_with_present();
+  if (goal != MendingGoal::layers) mender.compare_with_present();
   mender.split_fans();
   if (!mender.mend_locally()) return ended(unchanged(surface, tags));
   MendedSurface result = mender.result(tags);

@@ -39,8 +39,8 @@ struct MendedSurface {
 /// without area, vertices and edges at which several fans of faces touch, small crossings and contacts, and, for
 /// layers, vertices from which no direction sees all faces around.
 ///
-/// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one. For a solid, so
-///   do those at rims that are closer than the distance: cracks between the faces of a part close.
+/// - Vertices closer than the rounding of a file of single precision (1e-7 of the diagonal) become one. For a
+///   solid with cracks, so do those at rims that are closer than the distance.
 /// - Of faces on the same vertices, those of equal orientation become one, and two that face each other vanish. For a
 ///   solid, these may be of any size, since they enclose nothing.
 /// - Where several fans of faces have a vertex or an edge in common, each gets its own copy of it, and the copies move
@@ -49,7 +49,7 @@ struct MendedSurface {
 ///   distance collapses, an edge is exchanged for the other diagonal of its two triangles if these are as close, or a
 ///   vertex moves by up to the distance. If no change helps, two are tried together.
 ///
-/// surface   a surface without faults (for a solid, also without rims) is returned bit by bit, and so is one with
+/// surface   a surface without faults (for a solid with cracks, also without rims) is returned bit by bit, and so is one with
 ///           polygons of more than three corners.
 /// distance  in the surface's unit, >= 0; 0: the surface is returned as it is.
 /// returns   a surface that is farther than `distance` from the given one nowhere (for a solid: from the given one

@@ -19,7 +19,9 @@
 #include <exception>
 #include <numeric>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace subvol {
 
@@ -210,17 +212,11 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
   return repair;
 }
 
-/// Returns the surface with small faults removed, and a sentence about it; nothing if that brings no improvement.
-/// Sheets that divide the inside are left alone: what meets there is meant to meet.
-std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiagnosis& before,
-                                    const std::function<bool()>& cancelled, RegionRule rule) {
-  constexpr std::array<SurfaceFault, 5> kMendable{SurfaceFault::crossing, SurfaceFault::face_contact, SurfaceFault::fin,
-                                                  SurfaceFault::repeated_triangle, SurfaceFault::open_rim};
-  const bool is_mendable =
-      std::any_of(kMendable.begin(), kMendable.end(), [&](SurfaceFault f) { return before.find(f); });
-  if (!is_mendable || before.find(SurfaceFault::interface)) return std::nullopt;
-  const MendedSurface mending =
-      mend_surface(as_polygons(given), {}, kMendingShare * before.diagonal, MendingGoal::solid, cancelled);
+/// Returns the surface with small faults removed for a goal, and a sentence about it; nothing if that brings no
+/// improvement.
+std::optional<SurfaceRepair> mended_for(MendingGoal goal, const TriangleMesh& given, const SurfaceDiagnosis& before,
+                                        const std::function<bool()>& cancelled, RegionRule rule) {
+  const MendedSurface mending = mend_surface(as_polygons(given), {}, kMendingShare * before.diagonal, goal, cancelled);
   if (mending.is_cancelled || !mending.is_mended()) return std::nullopt;
   const TriangleMesh surface = triangulate(mending.surface);
   if (surface.triangles.empty()) return std::nullopt;
@@ -228,6 +224,33 @@ std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiag
   if (after.is_cancelled || num_obstacles(after) >= num_obstacles(before)) return std::nullopt;
   SurfaceRepair repair = rearranged(surface, after, cancelled, rule);
   repair.done.insert(repair.done.begin(), "target: " + to_text(mending, before.diagonal));
+  return repair;
+}
+
+/// Returns the surface with small faults removed, and a sentence about it; nothing if that brings no improvement.
+/// Rims may be cracks or the borders of holes; what can be filled decides. Sheets that divide the inside are left
+/// alone: what meets there is meant to meet. InputError: the surface without faults bounds no solid.
+std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiagnosis& before,
+                                    const std::function<bool()>& cancelled, RegionRule rule) {
+  constexpr std::array<SurfaceFault, 4> kMendable{SurfaceFault::crossing, SurfaceFault::face_contact, SurfaceFault::fin,
+                                                  SurfaceFault::repeated_triangle};
+  if (before.find(SurfaceFault::interface)) return std::nullopt;
+  std::vector<MendingGoal> goals;
+  if (before.find(SurfaceFault::open_rim)) goals.push_back(MendingGoal::solid_with_cracks);
+  if (std::ranges::any_of(kMendable, [&](SurfaceFault fault) { return before.find(fault) != nullptr; }))
+    goals.push_back(MendingGoal::solid);
+  std::optional<SurfaceRepair> repair;
+  std::exception_ptr error;
+  for (const MendingGoal goal : goals) {
+    try {
+      std::optional<SurfaceRepair> next = mended_for(goal, given, before, cancelled, rule);
+      if (next && (!repair || next->is_fillable)) repair = std::move(next);
+      if (repair && repair->is_fillable) return repair;
+    } catch (const InputError&) {
+      error = std::current_exception();
+    }
+  }
+  if (!repair && error) std::rethrow_exception(error);
   return repair;
 }
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """curved_as_read.py PROGRAM DATA [--orders 2 4 8] [--adaptive 12] [--basis legendre] [--cases NAME ..] [--keep FOLDER]
+                  [--time-limit SECONDS]
 
 Fits every case of a folder (DATA/NAME/target.off and template.mesh) with curved cells, and judges what VTK reconstructs
 from the .vtu: the scaled Jacobian of every cell at the points where the report samples it, and on a grid of 9 points in
@@ -123,9 +124,13 @@ def main():
     parser.add_argument("--basis", default="legendre")
     parser.add_argument("--cases", nargs="*")
     parser.add_argument("--keep")
+    parser.add_argument("--time-limit", help="of each fit; what it has reached by then is judged")
     arguments = parser.parse_args()
     runs = [["--order", str(p)] for p in arguments.orders]
     runs += [["--order", str(p), "--adaptive"] for p in arguments.adaptive]
+    more = ["--basis", arguments.basis]
+    if arguments.time_limit:
+        more += ["--time-limit", arguments.time_limit]
     all_right = True
     with tempfile.TemporaryDirectory() as folder:
         out = arguments.keep or folder
@@ -135,7 +140,7 @@ def main():
             if not os.path.exists(os.path.join(case, "target.off")):
                 continue
             for words in runs:
-                all_right = judge(arguments.program, case, name, [*words, "--basis", arguments.basis], out) and all_right
+                all_right = judge(arguments.program, case, name, [*words, *more], out) and all_right
     return 0 if all_right else 1
 
 

@@ -84,6 +84,12 @@ TEST_CASE("Cracks between the faces of a part close before it is filled", "[mend
   CHECK(repair.is_fillable);
   CHECK(internal::welded(repair.surface).mesh.positions.size() == cube.positions.size());
   CHECK(std::abs(internal::signed_volume_of(repair.surface)) == Approx(8).epsilon(1e-3));
+  // They do so only where rims count as cracks.
+  const PolygonMesh polygons = as_polygons(cracked);
+  const double distance = kMendingShare * diagonal;
+  CHECK(mend_surface(polygons, {}, distance, MendingGoal::solid).surface.positions.size() == cracked.positions.size());
+  CHECK(mend_surface(polygons, {}, distance, MendingGoal::solid_with_cracks).surface.positions.size() ==
+        cube.positions.size());
   // A hole is none.
   TriangleMesh open = cube;
   open.triangles.resize(open.triangles.size() - 20);
