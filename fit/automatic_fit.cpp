@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_driver.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/features/crisp_edges.h"
@@ -57,51 +58,9 @@ struct Edges {
   SignedFeatures features;  ///< no curves: there is nothing to follow
 };
 
-/// One attempt: a template of at most so many cells, and the number of times it is subdivided.
-struct Attempt {
-  enum class Kind {
-    smooth,  ///< a pillowed template
-    edges,   ///< a padded grid
-    aligned  ///< a padded grid through the target's planes
-  };
-  Kind kind;
-  std::size_t template_cells;
-  int levels;
-  bool is_last_count = true;  ///< no attempt with more cells follows
-};
-
-/// Returns the number of cells from which a mesh gets about this many if it is subdivided so many times.
-std::size_t cells_before(std::size_t cells, int levels) {
-  for (int level = 0; level < levels; ++level) cells /= kChildren;
-  return std::max(cells, kLeastTemplateCells);
-}
-
-std::vector<Attempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
-  using Kind = Attempt::Kind;
-  std::vector<Attempt> attempts;
-  if (has_edges) {
-    std::vector<std::size_t> counts(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
-    if (options.cells) counts = {options.makes_cage ? cells_before(*options.cells, 1) : *options.cells};
-    for (const std::size_t cells : counts)
-      for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0, cells == counts.back()});
-  } else if (options.makes_cage) {
-    std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
-    if (options.cells) counts = {*options.cells};
-    for (const std::size_t cells : counts)
-      attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});
-  } else if (options.cells) {
-    if (*options.cells >= kChildren * kLeastTemplateCells)
-      attempts.push_back({Kind::smooth, *options.cells / kChildren, 1});
-    attempts.push_back({Kind::smooth, *options.cells, 0});
-  } else {
-    for (const std::size_t cells : kAutomaticCells) attempts.push_back({Kind::smooth, cells / kChildren, 1});
-  }
-  return attempts;
-}
-
 /// Tells what a trial was made from, and where it is not as good as aimed at.
 struct TrialStart {
-  Attempt::Kind kind = Attempt::Kind::smooth;
+  AutomaticAttempt::Kind kind = AutomaticAttempt::Kind::smooth;
   SizedMesh grid;                ///< if edges are followed; else without cells, with the sizes of the trial's mesh
   std::vector<Vec3> fitted;      ///< positions of the grid's vertices near the target
   std::vector<Index> far, poor;  ///< cells of the trial's mesh that are too far from the target, or below the goal
@@ -148,13 +107,13 @@ class AutomaticFit : AutomaticDriver {
  private:
   void find_edges();
   void find_features();
-  bool run_attempt(const Attempt& attempt);
-  bool run_smooth(const Attempt& attempt);
-  bool run_edges(const Attempt& attempt);
+  bool run_attempt(const AutomaticAttempt& attempt);
+  bool run_smooth(const AutomaticAttempt& attempt);
+  bool run_edges(const AutomaticAttempt& attempt);
   bool run_refined();
   void lay_out(RoutingOptions routing);
   void begin_cage() override;
-  bool fit_smoothly(SizedMesh grid, Attempt::Kind kind);
+  bool fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind);
   bool fit_future_cage(RoutingOptions& routing);
   bool route_and_fit(const AutomaticFitTrial& described);
   std::vector<Fault> faults_of_best() const;
@@ -167,15 +126,15 @@ class AutomaticFit : AutomaticDriver {
   std::vector<UnfollowedCurve> unfollowed_curves() const;
   bool judge(AutomaticFitTrial trial) override;
   void conclude();
-  bool is_worth_trying(const Attempt& attempt) const {
+  bool is_worth_trying(const AutomaticAttempt& attempt) const {
     // A grid without planes is the grid of the attempt before; with many of them, grids not through them are worse.
     constexpr double kMany = 0.4;
-    return attempt.kind != Attempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
+    return attempt.kind != AutomaticAttempt::Kind::edges || (aligned_share_ > 0 && aligned_share_ < kMany);
   }
   /// Cages are not refined: cells that are cut have irregular edges, whose subdivision surfaces are poor.
   bool is_worth_refining() const {
     return !options_.makes_cage && !is_good() &&
-           (best_start_.kind == Attempt::Kind::smooth || best().merit > kWorthRefining);
+           (best_start_.kind == AutomaticAttempt::Kind::smooth || best().merit > kWorthRefining);
   }
 
   const TriangleMesh& original_;
@@ -187,7 +146,7 @@ class AutomaticFit : AutomaticDriver {
   TrialStart start_, best_start_;     ///< of the present trial, and of the best one
   std::optional<EdgeLayout> layout_;  ///< of mesh_, or of its cage; none: it follows no edges
   LevelLayout level_layout_;          ///< of mesh_, from layout_
-  std::vector<Attempt> skipped_;      ///< their grids were too coarse for many edges
+  std::vector<AutomaticAttempt> skipped_;  ///< their grids were too coarse for many edges
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
 
@@ -360,7 +319,7 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
 }
 
 /// Fits a pillowed template. Returns false if the fit must end.
-bool AutomaticFit::run_smooth(const Attempt& attempt) {
+bool AutomaticFit::run_smooth(const AutomaticAttempt& attempt) {
   cage_.reset();
   std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
   if (!made) return !no_template_.empty();
@@ -383,7 +342,7 @@ std::vector<double> AutomaticFit::faults_of_cells() const {
 }
 
 /// Brings a grid near the target and lays out the edges on it. Returns false if the fit must end.
-bool AutomaticFit::fit_smoothly(SizedMesh grid, Attempt::Kind kind) {
+bool AutomaticFit::fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind) {
   layout_.reset();
   cage_.reset();
   mesh_ = grid.mesh;
@@ -445,7 +404,7 @@ bool AutomaticFit::route_and_fit(const AutomaticFitTrial& described) {
 }
 
 /// Fits a padded grid. Returns false if the fit must end.
-bool AutomaticFit::run_edges(const Attempt& attempt) {
+bool AutomaticFit::run_edges(const AutomaticAttempt& attempt) {
   constexpr double kRoomForPads = 0.5, kLess = 0.95;
   constexpr double kEnough = 0.8;  // share of the edges that must find a path, or a finer grid is worth more than a fit
   constexpr int kTries = 3;
@@ -453,11 +412,11 @@ bool AutomaticFit::run_edges(const Attempt& attempt) {
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
     std::optional<AutoTemplate> made =
-        make_template({.cells = count, .through_planes = attempt.kind == Attempt::Kind::aligned});
+        make_template({.cells = count, .through_planes = attempt.kind == AutomaticAttempt::Kind::aligned});
     if (!made) return !no_template_.empty();
-    if (attempt.kind == Attempt::Kind::aligned) aligned_share_ = made->aligned_share;
+    if (attempt.kind == AutomaticAttempt::Kind::aligned) aligned_share_ = made->aligned_share;
     const AutomaticFitTrial described{.template_cells = made->mesh.num_cells(),
-                                      .through_planes = attempt.kind == Attempt::Kind::aligned};
+                                      .through_planes = attempt.kind == AutomaticAttempt::Kind::aligned};
     if (!fit_smoothly({std::move(made->mesh), {}}, attempt.kind)) {
       if (result_.trials.empty()) judge(described);
       return false;
@@ -488,7 +447,7 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
   for (const Index c : poor)
     if (least[c] < kEnoughQuality * options_.quality) faults.push_back({c});
   for (const Index c : best_start_.far) faults.push_back({c});
-  if (best_start_.kind == Attempt::Kind::smooth) return faults;
+  if (best_start_.kind == AutomaticAttempt::Kind::smooth) return faults;
   const VolumeMesh& grid = best_start_.grid.mesh;
   for (Fault& fault : faults) fault = cells_at(grid, best_start_.fitted, result_.mesh, fault);
   const BoundaryCells cells(grid, best_start_.fitted);
@@ -506,7 +465,7 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
 /// must end.
 bool AutomaticFit::run_refined() {
   const AutomaticFitTrial before = best();
-  const bool is_smooth = best_start_.kind == Attempt::Kind::smooth;
+  const bool is_smooth = best_start_.kind == AutomaticAttempt::Kind::smooth;
   const VolumeMesh& base = is_smooth ? result_.mesh : best_start_.grid.mesh;
   const double most_cells =
       options_.cells ? static_cast<double>(*options_.cells) : kMostGrowth * static_cast<double>(before.cells);
@@ -532,10 +491,10 @@ bool AutomaticFit::run_refined() {
 }
 
 /// Returns false if the fit must end. InputError: there is no template, and there was none before.
-bool AutomaticFit::run_attempt(const Attempt& attempt) {
+bool AutomaticFit::run_attempt(const AutomaticAttempt& attempt) {
   layout_.reset();
   no_template_.clear();
-  const bool going = attempt.kind == Attempt::Kind::smooth ? run_smooth(attempt) : run_edges(attempt);
+  const bool going = attempt.kind == AutomaticAttempt::Kind::smooth ? run_smooth(attempt) : run_edges(attempt);
   if (!no_template_.empty() && result_.trials.empty() && skipped_.empty()) throw InputError(no_template_);
   return going;
 }
@@ -566,13 +525,13 @@ void AutomaticFit::conclude() {
 AutomaticFitResult AutomaticFit::run() {
   find_edges();
   find_features();
-  const std::vector<Attempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
+  const std::vector<AutomaticAttempt> attempts = attempts_of(options_, !edges_.features.curves.empty());
   bool going = true;
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
     begin_attempt();
     if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
   }
-  for (Attempt attempt : std::exchange(skipped_, {})) {
+  for (AutomaticAttempt attempt : std::exchange(skipped_, {})) {
     if (!going || !result_.trials.empty()) break;
     attempt.is_last_count = true;
     going = run_attempt(attempt);
@@ -587,7 +546,8 @@ AutomaticFitResult AutomaticFit::run() {
   }
   if (going && !edges_.features.curves.empty() && !is_valid(best())) {
     begin_attempt();
-    going = run_attempt({Attempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
+    going =
+        run_attempt({AutomaticAttempt::Kind::smooth, options_.cells.value_or(kAutomaticCells.back()) / kChildren, 1});
   }
   if (going) going = polish();
   if (going) conclude();

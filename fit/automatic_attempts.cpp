@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/automatic_attempts.h"
+
+#include "subvol/fit/fits/fitted_cage.h"
+#include "subvol/templates/auto_template.h"
+
+#include <algorithm>
+
+namespace subvol::internal {
+
+namespace {
+
+/// Returns the number of cells from which a mesh gets about this many if it is subdivided so many times.
+std::size_t cells_before(std::size_t cells, int levels) {
+  for (int level = 0; level < levels; ++level) cells /= kChildren;
+  return std::max(cells, kLeastTemplateCells);
+}
+
+}  // namespace
+
+std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
+  using Kind = AutomaticAttempt::Kind;
+  std::vector<AutomaticAttempt> attempts;
+  if (has_edges) {
+    std::vector<std::size_t> counts(kAutomaticEdgeCells.begin(), kAutomaticEdgeCells.end());
+    if (options.cells) counts = {options.makes_cage ? cells_before(*options.cells, 1) : *options.cells};
+    for (const std::size_t cells : counts)
+      for (const Kind kind : {Kind::aligned, Kind::edges}) attempts.push_back({kind, cells, 0, cells == counts.back()});
+  } else if (options.makes_cage) {
+    std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+    if (options.cells) counts = {*options.cells};
+    for (const std::size_t cells : counts)
+      attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});
+  } else if (options.cells) {
+    if (*options.cells >= kChildren * kLeastTemplateCells)
+      attempts.push_back({Kind::smooth, *options.cells / kChildren, 1});
+    attempts.push_back({Kind::smooth, *options.cells, 0});
+  } else {
+    for (const std::size_t cells : kAutomaticCells) attempts.push_back({Kind::smooth, cells / kChildren, 1});
+  }
+  return attempts;
+}
+
+}  // namespace subvol::internal

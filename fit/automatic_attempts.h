@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/automatic_fit.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace subvol::internal {
+
+/// One attempt of an automatic fit of one solid: a template of at most so many cells, and the number of times it is subdivided.
+struct AutomaticAttempt {
+  enum class Kind {
+    smooth,  ///< a pillowed template
+    edges,   ///< a padded grid
+    aligned  ///< a padded grid through the target's planes
+  };
+  Kind kind;
+  std::size_t template_cells;
+  int levels;
+  bool is_last_count = true;  ///< no attempt with more cells follows
+};
+
+/// Returns the attempts to make, in this order, until a fit is good.
+/// has_edges  the target has sharp edges to follow.
+std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges);
+
+}  // namespace subvol::internal
