@@ -11,7 +11,10 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
+#include <utility>
+#include <vector>
 
 using namespace subvol;
 
@@ -41,6 +44,25 @@ TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow
   CHECK(polished.least_scaled_jacobian > 0.7);
   CHECK(polished.max_percent <= kAutomaticMaxPercent);
   CHECK(check_mesh(result.mesh, &ball, {}).valid());
+}
+
+TEST_CASE("A gap narrower than the mesh's distance stays open, and the relaxed trial is judged like any other",
+          "[slow]") {
+  TriangleMesh balls = test::cube_surface(12, true);
+  const auto first = static_cast<Index>(balls.positions.size());
+  const TriangleMesh ball = balls;
+  constexpr double kRadius = 0.3, kGap = 3e-4;
+  for (const Vec3& p : ball.positions) balls.positions.push_back(kRadius * p + (1 + kRadius + kGap) * Vec3::UnitX());
+  for (const auto& [a, b, c] : ball.triangles) balls.triangles.push_back({first + a, first + b, first + c});
+  const AutomaticFitResult result = fit_automatically(balls, {.cells = 4000});
+  CHECK(result.topology == BettiNumbers{2, 0, 0});
+  CHECK(check_mesh(result.mesh, &balls, {}).valid());
+  const auto relaxed =
+      std::ranges::find_if(result.trials, [](const AutomaticFitTrial& trial) { return trial.relaxed_at.has_value(); });
+  REQUIRE(relaxed != result.trials.end());
+  CHECK(relaxed->self_intersections == std::size_t{0});
+  const double share = std::min(1.0, relaxed->least_scaled_jacobian / kUsualQuality);
+  CHECK(std::abs(relaxed->least_share - share) < 0.05);
 }
 
 TEST_CASE("An automatic fit makes a cage whose mesh is well shaped", "[slow]") {

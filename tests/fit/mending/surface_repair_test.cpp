@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/mending/surface_repair.h"
 
+#include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/mending/mend_surface.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/welded_surface.h"
