@@ -18,6 +18,11 @@ std::size_t cells_before(std::size_t cells, int levels) {
 
 }  // namespace
 
+std::size_t cells_after(std::size_t cells, int levels) {
+  for (int level = 0; level < levels; ++level) cells *= kChildren;
+  return cells;
+}
+
 std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges) {
   using Kind = AutomaticAttempt::Kind;
   std::vector<AutomaticAttempt> attempts;

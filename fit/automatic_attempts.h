@@ -21,6 +21,9 @@ struct AutomaticAttempt {
   bool is_last_count = true;  ///< no attempt with more cells follows
 };
 
+/// Returns the number of cells that a template of so many becomes if it is subdivided so many times.
+std::size_t cells_after(std::size_t cells, int levels);
+
 /// Returns the attempts to make, in this order, until a fit is good.
 /// has_edges  the target has sharp edges to follow.
 std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bool has_edges);

@@ -147,6 +147,7 @@ class AutomaticFit : AutomaticDriver {
   std::optional<EdgeLayout> layout_;  ///< of mesh_, or of its cage; none: it follows no edges
   LevelLayout level_layout_;          ///< of mesh_, from layout_
   std::vector<AutomaticAttempt> skipped_;  ///< their grids were too coarse for many edges
+  std::string refusal_;                    ///< why there was no template for the last attempt that had none
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
 
@@ -325,10 +326,12 @@ bool AutomaticFit::run_smooth(const AutomaticAttempt& attempt) {
   if (!made) return !no_template_.empty();
   const bool another_follows = options_.cells && attempt.levels > 0 && !options_.makes_cage;
   if (another_follows && made->num_cells() > attempt.template_cells) return true;
+  // Only a fine grid may have the topology; its cells need not be cut.
+  const bool is_fine = !options_.makes_cage && made->num_cells() > cells_after(attempt.template_cells, attempt.levels);
   mesh_ = std::move(*made);
   sizes_.clear();
   start_ = {};
-  return fit_and_refine(attempt.levels);
+  return fit_and_refine(is_fine ? 0 : attempt.levels);
 }
 
 /// Returns how poor each cell of the present mesh, or of its cage, is, 0 for good ones.
@@ -490,12 +493,12 @@ bool AutomaticFit::run_refined() {
          judge(trial) && relax_last_trial();
 }
 
-/// Returns false if the fit must end. InputError: there is no template, and there was none before.
+/// Returns false if the fit must end.
 bool AutomaticFit::run_attempt(const AutomaticAttempt& attempt) {
   layout_.reset();
   no_template_.clear();
   const bool going = attempt.kind == AutomaticAttempt::Kind::smooth ? run_smooth(attempt) : run_edges(attempt);
-  if (!no_template_.empty() && result_.trials.empty() && skipped_.empty()) throw InputError(no_template_);
+  if (!no_template_.empty()) refusal_ = no_template_;
   return going;
 }
 
@@ -536,7 +539,7 @@ AutomaticFitResult AutomaticFit::run() {
     attempt.is_last_count = true;
     going = run_attempt(attempt);
   }
-  going = going && !result_.trials.empty();
+  if (going && result_.trials.empty()) throw InputError(refusal_);
   const int most_refinements = edges_.features.curves.empty() ? kMostRefinements : kMostRefinementsWithEdges;
   for (int round = 0; going && is_worth_refining() && round < most_refinements; ++round) {
     const std::size_t before = result_.chosen;

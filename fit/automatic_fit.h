@@ -126,6 +126,8 @@ struct AutomaticFitResult {
 /// poor are given up, and the rest is routed anew. A grid that is not through planes is tried, too, if less than 40 %
 /// of the target's area lies on them.
 ///
+/// If no grid has the solid's topology, the next attempt has finer ones.
+///
 /// Faces on flat parts of such a target are made exactly flat (`flatten_faces`). A number of cells at which less than
 /// 80 % of the edges' length finds a path is skipped if a larger one follows.
 ///
