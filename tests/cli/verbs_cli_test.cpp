@@ -499,7 +499,7 @@ TEST_CASE("A fit without a template makes a cage if one is asked for", "[cli][te
 
 TEST_CASE("A surface alone is enough for a fit", "[cli][templates][slow]") {
   const Workplace place;
-  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 400\nlevels = 1\n");
+  place.file("options.toml", "[template.auto]\ncells = 50\n[fit]\ncells = 400\nlevels = 1\nmax-tolerance = 2\n");
   const Run run = place.run("fit target.off --config options.toml -o out.mesh --report report.json");
   INFO(run.err);
   REQUIRE(run.status == 0);
@@ -508,6 +508,11 @@ TEST_CASE("A surface alone is enough for a fit", "[cli][templates][slow]") {
   CHECK(report.at("template").at("handles") == 0);
   CHECK(report.at("topology").at("boundary_euler_number") == 2);
   CHECK(report.at("distance").at("mean_percent") < 0.5);
+  // So few faces are more than 1 % off, which costs the status unless it is allowed.
+  const Run coarse = place.run("fit target.off --cells 400 --levels 1 -o coarse.mesh");
+  CHECK(coarse.status == 4);
+  CHECK(coarse.err.find("the largest distance is above 1 % of the diagonal") != std::string::npos);
+  CHECK(place.has("coarse.mesh"));
   CHECK(place.run("template auto target.off --config options.toml -o auto.mesh --report auto.json").status == 0);
   CHECK(place.json("auto.json").at("options").at("cells") == 50);
   CHECK(place.run("fit target.off --order 1 --cells 27 -o out.vtu").status == 0);
