@@ -29,18 +29,18 @@ CellGroup::LineProducts CellGroup::make_line(Basis basis, QuadratureRule rule) {
   const int n = points_per_direction, m = order + 1;
   values.resize(n * m);
   derivatives.resize(n * m);
-  LineProducts products{std::vector<double>(m), std::vector<double>(m), std::vector<double>(m)};
+  LineProducts means{std::vector<double>(m), std::vector<double>(m), std::vector<double>(m)};
   const LineRule line = rule == QuadratureRule::trapezoidal ? trapezoidal_rule(n) : gauss_lobatto_rule(n);
   for (int q = 0; q < n; ++q) {
     line_functions(basis, order, line.points[q], &values[q * m], &derivatives[q * m]);
     const double w = line.weights[q];
     for (int i = 0; i < m; ++i) {
-      products.vv[i] += w * values[q * m + i] * values[q * m + i];
-      products.vd[i] += w * values[q * m + i] * derivatives[q * m + i];
-      products.dd[i] += w * derivatives[q * m + i] * derivatives[q * m + i];
+      means.vv[i] += w * values[q * m + i] * values[q * m + i];
+      means.vd[i] += w * values[q * m + i] * derivatives[q * m + i];
+      means.dd[i] += w * derivatives[q * m + i] * derivatives[q * m + i];
     }
   }
-  return products;
+  return means;
 }
 
 void CellGroup::make_hex_tables(const LineProducts& line) {
