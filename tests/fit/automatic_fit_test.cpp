@@ -65,6 +65,26 @@ TEST_CASE("A gap narrower than the mesh's distance stays open, and the relaxed t
   CHECK(std::abs(relaxed->least_share - share) < 0.05);
 }
 
+TEST_CASE("A gap that the first grids close is held by finer ones", "[slow]") {
+  const TriangleMesh ball = test::cube_surface(12, true);
+  TriangleMesh bearing;  // a ball, a void around another ball, and that ball
+  constexpr double kInner = 0.6, kGap = 0.013;
+  for (const double radius : {1.0, kInner + kGap, kInner}) {
+    const auto first = static_cast<Index>(bearing.positions.size());
+    const bool is_void = radius == kInner + kGap;  // its wall is turned inward
+    for (const Vec3& p : ball.positions) bearing.positions.push_back(radius * p);
+    for (auto [i, j, k] : ball.triangles) {
+      if (is_void) std::swap(j, k);
+      bearing.triangles.push_back({first + i, first + j, first + k});
+    }
+  }
+  const AutomaticFitResult result = fit_automatically(bearing, {.quality = 0.3});
+  CHECK(result.topology == BettiNumbers{2, 0, 1});
+  CHECK(check_mesh(result.mesh, &bearing, {}).valid());
+  CHECK(result.trials.front().template_cells > kAutomaticCells.front());
+  CHECK(result.trials.front().level == 0);
+}
+
 TEST_CASE("An automatic fit makes a cage whose mesh is well shaped", "[slow]") {
   const TriangleMesh ball = test::cube_surface(12, true);
   const AutomaticFitResult result = fit_automatically(ball, {.cells = 3000, .makes_cage = true});
