@@ -8,7 +8,8 @@
 
 namespace subvol::internal {
 
-/// One attempt of an automatic fit of one solid: a template of at most so many cells, and the number of times it is subdivided.
+/// One attempt of an automatic fit of one solid: a template of at most so many cells, and the number of times it is
+/// subdivided.
 struct AutomaticAttempt {
   enum class Kind {
     smooth,  ///< a pillowed template

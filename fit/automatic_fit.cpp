@@ -378,6 +378,7 @@ bool AutomaticFit::fit_future_cage(RoutingOptions& routing) {
     const double sum = std::accumulate(faults.begin(), faults.end(), 0.0);
     if (sum >= least_faults) break;  // what was given up has not helped
     least_faults = sum;
+    if (round + 1 == kMostRoutings) break;  // the layout must be that of the routing's options
     if (!give_up_poor_curves(layout_->patched, edges_.features, layout_->routing, faults, routing)) break;
   }
   return true;

@@ -136,8 +136,8 @@ class CellSweep {
 
   const CellGroup& group_;
   int m_, n_;
-  std::vector<Wide> coefficients_, sums_;        // sums_: prism, tet
-  std::vector<Wide> layer_, layer_sums_;         // prism
+  std::vector<Wide> coefficients_, sums_;  // sums_: prism, tet
+  std::vector<Wide> layer_, layer_sums_;   // prism
   std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not initialized with zeros
   std::unique_ptr<Wide[][9]> points_;
 };

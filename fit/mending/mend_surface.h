@@ -49,8 +49,8 @@ struct MendedSurface {
 ///   distance collapses, an edge is exchanged for the other diagonal of its two triangles if these are as close, or a
 ///   vertex moves by up to the distance. If no change helps, two are tried together.
 ///
-/// surface   a surface without faults (for a solid with cracks, also without rims) is returned bit by bit, and so is one with
-///           polygons of more than three corners.
+/// surface   a surface without faults (for a solid with cracks, also without rims) is returned bit by bit, and so is
+///           one with polygons of more than three corners.
 /// distance  in the surface's unit, >= 0; 0: the surface is returned as it is.
 /// returns   a surface that is farther than `distance` from the given one nowhere (for a solid: from the given one
 ///           without the faces that vanish). Faults that could not be removed are still there, and what `make_layers`
