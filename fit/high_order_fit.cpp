@@ -12,6 +12,7 @@
 #include "subvol/fit/fits/high_order_schedule.h"
 #include "subvol/fit/fits/order_indicator.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/fit/stages/memory_budget.h"
 #include "subvol/fit/stages/stage_runner.h"
@@ -106,6 +107,7 @@ class HighOrderFit : StagedFit {
   bool raise_where_it_pays();
   bool run_adaptive_orders();
   bool finish();
+  void leave_folds();
   bool lower_lambda(std::size_t pairs);
   std::optional<Outcome> measured_outcome();
   bool improve_worst_places();
@@ -478,6 +480,26 @@ bool HighOrderFit::finish() {
   return *pairs == pairs_before || (lower_lambda(*pairs) && improve_worst_places());
 }
 
+/// If the boundary of a fit that had to end early intersects itself, and less so before the last stage of the schedule,
+/// rolls back to that state. This takes two searches for self-intersections beyond the time limit, so a fit that was
+/// cancelled is left as it is.
+void HighOrderFit::leave_folds() {
+  if (report_.stop_reason == StopReason::cancelled) return;
+  const auto pairs = [&] { return self_intersections(measured_boundary()).pairs.size(); };
+  if (start_.x.size() != mesh_.coefficients.size()) return;  // the last order's stage has not begun
+  const std::size_t pairs_now = pairs();
+  if (pairs_now == 0) return;
+  start_.x.swap(mesh_.coefficients);
+  const std::size_t pairs_before = pairs();
+  start_.x.swap(mesh_.coefficients);
+  if (pairs_before >= pairs_now) return;
+  go_back(std::move(start_));
+  report_.explanation += formatted(
+      "; %zu pairs of triangles of the boundary intersected then, %zu of them before, so "
+      "the state before was taken",
+      pairs_now, pairs_before);
+}
+
 /// Measures the state; returns nothing if the fit must end.
 std::optional<HighOrderFit::Outcome> HighOrderFit::measured_outcome() {
   const QualityReport quality = measure_quality(mesh_);
@@ -578,6 +600,8 @@ HighOrderFitResult HighOrderFit::run() {
   try {
     if (run_first_orders(first) && (options_.adaptive ? run_adaptive_orders() : run_higher_orders()) && finish())
       runner_.conclude(measured_mean(), options_.tolerance_percent, report_);
+    else
+      leave_folds();
   } catch (const std::bad_alloc&) {
     end_for_memory(formatted("no memory was left at order %d", order_));
   }

@@ -17,7 +17,7 @@ void CellGroup::make_tables(Basis basis, QuadratureRule rule) {
   Quadrature quadrature = make_quadrature(kind, rule, points_per_direction);
   points = std::move(quadrature.points);
   weights = std::move(quadrature.weights);
-  if (kind == CellKind::tet) return make_tet_tables(basis);
+  if (kind == CellKind::tet) return make_tet_tables(basis, rule);
   const LineProducts line = make_line(basis, rule);
   if (kind == CellKind::prism)
     make_prism_tables(basis, rule, line);
@@ -94,19 +94,45 @@ void CellGroup::make_prism_tables(Basis basis, QuadratureRule rule, const LinePr
   }
 }
 
-void CellGroup::make_tet_tables(Basis basis) {
+void CellGroup::make_tet_tables(Basis basis, QuadratureRule rule) {
   num_modes = modes.size();
-  ShapeFunctions functions(kind, basis, order);
   products.assign(num_modes, {});
+  const bool expands = basis == Basis::legendre;
+  ShapeFunctions functions(kind, basis, order);
   for (std::size_t q = 0; q < num_points(); ++q) {
     functions.set_point(points[q]);
     for (std::size_t a = 0; a < num_modes; ++a) {
       Vec3 gradient;
       functions.value(modes[a], gradient);
-      gradients.push_back(gradient);
+      if (!expands) gradients.push_back(gradient);
       for (int p = 0; p < 6; ++p) products[a][p] += weights[q] * gradient[kPairs[p][0]] * gradient[kPairs[p][1]];
     }
   }
+  if (!expands) return;
+  collapsed = CollapsedBasis(order - 1, rule, points_per_direction);
+  expand_gradients(basis);
+}
+
+/// The functions are polynomials, so a small quadrature gives the coefficients of their gradients exactly.
+void CellGroup::expand_gradients(Basis basis) {
+  const int n = order + 1;  // exact up to degree 2 order - 1
+  const CollapsedBasis exact(order - 1, QuadratureRule::gauss_lobatto, n);
+  const Quadrature quadrature = make_quadrature(kind, QuadratureRule::gauss_lobatto, n);
+  ShapeFunctions functions(kind, basis, order);
+  gradients.assign(exact.num_functions() * num_modes, Vec3::Zero());
+  std::size_t q = 0;
+  for (const CollapsedBasis::Layer& layer : exact.layers)
+    for (const CollapsedBasis::Row& row : layer.rows)
+      for (int point = 0; point < row.num_points; ++point, ++q) {
+        functions.set_point(quadrature.points[q]);
+        const std::vector<double> psi = exact.values(layer, row, point);
+        for (std::size_t a = 0; a < num_modes; ++a) {
+          Vec3 gradient;
+          functions.value(modes[a], gradient);
+          for (std::size_t m = 0; m < psi.size(); ++m)
+            gradients[m * num_modes + a] += quadrature.weights[q] * psi[m] * gradient;
+        }
+      }
 }
 
 }  // namespace subvol::internal

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/elements/collapsed_basis.h"
 #include "subvol/fit/elements/element_space.h"
 #include "subvol/fit/elements/quadrature.h"
 #include "subvol/fit/energies/frozen_distortion.h"
@@ -21,7 +22,10 @@ struct CellGroup {
   std::size_t num_modes = 0;
   std::vector<double> values, derivatives;  ///< hex, prism: the order + 1 line functions at every point of a line
   std::vector<LocalMode> modes;             ///< prism, tet: union of the cells' modes, ascending
-  std::vector<Vec3> gradients;              ///< tet: gradient of every mode at every point
+  /// Tet of Legendre functions: the polynomials of which the modes' gradients are sums.
+  CollapsedBasis collapsed;
+  /// Tet: the gradient of every mode, by its coefficients in `collapsed` if that has tables, or else at every point.
+  std::vector<Vec3> gradients;
   /// Prism: each mode's function of the triangle, and the derivatives along u and v and the value of each of these
   /// functions at every point of a layer.
   std::vector<std::size_t> triangle_function;
@@ -60,7 +64,8 @@ struct CellGroup {
   LineProducts make_line(Basis basis, QuadratureRule rule);
   void make_hex_tables(const LineProducts& line);
   void make_prism_tables(Basis basis, QuadratureRule rule, const LineProducts& line);
-  void make_tet_tables(Basis basis);
+  void make_tet_tables(Basis basis, QuadratureRule rule);
+  void expand_gradients(Basis basis);
 };
 
 }  // namespace subvol::internal

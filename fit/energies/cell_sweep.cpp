@@ -59,6 +59,86 @@ template void CellSweep::to_dense<CellSweep::kPoints>(std::size_t, Wide (*)[9]) 
 template void CellSweep::from_dense<1>(std::size_t, const Wide (*)[9]);
 template void CellSweep::from_dense<CellSweep::kPoints>(std::size_t, const Wide (*)[9]);
 
+void CellSweep::expand() {
+  const std::size_t num = group_.collapsed.num_functions();
+  for (std::size_t m = 0; m < num; m += kPoints) {
+    Wide j[kPoints][9];
+    const std::size_t count = std::min<std::size_t>(kPoints, num - m);
+    count == kPoints ? to_dense<kPoints>(m, j) : to_dense<1>(m, j);
+    for (std::size_t n = 0; n < count; ++n) put(j[n], &expansion_[9 * (m + n)]);
+  }
+}
+
+void CellSweep::collect() {
+  const std::size_t num = group_.collapsed.num_functions();
+  for (std::size_t m = 0; m < num; m += kPoints) {
+    Wide j[kPoints][9];
+    const std::size_t count = std::min<std::size_t>(kPoints, num - m);
+    std::copy_n(&expansion_sums_[9 * m], 9 * count, j[0]);
+    count == kPoints ? from_dense<kPoints>(m, j) : from_dense<1>(m, j);
+  }
+}
+
+void CellSweep::to_collapsed_layer(const CollapsedBasis::Layer& layer) {
+  const CollapsedBasis& basis = group_.collapsed;
+  const double* along_c = &basis.c[layer.c];
+  const Wide* from = expansion_.data();
+  for (int i = 0, pair = 0; i <= basis.degree; ++i)
+    for (int j = 0; i + j <= basis.degree; ++j, ++pair) {
+      const double* factors = along_c + basis.first_pair(i + j);
+      Wide sum[9] = {};
+      for (int k = 0; i + j + k <= basis.degree; ++k, from += 9)
+        for (int e = 0; e < 9; ++e) sum[e] += factors[k] * from[e];
+      put(sum, &layer_[9 * pair]);
+    }
+}
+
+void CellSweep::from_collapsed_layer(const CollapsedBasis::Layer& layer) {
+  const CollapsedBasis& basis = group_.collapsed;
+  const double* along_c = &basis.c[layer.c];
+  Wide* to = expansion_sums_.data();
+  for (int i = 0, pair = 0; i <= basis.degree; ++i)
+    for (int j = 0; i + j <= basis.degree; ++j, ++pair) {
+      const double* factors = along_c + basis.first_pair(i + j);
+      Wide sum[9];
+      for (int e = 0; e < 9; ++e) sum[e] = layer_sums_[9 * pair + e];
+      for (int k = 0; i + j + k <= basis.degree; ++k, to += 9)
+        for (int e = 0; e < 9; ++e) to[e] += factors[k] * sum[e];
+    }
+}
+
+void CellSweep::to_row(const CollapsedBasis::Row& row) {
+  const CollapsedBasis& basis = group_.collapsed;
+  const double* along_b = &basis.b[row.b];
+  for (int i = 0, pair = 0; i <= basis.degree; ++i) {
+    Wide sum[9] = {};
+    for (int j = 0; i + j <= basis.degree; ++j, ++pair)
+      for (int e = 0; e < 9; ++e) sum[e] += along_b[pair] * layer_[9 * pair + e];
+    put(sum, &row_[9 * i]);
+  }
+  for (int q = 0; q < row.num_points; ++q) {
+    const double* along_a = &basis.a[row.a + static_cast<std::size_t>(q) * basis.num_lines()];
+    Wide sum[9] = {};
+    for (int i = 0; i < basis.num_lines(); ++i)
+      for (int e = 0; e < 9; ++e) sum[e] += along_a[i] * row_[9 * i + e];
+    put(sum, points_[q]);
+  }
+}
+
+void CellSweep::from_row(const CollapsedBasis::Row& row) {
+  const CollapsedBasis& basis = group_.collapsed;
+  const double* along_b = &basis.b[row.b];
+  for (int i = 0, pair = 0; i <= basis.degree; ++i) {
+    Wide sum[9] = {};
+    for (int q = 0; q < row.num_points; ++q) {
+      const double along_a = basis.a[row.a + static_cast<std::size_t>(q) * basis.num_lines() + i];
+      for (int e = 0; e < 9; ++e) sum[e] += along_a * points_[q][e];
+    }
+    for (int j = 0; i + j <= basis.degree; ++j, ++pair)
+      for (int e = 0; e < 9; ++e) layer_sums_[9 * pair + e] += along_b[pair] * sum[e];
+  }
+}
+
 void CellSweep::to_layer(int layer) {
   std::fill(layer_.begin(), layer_.end(), Wide{});
   const double *values = &group_.values[layer * m_], *derivatives = &group_.derivatives[layer * m_];

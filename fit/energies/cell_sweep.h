@@ -17,8 +17,12 @@ class CellSweep {
       : group_(group), m_(group.order + 1), n_(group.points_per_direction), coefficients_(3 * group.num_modes) {
     if (group.kind != CellKind::hex) {
       sums_.resize(coefficients_.size());
-      layer_.resize(6 * group.num_triangle_functions);
+      layer_.resize(is_collapsed() ? 9 * group.collapsed.num_pairs() : 6 * group.num_triangle_functions);
       layer_sums_.resize(layer_.size());
+      if (!is_collapsed()) return;
+      expansion_.resize(9 * group.collapsed.num_functions());
+      row_.resize(9 * m_);
+      points_ = std::make_unique_for_overwrite<Wide[][9]>(n_);
       return;
     }
     const std::size_t lines = static_cast<std::size_t>(m_) * m_ * n_ * 6, planes = 9 * m_ * num_columns();
@@ -38,6 +42,8 @@ class CellSweep {
       run_tensor<kBack>(op);
     else if (group_.kind == CellKind::prism)
       run_layers<kBack>(op);
+    else if (is_collapsed())
+      run_collapsed<kBack>(op);
     else
       run_dense<kBack>(op);
   }
@@ -48,6 +54,7 @@ class CellSweep {
   /// Number of columns of a hex, or of points of another cell, per chunk: two, so that kernels can work on pairs.
   static constexpr int kColumns = 2, kPoints = 2;
 
+  bool is_collapsed() const { return group_.collapsed.degree >= 0; }
   std::size_t num_columns() const { return static_cast<std::size_t>(n_) * n_; }
   std::size_t plane_place(int k, std::size_t column) const { return 9 * (k * num_columns() + column); }
 
@@ -63,6 +70,30 @@ class CellSweep {
       if constexpr (kBack) all ? from_dense<kPoints>(first, j) : from_dense<1>(first, j);
     }
     if constexpr (kBack) coefficients_.swap(sums_);
+  }
+
+  /// Works on one direction at a time: coefficients -> polynomials (i, j, k) -> a layer's (i, j) -> a row's (i) -> points.
+  template <bool kBack, class Op>
+  void run_collapsed(Op&& op) {
+    expand();
+    if constexpr (kBack) std::fill(sums_.begin(), sums_.end(), Wide{});
+    if constexpr (kBack) expansion_sums_.assign(expansion_.size(), Wide{});
+    std::size_t first = 0;
+    for (const CollapsedBasis::Layer& layer : group_.collapsed.layers) {
+      to_collapsed_layer(layer);
+      if constexpr (kBack) std::fill(layer_sums_.begin(), layer_sums_.end(), Wide{});
+      for (const CollapsedBasis::Row& row : layer.rows) {
+        to_row(row);
+        op(first, row.num_points, points_.get());
+        if constexpr (kBack) from_row(row);
+        first += row.num_points;
+      }
+      if constexpr (kBack) from_collapsed_layer(layer);
+    }
+    if constexpr (kBack) {
+      collect();
+      coefficients_.swap(sums_);
+    }
   }
 
   /// Works on one layer of a prism's points at a time: coefficients -> functions of the triangle -> points.
@@ -114,6 +145,17 @@ class CellSweep {
   template <int kCount>
   void from_triangle(std::size_t first, const Wide (*j)[9]);
 
+  /// `expand` fills expansion_: for each polynomial of `collapsed`, the coefficients of the 9 entries of J. `collect`
+  /// sums back into the modes.
+  void expand();
+  void collect();
+  /// Fills layer_ with the coefficients of A_i B_ij in a layer.
+  void to_collapsed_layer(const CollapsedBasis::Layer& layer);
+  void from_collapsed_layer(const CollapsedBasis::Layer& layer);
+  /// Fills points_ with J at the points of a row of the layer.
+  void to_row(const CollapsedBasis::Row& row);
+  void from_row(const CollapsedBasis::Row& row);
+
   /// `to_dense` computes J at kCount points of a tet; `from_dense` sums back into its modes.
   template <int kCount>
   void to_dense(std::size_t first, Wide (*j)[9]) const;
@@ -137,9 +179,10 @@ class CellSweep {
   const CellGroup& group_;
   int m_, n_;
   std::vector<Wide> coefficients_, sums_;  // sums_: prism, tet
-  std::vector<Wide> layer_, layer_sums_;   // prism
+  std::vector<Wide> layer_, layer_sums_;   // prism, collapsed tet
+  std::vector<Wide> expansion_, expansion_sums_, row_;  // collapsed tet
   std::unique_ptr<Wide[]> lines_, planes_, plane_sums_;  // hex: not initialized with zeros
-  std::unique_ptr<Wide[][9]> points_;
+  std::unique_ptr<Wide[][9]> points_;                    // hex, collapsed tet
 };
 
 }  // namespace subvol::internal

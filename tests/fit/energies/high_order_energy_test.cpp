@@ -86,7 +86,7 @@ TEST_CASE("gradient and Hessian of curved cells agree with differences for every
   for (CellKind kind : kAllKinds)
     for (Basis basis : kBothBases)
       for (int order : {1, 2, 4, 8}) {
-        if (order == 8 && kind == CellKind::tet) continue;
+        if (order == 8 && kind == CellKind::tet && basis == Basis::fourier) continue;
         const VolumeMesh mesh = single_cell(kind);
         const ElementSpace space(mesh, basis, order);
         HighOrderEnergy energy(space, std::vector{Vec3(1.1, 0.9, 1.05)}, points_of(space, 2 * order + 1));
@@ -120,9 +120,11 @@ TEST_CASE("curved cells are undistorted against references that follow them", "[
     HighOrderMesh curved(space, mesh);
     for (std::size_t i = mesh.num_vertices(); i < curved.coefficients.size(); ++i)
       curved.coefficients[i] = 0.05 * source.vector();
-    const HighOrderEnergy energy(
-        space, [&](Index c, const Vec3& u) { return curved.jacobian(c, u); }, points_of(space, 5));
-    CHECK(energy.value(curved.coefficients) < 1e-26);
+    for (QuadratureRule rule : {QuadratureRule::trapezoidal, QuadratureRule::gauss_lobatto}) {
+      const HighOrderEnergy energy(
+          space, [&](Index c, const Vec3& u) { return curved.jacobian(c, u); }, points_of(space, 5), rule);
+      CHECK(energy.value(curved.coefficients) < 1e-26);
+    }
     CHECK_THROWS_AS(HighOrderEnergy(
                         space, [](Index, const Vec3&) { return Mat3(-Mat3::Identity()); }, points_of(space, 3)),
                     InputError);
