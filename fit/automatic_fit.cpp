@@ -148,6 +148,7 @@ class AutomaticFit : AutomaticDriver {
   LevelLayout level_layout_;          ///< of mesh_, from layout_
   std::vector<AutomaticAttempt> skipped_;  ///< their grids were too coarse for many edges
   std::string refusal_;                    ///< why there was no template for the last attempt that had none
+  std::optional<SurfaceDiagnosis> diagnosis_;  ///< of the target; none: no attempt has been without a template
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
 
@@ -181,9 +182,8 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
     return std::nullopt;
   }
   if (made.templates.empty()) {
-    no_template_ = "target: " +
-                   why_no_grid(original_, options.cells, made.wanted, [this] { return runner_.is_to_end(); }) +
-                   "; give a --template";
+    if (!diagnosis_) diagnosis_ = diagnose(original_, [this] { return runner_.is_to_end(); });
+    no_template_ = "target: " + why_no_grid(*diagnosis_, options.cells, made.wanted) + "; give a --template";
     return std::nullopt;
   }
   take_in(made.templates.front().mesh);
@@ -534,6 +534,9 @@ AutomaticFitResult AutomaticFit::run() {
   for (std::size_t i = 0; i < attempts.size() && going && !is_good(); ++i) {
     begin_attempt();
     if (is_worth_trying(attempts[i])) going = run_attempt(attempts[i]);
+    if (going && result_.trials.empty() && diagnosis_ &&
+        is_too_thin_for_grids(*diagnosis_, attempts.back().template_cells))
+      throw InputError(refusal_);
   }
   for (AutomaticAttempt attempt : std::exchange(skipped_, {})) {
     if (!going || !result_.trials.empty()) break;

@@ -110,7 +110,8 @@ int run_auto(AutoArguments arguments, const CLI::App& verb) {
     return kNotConverged;
   }
   if (result.templates.empty()) {
-    std::cerr << "subvol: " << why_no_grid(target, arguments.options.cells, result.wanted, interrupted) << '\n';
+    std::cerr << "subvol: " << why_no_grid(diagnose(target, interrupted), arguments.options.cells, result.wanted)
+              << '\n';
     return interrupted() ? kInterrupted : kFailed;
   }
   const AutoTemplate& made = result.templates.front();

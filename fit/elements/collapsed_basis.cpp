@@ -26,7 +26,7 @@ void jacobi_polynomials(int alpha, int last, double x, double* out) {
 
 /// Both rules take all rows from lines of points in [0, 1]: the Gauss points, or equal steps, of which a layer of the
 /// regular grid has one fewer than the layer before, and a row one fewer than the row before.
-CollapsedBasis::CollapsedBasis(int degree, QuadratureRule rule, int n) : degree(degree) {
+CollapsedBasis::CollapsedBasis(int highest, QuadratureRule rule, int n) : degree(highest) {
   if (degree < 0) throw InputError("CollapsedBasis: the degree must be at least 0, got " + std::to_string(degree));
   if (n < 2) throw InputError("CollapsedBasis: at least 2 points are needed, got " + std::to_string(n));
   if (rule == QuadratureRule::gauss_lobatto) {

@@ -34,8 +34,8 @@ struct CollapsedBasis {
   std::vector<Layer> layers;
 
   CollapsedBasis() = default;
-  /// InputError: degree < 0 or n < 2.
-  CollapsedBasis(int degree, QuadratureRule rule, int n);
+  /// highest: the degree. InputError: highest < 0 or n < 2.
+  CollapsedBasis(int highest, QuadratureRule rule, int n);
 
   int num_lines() const { return degree + 1; }
   int num_pairs() const { return (degree + 1) * (degree + 2) / 2; }

@@ -10,6 +10,7 @@
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
+#include "subvol/templates/auto_template.h"
 
 #include <Eigen/Geometry>
 
@@ -254,6 +255,11 @@ std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiag
   return repair;
 }
 
+/// Returns the edge length of the smallest cells that `auto_templates` tries if so many are wanted.
+double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
+  return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
+}
+
 }  // namespace
 
 SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
@@ -273,15 +279,19 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
   return std::move(*repair);
 }
 
-std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted,
-                        const std::function<bool()>& cancelled) {
-  constexpr double kMostTimes = 20;  // the largest count that `auto_templates` tries, as a multiple of the wanted one
-  const std::string text = "no grid that was tried, of up to 20 times " + std::to_string(cells) +
-                           " cells, has the target's " + to_string(wanted);
-  const SurfaceDiagnosis diagnosis = diagnose(surface, cancelled);
-  const double cell = std::cbrt(std::abs(diagnosis.volume) / (kMostTimes * static_cast<double>(cells)));
-  const std::string causes = obstacles_for_cells(diagnosis, cell);
+std::string why_no_grid(const SurfaceDiagnosis& diagnosis, std::size_t cells, const BettiNumbers& wanted) {
+  const std::string text = "no grid that was tried, of up to " + std::to_string(kMostTemplateGrowth) + " times " +
+                           std::to_string(cells) + " cells, has the target's " + to_string(wanted);
+  const std::string causes = obstacles_for_cells(diagnosis, smallest_cell(diagnosis, cells));
   return causes.empty() ? text : text + ": " + causes;
+}
+
+bool is_too_thin_for_grids(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
+  const double least = kHopelessShare * smallest_cell(diagnosis, cells);
+  return std::ranges::any_of(std::array{SurfaceFault::thin_wall, SurfaceFault::thin_gap}, [&](SurfaceFault fault) {
+    const SurfaceFinding* found = diagnosis.find(fault);
+    return found && found->places.front().measure < least;
+  });
 }
 
 }  // namespace subvol

@@ -44,10 +44,13 @@ struct SurfaceRepair {
 SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {},
                              RegionRule rule = RegionRule::automatic);
 
-/// Returns why grids with up to 20 times a number of cells do not have the topology of a surface's solid: that they
-/// have not, and each cause that a diagnosis finds, with its place.
-/// cancelled  asked now and then, from the calling thread; if it returns true, causes may be missing. Empty: never.
-std::string why_no_grid(const TriangleMesh& surface, std::size_t cells, const BettiNumbers& wanted,
-                        const std::function<bool()>& cancelled = {});
+/// Returns why grids with up to `kMostTemplateGrowth` times a number of cells do not have the topology of a surface's
+/// solid: that they do not, and each cause that the diagnosis of the surface holds, with its place.
+std::string why_no_grid(const SurfaceDiagnosis& diagnosis, std::size_t cells, const BettiNumbers& wanted);
+
+/// Returns true if a wall or gap is thinner than this share of the smallest cells that are tried if so many are wanted:
+/// if grids do not have the topology, that is why, and somewhat smaller cells do not help.
+inline constexpr double kHopelessShare = 0.05;
+bool is_too_thin_for_grids(const SurfaceDiagnosis& diagnosis, std::size_t cells);
 
 }  // namespace subvol

@@ -372,7 +372,7 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   if (most < 1) throw InputError("auto_templates: at least one template must be asked for");
   const SolidBoundary solid = solid_boundary(surface);
   const std::vector<Mat3> frames = template_frames(solid.surface);
-  constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, 20};
+  constexpr std::array<double, 10> kLadder{1, 1.3, 1.7, 2.2, 3, 4, 6, 9, 14, kMostTemplateGrowth};
   AutoTemplateResult result;
   result.wanted = solid.topology;
   const double most_cells = most_grid_cells(options.cells);

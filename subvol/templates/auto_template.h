@@ -21,6 +21,8 @@ struct AutoTemplateOptions {
 };
 
 inline constexpr std::size_t kLeastTemplateCells = 8, kMostTemplateCells = 200'000;
+/// If no grid with the requested count has the right topology, larger counts are tried, up to this multiple.
+inline constexpr std::size_t kMostTemplateGrowth = 20;
 /// The number of cells of a template lies between these multiples of `AutoTemplate::cells_asked`.
 inline constexpr double kLeastCellShare = 0.8, kMostCellShare = 1.4;
 /// These multiples hold for a template whose grid passes through planes, which leave little choice of sizes.

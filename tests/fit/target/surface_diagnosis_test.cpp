@@ -211,7 +211,13 @@ TEST_CASE("What no diagnosis can be made of is refused", "[diagnosis]") {
 }
 
 TEST_CASE("Why no grid has the topology is told with the place", "[diagnosis]") {
-  const std::string text = why_no_grid(box({0, 0, 0}, {1, 1, 0.002}), 300, {1, 0, 0});
+  const SurfaceDiagnosis plate = diagnose(box({0, 0, 0}, {1, 1, 0.002}));
+  const std::string text = why_no_grid(plate, 300, {1, 0, 0});
   CHECK_THAT(text, Catch::Contains("1 component") && Catch::Contains("thinnest wall is 0.002 wide") &&
                        Catch::Contains("thinner than a cell"));
+  CHECK_FALSE(is_too_thin_for_grids(plate, 300));  // its cells are 0.0069 wide
+  CHECK_FALSE(is_too_thin_for_grids(diagnose(box({0, 0, 0}, {1, 1, 0.1})), 300));
+  const SurfaceDiagnosis slit = diagnose(together(kUnit, box({1.0002, 0, 0}, {2, 1, 1})));
+  CHECK(is_too_thin_for_grids(slit, 3000));
+  CHECK_FALSE(is_too_thin_for_grids(slit, 30'000'000));
 }
