@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/fits/high_order_schedule.h"
+#include "subvol/fit/high_order_fit.h"
+#include "subvol/fit/solver/fit_problem.h"
+#include "subvol/fit/stages/memory_budget.h"
+#include "subvol/fit/stages/stage_runner.h"
+#include "subvol/fit/stages/staged_fit.h"
+#include "subvol/fit/target/fit_target.h"
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace subvol::internal {
+
+/// The base of the high-order fit: the mesh of curved cells and its orders, the minimizations on it, and its measures.
+/// All coordinates are normalized.
+///
+/// Functions that return a bool, or an optional, return false, or nothing, if the fit must end.
+class HighOrderDriver : protected StagedFit {
+ protected:
+  /// The measures of a state when shape is weighed against distance.
+  struct Outcome {
+    double least_scaled_jacobian, mean_percent, max_percent;
+    std::size_t pairs;  ///< number of intersecting triangle pairs
+  };
+
+  /// InputError: options out of range; the template has defects.
+  HighOrderDriver(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
+  ~HighOrderDriver() = default;
+
+  void look_over_template();
+  bool has_room(const EntityOrders& orders);
+  bool end_for_memory(const std::string& why);
+  void set_orders(const EntityOrders& orders);
+  void take_own_boxes();
+
+  std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space) const;
+  BoundarySamples sheet_samples(const ElementSpace& space) const;
+  FitProblem problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
+                     const Stage& stage) const;
+  bool run_stage(const Stage& stage);
+  bool run_next_stage(const Stage& stage);
+  bool run_final_stage(double lambda) override { return run_stage(schedule_.final_stage(lambda)); }
+
+  TriangleMesh measured_boundary() const;
+  double measured_mean();
+  bool meets_tolerance();
+  std::optional<Outcome> measured_outcome();
+  std::optional<std::size_t> intersecting_pairs() override;
+  std::optional<bool> is_folded();
+  std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
+
+  std::vector<Vec3>& unknowns() override { return mesh_.coefficients; }
+  FitReport& report() override { return report_; }
+
+  HighOrderFitOptions options_;
+  FitTarget target_;
+  VolumeMesh template_;
+  HighOrderSchedule schedule_;
+  std::vector<Vec3> ideal_boxes_;
+  HighOrderMesh mesh_;
+  int try_ = 0;              ///< number of the current attempt, from 1
+  int order_ = 1;            ///< highest order of any entity
+  /// States before the stages of the schedule in the current attempt, raised to the present orders.
+  std::vector<FitSnapshot> starts_;
+  std::vector<int> points_;  ///< quadrature points of each cell per direction in the last stage
+  bool stays_dense_ = false; ///< set after the first orders: cells keep at least points_
+  double emphasis_ = 0;      ///< emphasis on places of poor shape in E_W
+  double far_length_ = 0;    ///< distance at which places count twice in E_S; 0: all places count alike
+  FitReport report_;
+  MemoryBudget memory_;
+  StageRunner runner_;
+
+ private:
+  int sample_intervals(int order) const;
+  TriangleMesh boundary(int intervals) const;
+  std::optional<SurfaceDistance> measured_interfaces() const;
+  double keep_mean(double distance);
+
+  BoundarySamples samples_;
+  std::vector<Index> group_of_face_;  ///< `groups_of_sheets`; empty if there are no interfaces, or they are not kept
+  int order_in_progress_ = 0;         ///< the order whose part of the work has begun
+};
+
+}  // namespace subvol::internal
