@@ -28,7 +28,7 @@ namespace {
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
 /// A place is far if its distance exceeds kFarShare times the mean and kNearPercent of the diagonal: on flat faces, the
 /// mean can be so small that it is no measure. At first, a place at kFirstFarLength times the mean counts twice.
-constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.02;
+constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.1;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
 /// Emphasis on places of poor shape: its first value, doubled each time up to the last, until the least scaled Jacobian
 /// is good.
