@@ -13,9 +13,10 @@ void add_formats_command(CLI::App& app, Action& action) {
   verb->callback([&action] {
     action = [] {
       std::string text = cell_formats_table() + "\n" + surface_formats_table();
-      if (!has_exodus())
-        for (const FileFormat& format : file_formats())
-          if (format.needs_netcdf) text += std::string(format.extension) + ": not in this build, which has no netCDF\n";
+      for (const FileFormat& format : file_formats())
+        if ((format.needs_netcdf && !has_exodus()) || (format.needs_cgns && !has_cgns()))
+          text += std::string(format.extension) + ": not in this build, which has no " +
+                  (format.needs_netcdf ? "netCDF\n" : "CGNS library\n");
       print(text);
       return static_cast<int>(kDone);
     };

@@ -22,6 +22,7 @@ NodalMesh parse_inp(const std::string& name, std::string_view bytes, const std::
 NodalMesh parse_nastran(const std::string& name, std::string_view bytes, const std::string& references);
 NodalMesh parse_mfem(const std::string& name, std::string_view bytes, const std::string& references);
 NodalMesh parse_exodus(const std::string& name, std::string_view bytes, const std::string& references);
+NodalMesh parse_cgns(const std::string& name, std::string_view bytes, const std::string& references);
 
 /// Parses a file by its extension, with unused references dropped and groups sorted. It may have no cells. InputError:
 /// also an unknown extension.

@@ -26,9 +26,10 @@ struct NodalFormat {
 };
 
 constexpr NodalFormat kNodalFormats[] = {
-    {".msh", parse_msh}, {".vtu", parse_vtu}, {".vtk", parse_nodal_vtk}, {".inp", parse_inp},   {".bdf", parse_nastran},
-    {".nas", parse_nastran}, {".fem", parse_nastran}, {".mfem", parse_mfem}, {".mesh", parse_mfem},
-    {".e", parse_exodus}, {".exo", parse_exodus}, {".ex2", parse_exodus}, {".gen", parse_exodus},
+    {".msh", parse_msh},     {".vtu", parse_vtu},     {".vtk", parse_nodal_vtk}, {".inp", parse_inp},
+    {".bdf", parse_nastran}, {".nas", parse_nastran}, {".fem", parse_nastran},   {".mfem", parse_mfem},
+    {".mesh", parse_mfem},   {".e", parse_exodus},    {".exo", parse_exodus},    {".ex2", parse_exodus},
+    {".gen", parse_exodus},  {".cgns", parse_cgns},
 };
 
 const NodalFormat* nodal_format(const fs::path& path) {

@@ -84,6 +84,7 @@ class NodalCells {
 ///   .bdf .nas .fem       Nastran bulk data
 ///   .mfem, or a .mesh that begins with "MFEM mesh"       MFEM mesh v1.0, 1.2 and 1.3
 ///   .e .exo .ex2 .gen    Exodus II, if the library was built with netCDF (`has_exodus`)
+///   .cgns                CGNS, zones without structure, if it was built with the CGNS library (`has_cgns`)
 ///
 /// references  name of the cell data that become the references (.vtu, .vtk); empty: the usual ones.
 /// InputError, naming the file and line: as `read_volume_mesh`, except that the cells may be curved, and that they need
@@ -95,6 +96,9 @@ bool is_nodal_extension(const std::filesystem::path& path);
 
 /// Returns true if Exodus files can be read and written: the library was built with netCDF.
 bool has_exodus();
+
+/// Returns true if CGNS files can be read.
+bool has_cgns();
 
 /// Returns the cells as linear ones; nodes keep their numbers. InputError: a cell of order 2 or more.
 VolumeMesh linear_mesh(const std::string& name, NodalMesh mesh);
