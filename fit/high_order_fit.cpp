@@ -237,8 +237,9 @@ void HighOrderFit::leave_folds() {
   for (; starts_.size() > 1; starts_.pop_back()) {
     if (pairs_at(starts_.back().x) > 0) continue;
     go_back(std::move(starts_.back()));
-    report_.explanation += formatted("; %zu pairs of triangles of the boundary intersected then, so the fit went back to "
-                                     "its state after %s", pairs, report_.last_kept_stage()->name.c_str());
+    report_.explanation += formatted(
+        "; %zu pairs of triangles of the boundary intersected then, so the fit went back to its state after %s", pairs,
+        report_.last_kept_stage()->name.c_str());
     return;
   }
 }

@@ -72,7 +72,8 @@ class CellSweep {
     if constexpr (kBack) coefficients_.swap(sums_);
   }
 
-  /// Works on one direction at a time: coefficients -> polynomials (i, j, k) -> a layer's (i, j) -> a row's (i) -> points.
+  /// Works on one direction at a time: coefficients -> polynomials (i, j, k) -> a layer's (i, j) -> a row's (i) ->
+  /// points.
   template <bool kBack, class Op>
   void run_collapsed(Op&& op) {
     expand();

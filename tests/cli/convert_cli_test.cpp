@@ -81,7 +81,7 @@ TEST_CASE("The option --references chooses the cell data that become references,
 
 TEST_CASE("an input that cannot be read is told as what it is, by every verb", "[cli]") {
   const Workplace place;
-  for (const char* name : {"a.med", "a.cgns", "a.vol", "a"}) {
+  for (const char* name : {"a.med", "a.su2", "a.vol", "a"}) {
     place.file(name, "x");
     const std::string file = name;
     for (const std::string& verb :

@@ -3,6 +3,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/quality/high_order_quality.h"
@@ -213,6 +214,19 @@ TEST_CASE("a high-order fit that is cancelled returns what it has") {
   CHECK(result.report.stop_reason == StopReason::cancelled);
   CHECK(told == 5);
   CHECK(positive(result.mesh, 5));
+}
+
+TEST_CASE("a high-order fit at its time limit keeps no boundary that intersects itself", "[slow]") {
+  const auto data = require_data();
+  if (!data) return;
+  const TriangleMesh target = read_triangle_mesh(*data / "fit" / "far_asm122" / "target.off");
+  HighOrderFitOptions options = of_order(4);
+  options.time_limit_seconds = 12;  // at order 4, its boundary is folded then
+  const HighOrderFitResult result =
+      fit_high_order(target, read_volume_mesh(*data / "fit" / "far_asm122" / "template.mesh"), options);
+  CHECK(result.report.stop_reason == StopReason::time_limit);
+  const BoundarySamples samples = make_boundary_samples(result.mesh.space, 16);
+  CHECK(self_intersections({samples.positions.apply(result.mesh.coefficients), samples.triangles}).pairs.empty());
 }
 
 TEST_CASE("a high-order fit refuses what it cannot do") {
