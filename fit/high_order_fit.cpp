@@ -26,9 +26,10 @@ namespace {
 /// p-adaptivity: share of the total possible gain that one raise aims at, and the least gain, relative to E_S, that
 /// justifies a raise.
 constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
-/// A place is far if its distance exceeds kFarShare times the mean and kNearPercent of the diagonal: on flat faces, the
-/// mean can be so small that it is no measure. At first, a place at kFirstFarLength times the mean counts twice.
-constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.1;
+/// A place is far if its distance exceeds kFarShare times the mean and kNearPercent of the diagonal, a tenth of the
+/// largest distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure. At first,
+/// a place at kFirstFarLength times the mean counts twice.
+constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
 /// Emphasis on places of poor shape: its first value, doubled each time up to the last, until the least scaled Jacobian
 /// is good.
