@@ -80,7 +80,6 @@ int HighOrderDriver::sample_intervals(int order) const {
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
 }
 
-/// Ends the fit in its current state. Throws std::runtime_error if nothing has been fitted yet.
 bool HighOrderDriver::end_for_memory(const std::string& why) {
   if (report_.stages.empty()) throw std::runtime_error("out of memory: " + why);
   report_.stop_reason = StopReason::memory_limit;
@@ -168,7 +167,6 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
   return going;
 }
 
-/// Runs a stage of the schedule and remembers the state before it.
 bool HighOrderDriver::run_next_stage(const Stage& stage) {
   starts_.push_back(snapshot());
   return run_stage(stage);
@@ -219,7 +217,6 @@ bool HighOrderDriver::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
-/// From now on, the ideal cells are boxes of the cells' present sizes: graded meshes stay graded.
 void HighOrderDriver::take_own_boxes() {
   ideal_boxes_ = ideal_boxes(template_, std::span(mesh_.coefficients).first(template_.num_vertices()),
                              target_.surface.volume(), 1);

@@ -23,7 +23,7 @@ namespace subvol::internal {
 /// The base of the high-order fit: the mesh of curved cells and its orders, the minimizations on it, and its measures.
 /// All coordinates are normalized.
 ///
-/// Functions that return a bool, or an optional, return false, or nothing, if the fit must end.
+/// Functions that return a bool or an optional return false or nothing if the fit must end, except `meets_tolerance`.
 class HighOrderDriver : protected StagedFit {
  protected:
   /// The measures of a state when shape is weighed against distance.
@@ -36,17 +36,24 @@ class HighOrderDriver : protected StagedFit {
   HighOrderDriver(FitTarget target, const VolumeMesh& template_mesh, const HighOrderFitOptions& options);
   ~HighOrderDriver() = default;
 
+  /// Measures the template's distance, chooses the schedule by it, and finds the interfaces to be kept.
   void look_over_template();
+  /// Checks that the memory suffices for a mesh of these orders.
   bool has_room(const EntityOrders& orders);
+  /// Ends the fit in its current state. Throws std::runtime_error if nothing has been fitted yet.
   bool end_for_memory(const std::string& why);
+  /// Changes the orders of the mesh and of all kept states; their maps stay the same if no order falls.
   void set_orders(const EntityOrders& orders);
+  /// Makes the ideal cells boxes of the cells' present sizes, so that graded meshes stay graded.
   void take_own_boxes();
 
   std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space) const;
   BoundarySamples sheet_samples(const ElementSpace& space) const;
   FitProblem problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
                      const Stage& stage) const;
+  /// Minimizes with the present orders and settings, and adds the stage to the report.
   bool run_stage(const Stage& stage);
+  /// Does the same for a stage of the schedule, and remembers the state before it in `starts_`.
   bool run_next_stage(const Stage& stage);
   bool run_final_stage(double lambda) override { return run_stage(schedule_.final_stage(lambda)); }
 

@@ -292,9 +292,10 @@ class CgnsParser {
       left_out_.add("elements of type " + std::string(type_name), elements.count);
       return;
     }
-    std::vector<std::size_t> places;
-    if (cell) places = cgns_places(cell->kind, elements.size);
-    std::vector<Index> nodes(cell ? elements.size : num_corners);
+    std::vector<std::size_t>& places = places_[elements.type];
+    if (cell && places.empty()) places = cgns_places(cell->kind, elements.size);
+    std::vector<Index>& nodes = nodes_;
+    nodes.resize(cell ? elements.size : num_corners);
     for (std::size_t e = 0; e < elements.count; ++e) {
       const cgsize_t number = elements.first_number + static_cast<cgsize_t>(e);
       for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -409,7 +410,9 @@ class CgnsParser {
   LeftOut left_out_;
   GroupList groups_;
   std::vector<CellSection> sections_;
-  // Of the present zone:
+  std::map<Type, std::vector<std::size_t>> places_;  ///< `cgns_places` of the types of cells
+  std::vector<Index> nodes_;                         ///< of the element that is being read
+  // What follows describes the zone that is being read.
   std::string zone_name_;
   std::size_t first_node_ = 0, num_nodes_ = 0;
   std::vector<Face> faces_;
