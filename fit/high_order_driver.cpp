@@ -8,6 +8,7 @@
 #include "subvol/fit/elements/quadrature.h"
 #include "subvol/fit/energies/make_surface_term.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/validate.h"
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <utility>
 
@@ -80,6 +82,15 @@ int HighOrderDriver::sample_intervals(int order) const {
   return std::max({of_target, kLeastPerOrder * order, std::min(kWantedPerOrder * order, affordable)});
 }
 
+/// Returns the number of intervals for measuring: more than for the fit, up to about twice as many, if there are not
+/// too many triangles.
+int HighOrderDriver::measured_intervals() const {
+  constexpr double kMostTriangles = 1e6;
+  const double faces = static_cast<double>(mesh_.space.topology().boundary_faces().size());
+  const int own = sample_intervals(order_);
+  return std::max(own + 1, std::min(2 * own + 1, static_cast<int>(std::sqrt(kMostTriangles / (2 * faces)))));
+}
+
 bool HighOrderDriver::end_for_memory(const std::string& why) {
   if (report_.stages.empty()) throw std::runtime_error("out of memory: " + why);
   report_.stop_reason = StopReason::memory_limit;
@@ -111,34 +122,41 @@ BoundarySamples HighOrderDriver::sheet_samples(const ElementSpace& space) const 
                                   : make_boundary_samples(space, intervals);
 }
 
-std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space) const {
+std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space,
+                                                                std::span<const Index> cells) const {
   constexpr int kLeastPoints = 5;
   std::vector<int> points(space.num_cells());
-  for (std::size_t c = 0; c < points.size(); ++c)
-    points[c] = std::max({kLeastPoints, points_for_order(space.pattern_order(space.pattern(c))),
-                          stays_dense_ ? points_[c] : 0});
-  auto volume = std::make_unique<HighOrderEnergy>(space, ideal_boxes_, points);
+  std::vector<Vec3> boxes(space.num_cells());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::size_t c = cells.empty() ? i : static_cast<std::size_t>(cells[i]);
+    points[i] = std::max(
+        {kLeastPoints, points_for_order(space.pattern_order(space.pattern(i))), stays_dense_ ? points_[c] : 0});
+    boxes[i] = ideal_boxes_[c];
+  }
+  auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
+  volume->count_as_part(template_.num_cells());
   volume->set_distortion(options_.distortion);
   return volume;
 }
 
 /// Cell edges can stick out of the surface as fins, which are too thin to count if only points beside the edges are
 /// used. So the edges themselves get points (`samples.at_edges`).
+std::unique_ptr<SurfaceTerm> HighOrderDriver::surface_energy(const BoundarySamples& samples,
+                                                             double tangential_weight) const {
+  return make_surface_term(target_.surface, samples.triangles, samples.points.size(), tangential_weight,
+                           options_.correspondence, SurfacePull::straight, far_length_, samples.at_edges,
+                           {groups_of_triangles(samples.triangle_faces, group_of_face_), target_.group_of_triangle});
+}
+
 FitProblem HighOrderDriver::problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume,
                                     const BoundarySamples& samples, const Stage& stage) const {
   FitProblem problem(identity_map(samples.positions.num_cols), samples.positions, std::move(volume),
-                     make_surface_term(target_.surface, samples.triangles, samples.points.size(),
-                                       stage.tangential_weight, options_.correspondence, SurfacePull::straight,
-                                       far_length_, samples.at_edges,
-                                       {groups_of_triangles(samples.triangle_faces, group_of_face_),
-                                        target_.group_of_triangle}),
-                     stage.lambda);
+                     surface_energy(samples, stage.tangential_weight), stage.lambda);
   problem.tables.emplace(space, samples.points);
   return problem;
 }
 
-bool HighOrderDriver::run_stage(const Stage& stage) {
-  if (!report_.stages.empty() && !runner_.in_time(formatted("order %d", order_), report_)) return false;
+StageRecord HighOrderDriver::new_record(const Stage& stage) const {
   StageRecord record;
   const int least = std::ranges::min(mesh_.space.orders().cells);
   record.name = (try_ > 1 ? formatted("try %d, ", try_) : "") +
@@ -148,22 +166,60 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
   if (emphasis_ > 0) record.name += formatted(", poor shape up to %g times as heavy", 1 + emphasis_);
   record.order = order_;
   record.cells = mesh_.space.num_cells();
+  return record;
+}
+
+void HighOrderDriver::begin_stage(const Stage& stage) {
   keep_state();
   lambda_ = stage.lambda;
   mean_.reset();
+  if (order_ == order_in_progress_) return;
+  constexpr double kExpectedSteps = 20;
+  order_in_progress_ = order_;
+  // An order takes about a quarter of the work of twice the order.
+  const double share = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_));
+  runner_.work().begin_part(share, kExpectedSteps);
+}
+
+bool HighOrderDriver::run_stage(const Stage& stage) {
+  if (!report_.stages.empty() && !runner_.in_time(formatted("order %d", order_), report_)) return false;
+  begin_stage(stage);
+  moved_cells_.clear();
   std::unique_ptr<HighOrderEnergy> volume = volume_energy(mesh_.space);
   volume->emphasize_poor(mesh_.coefficients, emphasis_);
   const HighOrderEnergy& energy = *volume;
   FitProblem stage_problem = problem(mesh_.space, std::move(volume), samples_, stage);
-  if (order_ != order_in_progress_) {
-    constexpr double kExpectedSteps = 20;
-    order_in_progress_ = order_;
-    // An order takes about a quarter of the work of twice the order.
-    const double share = std::pow(0.25, std::log2(static_cast<double>(options_.order) / order_));
-    runner_.work().begin_part(share, kExpectedSteps);
-  }
-  const bool going = runner_.run(stage_problem, stage, std::move(record), mesh_.coefficients, report_);
+  const bool going = runner_.run(stage_problem, stage, new_record(stage), mesh_.coefficients, report_);
   points_.assign(energy.points_per_direction().begin(), energy.points_per_direction().end());
+  return going;
+}
+
+/// The patch is a part of the problem of `run_stage`, with the same weights.
+bool HighOrderDriver::run_stage_around(std::span<const Index> cells, const Stage& stage) {
+  constexpr int kRings = 2;
+  constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
+  const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(template_.num_cells()));
+  std::optional<HighOrderPatch> patch;
+  if (!cells.empty() && options_.correspondence == Correspondence::closest)
+    patch = high_order_patch(template_, mesh_.space, cells, kRings, most);
+  if (!patch) return run_stage(stage);
+  if (!runner_.in_time(formatted("order %d", order_), report_)) return false;
+  begin_stage(stage);
+  std::unique_ptr<HighOrderEnergy> volume = volume_energy(patch->space, patch->cells);
+  volume->emphasize_poor(patch->coefficients(mesh_.coefficients), emphasis_);
+  const HighOrderEnergy& energy = *volume;
+  const std::unique_ptr<ClosestPointEnergy> surface = closest_point_energy(stage.tangential_weight);
+  surface->assign_target(samples_.positions.apply(mesh_.coefficients));
+  FitProblem part = patch_problem(*patch, mesh_.coefficients, std::move(volume), samples_, *surface, stage.lambda);
+  StageRecord record = new_record(stage);
+  record.name += formatted(", %zu cells", patch->cells.size());
+  std::vector<Vec3> x;
+  for (const Index node : patch->unknowns) x.push_back(mesh_.coefficients[node]);
+  const double step_work = static_cast<double>(patch->cells.size()) / static_cast<double>(template_.num_cells());
+  const bool going = runner_.run(part, stage, std::move(record), x, report_, step_work);
+  for (std::size_t i = 0; i < x.size(); ++i) mesh_.coefficients[patch->unknowns[i]] = x[i];
+  for (std::size_t i = 0; i < patch->cells.size(); ++i) points_[patch->cells[i]] = energy.points_per_direction()[i];
+  moved_cells_ = std::move(patch->cells);
   return going;
 }
 
@@ -172,13 +228,16 @@ bool HighOrderDriver::run_next_stage(const Stage& stage) {
   return run_stage(stage);
 }
 
+TriangleMesh HighOrderDriver::surface_at(const BoundarySamples& samples) const {
+  return {samples.positions.apply(mesh_.coefficients), samples.triangles};
+}
+
 TriangleMesh HighOrderDriver::boundary(int intervals) const {
-  BoundarySamples fine = make_boundary_samples(mesh_.space, intervals);
-  return {fine.positions.apply(mesh_.coefficients), std::move(fine.triangles)};
+  return surface_at(make_boundary_samples(mesh_.space, intervals));
 }
 
 /// Returns the boundary, sampled more densely than for the fit.
-TriangleMesh HighOrderDriver::measured_boundary() const { return boundary(2 * sample_intervals(order_) + 1); }
+TriangleMesh HighOrderDriver::measured_boundary() const { return boundary(measured_intervals()); }
 
 std::optional<std::size_t> HighOrderDriver::intersecting_pairs() {
   return runner_.intersecting_pairs(measured_boundary(), report_);
@@ -208,9 +267,8 @@ double HighOrderDriver::measured_mean() {
 std::optional<SurfaceDistance> HighOrderDriver::measured_interfaces() const {
   if (target_.region_triangle.empty()) return std::nullopt;
   const std::vector<Index> faces = find_interfaces(template_, mesh_.space.topology()).faces;
-  const BoundarySamples fine = make_face_samples(mesh_.space, faces, 2 * sample_intervals(order_) + 1);
-  return target_.interface_distance({fine.positions.apply(mesh_.coefficients), fine.triangles},
-                                    groups_of_triangles(fine.triangle_faces, group_of_face_));
+  const BoundarySamples fine = make_face_samples(mesh_.space, faces, measured_intervals());
+  return target_.interface_distance(surface_at(fine), groups_of_triangles(fine.triangle_faces, group_of_face_));
 }
 
 bool HighOrderDriver::meets_tolerance() {
@@ -222,16 +280,39 @@ void HighOrderDriver::take_own_boxes() {
                              target_.surface.volume(), 1);
 }
 
-/// Measures the state; returns nothing if the fit must end.
-std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome() {
-  const QualityReport quality = measure_quality(mesh_);
-  const SurfaceDistance distance = target_.distance(measured_boundary());
+std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome(std::size_t pairs_before) {
+  QualityReport quality = measure_quality(mesh_);
+  const BoundarySamples fine = make_boundary_samples(mesh_.space, measured_intervals());
+  const TriangleMesh surface = surface_at(fine);
+  const SurfaceDistance distance = target_.distance(surface);
   const std::optional<SurfaceDistance> inner = measured_interfaces();
   const double mean = keep_mean(inner ? std::max(distance.mean(), inner->mean()) : distance.mean());
   const double largest = inner ? std::max(distance.max(), inner->max()) : distance.max();
-  const std::optional<std::size_t> pairs = intersecting_pairs();
+  std::vector<std::uint8_t> moved;
+  if (pairs_before == 0 && !moved_cells_.empty())
+    for (const Index face : fine.triangle_faces)
+      moved.push_back(std::ranges::binary_search(moved_cells_, mesh_.space.topology().face_cells(face)[0]));
+  const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, report_, moved);
   if (!pairs) return {};
-  return Outcome{quality.min_scaled_jacobian, mean, 100 * largest, *pairs};
+  return Outcome{std::move(quality.cell_minima), quality.min_scaled_jacobian, mean, 100 * largest, *pairs};
+}
+
+/// Returns E_S, whose correspondences must be closest points.
+std::unique_ptr<ClosestPointEnergy> HighOrderDriver::closest_point_energy(double tangential_weight) const {
+  std::unique_ptr<SurfaceTerm> surface = surface_energy(samples_, tangential_weight);
+  return std::unique_ptr<ClosestPointEnergy>(&dynamic_cast<ClosestPointEnergy&>(*surface.release()));
+}
+
+std::vector<Index> HighOrderDriver::far_cells(double percent) const {
+  const std::unique_ptr<ClosestPointEnergy> surface = closest_point_energy(0);
+  surface->assign(samples_.positions.apply(mesh_.coefficients));
+  const std::vector<double> distances = surface->triangle_distances();
+  std::vector<Index> cells;
+  for (std::size_t t = 0; t < distances.size(); ++t)
+    if (100 * distances[t] > percent) cells.push_back(mesh_.space.topology().face_cells(samples_.triangle_faces[t])[0]);
+  std::ranges::sort(cells);
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  return cells;
 }
 
 std::vector<Vec3> HighOrderDriver::in_target_units(std::vector<Vec3> coefficients) const {

@@ -3,6 +3,7 @@
 
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/elements/high_order_mesh.h"
+#include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/fits/high_order_schedule.h"
 #include "subvol/fit/high_order_fit.h"
@@ -15,6 +16,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,8 +30,9 @@ class HighOrderDriver : protected StagedFit {
  protected:
   /// The measures of a state when shape is weighed against distance.
   struct Outcome {
-    double least_scaled_jacobian, mean_percent, max_percent;
-    std::size_t pairs;  ///< number of intersecting triangle pairs
+    std::vector<double> cell_minima{};  ///< least scaled Jacobian of each cell
+    double least_scaled_jacobian = 0, mean_percent = 0, max_percent = 0;
+    std::size_t pairs = 0;  ///< number of intersecting triangle pairs
   };
 
   /// InputError: options out of range; the template has defects.
@@ -47,12 +50,16 @@ class HighOrderDriver : protected StagedFit {
   /// Makes the ideal cells boxes of the cells' present sizes, so that graded meshes stay graded.
   void take_own_boxes();
 
-  std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space) const;
+  /// cells  of the mesh that the space consists of, if it is a part of it.
+  std::unique_ptr<HighOrderEnergy> volume_energy(const ElementSpace& space, std::span<const Index> cells = {}) const;
   BoundarySamples sheet_samples(const ElementSpace& space) const;
+  std::unique_ptr<SurfaceTerm> surface_energy(const BoundarySamples& samples, double tangential_weight) const;
   FitProblem problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume, const BoundarySamples& samples,
                      const Stage& stage) const;
   /// Minimizes with the present orders and settings, and adds the stage to the report.
   bool run_stage(const Stage& stage);
+  /// Does the same, but moves only the surroundings of some cells, unless these are most of the mesh.
+  bool run_stage_around(std::span<const Index> cells, const Stage& stage);
   /// Does the same for a stage of the schedule, and remembers the state before it in `starts_`.
   bool run_next_stage(const Stage& stage);
   bool run_final_stage(double lambda) override { return run_stage(schedule_.final_stage(lambda)); }
@@ -60,7 +67,11 @@ class HighOrderDriver : protected StagedFit {
   TriangleMesh measured_boundary() const;
   double measured_mean();
   bool meets_tolerance();
-  std::optional<Outcome> measured_outcome();
+  /// pairs_before  number of pairs before the last stage; if it is 0, only what that stage moved is searched for pairs.
+  std::optional<Outcome> measured_outcome(std::size_t pairs_before);
+  /// Returns the cells at the boundary that are farther from the target than this, in per cent of the diagonal,
+  /// ascending.
+  std::vector<Index> far_cells(double percent) const;
   std::optional<std::size_t> intersecting_pairs() override;
   std::optional<bool> is_folded();
   std::vector<Vec3> in_target_units(std::vector<Vec3> coefficients) const;
@@ -88,11 +99,17 @@ class HighOrderDriver : protected StagedFit {
 
  private:
   int sample_intervals(int order) const;
+  int measured_intervals() const;
+  StageRecord new_record(const Stage& stage) const;
+  std::unique_ptr<ClosestPointEnergy> closest_point_energy(double tangential_weight) const;
+  void begin_stage(const Stage& stage);
+  TriangleMesh surface_at(const BoundarySamples& samples) const;
   TriangleMesh boundary(int intervals) const;
   std::optional<SurfaceDistance> measured_interfaces() const;
   double keep_mean(double distance);
 
   BoundarySamples samples_;
+  std::vector<Index> moved_cells_;    ///< that the last stage moved, ascending; empty: all
   std::vector<Index> group_of_face_;  ///< `groups_of_sheets`; empty if there are no interfaces, or they are not kept
   int order_in_progress_ = 0;         ///< the order whose part of the work has begun
 };

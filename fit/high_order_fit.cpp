@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -30,6 +31,8 @@ constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
 /// largest distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure. At first,
 /// a place at kFirstFarLength times the mean counts twice.
 constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
+/// Share of this distance from which on the surroundings of a place move.
+constexpr double kStartOfFar = 0.5;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
 /// Emphasis on places of poor shape: its first value, doubled each time up to the last, until the least scaled Jacobian
 /// is good.
@@ -63,7 +66,7 @@ class HighOrderFit : HighOrderDriver {
   bool lower_lambda(std::size_t pairs);
   bool improve_worst_places();
   bool is_better(const Outcome& next) const;
-  Again run_again(double& setting, double value, int steps);
+  Again run_again(std::span<const Index> cells, double& setting, double value, int steps);
   Again draw_in_far_places();
   Again lift_worst_places();
 
@@ -248,7 +251,7 @@ void HighOrderFit::leave_folds() {
 /// Repeats the last stage to improve a few places that hardly count in the energies, since these are means.
 bool HighOrderFit::improve_worst_places() {
   if (!options_.improve_worst_places || options_.order < 2) return true;
-  const std::optional<Outcome> first = measured_outcome();
+  const std::optional<Outcome> first = measured_outcome(1);
   if (!first) return false;
   outcome_ = *first;
   most_max_ = kMostDistanceGrowth * outcome_.max_percent;
@@ -274,16 +277,17 @@ bool HighOrderFit::is_better(const Outcome& next) const {
          next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
 }
 
-/// Repeats the last stage with one setting changed; if the result is not better, rolls back the stage and the setting.
-HighOrderFit::Again HighOrderFit::run_again(double& setting, double value, int steps) {
+/// Repeats the last stage around some cells with one setting changed; if the result is not better, rolls back the stage
+/// and the setting.
+HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double& setting, double value, int steps) {
   FitSnapshot before = snapshot();
   const double setting_before = std::exchange(setting, value);
   Stage stage = schedule_.final_stage(lambda_);
   stage.max_iterations = steps;
-  const std::optional<Outcome> next =
-      or_back(before, [&] { return run_stage(stage) ? measured_outcome() : std::nullopt; });
+  std::optional<Outcome> next =
+      or_back(before, [&] { return run_stage_around(cells, stage) ? measured_outcome(outcome_.pairs) : std::nullopt; });
   if (next && is_better(*next)) {
-    outcome_ = *next;
+    outcome_ = *std::move(next);
     return Again::kept;
   }
   go_back(std::move(before));
@@ -296,9 +300,10 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   Again last = Again::kept;
   if (options_.correspondence != Correspondence::closest) return last;
   for (int draw = 0; draw < kMostDraws && last == Again::kept; ++draw) {
-    if (!(outcome_.max_percent > std::max(kFarShare * outcome_.mean_percent, kNearPercent))) break;
+    const double far = std::max(kFarShare * outcome_.mean_percent, kNearPercent);
+    if (!(outcome_.max_percent > far)) break;
     const double first = kFirstFarLength * outcome_.mean_percent / 100;
-    last = run_again(far_length_, far_length_ == 0 ? first : far_length_ / 2, kDrawSteps);
+    last = run_again(far_cells(kStartOfFar * far), far_length_, far_length_ == 0 ? first : far_length_ / 2, kDrawSteps);
   }
   return last;
 }
@@ -306,13 +311,19 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
 /// Puts more and more emphasis on places of poor shape, as long as there are any. An emphasis that does not help may be
 /// too weak to change the worst cell, so stronger ones are attempted as well before this ends.
 HighOrderFit::Again HighOrderFit::lift_worst_places() {
+  const auto poor_cells = [&] {
+    std::vector<Index> cells;
+    for (std::size_t c = 0; c < outcome_.cell_minima.size(); ++c)
+      if (outcome_.cell_minima[c] < kGoodScaledJacobian) cells.push_back(static_cast<Index>(c));
+    return cells;
+  };
   const auto is_poor = [&] {
     return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < kGoodScaledJacobian;
   };
   double attempted = emphasis_;
   for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < kLastEmphasis;) {
     attempted = attempted == 0 ? kFirstEmphasis : 2 * attempted;
-    const Again last = run_again(emphasis_, attempted, kLiftSteps);
+    const Again last = run_again(poor_cells(), emphasis_, attempted, kLiftSteps);
     if (last == Again::ended) return last;
     failures = last == Again::kept ? 0 : failures + 1;
   }

@@ -51,8 +51,8 @@ class ClosestPointEnergy final : public SurfaceTerm {
                      SurfacePull pull = SurfacePull::along_normals);
 
   /// Makes the part of an energy that belongs to some of its sample triangles; all others stay where they are. The
-  /// whole must be assigned: a point of the target belongs to the part if it corresponds to one of these triangles
-  /// there.
+  /// whole must be assigned (`assign_target` suffices): a point of the target belongs to the part if it corresponds to
+  /// one of these triangles there.
   ///
   /// triangles    of the whole, ascending.
   /// numbers      number in the part of each sample of the whole; kNoIndex for those outside. Corners of `triangles`
@@ -90,6 +90,9 @@ class ClosestPointEnergy final : public SurfaceTerm {
   /// the previous call, and the tree over S~ is refitted.
   void assign(std::span<const Vec3> samples) override;
   void forget() override;
+  /// Finds the correspondences of the target's points only: all that the energies of parts take from this one. `assign`
+  /// must follow before anything else is asked for.
+  void assign_target(std::span<const Vec3> samples) { link_target(samples); }
 
   /// Distances between the surfaces at the last `assign`, each the larger of both directions; means are weighted by
   /// area. Points over a boundary of the target count as distance 0.

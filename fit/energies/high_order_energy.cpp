@@ -24,7 +24,10 @@ HighOrderEnergy::~HighOrderEnergy() = default;
 
 HighOrderEnergy::HighOrderEnergy(const ElementSpace& space, std::span<const Vec3> ideal_lengths,
                                  std::span<const int> points_per_direction, QuadratureRule rule)
-    : space_(&space), rule_(rule), points_(points_per_direction.begin(), points_per_direction.end()) {
+    : space_(&space),
+      rule_(rule),
+      num_cells_(static_cast<double>(space.num_cells())),
+      points_(points_per_direction.begin(), points_per_direction.end()) {
   if (ideal_lengths.size() != space.num_cells())
     throw InputError("HighOrderEnergy: ideal_lengths must hold one entry per cell (" +
                      std::to_string(space.num_cells()) + "), got " + std::to_string(ideal_lengths.size()));
@@ -41,6 +44,7 @@ HighOrderEnergy::HighOrderEnergy(const ElementSpace& space, CellReference refere
                                  std::span<const int> points_per_direction, QuadratureRule rule)
     : space_(&space),
       rule_(rule),
+      num_cells_(static_cast<double>(space.num_cells())),
       reference_(std::move(reference)),
       points_(points_per_direction.begin(), points_per_direction.end()) {
   rebuild_groups();
@@ -415,7 +419,7 @@ void HighOrderEnergy::weigh_points(std::span<const Vec3> nodes) {
     for (std::size_t i = 0; i < weights[g].size(); ++i)
       for (int l = 0; l < groups_[g].active[i / groups_[g].num_points()]; ++l)
         sum += groups_[g].weights[i % groups_[g].num_points()] * weights[g][i][l];
-  const double inverse_mean = 1 / (cell_share() * sum);
+  const double inverse_mean = static_cast<double>(space_->num_cells()) / sum;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     for (Wide& weight : weights[g]) weight *= inverse_mean;
     groups_[g].point_weights = std::move(weights[g]);

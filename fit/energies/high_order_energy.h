@@ -72,6 +72,8 @@ class HighOrderEnergy final : public VolumeTerm {
   bool keeps_off_inversion() const override { return true; }
   /// Refines these cells (n -> 2 n - 1 points per direction, up to 25) and emphasizes points of poor shape in them.
   void densify(std::span<const Index> cells, std::span<const Vec3> nodes) override;
+  /// Makes the cells part of a mesh of so many cells: n above.
+  void count_as_part(std::size_t num_cells) { num_cells_ = static_cast<double>(num_cells); }
   /// Sets e, initially Hencky.
   /// floor  least eigenvalue of its second derivative at a point; -infinity: it may be indefinite.
   void set_distortion(Distortion distortion, double floor = kHessianFloor);
@@ -93,7 +95,7 @@ class HighOrderEnergy final : public VolumeTerm {
   void stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane);
   template <bool kBack, class Kernel, class PerPoint>
   double integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const;
-  double cell_share() const { return 1.0 / static_cast<double>(space_->num_cells()); }
+  double cell_share() const { return 1.0 / num_cells_; }
   template <class PerPoint>
   void for_each_pair(std::span<const Vec3> nodes, std::span<const Vec3> direction, const PerPoint& per_point) const;
   template <class PerBatch>
@@ -103,6 +105,7 @@ class HighOrderEnergy final : public VolumeTerm {
 
   const ElementSpace* space_;
   QuadratureRule rule_;
+  double num_cells_;  ///< n
   std::vector<Mat3> inverse_ideal_;  ///< A^-1 of each cell; empty with a `reference_`
   CellReference reference_;
   std::vector<int> points_;

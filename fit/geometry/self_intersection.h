@@ -5,7 +5,9 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 namespace subvol::internal {
@@ -34,7 +36,11 @@ inline constexpr std::size_t kMostIntersectingPairs = 1'000'000;
 /// Runs in parallel; the result is the same for any number of threads. Cost: 1 to 3 us a triangle on one core, twice
 /// that on flat surfaces, where only exact arithmetic decides. The cost is quadratic in the triangles around one vertex
 /// (8,000 around each of two: 5 s) and in triangles in a heap, all of whose boxes meet. Memory: that of the result.
-SelfIntersections self_intersections(const TriangleMesh& mesh, const std::function<bool()>& cancelled = {});
+///
+/// marked  one entry per triangle: only pairs with a triangle whose entry is not 0 are found, at a cost of 0.2 us for
+///         each of the others. Empty: all pairs.
+SelfIntersections self_intersections(const TriangleMesh& mesh, const std::function<bool()>& cancelled = {},
+                                     std::span<const std::uint8_t> marked = {});
 
 /// Returns the number of pairs, or `kMostIntersectingPairs` if the search was cancelled.
 std::size_t count_intersecting_pairs(const TriangleMesh& mesh, const std::function<bool()>& cancelled = {});

@@ -103,13 +103,19 @@ class Search {
   Search(const PairTest& test, const std::function<bool()>& cancelled, SelfIntersections& result)
       : test_(test), cancelled_(cancelled), result_(result) {}
 
-  void run(const std::vector<Box>& boxes) {
-    std::vector<const Box*> pointers;
-    for (const Box& box : boxes) pointers.push_back(&box);
+  /// Tests the pairs among some boxes, and those of one of them and one of the others.
+  void run(const std::vector<Box>& boxes, const std::vector<Box>& others) {
+    const auto pointers_to = [](const std::vector<Box>& all) {
+      std::vector<const Box*> pointers;
+      for (const Box& box : all) pointers.push_back(&box);
+      return pointers;
+    };
+    std::vector<const Box*> own = pointers_to(boxes), rest = pointers_to(others);
+    const auto take_pair = [&](const Box* a, const Box* b) { take(a->info(), b->info()); };
     constexpr std::ptrdiff_t kCutoff = 200;  // boxes up to which all pairs are tested; flat from 50 to 2000
     try {
-      CGAL::box_self_intersection_d(
-          pointers.begin(), pointers.end(), [&](const Box* a, const Box* b) { take(a->info(), b->info()); }, kCutoff);
+      CGAL::box_self_intersection_d(own.begin(), own.end(), take_pair, kCutoff);
+      if (!rest.empty()) CGAL::box_intersection_d(own.begin(), own.end(), rest.begin(), rest.end(), take_pair, kCutoff);
       test_some();
     } catch (const Ended&) {
       result_.is_complete = false;
@@ -149,19 +155,23 @@ class Search {
 
 }  // namespace
 
-SelfIntersections self_intersections(const TriangleMesh& mesh, const std::function<bool()>& cancelled) {
+SelfIntersections self_intersections(const TriangleMesh& mesh, const std::function<bool()>& cancelled,
+                                     std::span<const std::uint8_t> marked) {
+  if (!marked.empty() && marked.size() != mesh.triangles.size())
+    throw InputError("self-intersection: one mark is expected for each triangle");
   const std::vector<Point> points = checked_points(mesh);
   SelfIntersections result;
-  std::vector<Box> boxes;
+  std::vector<Box> boxes, others;
   boxes.reserve(mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
     if (CGAL::collinear(points[a], points[b], points[c]))
       result.degenerate.push_back(static_cast<Index>(t));
     else
-      boxes.emplace_back(points[a].bbox() + points[b].bbox() + points[c].bbox(), static_cast<Index>(t));
+      (marked.empty() || marked[t] ? boxes : others)
+          .emplace_back(points[a].bbox() + points[b].bbox() + points[c].bbox(), static_cast<Index>(t));
   }
-  Search(PairTest(mesh, points), cancelled, result).run(boxes);
+  Search(PairTest(mesh, points), cancelled, result).run(boxes, others);
   return result;
 }
 

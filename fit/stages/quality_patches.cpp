@@ -109,16 +109,20 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
   return patches;
 }
 
-VolumeMesh patch_mesh(const VolumeMesh& mesh, const QualityPatch& patch) {
+VolumeMesh patch_mesh(const VolumeMesh& mesh, std::span<const Index> cells) {
+  std::vector<std::uint8_t> is_used(mesh.num_vertices(), 0);
+  for (const Index c : cells)
+    for (const Index v : mesh.cell(c)) is_used[v] = 1;
   VolumeMesh part;
-  for (const Index v : patch.vertices) part.positions.push_back(mesh.positions[v]);
+  std::vector<Index> numbers(mesh.num_vertices(), kNoIndex);
+  for (const Index v : marked_ones(is_used)) {
+    numbers[v] = static_cast<Index>(part.positions.size());
+    part.positions.push_back(mesh.positions[v]);
+  }
   std::vector<Index> corners;
-  for (const Index c : patch.cells) {
+  for (const Index c : cells) {
     corners.clear();
-    for (const Index v : mesh.cell(c)) {
-      const auto at = std::lower_bound(patch.vertices.begin(), patch.vertices.end(), v);
-      corners.push_back(static_cast<Index>(at - patch.vertices.begin()));
-    }
+    for (const Index v : mesh.cell(c)) corners.push_back(numbers[v]);
     part.add_cell(mesh.kinds[c], corners);
   }
   return part;

@@ -30,10 +30,11 @@ std::vector<QualityPatch> quality_patches(const VolumeMesh& mesh, const FitProbl
                                           std::span<const std::array<Index, 3>> triangles,
                                           std::span<const Index> centers, int rings, std::size_t most_cells);
 
-/// Returns the mesh of a patch, its vertices numbered as `QualityPatch::vertices`: cells only, no tags or groups.
-VolumeMesh patch_mesh(const VolumeMesh& mesh, const QualityPatch& patch);
+/// Returns the mesh of some cells and their vertices, both in the order of the mesh: no tags, groups or references.
+/// cells  ascending.
+VolumeMesh patch_mesh(const VolumeMesh& mesh, std::span<const Index> cells);
 
-/// Returns part of a map: the given rows, and the entries in the given columns (both ascending, columns renumbered).
+/// Returns part of a map: the given rows, and the entries in the given columns (ascending), which are renumbered.
 SparseMap select(const SparseMap& map, std::span<const Index> rows, std::span<const Index> columns);
 
 }  // namespace subvol::internal

@@ -145,7 +145,7 @@ QualityStages::QualityStages(const VolumeMesh& mesh, std::span<const Vec3> lengt
 }
 
 QualityStages::QualityStages(const QualityStages& whole, const QualityPatch& patch, std::span<const Vec3> x)
-    : patch_mesh_(std::make_unique<VolumeMesh>(internal::patch_mesh(*whole.mesh_, patch))),
+    : patch_mesh_(std::make_unique<VolumeMesh>(internal::patch_mesh(*whole.mesh_, patch.cells))),
       mesh_(patch_mesh_.get()),
       mean_length_(whole.mean_length_),
       lambda_one_(whole.lambda_one_),

@@ -86,9 +86,11 @@ void StageRunner::give_up(const std::string& work, FitReport& report) const {
   report.explanation = "cancelled in " + work;
 }
 
-std::optional<std::size_t> StageRunner::intersecting_pairs(const TriangleMesh& boundary, FitReport& report) const {
+std::optional<std::size_t> StageRunner::intersecting_pairs(const TriangleMesh& boundary, FitReport& report,
+                                                           std::span<const std::uint8_t> marked) const {
   bool ended = false;
-  const SelfIntersections found = self_intersections(boundary, [&] { return ended = ended || is_to_end(); });
+  const SelfIntersections found = self_intersections(
+      boundary, [&] { return ended = ended || is_to_end(); }, marked);
   if (!ended) return found.pairs.size();
   give_up("the search for self-intersections", report);
   return {};

@@ -12,9 +12,11 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -61,7 +63,9 @@ class StageRunner {
 
   /// Returns the number of intersecting triangle pairs of a fitted boundary. If the search was interrupted and the fit
   /// must end, sets the report's stop reason and returns nothing.
-  std::optional<std::size_t> intersecting_pairs(const TriangleMesh& boundary, FitReport& report) const;
+  /// marked  as for `self_intersections`.
+  std::optional<std::size_t> intersecting_pairs(const TriangleMesh& boundary, FitReport& report,
+                                                std::span<const std::uint8_t> marked = {}) const;
 
   /// Sets the report's stop reason and explanation for a fit that has run all its stages, given its mean distance.
   void conclude(double mean_percent, std::optional<double> tolerance_percent, FitReport& report) const;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 
@@ -134,6 +135,22 @@ TEST_CASE("many triangles round a vertex are told apart, a search in a heap has 
   CHECK(found.pairs.size() < kMostIntersectingPairs);
   CHECK(count_intersecting_pairs(heap, [] { return true; }) == kMostIntersectingPairs);
   CHECK(count_intersecting_pairs(bent) == self_intersections(bent).pairs.size());
+}
+
+TEST_CASE("with marked triangles, exactly the pairs with one of them are found", "[self_intersection]") {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> place(0, 3);
+  TriangleMesh mesh;
+  for (int i = 0; i < 30; ++i) add(mesh, tetrahedron(1.5, {place(random), place(random), place(random)}));
+  std::vector<std::uint8_t> marked(mesh.triangles.size());
+  for (auto& mark : marked) mark = random() % 4 == 0;
+  Pairs expected;
+  for (const auto& pair : self_intersections(mesh).pairs)
+    if (marked[pair[0]] || marked[pair[1]]) expected.push_back(pair);
+  REQUIRE(expected.size() > 20);
+  CHECK(self_intersections(mesh, {}, marked).pairs == expected);
+  CHECK(self_intersections(mesh, {}, std::vector<std::uint8_t>(marked.size(), 0)).empty());
+  CHECK_THROWS_AS(self_intersections(mesh, {}, std::vector<std::uint8_t>(3, 1)), InputError);
 }
 
 TEST_CASE("self-intersection refuses broken surfaces", "[self_intersection]") {

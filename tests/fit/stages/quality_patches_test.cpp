@@ -47,7 +47,7 @@ TEST_CASE("Patches hold the cells around their centers, and share none", "[quali
     CHECK(patches[0].vertices.size() == 64);
     CHECK(patches[1].cells.size() == 27);
     CHECK(std::ranges::find_first_of(patches[0].cells, patches[1].cells) == patches[0].cells.end());
-    const VolumeMesh part = patch_mesh(bar, patches[1]);
+    const VolumeMesh part = patch_mesh(bar, patches[1].cells);
     CHECK(part.num_cells() == 27);
     CHECK(part.positions[part.cell(26)[6]] == Vec3(kLength, kWidth, kWidth));
   }
