@@ -58,6 +58,8 @@ struct QualitySchedule {
   /// Share of `most_distance` from which on places are emphasized.
   double far_margin = 0.5;
   LiftMerit merit;  ///< of the states of the lift
+  /// Patches around the worst cells alone are lifted, too, if those around all poor cells are most of a cage.
+  bool lifts_worst_of_cage = false;
 
   /// Number of steps of the whole mesh that the schedule is expected to take, for forecasts of work.
   double expected_steps() const;

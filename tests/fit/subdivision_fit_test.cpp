@@ -200,6 +200,20 @@ TEST_CASE("Quality stages raise the least scaled Jacobian of a fit, the cage sta
   CHECK_THROWS_AS(fit_subdivision_volume(sample.target, sample.template_mesh, options), InputError);
 }
 
+TEST_CASE("The cells of a coarse cage become good without the surface suffering", "[slow]") {
+  const auto data = require_data();
+  if (!data) return;
+  const TriangleMesh target = read_triangle_mesh(*data / "fit/joint129/target.off");
+  const VolumeMesh mesh = read_volume_mesh(*data / "fit/joint129/template.mesh");
+  FitOptions options = quick(2);
+  const FitResult plain = fit_subdivision_volume(target, mesh, options);
+  options.quality = kUsualQuality;
+  const FitResult lifted = fit_subdivision_volume(target, mesh, options);
+  CHECK(measure_quality(plain.mesh).min_scaled_jacobian < 0.2);
+  CHECK(measure_quality(lifted.mesh).min_scaled_jacobian > 0.5);
+  CHECK(mesh_percent(lifted.mesh, target) <= 1.05 * mesh_percent(plain.mesh, target));
+}
+
 TEST_CASE("A tolerance that is met ends the fit, one out of reach is said to be missed", "[slow]") {
   const samples::Sample sample = samples::ball_sample();
   FitOptions options = quick();
