@@ -150,4 +150,18 @@ void hold_to_quality(std::optional<double> least, const MeshCheck& found, FitRep
                                  found.quality->min_scaled_jacobian, *least);
 }
 
+std::vector<std::string> warnings_of_quality(double aim, const MeshCheck& found) {
+  constexpr double kReached = 0.01;  // a fit ends at an aim that is rounded
+  if (aim == 0 || !found.quality || found.quality->worst_cells.empty()) return {};
+  const QualityReport& quality = *found.quality;
+  if (quality.min_scaled_jacobian >= aim - kReached) return {};
+  const auto poor = std::ranges::count_if(quality.cell_minima, [&](double least) { return least < aim; });
+  const Vec3& place = quality.worst_cells.front().centre;
+  return {formatted(
+      "the quality of %.2f that was aimed at is missed by %zu of %zu cells: the least scaled Jacobian is %.3f, "
+      "at (%.6g, %.6g, %.6g)",
+      aim, static_cast<std::size_t>(poor), quality.num_cells, quality.min_scaled_jacobian, place.x(), place.y(),
+      place.z())};
+}
+
 }  // namespace subvol::cli

@@ -73,4 +73,8 @@ void hold_to(std::optional<double> most_percent, const char* which, double perce
 /// Does the same for the least scaled Jacobian, which must be at least `least`; empty means no requirement.
 void hold_to_quality(std::optional<double> least, const MeshCheck& found, FitReport& report);
 
+/// Says how many cells have a scaled Jacobian below the quality aimed at, and where the worst one is. Empty if the
+/// quality is reached (to 0.01), or is 0.
+std::vector<std::string> warnings_of_quality(double aim, const MeshCheck& found);
+
 }  // namespace subvol::cli

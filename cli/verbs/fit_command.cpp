@@ -182,6 +182,7 @@ void FitRun::check() {
   measure_limit(result_.cage, outer_, arguments_.writing);
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
+  add_warnings(warnings_of_quality(arguments_.fit.quality, mesh_check_));
   if (arguments_.surface == "limit")
     hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
             limit_.mean_percent(mesh_check_.target_diagonal), result_.report);

@@ -106,6 +106,7 @@ void OptimizeRun::check() {
   const OptimizeOptions& asked = arguments_.optimize;
   if (!asked.fixed_boundary)
     hold_to({asked.mean_tolerance_percent, asked.max_tolerance_percent}, mesh_check_, result_.report);
+  add_warnings(warnings_of_quality(asked.quality, mesh_check_));
 }
 
 Json OptimizeRun::report() const {

@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/subdivision_driver.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/format.h"
+#include "subvol/base/option_checks.h"
+#include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/elements/ideal_boxes.h"
+#include "subvol/fit/energies/make_surface_term.h"
+#include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/quality/quality.h"
+#include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/validate.h"
+#include "subvol/subdivision/audit.h"
+#include "subvol/surface/boundary.h"
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+#include <utility>
+
+namespace subvol::internal {
+
+namespace {
+
+void check_options(const FitOptions& options) {
+  const auto in_range = [](const char* name, double value, double low, double high) {
+    require_in_range("FitOptions", name, value, low, high);
+  };
+  in_range("levels", options.levels, 1, 6);
+  in_range("lambda_far", options.lambda_far, 1e-9, 1e9);
+  in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
+  in_range("quality", options.quality, 0, kMostQuality);
+  in_range("max_iterations", options.max_iterations, 0, 1e9);
+  in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
+  in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
+  if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
+  if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
+}
+
+}  // namespace
+
+SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& template_mesh, const FitOptions& options)
+    : StagedFit(options.keep_states),
+      options_((check_options(options), options)),
+      target_(std::move(target)),
+      template_(template_mesh),
+      memory_(options.memory_limit_bytes, kMemoryOfLevelCell),
+      runner_({options.solver, options.max_iterations, options.time_limit_seconds, options.progress, options.cancelled,
+               options.log}) {
+  for (const MeshDefect& defect : validate(template_mesh))
+    if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
+  target_.normalisation.take_in(template_);
+  std::vector<std::array<Index, 2>> borders;
+  if (options.keeps_groups) borders = group_borders(target_.mesh, target_.mesh);
+  constexpr double kNone = 180;  // no edge is sharper
+  const std::optional<double> angle =
+      !borders.empty() && !options.crease_angle_degrees ? kNone : options.crease_angle_degrees;
+  const bool wants_creases = angle || !template_.tags.creases.empty();
+  if (wants_creases && !target_.surface.is_cloud())
+    template_creases_ = FollowedCreases(target_.mesh, angle, template_, borders);
+}
+
+void SubdivisionDriver::look_over_template() {
+  FitReport& report = result_.report;
+  report.warnings = audit(template_).warnings;
+  const StartComparison start =
+      target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
+  report.note_start(start);
+  schedule_ =
+      make_schedule(options_, start.mean_distance / target_.surface.length(), template_creases_.hold_the_surface());
+  keep_interfaces();
+}
+
+/// The interfaces between the template's regions get the shape of the target's, or keep their own, sharp edges
+/// included.
+void SubdivisionDriver::keep_interfaces() {
+  target_.keep_interfaces(template_);
+  if (target_.has_interfaces())
+    template_creases_.keep_interfaces(template_, options_.crease_angle_degrees.value_or(kUsualCreaseAngle),
+                                      target_.region_triangle.empty() ? FollowedCreases::InnerCurves::themselves
+                                                                      : FollowedCreases::InnerCurves::nothing);
+  else if (region_references(template_).size() > 1)
+    result_.report.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
+}
+
+void SubdivisionDriver::prepare_level() {
+  const double begin = runner_.seconds();
+  level_ = make_fit_level(control_, from_unknowns_, previous_nodes_, options_, target_.surface.num_details(), finest());
+  limit_check_.reset();
+  creases_.refine(level_.parent_creases);
+  sample_target();
+  ideal_boxes_ = ideal_boxes(level_.mesh, level_.safe_nodes.apply(unknowns_), target_.surface.volume(),
+                             number_ == 1 ? own_box_share_ : 1);
+  seconds_["levels"] += runner_.seconds() - begin;
+}
+
+/// Samples the target as densely as the level can follow it: more correspondences cost time and change nothing. On the
+/// finest level, a target that has far more detail counts fully in the end only (`fit_all_samples`).
+void SubdivisionDriver::sample_target() {
+  constexpr std::size_t kPerQuad = 6, kLeastCoarse = 3000;  // target samples of a level below the finest
+  constexpr std::size_t kMostPerSample = 4;                 // target samples for each sample of the fitted surface
+  constexpr std::size_t kFarTooMany = 8;                    // the same, from which on the finest level is thinned
+  const std::size_t samples = level_.samples.num_rows();
+  samples_all_ = true;
+  if (finest()) {
+    target_.sample(samples);
+    if (target_.surface.samples().size() <= kFarTooMany * samples) return;
+    samples_all_ = target_.surface.is_cloud();
+    target_.surface.thin(kMostPerSample * samples);
+  } else {
+    const std::size_t quads = MeshTopology(level_.mesh).boundary_faces().size();
+    target_.sample(samples, std::clamp(kPerQuad * quads, kLeastCoarse, kLeastTargetSamples), kMostPerSample * samples);
+  }
+}
+
+/// Ends a fit to some of the target's samples with a few steps towards all of them. Returns false if the fit must end.
+bool SubdivisionDriver::fit_all_samples() {
+  constexpr int kSteps = 2;
+  if (samples_all_) return true;
+  target_.sample(level_.samples.num_rows());
+  samples_all_ = true;
+  Stage stage = schedule_.final_stage(lambda_);
+  stage.max_iterations = kSteps;
+  return run_stage(stage, stage_name(stage) + ", all of the target");
+}
+
+std::string SubdivisionDriver::stage_name(const Stage& stage) const {
+  return formatted("level %d, lambda %g, tangential weight %g", number_, stage.lambda, stage.tangential_weight);
+}
+
+std::unique_ptr<SurfaceTerm> SubdivisionDriver::surface_term(const Stage& stage) const {
+  std::unique_ptr<SurfaceTerm> term = make_surface_term(
+      target_.surface, level_.sample_triangles, level_.samples.num_rows(), stage.tangential_weight,
+      options_.correspondence, SurfacePull::along_normals, 0, {}, {level_.sample_groups, target_.group_of_triangle});
+  if (!creases_.curves().empty())
+    term->add_creases(creases_.energy(level_.crease_edges, level_.samples.num_rows(),
+                                      kCreaseWidth * target_.surface.length(), stage.tangential_weight));
+  return term;
+}
+
+bool SubdivisionDriver::run_stage(const Stage& stage, const std::string& name) {
+  if (!runner_.in_time(name, result_.report)) return false;
+  StageRecord record;
+  record.name = try_ == 1 ? name : formatted("try %d, ", try_) + name;
+  record.level = number_;
+  record.cells = level_.mesh.num_cells();
+  keep_state();
+  lambda_ = stage.lambda;
+  auto volume = std::make_unique<VolumeEnergy>(level_.mesh, ideal_boxes_, schedule_.quadrature_points(number_));
+  volume->set_distortion(options_.distortion);
+  FitProblem problem(level_.nodes, level_.samples, std::move(volume), surface_term(stage), stage.lambda);
+  const double begin = runner_.seconds();
+  const bool going = runner_.run(problem, stage, std::move(record), unknowns_, result_.report);
+  seconds_["solve"] += runner_.seconds() - begin;
+  mean_.reset();
+  return going;
+}
+
+/// Makes the level's start valid by continuation from the linear split L of the level below:
+///   M_t = (1 - t) L + t M; a few minimizer steps at each t that is feasible, until t = 1.
+bool SubdivisionDriver::start_level() {
+  constexpr int kMaxRounds = 60;
+  constexpr double kBackOff = 0.6, kLeastProgress = 1e-3, kSlowShare = 0.25;
+  const SparseMap nodes = level_.nodes;
+  const std::vector<Index> failing_before = certify(level_.safe_nodes.apply(unknowns_), level_.mesh).not_certified;
+  const auto feasible = [&](double t) {
+    const SparseMap map = blend(level_.safe_nodes, nodes, t);
+    const std::vector<Index> failing = certify(map.apply(unknowns_), level_.mesh).not_certified;
+    return std::includes(failing_before.begin(), failing_before.end(), failing.begin(), failing.end());
+  };
+  Stage stage = schedule_.continuation;
+  double t = 0;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    double next = 1;
+    while (next > t && !feasible(next)) {
+      next = t + kBackOff * (next - t);
+      if (next - t <= kLeastProgress) next = t;
+    }
+    // Cells that block the way need better shapes before they can follow.
+    const bool slow = next - t < kSlowShare * (1 - t);
+    if (next > t)
+      t = next;
+    else if (stage.lambda >= options_.lambda_far)
+      break;
+    if (slow) stage.lambda = std::min(4 * stage.lambda, std::max(stage.lambda, options_.lambda_far));
+    level_.nodes = t == 1 ? nodes : blend(level_.safe_nodes, nodes, t);
+    if (t == 1) return true;
+    if (!run_stage(stage, formatted("level %d, continuation t = %.3f, lambda %g", number_, t, stage.lambda)))
+      return false;
+  }
+  level_.nodes = blend(level_.safe_nodes, nodes, t);
+  result_.report.stop_reason = StopReason::stalled;
+  result_.report.explanation =
+      formatted("level %d could not be reached without inverting a cell (%.0f %% of the way)", number_, 100 * t);
+  return false;
+}
+
+TriangleMesh SubdivisionDriver::limit_triangles() {
+  if (!limit_check_) limit_check_ = refine_sheets(level_.mesh, kLimitRefinements);
+  return internal::limit_triangles(level_, *limit_check_, from_unknowns_.apply(unknowns_));
+}
+
+/// Returns the mean distance between the target and the fit, in per cent of the diagonal: the largest one of the finite
+/// element mesh's, of its interfaces', and of the limit surface's.
+double SubdivisionDriver::measured_mean() {
+  if (mean_) return *mean_;
+  const double begin = runner_.seconds();
+  const VolumeMesh mesh = current_mesh();
+  std::vector<TriangleMesh> surfaces = {refined_triangles(boundary_surface(mesh, MeshTopology(mesh)))};
+  if (options_.surface == FittedSurface::limit) surfaces.push_back(limit_triangles());
+  double mean = 0;
+  for (const TriangleMesh& surface : surfaces) mean = std::max(mean, target_.mean_distance(surface));
+  if (target_.has_interfaces()) mean = std::max(mean, target_.interface_distance(mesh).mean());
+  mean_ = 100 * mean;
+  if (StageRecord* stage = result_.report.last_kept_stage()) stage->mean_distance_percent = *mean_;
+  seconds_["distance"] += runner_.seconds() - begin;
+  return *mean_;
+}
+
+VolumeMesh SubdivisionDriver::current_mesh() const {
+  VolumeMesh mesh = level_.mesh;
+  mesh.positions = level_.nodes.apply(unknowns_);
+  return mesh;
+}
+
+double SubdivisionDriver::mean_scaled_jacobian() const { return measure_quality(current_mesh()).mean_scaled_jacobian; }
+
+std::optional<std::size_t> SubdivisionDriver::intersecting_pairs() {
+  const VolumeMesh mesh = current_mesh();
+  return runner_.intersecting_pairs(refined_triangles(boundary_surface(mesh, MeshTopology(mesh))), result_.report);
+}
+
+bool SubdivisionDriver::meets_tolerance() {
+  return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
+}
+
+double SubdivisionDriver::Measured::largest() const {
+  double largest = 0;
+  for (const SurfaceDistance& distance : distances) largest = std::max(largest, distance.max());
+  return largest;
+}
+
+bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional<double> tolerance_percent) const {
+  // Distances may rise by 5 %, but not past the tolerance; those of the surface that is nearer by a quarter. It gives
+  // way first, because the stages before put it as near as they could.
+  constexpr double kFarther = 1.05, kNearerFarther = 1.25;
+  double farthest_mean = 0, farthest_max = 0;
+  for (const SurfaceDistance& distance : before.distances) {
+    farthest_mean = std::max(farthest_mean, distance.mean());
+    farthest_max = std::max(farthest_max, distance.max());
+  }
+  const auto most = [](double distance, double farthest) {
+    return std::max(kFarther * distance, std::min(kNearerFarther * distance, farthest));
+  };
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const double mean = distances[i].mean(), mean_before = before.distances[i].mean();
+    const bool misses = tolerance_percent && 100 * mean > *tolerance_percent && mean > mean_before;
+    if (misses || mean > most(mean_before, farthest_mean) ||
+        distances[i].max() > most(before.distances[i].max(), farthest_max))
+      return false;
+  }
+  return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;
+}
+
+std::optional<SubdivisionDriver::Measured> SubdivisionDriver::measure() {
+  const VolumeMesh mesh = current_mesh();
+  const QualityReport quality = measure_quality(mesh);
+  const TriangleMesh surface = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
+  const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, result_.report);
+  if (!pairs) return std::nullopt;
+  Measured result{quality.min_scaled_jacobian, quality.certificate.not_certified.size(), *pairs, {}};
+  result.distances.push_back(target_.distance(surface));
+  if (target_.has_interfaces()) result.distances.push_back(target_.interface_distance(mesh));
+  if (options_.surface == FittedSurface::limit) result.distances.push_back(target_.distance(limit_triangles()));
+  return result;
+}
+
+bool SubdivisionDriver::run_quality_stages(const QualitySchedule& schedule) {
+  const auto creases = [&](double width) {
+    return creases_.energy(level_.crease_edges, level_.samples.num_rows(), width, kQualityTangentialWeight);
+  };
+  const bool has_creases = !creases_.curves().empty();
+  QualityStages stages(level_.mesh, ideal_boxes_, level_.nodes, {},
+                       {level_.samples,
+                        {},
+                        level_.sample_triangles,
+                        level_.sample_faces,
+                        level_.interfaces,
+                        level_.face_groups,
+                        target_.group_of_triangle},
+                       target_.surface, has_creases ? std::function<CreaseEnergy(double)>(creases) : nullptr);
+  stages.before_stage = [this] { keep_state(); };
+  StageRecord record;
+  record.name = formatted("level %d, quality", number_);
+  record.level = number_;
+  record.cells = level_.mesh.num_cells();
+  const bool going = stages.run(schedule, runner_, record, unknowns_, result_.report);
+  mean_.reset();
+  return going;
+}
+
+/// Stores the whole state or nothing, since memory may run out here.
+void SubdivisionDriver::store_result() {
+  FitResult stored{cage_, level_.mesh, {}, states_};
+  stored.cage.positions = target_.normalisation.from_unit(unknowns_);
+  stored.mesh.positions = target_.normalisation.from_unit(level_.nodes.apply(unknowns_));
+  for (FitState& state : stored.states) state.positions = target_.normalisation.from_unit(std::move(state.positions));
+  if (!creases_.curves().empty()) {
+    const TriangleMesh limit = limit_triangles();
+    CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
+    creases.farthest = target_.normalisation.from_unit({creases.farthest})[0];
+    result_.report.creases = creases;
+  }
+  result_.cage = std::move(stored.cage);
+  result_.mesh = std::move(stored.mesh);
+  result_.states = std::move(stored.states);
+  result_stages_ = {try_begin_, result_.report.stages.size()};
+}
+
+/// Makes the refined mesh the next control mesh (paper: section 4.3). In cage-only fits, the degrees of freedom stay.
+void SubdivisionDriver::next_control() {
+  control_ = std::move(level_.mesh);
+  if (options_.cage_only) {
+    from_unknowns_ = compose(level_.refine, from_unknowns_);
+    previous_nodes_ = level_.nodes;
+    control_.positions = from_unknowns_.apply(unknowns_);
+    return;
+  }
+  unknowns_ = level_.refine.apply(unknowns_);
+  for (FitState& state : states_) state.positions = level_.refine.apply(state.positions);
+  control_.positions = unknowns_;
+  cage_ = control_;
+  from_unknowns_ = identity_map(unknowns_.size());
+  previous_nodes_ = options_.surface == FittedSurface::limit ? limit_map(control_) : from_unknowns_;
+}
+
+void SubdivisionDriver::begin(double own_box_share) {
+  ++try_;
+  try_begin_ = result_.report.stages.size();
+  own_box_share_ = own_box_share;
+  control_ = cage_ = template_;
+  creases_ = template_creases_;
+  unknowns_ = control_.positions;
+  states_.clear();
+  from_unknowns_ = previous_nodes_ = identity_map(unknowns_.size());
+}
+
+bool SubdivisionDriver::end_for_memory(const std::string& why) {
+  if (result_.mesh.num_cells() == 0) throw std::runtime_error("out of memory: " + why);
+  result_.report.stop_reason = StopReason::memory_limit;
+  result_.report.explanation = why;
+  return false;
+}
+
+bool SubdivisionDriver::has_room() {
+  std::size_t cells = 0;
+  for (const CellKind kind : control_.kinds) cells += static_cast<std::size_t>(cell_topology(kind).num_vertices);
+  return memory_.allows(cells) || end_for_memory(memory_.refusal(formatted("level %d of %zu cells", number_, cells)));
+}
+
+}  // namespace subvol::internal
