@@ -91,8 +91,8 @@ TEST_CASE("A checkpoint whose template depends on the time is kept with a warnin
     return place.run("fit target.off --levels 1 --cage-only --report r.json --force " + words).err.find("--resume") !=
            std::string::npos;
   };
-  CHECK(is_warned("--time-limit 3 --checkpoint c"));  // half of it is enough for a template
-  CHECK_FALSE(is_warned("--time-limit 3"));
+  CHECK(is_warned("--time-limit 6 --checkpoint c"));  // half of it is enough for a template
+  CHECK_FALSE(is_warned("--time-limit 6"));
   CHECK_FALSE(is_warned("--time-limit 0.1 --checkpoint c --template template.mesh"));
 }
 
