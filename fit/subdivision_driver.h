@@ -23,8 +23,8 @@
 
 namespace subvol::internal {
 
-/// The base of the fit of a subdivision volume: its levels, the minimizations on them, and its measures. All coordinates
-/// are normalized.
+/// The base of the fit of a subdivision volume: its levels, the minimizations on them, and its measures. All
+/// coordinates are normalized.
 ///
 /// Functions that return a bool or an optional return false or nothing if the fit must end, except `meets_tolerance`.
 class SubdivisionDriver : protected StagedFit {
