@@ -280,7 +280,7 @@ void HighOrderDriver::take_own_boxes() {
                              target_.surface.volume(), 1);
 }
 
-std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome(std::size_t pairs_before) {
+std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome(bool moved_only) {
   QualityReport quality = measure_quality(mesh_);
   const BoundarySamples fine = make_boundary_samples(mesh_.space, measured_intervals());
   const TriangleMesh surface = surface_at(fine);
@@ -289,7 +289,7 @@ std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome(std::s
   const double mean = keep_mean(inner ? std::max(distance.mean(), inner->mean()) : distance.mean());
   const double largest = inner ? std::max(distance.max(), inner->max()) : distance.max();
   std::vector<std::uint8_t> moved;
-  if (pairs_before == 0 && !moved_cells_.empty())
+  if (moved_only && !moved_cells_.empty())
     for (const Index face : fine.triangle_faces)
       moved.push_back(std::ranges::binary_search(moved_cells_, mesh_.space.topology().face_cells(face)[0]));
   const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, report_, moved);

@@ -25,7 +25,8 @@ namespace subvol::internal {
 /// The base of the high-order fit: the mesh of curved cells and its orders, the minimizations on it, and its measures.
 /// All coordinates are normalized.
 ///
-/// Functions that return a bool or an optional return false or nothing if the fit must end, except `meets_tolerance`.
+/// Functions that return a bool or an optional return false or nothing if the fit must end, except `meets_tolerance`
+/// and `measured_interfaces`.
 class HighOrderDriver : protected StagedFit {
  protected:
   /// The measures of a state when shape is weighed against distance.
@@ -67,8 +68,8 @@ class HighOrderDriver : protected StagedFit {
   TriangleMesh measured_boundary() const;
   double measured_mean();
   bool meets_tolerance();
-  /// pairs_before  number of pairs before the last stage; if it is 0, only what that stage moved is searched for pairs.
-  std::optional<Outcome> measured_outcome(std::size_t pairs_before);
+  /// moved_only  the state before the last stage had no intersecting pairs, so only what that stage moved is searched.
+  std::optional<Outcome> measured_outcome(bool moved_only);
   /// Returns the cells at the boundary that are farther from the target than this, in per cent of the diagonal,
   /// ascending.
   std::vector<Index> far_cells(double percent) const;

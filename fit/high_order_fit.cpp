@@ -251,7 +251,7 @@ void HighOrderFit::leave_folds() {
 /// Repeats the last stage to improve a few places that hardly count in the energies, since these are means.
 bool HighOrderFit::improve_worst_places() {
   if (!options_.improve_worst_places || options_.order < 2) return true;
-  const std::optional<Outcome> first = measured_outcome(1);
+  const std::optional<Outcome> first = measured_outcome(false);
   if (!first) return false;
   outcome_ = *first;
   most_max_ = kMostDistanceGrowth * outcome_.max_percent;
@@ -284,8 +284,8 @@ HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double
   const double setting_before = std::exchange(setting, value);
   Stage stage = schedule_.final_stage(lambda_);
   stage.max_iterations = steps;
-  std::optional<Outcome> next =
-      or_back(before, [&] { return run_stage_around(cells, stage) ? measured_outcome(outcome_.pairs) : std::nullopt; });
+  std::optional<Outcome> next = or_back(
+      before, [&] { return run_stage_around(cells, stage) ? measured_outcome(outcome_.pairs == 0) : std::nullopt; });
   if (next && is_better(*next)) {
     outcome_ = *std::move(next);
     return Again::kept;

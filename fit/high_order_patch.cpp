@@ -96,7 +96,7 @@ std::optional<HighOrderPatch> high_order_patch(const VolumeMesh& mesh, const Ele
 FitProblem patch_problem(const HighOrderPatch& patch, std::span<const Vec3> coefficients,
                          std::unique_ptr<VolumeTerm> volume, const BoundarySamples& samples,
                          const ClosestPointEnergy& surface, double lambda) {
-  // What does not move with the patch is fixed where it is.
+  // All other nodes stay where they are.
   Marks moves(coefficients.size(), 0);
   std::vector<Vec3> fixed(coefficients.begin(), coefficients.end());
   for (const Index node : patch.unknowns) {
@@ -105,11 +105,10 @@ FitProblem patch_problem(const HighOrderPatch& patch, std::span<const Vec3> coef
   }
 
   std::vector<Index> triangles, rows, numbers(samples.points.size(), kNoIndex);
-  const auto is_free = [&](Index sample) {
-    return std::ranges::any_of(samples.positions.row_columns(sample), [&](Index node) { return moves[node] != 0; });
-  };
   Marks is_used(samples.points.size(), 0), is_sample_free(samples.points.size(), 0);
-  for (std::size_t i = 0; i < is_sample_free.size(); ++i) is_sample_free[i] = is_free(static_cast<Index>(i));
+  for (std::size_t i = 0; i < is_sample_free.size(); ++i)
+    is_sample_free[i] =
+        std::ranges::any_of(samples.positions.row_columns(i), [&](Index node) { return moves[node] != 0; });
   for (std::size_t t = 0; t < samples.triangles.size(); ++t) {
     const auto& corners = samples.triangles[t];
     if (!std::ranges::any_of(corners, [&](Index sample) { return is_sample_free[sample] != 0; })) continue;

@@ -16,6 +16,7 @@
 #include "subvol/subdivision/audit.h"
 #include "subvol/surface/boundary.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>

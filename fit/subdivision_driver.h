@@ -13,7 +13,6 @@
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/subdivision/limit_surface.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <map>
 #include <memory>
@@ -26,7 +25,8 @@ namespace subvol::internal {
 /// The base of the fit of a subdivision volume: its levels, the minimizations on them, and its measures. All
 /// coordinates are normalized.
 ///
-/// Functions that return a bool or an optional return false or nothing if the fit must end, except `meets_tolerance`.
+/// Functions that return a bool or an optional return false or nothing if the fit must end, except `meets_tolerance`
+/// and `finest`.
 class SubdivisionDriver : protected StagedFit {
  protected:
   /// A range of stages in a report.

@@ -80,11 +80,12 @@ struct QualityAttempt {
   bool worst_patches;  ///< `QualitySchedule::lifts_worst_of_cage`
 };
 
-/// Made in this order until the quality has risen and the distances have not suffered. A cage has few degrees of
-/// freedom, so its surface suffers more than that of a mesh whose vertices are all free, and counts more here. First
-/// the cells are lifted. Then the surface is drawn back with more and more weight, while the hinge keeps the cells as
-/// they are: femur180 at level 2 rises from 0.008 to 0.60 by the lift, but is 8 % farther from the target then; drawn
-/// back, it has 0.53 and is 4 % farther. If none of this has gained, the same is done around the worst cells alone.
+/// The attempts, which are made in this order until the quality has risen and the distances have not suffered. A cage
+/// has few degrees of freedom, so its surface suffers more than that of a mesh whose vertices are all free, and counts
+/// more here. First the cells are lifted. Then the surface is drawn back with more and more weight, while the hinge
+/// keeps the cells as they are: femur180 at level 2 rises from 0.008 to 0.60 by the lift, but is 8 % farther from the
+/// target then; drawn back, it has 0.53 and is 4 % farther. If none of this has gained, the same is done around the
+/// worst cells alone.
 constexpr std::array<QualityAttempt, 9> kQualityAttempts{{{QualityAttempt::Kind::lift, 10, false},
                                                           {QualityAttempt::Kind::draw_back, 100, false},
                                                           {QualityAttempt::Kind::draw_back, 300, false},

@@ -37,8 +37,8 @@ inline constexpr std::size_t kMostIntersectingPairs = 1'000'000;
 /// that on flat surfaces, where only exact arithmetic decides. The cost is quadratic in the triangles around one vertex
 /// (8,000 around each of two: 5 s) and in triangles in a heap, all of whose boxes meet. Memory: that of the result.
 ///
-/// marked  one entry per triangle: only pairs with a triangle whose entry is not 0 are found, at a cost of 0.2 us for
-///         each of the others. Empty: all pairs.
+/// marked  one entry per triangle: only pairs with a triangle whose entry is not 0 are found; the others cost little
+///         more than their boxes. Empty: all pairs.
 SelfIntersections self_intersections(const TriangleMesh& mesh, const std::function<bool()>& cancelled = {},
                                      std::span<const std::uint8_t> marked = {});
 

@@ -336,9 +336,9 @@ bool QualityStages::lift(const QualitySchedule& schedule, std::vector<Vec3>& x) 
   constexpr int kSteps = 2, kPatience = 5;
   constexpr double kWorthwhile = 0.7;  // a round of the whole mesh must leave less than this share of the poor cells
   const bool is_patch = patch_mesh_ != nullptr;
-  // Of a cage, patches around the worst cells alone have too few degrees of freedom: joint129 at level 2 rises to 0.21
-  // by them, but to 0.65 if the whole mesh is lifted as long as that helps.
-  const bool is_cage = 2 * problem_->nodes.num_cols < problem_->nodes.num_rows();
+  // A degree of freedom of a cage moves several vertices. Patches around its worst cells alone have too few of them:
+  // joint129 at level 2 rises to 0.21 by such patches, but to 0.65 if the whole mesh is lifted as long as that helps.
+  const bool is_cage = problem_->nodes.num_nonzeros() > 2 * problem_->nodes.num_cols;
   const bool is_whole_cage = is_cage && !schedule.lifts_worst_of_cage;
   energy_->reset_emphasis();
   far_emphasis_.assign(factors_.size(), 1);

@@ -412,7 +412,7 @@ class CgnsParser {
   std::vector<CellSection> sections_;
   std::map<Type, std::vector<std::size_t>> places_;  ///< `cgns_places` of the types of cells
   std::vector<Index> nodes_;                         ///< of the element that is being read
-  // What follows describes the zone that is being read.
+  // These members describe the zone that is being read.
   std::string zone_name_;
   std::size_t first_node_ = 0, num_nodes_ = 0;
   std::vector<Face> faces_;
