@@ -20,14 +20,24 @@ namespace {
 
 constexpr int kGmshTets[] = {4, 11, 29, 30, 31, 71, 72, 73, 74, 75};
 constexpr int kGmshPrisms[] = {6, 13};
+constexpr int kGmshPyramids[] = {7};
 constexpr int kGmshHexes[] = {5, 12, 92, 93, 94, 95, 96, 97, 98};
 
 constexpr int kGmshTriangles[] = {2, 9, 21, 23, 25, 42, 43, 44, 45, 46};
 constexpr int kGmshQuads[] = {3, 10, 36, 37, 38, 47, 48, 49, 50, 51};
 
 std::span<const int> gmsh_types(CellKind kind) {
-  if (kind == CellKind::tet) return kGmshTets;
-  return kind == CellKind::prism ? std::span<const int>(kGmshPrisms) : std::span<const int>(kGmshHexes);
+  switch (kind) {
+    case CellKind::tet:
+      return kGmshTets;
+    case CellKind::prism:
+      return kGmshPrisms;
+    case CellKind::pyramid:
+      return kGmshPyramids;
+    case CellKind::hex:
+      break;
+  }
+  return kGmshHexes;
 }
 
 /// A volume of a .msh: the cells of one reference and order. Gmsh assumes that all tets of a volume have the same
@@ -305,7 +315,10 @@ void append_node_data(std::string& text, const VertexField& field) {
 
 std::uint8_t vtk_type(CellKind kind) { return kind == CellKind::tet ? 71 : kind == CellKind::hex ? 72 : 73; }
 
-std::uint8_t vtk_linear_type(CellKind kind) { return kind == CellKind::tet ? 10 : kind == CellKind::hex ? 12 : 13; }
+std::uint8_t vtk_linear_type(CellKind kind) {
+  constexpr std::uint8_t kTypes[] = {10, 13, 12, 14};
+  return kTypes[static_cast<std::size_t>(kind)];
+}
 
 void turn_wedge(std::int64_t* corners) {
   std::swap(corners[1], corners[2]);

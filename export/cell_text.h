@@ -29,16 +29,16 @@ struct CellView {
   std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
 };
 
-/// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13) without `orders`, else of version 2.2 with Lagrange
+/// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13, 14) without `orders`, else of version 2.2 with Lagrange
 /// cells and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty. They stand
 /// behind the grid, because some readers stop at field data before it; the groups of plain cells stand at its end.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {}, const std::string& group_data = {});
 
-/// Largest order that Gmsh evaluates for a kind of cell: 10 for tets, 2 for prisms, 9 for hexes.
+/// Largest order for a kind of cell, which Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes; 1 for pyramids.
 int max_gmsh_order(CellKind kind);
 /// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted); VTK's for Lagrange cells of a
-/// kind.
+/// kind other than pyramids.
 int gmsh_type(CellKind kind, int order);
 /// Returns Gmsh's type number of a face of 3 or 4 corners, of an order from 1 to 10.
 int gmsh_face_type(std::size_t num_corners, int order);

@@ -38,8 +38,18 @@ std::span<const std::array<int, 3>> canonical_corners(CellKind kind) {
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}}};
   static constexpr std::array<std::array<int, 3>, 8> kHex{
       {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
-  if (kind == CellKind::tet) return kTet;
-  return kind == CellKind::prism ? std::span<const std::array<int, 3>>(kPrism) : kHex;
+  static constexpr std::array<std::array<int, 3>, 5> kPyramid{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}}};
+  switch (kind) {
+    case CellKind::tet:
+      return kTet;
+    case CellKind::prism:
+      return kPrism;
+    case CellKind::pyramid:
+      return kPyramid;
+    case CellKind::hex:
+      break;
+  }
+  return kHex;
 }
 
 /// Places of the points of a cell in its list, by their coordinates on the grid.

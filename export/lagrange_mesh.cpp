@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
 #include "subvol/fit/elements/pattern_table.h"
+#include "subvol/mesh/pyramids.h"
 
 #include <algorithm>
 #include <array>
@@ -213,6 +214,7 @@ LagrangeMesh lagrange_mesh(const HighOrderMesh& mesh, std::span<const int> order
   if (orders.size() != space.num_cells())
     throw InputError("lagrange_mesh: " + std::to_string(orders.size()) + " orders for " +
                      std::to_string(space.num_cells()) + " cells");
+  require_no_pyramids(space.kinds(), "lagrange_mesh: pyramids cannot be curved");
   std::map<LatticeKey, Lattice> lattices;
   LagrangeMesh out;
   out.orders.assign(orders.begin(), orders.end());

@@ -111,9 +111,10 @@ void compare_linear(const WrittenFile& file, const VolumeMesh& wanted, bool is_m
   file.same_count("cells", found.num_cells(), wanted.num_cells());
   for (std::size_t v = 0; v < wanted.num_vertices(); ++v)
     file.same(found.positions[v] == wanted.positions[v], "vertex", v);
-  // Medit has one section for each kind: hexes, prisms, tets.
+  // Medit has one section for each kind: hexes, prisms, tets, pyramids.
   const auto section = [&](std::size_t c) {
-    return !is_medit ? 0 : wanted.kinds[c] == CellKind::hex ? 1 : wanted.kinds[c] == CellKind::prism ? 2 : 3;
+    constexpr int kSections[] = {3, 2, 1, 4};
+    return is_medit ? kSections[static_cast<std::size_t>(wanted.kinds[c])] : 0;
   };
   const std::vector<std::size_t> order = sorted_cells(wanted.num_cells(), section);
   for (std::size_t i = 0; i < order.size(); ++i) {

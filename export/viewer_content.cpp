@@ -11,7 +11,8 @@
 namespace subvol::internal {
 namespace {
 
-constexpr std::uint8_t kTriangle = 3, kQuad = 4;  // kinds of cells of surfaces, after those of CellKind
+constexpr std::uint8_t kTriangle = kNumCellKinds,
+                       kQuad = kTriangle + 1;  // kinds of cells of surfaces, after those of CellKind
 
 /// Evaluates a cell's map at points in canonical coordinates.
 class CellMap {

@@ -11,6 +11,7 @@
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/interfaces.h"
+#include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/surface/boundary.h"
 
@@ -40,6 +41,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
 VolumeMesh checked_template(VolumeMesh mesh) {
   for (const MeshDefect& defect : validate(mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
+  require_no_pyramids(mesh.kinds, "template mesh: pyramids cannot be curved");
   return mesh;
 }
 

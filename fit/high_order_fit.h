@@ -50,9 +50,9 @@ struct HighOrderFitResult {
 /// either uniformly or only for the edges, faces and cells that gain most (`order_indicator.h`).
 ///
 /// target         triangles in any state that encloses a volume; the unit of length is the target's.
-/// template_mesh  hexes, prisms and tets; must pass `validate` except for unused vertices and should lie roughly at the
-///                target's place. Interfaces between its regions (cells of different references) are fitted to themselves
-///                as they are, unless the target is a cloud.
+/// template_mesh  hexes, prisms and tets, no pyramids; must pass `validate` except for unused vertices and should lie
+///                roughly at the target's place. Interfaces between its regions (cells of different references) are
+///                fitted to themselves as they are, unless the target is a cloud.
 /// returns        the last state reached. No step makes a cell lose its certificate (`VolumeTerm::uncertified`). Cells
 ///                that had none are only guarded at their quadrature points, and the boundary may come to intersect
 ///                itself, so check the result.

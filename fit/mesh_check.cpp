@@ -264,7 +264,9 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
   if (!begins("topology", 0.2, options.progress, check)) return check;
   const MeshTopology topology(mesh);
   check_topology(mesh, topology, check);
-  if (!has_any(check.defects, {Kind::bad_tag, Kind::inconsistent_orientation, Kind::nonconforming_face}))
+  const bool can_be_subdivided = check.num_cells_of_kind[static_cast<std::size_t>(CellKind::pyramid)] == 0;
+  if (can_be_subdivided &&
+      !has_any(check.defects, {Kind::bad_tag, Kind::inconsistent_orientation, Kind::nonconforming_face}))
     check.subdivision_audit = audit(mesh);
   if (RegionReport regions = measure_regions(mesh, &*check.quality); regions.regions.size() > 1)
     check.regions = std::move(regions);

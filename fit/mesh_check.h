@@ -62,7 +62,7 @@ struct MeshCheck {
   std::vector<MeshDefect> defects;                           ///< those of `validate`
 
   std::size_t num_vertices = 0, num_cells = 0;
-  std::array<std::size_t, kNumCellKinds> num_cells_of_kind{};  ///< by CellKind: tets, prisms, hexes
+  std::array<std::size_t, kNumCellKinds> num_cells_of_kind{};  ///< by CellKind: tets, prisms, hexes, pyramids
   std::optional<OrderSummary> orders;                        ///< for a high-order mesh
 
   bool has_topology = false;                                 ///< true if the numbers below are set

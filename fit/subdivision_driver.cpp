@@ -12,6 +12,7 @@
 #include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
 #include "subvol/subdivision/audit.h"
 #include "subvol/surface/boundary.h"
@@ -54,6 +55,8 @@ SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& templat
                options.log}) {
   for (const MeshDefect& defect : validate(template_mesh))
     if (defect.kind != MeshDefect::Kind::unused_vertex) throw InputError("template mesh: " + defect.message);
+  require_no_pyramids(template_.kinds,
+                      "template mesh: pyramids do not split into hexes, because four edges meet at their apex");
   target_.normalisation.take_in(template_);
   std::vector<std::array<Index, 2>> borders;
   if (options.keeps_groups) borders = group_borders(target_.mesh, target_.mesh);

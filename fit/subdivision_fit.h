@@ -30,7 +30,8 @@ struct FitResult {
 /// returns        the best state reached. Every cell of `mesh` is certified (`certificate.h`) unless report.stop_reason
 ///                is `stalled` or the template has cells that are not certified: no step makes a certified cell lose
 ///                its certificate.
-/// InputError: options out of range, an empty target, a template that cannot be subdivided or that has inverted cells.
+/// InputError: options out of range, an empty target, a template that cannot be subdivided (pyramids) or that has
+/// inverted cells.
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options);
 

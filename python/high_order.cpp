@@ -7,6 +7,7 @@
 #include "subvol/base/error.h"
 #include "subvol/export/export.h"
 #include "subvol/export/lagrange_mesh.h"
+#include "subvol/mesh/pyramids.h"
 #include "subvol/surface/boundary.h"
 
 namespace subvol::python {
@@ -20,6 +21,7 @@ std::shared_ptr<CurvedMesh> make_curved(const py::object& object, int order, con
   keywords.take("basis", basis, bases());
   keywords.finish();
   const auto mesh = sound_volume_from(object, "mesh");
+  require_no_pyramids(mesh->kinds, "mesh: pyramids cannot be curved");
   return std::make_shared<CurvedMesh>(
       CurvedMesh{HighOrderMesh(ElementSpace(*mesh, basis, order), *mesh), mesh->references, mesh->face_groups, mesh->regions});
 }

@@ -112,8 +112,8 @@ struct KindName {
   CellKind kind;
   const char* plural;
 };
-constexpr std::array<KindName, kNumCellKinds> kKinds{{{CellKind::hex, "hexes"}, {CellKind::prism, "prisms"},
-                                                      {CellKind::tet, "tets"}}};
+constexpr std::array<KindName, kNumCellKinds> kKinds{
+    {{CellKind::hex, "hexes"}, {CellKind::prism, "prisms"}, {CellKind::tet, "tets"}, {CellKind::pyramid, "pyramids"}}};
 
 std::shared_ptr<VolumeMesh> make_volume(const py::object& points, const py::kwargs& given) {
   Keywords keywords("VolumeMesh", given);
@@ -159,13 +159,14 @@ std::string volume_text(const VolumeMesh& mesh) {
 
 void add_volume_mesh(py::module_& module) {
   py::class_<VolumeMesh, std::shared_ptr<VolumeMesh>> type(module, "VolumeMesh",
-      R"(A mesh of linear hexes, prisms and tets.
+                                                           R"(A mesh of linear hexes, prisms, tets and pyramids.
 
 points      (n, 3) numbers, in the mesh's own unit of length
 hexes       (n, 8) point numbers: 0 1 2 3 seen from 4 5 6 7 counter-clockwise
 prisms      (n, 6): 0 1 2 seen from 3 4 5 counter-clockwise
 tets        (n, 4): 0 1 2 seen from 3 counter-clockwise
-references  a group number for each cell: of the hexes, then the prisms, then the tets
+pyramids    (n, 5): 0 1 2 3 seen from the apex 4 counter-clockwise
+references  a group number for each cell: of the hexes, then the prisms, the tets and the pyramids
 creases     (n, 2) boundary edges kept sharp, for ever or through so many refinements
 corners     (n,) boundary points kept in their place
 
@@ -177,9 +178,9 @@ face_groups    (n,) the place of each face's group in group_names
 The arrays given are copied. Those of a mesh are views of its memory, which they keep alive; only points can be written.
 What is wrong with a mesh is told by `check`; InputError here only for arrays that do not fit together.)");
   type.def(py::init(&make_volume), py::arg("points"),
-           R"(__init__(self, points, *, hexes=None, prisms=None, tets=None, references=None, creases=None,
-    crease_sharpness=None, corners=None, corner_sharpness=None, grouped_faces=None, face_groups=None, group_names=None,
-    group_numbers=None)
+           R"(__init__(self, points, *, hexes=None, prisms=None, tets=None, pyramids=None, references=None,
+    creases=None, crease_sharpness=None, corners=None, corner_sharpness=None, grouped_faces=None, face_groups=None,
+    group_names=None, group_numbers=None)
 --
 
 Takes the arrays named above.)");
@@ -190,10 +191,14 @@ Takes the arrays named above.)");
     type.def_property_readonly(plural, [k = kind](const py::object& self) { return cells_of(self, k); },
                                "Point numbers of the cells of this kind: int32, one row for each. A view where these "
                                "cells follow one another.");
-  type.def_property_readonly("kinds", [](const py::object& self) {
-    const auto& kinds = self.cast<const VolumeMesh&>().kinds;
-    return shown(reinterpret_cast<const std::uint8_t*>(kinds.data()), {static_cast<py::ssize_t>(kinds.size())}, self);
-  }, "Kind of each cell: (n,) uint8, TET, PRISM or HEX. A view.");
+  type.def_property_readonly(
+      "kinds",
+      [](const py::object& self) {
+        const auto& kinds = self.cast<const VolumeMesh&>().kinds;
+        return shown(reinterpret_cast<const std::uint8_t*>(kinds.data()), {static_cast<py::ssize_t>(kinds.size())},
+                     self);
+      },
+      "Kind of each cell: (n,) uint8, TET, PRISM, HEX or PYRAMID. A view.");
   type.def_property_readonly("cell_points", [](const py::object& self) {
     const auto& points = self.cast<const VolumeMesh&>().cell_vertices;
     return shown(points.data(), {static_cast<py::ssize_t>(points.size())}, self);

@@ -260,6 +260,7 @@ Json describe(const std::string& path, const VolumeMesh& mesh) {
           {"hexes", counts[static_cast<std::size_t>(CellKind::hex)]},
           {"prisms", counts[static_cast<std::size_t>(CellKind::prism)]},
           {"tets", counts[static_cast<std::size_t>(CellKind::tet)]},
+          {"pyramids", counts[static_cast<std::size_t>(CellKind::pyramid)]},
           {"creases", mesh.tags.creases.size()},
           {"corners", mesh.tags.corners.size()}};
 }

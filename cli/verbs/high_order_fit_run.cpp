@@ -21,6 +21,7 @@
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/fit/stages/fit_report.h"
+#include "subvol/mesh/pyramids.h"
 #include "subvol/templates/voxel_grid.h"
 
 #include <algorithm>
@@ -38,6 +39,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 /// Refuses, before the work, outputs to which no curved mesh can be written; the template's cells represent the result.
 void refuse_impossible(const std::vector<Output>& outputs, const HighOrderFitArguments& arguments,
                        const VolumeMesh& cells) {
+  internal::require_no_pyramids(cells.kinds, "template mesh: pyramids cannot be curved");
   for (const Output& output : outputs) {
     require_for_curved_cells(output);
     if (output.extension == ".msh") msh_text({ElementSpace(cells, arguments.fit.basis, arguments.fit.order), cells});

@@ -114,6 +114,26 @@ void tet_coefficients(const std::array<Vector<T>, 4>& x, std::array<T, 1>& d, Ed
   d[0] = dot(a, cross(b, c));
 }
 
+/// Computes the 4 coefficients of det J of a pyramid, which is bilinear over the base and constant along the rays to
+/// the apex: (i, j) is at 2 i + j, the value at the base's corner (i, j) along u and v. With e and f the base's edges
+/// along u and v and g = x0 - x1 + x2 - x3, det J = det[e + t g, f + s g, x4 - x0 + s t g] is linear in s and in t.
+template <class T>
+void pyramid_coefficients(const std::array<Vector<T>, 5>& x, std::array<T, 4>& d, EdgeLengths<T>& lengths) {
+  const std::array<Vector<T>, 2> e = {difference(x[1], x[0]), difference(x[2], x[3])};
+  const std::array<Vector<T>, 2> f = {difference(x[3], x[0]), difference(x[2], x[1])};
+  const T e0 = dot(e[0], e[0]), e1 = dot(e[1], e[1]), f0 = dot(f[0], f[0]), f1 = dot(f[1], f[1]);
+  lengths.squared_max = {larger(e0, e1), larger(f0, f1), e0};
+  lengths.squared_sum = e0 + e1 + f0 + f1;
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      const Vector<T> up = difference(x[4], x[hex_corner(i, j, 0)]);
+      const T l = dot(up, up);
+      lengths.squared_max[2] = i + j == 0 ? l : larger(lengths.squared_max[2], l);
+      lengths.squared_sum = lengths.squared_sum + l;
+      d[2 * i + j] = dot(up, cross(e[j], f[i]));
+    }
+}
+
 /// Largest possible product |a||b||c| of a cell's edges along the three directions: the unit of all rounding margins.
 ///
 /// Infinite (nothing can be certified) if a length is NaN, or outside [1e-50, 1e50] so that products might underflow or

@@ -57,6 +57,10 @@ Coefficients coefficients(CellKind kind, std::span<const Vec3> corners) {
     std::array<double, 9> d;
     bernstein::prism_coefficients(gather<6>(corners), d, lengths);
     keep(d);
+  } else if (kind == CellKind::pyramid) {
+    std::array<double, 4> d;
+    bernstein::pyramid_coefficients(gather<5>(corners), d, lengths);
+    keep(d);
   } else {
     std::array<double, 1> d;
     bernstein::tet_coefficients(gather<4>(corners), d, lengths);
@@ -68,7 +72,7 @@ Coefficients coefficients(CellKind kind, std::span<const Vec3> corners) {
 
 bool is_corner(CellKind kind, int index) {
   if (kind == CellKind::hex) return index % 3 != 1 && index / 3 % 3 != 1 && index / 9 != 1;
-  return kind == CellKind::tet || index % 3 != 1;
+  return kind != CellKind::prism || index % 3 != 1;
 }
 
 Bounds bounds(CellKind kind, std::span<const Vec3> corners) {
@@ -138,6 +142,12 @@ Evaluated evaluate(CellKind kind, std::span<const Vec3> x, const Vec3& at, doubl
       for (int d = 0; d < 2; ++d) add(d, m ? w : 1 - w, 3 * m + d + 1, 3 * m);
     const long double triangle[3] = {1 - u - v, u, v};
     for (int i = 0; i < 3; ++i) add(2, triangle[i], i + 3, i);
+  } else if (kind == CellKind::pyramid) {  // dx/dw but for multiples of the other columns
+    for (int m = 0; m < 2; ++m) {
+      add(0, m ? v : 1 - v, bernstein::hex_corner(1, m, 0), bernstein::hex_corner(0, m, 0));
+      add(1, m ? u : 1 - u, bernstein::hex_corner(m, 1, 0), bernstein::hex_corner(m, 0, 0));
+      for (int n = 0; n < 2; ++n) add(2, (m ? u : 1 - u) * (n ? v : 1 - v), 4, bernstein::hex_corner(m, n, 0));
+    }
   } else {
     for (int d = 0; d < 3; ++d) add(d, 1, d + 1, 0);
   }
@@ -257,12 +267,15 @@ class Search {
   CellCertificate result_;
 };
 
-CellCertificate certify_tet(std::span<const Vec3> corners, const Coefficients& c) {
+/// For tets and pyramids, whose coefficients are all values of det J.
+CellCertificate certify_by_corners(CellKind kind, std::span<const Vec3> corners, const Coefficients& c) {
   CellCertificate result;
-  const Evaluated exact = evaluate(CellKind::tet, corners, result.witness, c.scale);
+  const auto lowest = static_cast<int>(std::min_element(c.d.begin(), c.d.begin() + c.count) - c.d.begin());
+  result.witness = Vec3(lowest / 2, lowest % 2, 0);
+  const Evaluated exact = evaluate(kind, corners, result.witness, c.scale);
   result.boxes = 1;
   result.witness_determinant = static_cast<double>(exact.value);
-  result.lower_bound = c.d[0] - bernstein::rounding_margin(c.scale, 0);
+  result.lower_bound = c.d[lowest] - bernstein::rounding_margin(c.scale, 0);
   if (result.lower_bound > 0) result.validity = CellValidity::valid;
   if (exact.value < -exact.margin) result.validity = CellValidity::invalid;
   return result;
@@ -277,7 +290,7 @@ CellCertificate certify_checked(CellKind kind, std::span<const Vec3> corners, co
   }
   if (kind == CellKind::hex) return Search<27, 8>(kind, corners, c.scale).run(c, options);
   if (kind == CellKind::prism) return Search<9, 2>(kind, corners, c.scale).run(c, options);
-  return certify_tet(corners, c);
+  return certify_by_corners(kind, corners, c);
 }
 
 void check_corners(CellKind kind, std::span<const Vec3> corners) {

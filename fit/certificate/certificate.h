@@ -39,8 +39,10 @@ struct CellCertificate {
 ///
 ///   det J(u) = sum_b d_b B_b(u),  B_b >= 0,  sum_b B_b = 1   =>   min_b d_b <= det J(u) <= max_b d_b
 ///
-/// The hex is certified by its 27 coefficients (degree 2 per direction), the prism by 9, the tet by 1. Boxes that these
-/// do not decide are bisected in each direction (de Casteljau); each bisection reduces the gap by a factor of four. A
+/// The hex is certified by its 27 coefficients (degree 2 per direction), the prism by 9, the tet by 1, the pyramid by
+/// 4: its det J is bilinear over the base and constant along rays to the apex (`pyramid_coefficients`), so the values
+/// at the base's corners decide. Boxes that the coefficients of hexes and prisms do not decide are bisected in each
+/// direction (de Casteljau); each bisection reduces the gap by a factor of four. A
 /// sign counts only if it exceeds an a priori bound on the rounding errors: about 2e-15 times the product of the
 /// longest edges along the three directions.
 /// The paper leaves this open (section 5); the approach is that of Johnen, Remacle and Geuzaine for polynomial cells.

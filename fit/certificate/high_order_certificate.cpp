@@ -5,6 +5,7 @@
 #include "subvol/base/parallel_errors.h"
 #include "subvol/fit/certificate/hex_boxes.h"
 #include "subvol/fit/certificate/simplex_boxes.h"
+#include "subvol/mesh/pyramids.h"
 
 #include <Eigen/LU>
 
@@ -187,6 +188,7 @@ struct HighOrderCertifier::Buffers {
 HighOrderCertifier::HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options)
     : space_(&space), options_(options), buffers_(std::make_unique<Buffers>()) {
   check_options(options);
+  require_no_pyramids(space.kinds(), "certificate: pyramids cannot be curved");
 }
 HighOrderCertifier::~HighOrderCertifier() = default;
 HighOrderCertifier::HighOrderCertifier(HighOrderCertifier&&) noexcept = default;

@@ -23,6 +23,9 @@ std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
       return {Vec3(-(1 - w), -(1 - w), -t), Vec3(1 - w, 0, -u), Vec3(0, 1 - w, -v),
               Vec3(-w, -w, t),              Vec3(w, 0, u),      Vec3(0, w, v)};
     }
+    case CellKind::pyramid:  // at the base, w = 0: the gradients are the same along each ray to the apex
+      return {Vec3(v - 1, u - 1, u * v - 1), Vec3(1 - v, -u, -u * v), Vec3(v, u, u * v), Vec3(-v, 1 - u, -u * v),
+              Vec3(0, 0, 1)};
     case CellKind::hex:
       break;
   }
@@ -36,15 +39,16 @@ std::vector<Vec3> canonical_gradients(CellKind kind, const Vec3& p) {
 
 Mat3 ideal_matrix(CellKind kind) {
   Mat3 a = Mat3::Identity();
-  if (kind != CellKind::hex) a.col(1) = Vec3(0.5, std::sqrt(3.0) / 2, 0);
+  if (kind == CellKind::tet || kind == CellKind::prism) a.col(1) = Vec3(0.5, std::sqrt(3.0) / 2, 0);
   if (kind == CellKind::tet) a.col(2) = Vec3(0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3);
+  if (kind == CellKind::pyramid) a.col(2) = Vec3(0.5, 0.5, std::sqrt(0.5));
   return a;
 }
 
 Mat3 ideal_inverse(CellKind kind) { return ideal_matrix(kind).inverse(); }
 
 double ideal_volume(CellKind kind) {
-  const double canonical[] = {1.0 / 6, 0.5, 1.0};
+  const double canonical[] = {1.0 / 6, 0.5, 1.0, 1.0 / 3};
   return canonical[static_cast<int>(kind)] * ideal_matrix(kind).determinant();
 }
 

@@ -15,9 +15,11 @@ namespace subvol::internal {
 ///   J_q = sum_a x_a grad N_a(u_q) A^-1 / h                                     Paper: Eqs. 4-6
 ///
 /// A maps the canonical to the ideal cell of edge length 1: the unit cube, the prism over the equilateral triangle, the
-/// regular tetrahedron. Points form the trapezoidal grid with `points_per_direction` samples (both ends included) and
-/// its counterparts on triangle and tetrahedron: the corners of the regular split into (n-1)^2 triangles, with the
-/// weights of the vertex rule on each. A tet's Jacobian is constant: one point. Weights sum to 1.
+/// regular tetrahedron, the pyramid of four equilateral triangles over the unit square. Points form the trapezoidal
+/// grid with `points_per_direction` samples (both ends included) and its counterparts on triangle and tetrahedron: the
+/// corners of the regular split into (n-1)^2 triangles, with the weights of the vertex rule on each. A tet's Jacobian
+/// is constant: one point. A pyramid's is constant along each ray from its base to its apex: the points are those of
+/// its base. Weights sum to 1.
 ///
 /// Only the vertices whose shape function has a nonzero gradient at a point are listed: 4 of 8 at a hex's corner.
 struct ElementRule {

@@ -36,6 +36,16 @@ void for_each_face_edge(const MeshTopology& topology, const Function& f) {
   }
 }
 
+/// InputError: a pyramid with an edge of an order above 1. Its faces and its inside have no higher order.
+void check_pyramids(const EntityOrders& orders, const MeshTopology& topology, std::span<const CellKind> kinds) {
+  for (std::size_t c = 0; c < kinds.size(); ++c) {
+    if (kinds[c] != CellKind::pyramid) continue;
+    for (const Index e : topology.cell_edges(c))
+      if (orders.edges[e] > 1)
+        throw InputError("ElementSpace: cell " + std::to_string(c) + " is a pyramid, which cannot be curved");
+  }
+}
+
 void check_rule(const EntityOrders& orders, const MeshTopology& topology) {
   for_each_face_edge(topology, [&](std::size_t f, std::size_t e) {
     if (orders.faces[f] > orders.edges[e])
@@ -115,6 +125,7 @@ ElementSpace::ElementSpace(std::shared_ptr<const Cells> cells, Basis basis, cons
   check_orders("face", orders.faces, topology().num_faces());
   check_orders("cell", orders.cells, topology().num_cells());
   check_rule(orders, topology());
+  check_pyramids(orders, topology(), cells_->kinds);
   number_nodes();
   list_cell_modes();
 }

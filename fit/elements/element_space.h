@@ -51,9 +51,10 @@ struct EntityOrders {
 /// Immutable; copies share what they can. The positions of the mesh are not kept.
 class ElementSpace {
  public:
-  /// mesh: as MeshTopology requires it. InputError: an order outside 1 .. kMaxOrder.
+  /// mesh: as MeshTopology requires it. InputError: an order outside 1 .. kMaxOrder; a pyramid of an order above 1.
   ElementSpace(const VolumeMesh& mesh, Basis basis, int order);
-  /// InputError: sizes that differ from the mesh's, an order out of range, or orders that break the rule.
+  /// InputError: sizes that differ from the mesh's, an order out of range, or orders that break the rule;
+  /// a pyramid with an edge of an order above 1.
   ElementSpace(const VolumeMesh& mesh, Basis basis, const EntityOrders& orders);
   /// Returns a space of the same cells with other orders; `node_numbers_in` maps the nodes. InputError as above.
   ElementSpace with_orders(const EntityOrders& orders) const;
@@ -63,6 +64,7 @@ class ElementSpace {
   const MeshTopology& topology() const { return cells_->topology; }
   std::size_t num_cells() const { return cells_->kinds.size(); }
   CellKind kind(std::size_t c) const { return cells_->kinds[c]; }
+  std::span<const CellKind> kinds() const { return cells_->kinds; }
   std::span<const Index> vertices(std::size_t c) const {
     const auto& offsets = cells_->vertex_offsets;
     return {cells_->vertices.data() + offsets[c], offsets[c + 1] - offsets[c]};

@@ -21,6 +21,7 @@ bool is_inside(CellKind kind, const Vec3& p) {
   const auto within = [](double x) { return x >= -kOutside && x <= 1 + kOutside; };  // false for NaN
   if (!within(p[0]) || !within(p[1]) || !within(p[2])) return false;
   if (kind == CellKind::tet) return within(p[0] + p[1] + p[2]);
+  if (kind == CellKind::pyramid) return within(p[0] + p[2]) && within(p[1] + p[2]);
   return kind == CellKind::hex || within(p[0] + p[1]);
 }
 

@@ -17,7 +17,8 @@ constexpr int kMaxSweeps = 200;
 constexpr double kSmallChange = 1e-3;
 
 /// Mean lengths of a cell's edges. Hex: along the three directions; prism: of the triangles' edges (twice) and of the
-/// upright edges; tet: of all edges (three times).
+/// upright edges; tet: of all edges (three times); pyramid: along the two directions of the base, and of the other
+/// edges.
 Vec3 box_lengths(CellKind kind, std::span<const Index> cell, std::span<const Vec3> nodes) {
   const CellTopology& topology = cell_topology(kind);
   Vec3 sums = Vec3::Zero(), counts = Vec3::Zero();

@@ -166,7 +166,7 @@ Quadrature make_quadrature(CellKind kind, QuadratureRule rule, int n) {
   const bool trapezoidal = rule == QuadratureRule::trapezoidal;
   if (kind == CellKind::tet) return trapezoidal ? regular_tet(n) : collapsed_tet(n);
   const LineRule line = trapezoidal ? trapezoidal_rule(n) : gauss_lobatto_rule(n);
-  Quadrature layer;  // the prism's triangle or the hex's square
+  Quadrature layer;  // the prism's triangle, the hex's square or the pyramid's base
   if (kind == CellKind::prism) {
     layer = make_triangle_quadrature(rule, n);
   } else {
@@ -176,6 +176,7 @@ Quadrature make_quadrature(CellKind kind, QuadratureRule rule, int n) {
         layer.weights.push_back(line.weights[i] * line.weights[j]);
       }
   }
+  if (kind == CellKind::pyramid) return layer;
   Quadrature result;
   for (int k = 0; k < n; ++k)
     for (std::size_t q = 0; q < layer.points.size(); ++q) {

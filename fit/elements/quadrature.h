@@ -27,6 +27,8 @@ struct Quadrature {
 /// the regular split (an octahedron among a tet's pieces has equal weights at its vertices); exact for linear
 /// functions. Gauss-Lobatto has no such grid: Gauss points in collapsed coordinates are used instead, all in the
 /// interior, also exact up to degree 2n - 3.
+///
+/// Pyramid, for functions that are constant along the rays to its apex, as its Jacobian is: the points of its base.
 /// InputError: n < 2. Trapezoidal grids are nested if n - 1 divides n' - 1.
 Quadrature make_quadrature(CellKind kind, QuadratureRule rule, int n);
 /// Makes the quadrature of the triangle {u + v <= 1}, w = 0, by the same rules.

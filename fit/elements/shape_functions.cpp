@@ -64,13 +64,24 @@ std::span<const Vec3> canonical_vertices(CellKind kind) {
                                             Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)};
   static const std::array<Vec3, 8> hex = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0),
                                           Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(1, 1, 1), Vec3(0, 1, 1)};
-  if (kind == CellKind::tet) return tet;
-  if (kind == CellKind::prism) return prism;
+  static const std::array<Vec3, 5> pyramid = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0),
+                                              Vec3(0, 0, 1)};
+  switch (kind) {
+    case CellKind::tet:
+      return tet;
+    case CellKind::prism:
+      return prism;
+    case CellKind::pyramid:
+      return pyramid;
+    case CellKind::hex:
+      break;
+  }
   return hex;
 }
 
 EntityShape entity_shape(CellKind kind) {
-  return kind == CellKind::tet ? EntityShape::tet : kind == CellKind::prism ? EntityShape::prism : EntityShape::hex;
+  constexpr EntityShape kShapes[] = {EntityShape::tet, EntityShape::prism, EntityShape::hex, EntityShape::pyramid};
+  return kShapes[static_cast<std::size_t>(kind)];
 }
 
 int num_modes(EntityShape shape, int order) {
@@ -81,6 +92,8 @@ int num_modes(EntityShape shape, int order) {
     case EntityShape::quad: return n * n;
     case EntityShape::tet: return n * (n - 1) * (n - 2) / 6;
     case EntityShape::prism: return n * n * (n - 1) / 2;
+    case EntityShape::pyramid:
+      return 0;
     case EntityShape::hex: break;
   }
   return n * n * n;
@@ -88,7 +101,7 @@ int num_modes(EntityShape shape, int order) {
 
 LocalMode vertex_mode(CellKind kind, int vertex) {
   LocalMode mode;
-  if (kind == CellKind::tet) {
+  if (kind == CellKind::tet || kind == CellKind::pyramid) {
     mode.vertex = static_cast<std::int8_t>(vertex);
   } else if (kind == CellKind::prism) {
     mode.vertex = static_cast<std::int8_t>(vertex % 3);
@@ -153,7 +166,21 @@ void ShapeFunctions::set_axis(int axis, double x) {
   for (int i = 0; i <= max_order_; ++i) axes_[axis][i] = {values[i], derivatives[i] * Vec3::Unit(axis)};
 }
 
+void ShapeFunctions::set_pyramid_point(const Vec3& point) {
+  const double below = 1 - point[2];  // height left to the apex
+  const bool is_apex = !(below > 0);
+  const double s = is_apex ? 0.5 : point[0] / below, t = is_apex ? 0.5 : point[1] / below;
+  for (int v = 0; v < 4; ++v) {
+    const bool far_u = v == 1 || v == 2, far_v = v >= 2;
+    const double fu = far_u ? s : 1 - s, fv = far_v ? t : 1 - t;
+    const double du = (far_u ? 1 : -1) * fv, dv = (far_v ? 1 : -1) * fu;
+    vertices_[v][0] = {below * fu * fv, {du, dv, s * du + t * dv - fu * fv}};
+  }
+  vertices_[4][0] = {point[2], Vec3::UnitZ()};
+}
+
 void ShapeFunctions::set_point(const Vec3& point) {
+  if (kind_ == CellKind::pyramid) return set_pyramid_point(point);
   if (kind_ == CellKind::hex) {
     for (int d = 0; d < 3; ++d) set_axis(d, point[d]);
     return;

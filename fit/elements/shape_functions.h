@@ -20,6 +20,7 @@ std::span<const Vec3> canonical_vertices(CellKind kind);
 ///   hex     N_i(u) N_j(v) N_k(w)                                     N: `line_functions`          Paper: Eq. 5
 ///   prism   E_edge,i  V_vertex,j  N_k(w)                             edge, vertex: those of triangle 0 1 2
 ///   tet     E_edge,i  V_vertex,j  V_3,k                              the last factor only if k > 0
+///   pyramid N_vertex                                                 of order 1 only
 ///
 ///   E_ab,i = l_a l_b psi_i((1 + l_b - l_a) / 2)                      a factor only if edge >= 0; i >= 1
 ///   V_c,j  = l_c psi_j(l_c), V_c,0 = l_c                             a factor only if vertex >= 0
@@ -28,9 +29,12 @@ std::span<const Vec3> canonical_vertices(CellKind kind);
 /// swapping a and b multiplies it by phi_i's parity. So edges carry phi_i and quad faces phi_i phi_j on every kind, and
 /// triangle faces E_ab,i V_c,j on both kinds that have them. With Legendre, prism functions are polynomials over the
 /// triangle, of degree i + 1 or i + j + 1, and tet functions are polynomials of degree i + j + k + 1.
+///
+/// Pyramids have their five rational vertex functions: with s = u / (1-w) and t = v / (1-w), (1-w) times the bilinear
+/// functions of s and t at the base, and w at the apex.
 struct LocalMode {
   std::int8_t edge = -1;    ///< of a prism or tet, in the kind's order (prism: 0 .. 2); or -1
-  std::int8_t vertex = -1;  ///< of a prism (0 .. 2) or tet; or -1
+  std::int8_t vertex = -1;  ///< of a prism (0 .. 2), tet or pyramid; or -1
   std::uint8_t k = 0, j = 0, i = 0;
 
   auto operator<=>(const LocalMode&) const = default;
@@ -43,7 +47,7 @@ struct SignedMode {
 };
 
 /// The entities of a cell that carry modes, by shape.
-enum class EntityShape : std::uint8_t { edge, triangle, quad, tet, prism, hex };
+enum class EntityShape : std::uint8_t { edge, triangle, quad, tet, prism, hex, pyramid };
 EntityShape entity_shape(CellKind kind);
 
 /// Indices (i, j, k) of an entity's mode, from 1 on; those that the entity does not have are 0. With n = order - 1:
@@ -55,7 +59,7 @@ struct ModeIndex {
   int i, j, k;
 };
 
-/// Number of modes of an entity: n, n(n-1)/2, n^2, n(n-1)(n-2)/6, n^2(n-1)/2, n^3 in the order of EntityShape.
+/// Number of modes of an entity: n, n(n-1)/2, n^2, n(n-1)(n-2)/6, n^2(n-1)/2, n^3, 0 in the order of EntityShape.
 int num_modes(EntityShape shape, int order);
 
 /// Calls f(ModeIndex) for every mode, i fastest, then j, then k: the order in which nodes are numbered.
@@ -79,7 +83,8 @@ class ShapeFunctions {
   ShapeFunctions(CellKind kind, Basis basis, int max_order);
 
   CellKind kind() const { return kind_; }
-  /// Sets the point, in canonical coordinates inside the cell.
+  /// Sets the point, in canonical coordinates inside the cell. At the apex of a pyramid, the gradients are those along
+  /// its axis.
   void set_point(const Vec3& point);
   double value(const LocalMode& mode) const {
     if (kind_ == CellKind::hex)
@@ -107,17 +112,19 @@ class ShapeFunctions {
   }
   Factor evaluate(const LocalMode& mode) const;
   void set_axis(int axis, double x);
+  void set_pyramid_point(const Vec3& point);
 
   CellKind kind_;
   Basis basis_;
   int max_order_;
   std::array<LineTable, 3> axes_;      // N along u, v, w; a prism uses w alone
   std::array<LineTable, 6> edges_;     // E_edge,i at i
-  std::array<LineTable, 4> vertices_;  // V_vertex,j at j
+  std::array<LineTable, 5> vertices_;  // V_vertex,j at j; a pyramid's N_vertex at 0
 };
 
 template <class Function>
 void for_each_mode(EntityShape shape, int order, const Function& f) {
+  if (shape == EntityShape::pyramid) return;
   const int n = order - 1;
   const bool simplex = shape == EntityShape::triangle || shape == EntityShape::prism;
   const bool flat = shape == EntityShape::triangle || shape == EntityShape::quad;

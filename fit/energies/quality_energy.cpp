@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/fit/certificate/certificate.h"
+#include "subvol/fit/elements/shape_functions.h"
 
 #include <Eigen/Geometry>
 
@@ -30,21 +31,15 @@ constexpr double kLeastShare = -1;         // of a goal; no inverted cell is wor
 constexpr double kFoldGoal = 0.5;          // residual of a fold that is good enough: 330 degrees if the limit is 300
 constexpr double kRaise = 2.5, kFallBack = 0.97, kMostEmphasis = 1000;
 
-/// Canonical coordinates of a corner of a hex or a prism.
-Vec3 canonical_corner(CellKind kind, int corner) {
-  const int layer = kind == CellKind::hex ? 4 : 3, in_layer = corner % layer;
-  if (kind == CellKind::hex) return Vec3(in_layer == 1 || in_layer == 2, in_layer >= 2, corner >= layer);
-  return Vec3(in_layer == 1, in_layer == 2, corner >= layer);
-}
-
 constexpr double kSamePlace = 1e-12;  // in canonical coordinates
 
-/// Returns the corner of a hex or a prism at a place in canonical coordinates, -1 if there is none. A tet has one point
-/// only, which stands for the whole cell.
+/// Returns the corner of a cell at a place in canonical coordinates, -1 if there is none. A tet has one point only,
+/// which stands for the whole cell.
 int corner_at(CellKind kind, const Vec3& at) {
   if (kind == CellKind::tet) return -1;
-  for (int a = 0; a < cell_topology(kind).num_vertices; ++a)
-    if ((at - canonical_corner(kind, a)).norm() < kSamePlace) return a;
+  const std::span<const Vec3> corners = canonical_vertices(kind);
+  for (std::size_t a = 0; a < corners.size(); ++a)
+    if ((at - corners[a]).norm() < kSamePlace) return static_cast<int>(a);
   return -1;
 }
 
@@ -53,7 +48,7 @@ int edge_at(CellKind kind, const Vec3& at) {
   if (kind == CellKind::tet) return -1;
   const CellTopology& topology = cell_topology(kind);
   for (int e = 0; e < topology.num_edges; ++e) {
-    const Vec3 a = canonical_corner(kind, topology.edges[e][0]), b = canonical_corner(kind, topology.edges[e][1]);
+    const Vec3 &a = canonical_vertices(kind)[topology.edges[e][0]], &b = canonical_vertices(kind)[topology.edges[e][1]];
     if ((at - a).norm() + (at - b).norm() < (b - a).norm() + kSamePlace) return e;
   }
   return -1;
@@ -126,7 +121,7 @@ struct QualityEnergy::CellSums {
 QualityEnergy::Points QualityEnergy::make_points(CellKind kind, int points_per_direction) {
   Points points{make_element_rule(kind, points_per_direction), {}, {}, {}, {}};
   points.jacobians = PointJacobians(points.rule);
-  const double corner_weight = 1.0 / cell_topology(kind).num_vertices;
+  const double corner_weight = 1.0 / cell_topology(kind).num_trivalent;
   for (const Vec3& at : points.rule.points) {
     const int corner = corner_at(kind, at);
     points.corner.push_back(corner);

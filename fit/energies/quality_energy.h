@@ -42,7 +42,8 @@ struct QualityWeights {
 /// h_i  wanted lengths of the cell;  h: their geometric mean
 /// t    the threshold, or the cap of the point if that is lower (`set_caps`)
 /// a_q  1 / number of corners at the corners; 1/16 at other points: the midpoints of edges, faces and cell, or more of
-///      them in cells that were refined (`densify`). A tet has one point only, which stands for all and has a_q = 1
+///      them in cells that were refined (`densify`). A tet has one point only, which stands for all and has a_q = 1. A
+///      pyramid has the points of its base, which stand for the rays to its apex, and its four corners there
 /// f    residual of a fold (`BoundaryFolds`); its Hessian is bounded by that of two faces that turn on their own
 /// omega >= 1: emphasis of poor corners, cells and folds (`emphasize_poor`)
 ///

@@ -20,9 +20,13 @@ constexpr std::array<Corner, 6> kPrismCorners{
     {{0, 1, 2, 3}, {1, 2, 0, 4}, {2, 0, 1, 5}, {3, 5, 4, 0}, {4, 3, 5, 1}, {5, 4, 3, 2}}};
 constexpr std::array<Corner, 4> kTetCorners{{{0, 1, 2, 3}, {1, 2, 0, 3}, {2, 0, 1, 3}, {3, 1, 0, 2}}};
 
+constexpr std::array<Corner, 4> kPyramidCorners{{{0, 1, 3, 4}, {1, 2, 0, 4}, {2, 3, 1, 4}, {3, 0, 2, 4}}};
+
 std::span<const Corner> corners_of(CellKind kind) {
   switch (kind) {
     case CellKind::hex: return kHexCorners;
+    case CellKind::pyramid:
+      return kPyramidCorners;
     case CellKind::prism: return kPrismCorners;
     default: return kTetCorners;
   }

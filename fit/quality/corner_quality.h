@@ -16,9 +16,10 @@ struct CornerQuality {
 
 /// Measures the scaled Jacobian at every corner of a mesh's cells:
 ///
-///   c det(a, b, c) / (|a| |b| |c|),   c = 1 for hexes, 2 / sqrt(3) for prisms, sqrt(2) for tets
+///   f det(a, b, c) / (|a| |b| |c|),   f = 1 for hexes, 2 / sqrt(3) for prisms, sqrt(2) for tets and pyramids
 ///
-/// with the three edges a, b, c at the corner: 1 for a cube, an equilateral prism and a regular tetrahedron. It differs
+/// with the three edges a, b, c at the corner: 1 for a cube, an equilateral prism, a regular tetrahedron and a pyramid
+/// of eight equal edges, whose apex does not count. It differs
 /// from that of `measure_quality` in the lengths that it is divided by, except in hexes.
 ///
 /// returns  values in [-1, 1] for each cell, 0 if an edge has no length. The mesh must have valid vertex numbers.

@@ -144,13 +144,46 @@ double tet_value(std::span<const Vec3> corners) {
   return triple(direction(xu), direction(second_column(xu, xv)), direction(third_column_of_tet(xu, xv, xw)));
 }
 
+/// J is the same along each ray from the base to the apex.
+Sampled<double> sample_pyramid(std::span<const Vec3> corners, int n, std::span<const double> weights) {
+  const double f = std::sqrt(2.0);
+  std::array<Point, 5> x;
+  for (int v = 0; v < 5; ++v) x[v] = to_point(corners[v]);
+  const Point low_u = bernstein::difference(x[1], x[0]), high_u = bernstein::difference(x[2], x[3]),
+              low_v = bernstein::difference(x[3], x[0]), high_v = bernstein::difference(x[2], x[1]);
+  Sampled<double> result{1, 0};
+  std::size_t q = 0;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const double s = i / (n - 1.0), t = j / (n - 1.0);
+      const Point xu = blend(low_u, high_u, t), xv = blend(low_v, high_v, s);
+      const Point base = blend(blend(x[0], x[1], s), blend(x[3], x[2], s), t);
+      Point up;
+      for (int a = 0; a < 3; ++a) up[a] = f * (x[4][a] - base[a] + (s - 0.5) * xu[a] + (t - 0.5) * xv[a]);
+      const double value = triple(direction(xu), direction(xv), direction(up));
+      result.least = smaller(value, result.least);
+      result.mean += weights[q++] * value;
+    }
+  return result;
+}
+
 std::size_t num_samples(CellKind kind, std::size_t n) {
-  if (kind == CellKind::hex) return n * n * n;
-  return kind == CellKind::prism ? n * n * (n + 1) / 2 : n * (n + 1) * (n + 2) / 6;
+  switch (kind) {
+    case CellKind::tet:
+      return n * (n + 1) * (n + 2) / 6;
+    case CellKind::prism:
+      return n * n * (n + 1) / 2;
+    case CellKind::pyramid:
+      return n * n;
+    case CellKind::hex:
+      break;
+  }
+  return n * n * n;
 }
 
 Sampled<double> sample_cell(CellKind kind, std::span<const Vec3> corners, int n, std::span<const double> weights) {
   if (kind == CellKind::prism) return sample_prism(corners, n, weights);
+  if (kind == CellKind::pyramid) return sample_pyramid(corners, n, weights);
   if (kind == CellKind::tet) {
     const double value = tet_value(corners);
     return {value, value};
@@ -204,7 +237,8 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
     result[c] = {finite ? std::clamp(least, -1.0, 1.0) : -1, finite ? mean : -1};
   };
   if (reference) {
-    const SamplePoints points[] = {{CellKind::tet, n}, {CellKind::prism, n}, {CellKind::hex, n}};
+    const SamplePoints points[] = {
+        {CellKind::tet, n}, {CellKind::prism, n}, {CellKind::hex, n}, {CellKind::pyramid, n}};
 #pragma omp parallel for schedule(static)
     for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
       const auto corners = gather_cell(mesh.positions, mesh, c);
@@ -215,7 +249,8 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
     }
     return result;
   }
-  const std::vector<double> of_prism = sample_weights(CellKind::prism, n), of_hex = sample_weights(CellKind::hex, n);
+  const std::vector<double> of_prism = sample_weights(CellKind::prism, n), of_hex = sample_weights(CellKind::hex, n),
+                            of_pyramid = sample_weights(CellKind::pyramid, n);
   const auto hexes = [&](std::size_t first) {
     thread_local HexSampler<Lanes> sampler;
     const Sampled<Lanes> s = sampler.run(gather_hexes(mesh.positions, mesh.cell(first).data()), n, of_hex);
@@ -224,7 +259,9 @@ std::vector<Sampled<double>> sample_cells(const VolumeMesh& mesh, int n, const C
   for_each_cell_block(mesh, hexes, [&](std::size_t c) {
     const auto corners = gather_cell(mesh.positions, mesh, c);
     const Sampled<double> s = sample_cell(mesh.kinds[c], {corners.data(), mesh.cell(c).size()}, n,
-                                          mesh.kinds[c] == CellKind::prism ? of_prism : of_hex);
+                                          mesh.kinds[c] == CellKind::prism     ? of_prism
+                                          : mesh.kinds[c] == CellKind::pyramid ? of_pyramid
+                                                                               : of_hex);
     keep(c, s.least, s.mean);
   });
   return result;

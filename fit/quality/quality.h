@@ -42,10 +42,11 @@ struct QualityReport {
 ///
 ///   SJ = det F / (|F e1| |F e2| |F e3|),   F = dx/dxi A^-1
 ///
-/// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2), or the given reference.
+/// with A the ideal cell (cube, equilateral prism, regular tetrahedron; paper: section 3.2; pyramid of eight equal
+/// edges), or the given reference.
 ///
 /// samples_per_direction  n >= 2: n^3 points for a hex, n^2 (n+1)/2 for a prism, n(n+1)(n+2)/6 for a tet, corners
-///                        included.
+///                        included; n^2 for a pyramid, each of which stands for a ray from its base to its apex.
 /// reference  of each cell; empty: the ideal cells. Cost with a reference: ten times that without.
 /// returns   values in [-1, 1]; 1 for ideal cells of any size and orientation, 0 if a column of F vanishes, -1 if a
 ///           coordinate is not finite.

@@ -24,6 +24,7 @@ __all__: Sequence[str]
 TET: int
 PRISM: int
 HEX: int
+PYRAMID: int
 
 class Error(Exception): ...
 class InputError(Error, ValueError): ...
@@ -54,6 +55,7 @@ class VolumeMesh:
         hexes: Optional[npt.ArrayLike] = None,
         prisms: Optional[npt.ArrayLike] = None,
         tets: Optional[npt.ArrayLike] = None,
+        pyramids: Optional[npt.ArrayLike] = None,
         references: Optional[npt.ArrayLike] = None,
         creases: Optional[npt.ArrayLike] = None,
         crease_sharpness: Optional[npt.ArrayLike] = None,
@@ -72,6 +74,8 @@ class VolumeMesh:
     def prisms(self) -> Ints: ...
     @property
     def tets(self) -> Ints: ...
+    @property
+    def pyramids(self) -> Ints: ...
     @property
     def kinds(self) -> npt.NDArray[np.uint8]: ...
     @property

@@ -135,6 +135,7 @@ void add_by_scheme(Lattice& out, CellKind kind, const Part& part, const Scheme& 
 Lattice corner_points(CellKind kind, int p) {
   if (kind == CellKind::tet) return {{0, 0, 0}, {p, 0, 0}, {0, p, 0}, {0, 0, p}};
   if (kind == CellKind::prism) return {{0, 0, 0}, {p, 0, 0}, {0, p, 0}, {0, 0, p}, {p, 0, p}, {0, p, p}};
+  if (kind == CellKind::pyramid) return {{0, 0, 0}, {p, 0, 0}, {p, p, 0}, {0, p, 0}, {0, 0, p}};
   return {{0, 0, 0}, {p, 0, 0}, {p, p, 0}, {0, p, 0}, {0, 0, p}, {p, 0, p}, {p, p, p}, {0, p, p}};
 }
 
@@ -144,6 +145,9 @@ std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering or
   if (order < 1) throw InputError("cell_lattice: the order is " + std::to_string(order) + ", expected 1 or more");
   if (ordering == NodeOrdering::gmsh && kind == CellKind::prism && order > 2)
     throw InputError("cell_lattice: Gmsh evaluates prisms up to order 2 only, got " + std::to_string(order));
+  if (kind == CellKind::pyramid && order > 1)
+    throw InputError("cell_lattice: pyramids have order 1 only, got " + std::to_string(order));
+  if (kind == CellKind::pyramid) return corner_points(kind, order);
   Lattice points;
   if (ordering == NodeOrdering::rows)
     add_rows(points, kind, order, 0);
@@ -156,6 +160,7 @@ std::vector<LatticePoint> cell_lattice(CellKind kind, int order, NodeOrdering or
 std::size_t num_lattice_points(CellKind kind, int order) {
   const auto n = static_cast<std::size_t>(order) + 1;
   if (kind == CellKind::tet) return n * (n + 1) * (n + 2) / 6;
+  if (kind == CellKind::pyramid) return n * (n + 1) * (2 * n + 1) / 6;
   return kind == CellKind::prism ? n * n * (n + 1) / 2 : n * n * n;
 }
 

@@ -9,7 +9,8 @@ std::mutex& netcdf_lock() {
 }
 
 const char* kind_suffix(CellKind kind) {
-  return kind == CellKind::tet ? "_tets" : kind == CellKind::prism ? "_prisms" : "_hexes";
+  constexpr const char* kSuffixes[] = {"_tets", "_prisms", "_hexes", "_pyramids"};
+  return kSuffixes[static_cast<std::size_t>(kind)];
 }
 
 std::vector<std::size_t> exodus_places(CellKind kind, std::size_t num_nodes) {

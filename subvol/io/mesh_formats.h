@@ -28,10 +28,8 @@ ParsedMesh parse_medit(const std::string& name, std::string_view bytes, const st
 std::string format_medit(const VolumeMesh& mesh);
 std::string format_legacy_vtk(const VolumeMesh& mesh);
 
-/// Reason for messages why pyramids cannot be read.
-inline constexpr const char* kNoPyramids =
-    "pyramids cannot be used: four edges meet at the apex, so splitting its corners gives no hexes; cut each pyramid "
-    "into "
-    "two tets, or refine it into hexes, prisms and tets";
+/// Reason for messages why curved pyramids cannot be read.
+inline constexpr const char* kNoCurvedPyramids =
+    "pyramids are read with straight edges only, because their functions of higher order are no polynomials";
 
 }  // namespace subvol::internal

@@ -100,7 +100,7 @@ void require_extent(const std::string& name, const VolumeMesh& mesh) {
 bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
   const CellTopology& topology = cell_topology(mesh.kinds[c]);
   const auto cell = mesh.cell(c);
-  for (int i = 0; i < topology.num_vertices; ++i) {
+  for (int i = 0; i < topology.num_trivalent; ++i) {
     const auto& n = topology.corner_neighbors[i];
     const Vec3& x = mesh.positions[cell[i]];
     const Vec3 e0 = mesh.positions[cell[n[0]]] - x, e1 = mesh.positions[cell[n[1]]] - x,
@@ -113,13 +113,20 @@ bool is_left_handed(const VolumeMesh& mesh, std::size_t c) {
 /// Renumbers the corners of a cell so that its orientation is reversed.
 void turn_over(VolumeMesh& mesh, std::size_t c) {
   const auto corner = [&](std::size_t i) -> Index& { return mesh.cell_vertices[mesh.cell_offsets[c] + i]; };
-  if (mesh.kinds[c] == CellKind::hex) {
-    std::swap(corner(1), corner(3));
-    std::swap(corner(5), corner(7));
-    return;
+  switch (mesh.kinds[c]) {
+    case CellKind::hex:
+      std::swap(corner(5), corner(7));
+      [[fallthrough]];
+    case CellKind::pyramid:
+      std::swap(corner(1), corner(3));
+      break;
+    case CellKind::prism:
+      std::swap(corner(4), corner(5));
+      [[fallthrough]];
+    case CellKind::tet:
+      std::swap(corner(1), corner(2));
+      break;
   }
-  std::swap(corner(1), corner(2));
-  if (mesh.kinds[c] == CellKind::prism) std::swap(corner(4), corner(5));
 }
 
 /// Renumbers the corners of all cells, or of all prisms, if each of them is left-handed at every corner: that is not
@@ -171,10 +178,12 @@ FileCells read_cells(const fs::path& path, const ReadOptions& options) {
     parsed.warnings = std::move(mesh.warnings);
     if (mesh.num_cells() > 0) parsed.mesh = linear_mesh(name, std::move(mesh));
   }
-  if (parsed.mesh.num_cells() == 0) throw InputError(name + ": no hexes, prisms or tets in the file");
+  if (parsed.mesh.num_cells() == 0) throw InputError(name + ": no hexes, prisms, tets or pyramids in the file");
   require_extent(name, parsed.mesh);
   turn_over_mirrored(parsed, options.check);
   if (options.check) check_mesh(name, parsed);
+  if (const auto n = std::ranges::count(parsed.mesh.kinds, CellKind::pyramid); n > 0)
+    parsed.warnings.push_back("pyramids, which cannot be subdivided or fitted: " + std::to_string(n));
   if (options.warnings)
     for (const std::string& warning : parsed.warnings) options.warnings->push_back(name + ": " + warning);
   return std::move(parsed.mesh);
@@ -184,7 +193,7 @@ VolumeMesh read_volume_mesh(const fs::path& path, const ReadOptions& options) {
   FileCells cells = read_cells(path, options);
   if (auto* mesh = std::get_if<VolumeMesh>(&cells)) return std::move(*mesh);
   if (auto* curved = std::get_if<NodalMesh>(&cells)) return linear_mesh(path.string(), std::move(*curved));
-  throw InputError(path.string() + ": faces without cells: no hexes, prisms or tets in the file");
+  throw InputError(path.string() + ": faces without cells: no hexes, prisms, tets or pyramids in the file");
 }
 
 void write_volume_mesh(const fs::path& path, const VolumeMesh& mesh) {

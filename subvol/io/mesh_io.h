@@ -37,7 +37,7 @@ using FileCells = std::variant<VolumeMesh, NodalMesh, PolygonMesh>;
 /// InputError: as these.
 FileCells read_cells(const std::filesystem::path& path, const ReadOptions& options = {});
 
-/// Reads a volume mesh of hexes, prisms and tets; the extension chooses the format (docs/file-formats.md).
+/// Reads a volume mesh of hexes, prisms, tets and pyramids; the extension chooses the format (docs/file-formats.md).
 ///
 ///   .mesh  Medit ASCII, versions 1 to 4, dimension 3; tags from Edges + Ridges and Corners; groups of faces from the
 ///          references of Triangles and Quadrilaterals
@@ -48,7 +48,7 @@ FileCells read_cells(const std::filesystem::path& path, const ReadOptions& optio
 /// if all cells, or all prisms, are left-handed at every corner.
 ///
 /// Throws InputError with the file and, for its contents, the line (binary VTK: that of the last text) for an unknown
-/// extension, keyword or cell type; pyramids and cells of higher order; indices out of range; numbers that are not
+/// extension, keyword or cell type; cells of higher order; indices out of range; numbers that are not
 /// finite; counts beyond what the file can hold; a file cut short; no cells; all their vertices in one place; and, with
 /// `check`, a mesh that is not valid.
 /// Memory: a few times the size of the file, whatever counts it claims.

@@ -20,9 +20,11 @@ struct CellSection {
   const char* keyword;
   CellKind kind;
 };
-constexpr CellSection kCellSections[] = {
-    {"Hexahedra", CellKind::hex}, {"Prisms", CellKind::prism}, {"Tetrahedra", CellKind::tet},
-    {"Pentahedra", CellKind::prism}};  // an old name of Prisms, never written
+constexpr CellSection kCellSections[] = {{"Hexahedra", CellKind::hex},
+                                         {"Prisms", CellKind::prism},
+                                         {"Tetrahedra", CellKind::tet},
+                                         {"Pyramids", CellKind::pyramid},
+                                         {"Pentahedra", CellKind::prism}};  // an old name of Prisms, never written
 
 /// Sections of faces, whose references are groups.
 struct FaceSection {
@@ -127,7 +129,6 @@ class MeditParser {
     if (keyword == "Edges") return read_edges();
     if (keyword == "Ridges") return read_numbers(ridges_, "the number of Ridges", "an edge number");
     if (keyword == "Corners") return read_numbers(corners_, "the number of Corners", "a vertex number");
-    if (keyword == "Pyramids") return refuse_pyramids();
     if (const auto* s = std::find_if(std::begin(kCellSections), std::end(kCellSections), named);
         s != std::end(kCellSections))
       return read_cells(*s);
@@ -147,11 +148,6 @@ class MeditParser {
   void read_dimension() {
     const std::int64_t dimension = scan_.integer("the dimension");
     if (dimension != 3) scan_.fail("dimension " + std::to_string(dimension) + ", expected 3");
-  }
-
-  void refuse_pyramids() {
-    if (const std::size_t n = scan_.count("the number of Pyramids", 6); n > 0)
-      scan_.fail(std::to_string(n) + " pyramids: " + kNoPyramids);
   }
 
   void skip_section(const SkippedSection& section) {

@@ -86,6 +86,8 @@ std::optional<CellType> cell_type(CGNS_ENUMT(ElementType_t) type) {
     case CGNS_ENUMV(PENTA_15):
     case CGNS_ENUMV(PENTA_18):
       return CellType{CellKind::prism, 2};
+    case CGNS_ENUMV(PYRA_5):
+      return CellType{CellKind::pyramid, 1};
     case CGNS_ENUMV(HEXA_8):
       return CellType{CellKind::hex, 1};
     case CGNS_ENUMV(HEXA_20):
@@ -283,7 +285,7 @@ class CgnsParser {
 
   void add_elements(const Elements& elements, const std::string& what) {
     const std::string_view type_name = cg_ElementTypeName(elements.type);
-    if (type_name.starts_with("PYRA_")) fail(what + ": pyramids: " + kNoPyramids);
+    if (type_name.starts_with("PYRA_") && elements.type != CGNS_ENUMV(PYRA_5)) fail(what + ": " + kNoCurvedPyramids);
     const std::optional<CellType> cell = cell_type(elements.type);
     const std::size_t num_corners = num_face_corners(type_name);
     if (!cell && num_corners == 0) {

@@ -252,7 +252,7 @@ class ExodusParser {
   }
 
   void read_block(Block& block, const std::string& connect, const std::string& type, std::size_t size) {
-    if (type.starts_with("PYR")) file_.fail(connect + ": pyramids: " + kNoPyramids);
+    if (type.starts_with("PYR")) block.kind = CellKind::pyramid;
     if (type.starts_with("HEX")) block.kind = CellKind::hex;
     if (type.starts_with("WED")) block.kind = CellKind::prism;
     if (type.starts_with("TET")) block.kind = CellKind::tet;
@@ -262,9 +262,10 @@ class ExodusParser {
     }
     const CellKind kind = *block.kind;
     const int order = size == num_corners(kind) ? 1 : 2;
+    if (kind == CellKind::pyramid && order > 1) file_.fail(connect + ": " + kNoCurvedPyramids);
     if (!NodalCells::is_size(kind, order, size))
       file_.fail(connect + ": " + in_quotes(type) + " with " + std::to_string(size) +
-                 " nodes is not read, expected HEX8, 20, 27, WEDGE6, 15, 18, TET4 or 10");
+                 " nodes is not read, expected HEX8, 20, 27, WEDGE6, 15, 18, TET4, 10 or PYRAMID5");
     const std::vector<std::size_t> places = exodus_places(kind, size);
     const std::vector<long long> nodes =
         file_.integers(connect, file_.size_of(connect, block.num_elements, size));
@@ -317,8 +318,7 @@ class ExodusParser {
     const std::size_t n = count_of("num_side_sets");
     const std::vector<long long> numbers = ids("ss_prop1", file_.size_of("ss_prop1", n, 1));
     side_names_ = file_.names("ss_names", n);
-    const SideTable table = exodus_faces;
-    const std::vector<std::vector<int>> faces[] = {table(CellKind::tet), table(CellKind::prism), table(CellKind::hex)};
+    const auto faces = faces_by_kind(exodus_faces);
     GroupList groups;
     std::vector<Index> corners;
     for (std::size_t s = 0; s < n; ++s) {

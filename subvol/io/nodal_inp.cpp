@@ -25,8 +25,8 @@ struct InpType {
   int order;
 };
 constexpr InpType kInpTypes[] = {
-    {4, CellKind::tet, 1},   {6, CellKind::prism, 1},  {8, CellKind::hex, 1},  {10, CellKind::tet, 2},
-    {15, CellKind::prism, 2}, {20, CellKind::hex, 2}, {27, CellKind::hex, 2},
+    {4, CellKind::tet, 1},  {5, CellKind::pyramid, 1}, {6, CellKind::prism, 1}, {8, CellKind::hex, 1},
+    {10, CellKind::tet, 2}, {15, CellKind::prism, 2},  {20, CellKind::hex, 2},  {27, CellKind::hex, 2},
 };
 constexpr const char* kSolidFamilies[] = {"C3D", "DC3D", "AC3D", "DCC3D", "F3D"};
 constexpr const char* kShellFamilies[] = {"STRI", "S", "M3D", "R3D", "SFM3D", "DS"};
@@ -239,11 +239,11 @@ class InpParser {
       if (!type.starts_with(family)) continue;
       const auto digits = digits_after(type, family);
       if (!digits) continue;
-      if (*digits == 5 || *digits == 13) fail(std::string("a pyramid: ") + kNoPyramids);
+      if (*digits == 13) fail(std::string("a curved pyramid: ") + kNoCurvedPyramids);
       const auto found = std::find_if(std::begin(kInpTypes), std::end(kInpTypes),
                                       [&](const InpType& t) { return t.digits == *digits; });
       if (found == std::end(kInpTypes))
-        fail("elements of type " + in_quotes(type) + " are not read, expected C3D4, 6, 8, 10, 15, 20 or 27");
+        fail("elements of type " + in_quotes(type) + " are not read, expected C3D4, 5, 6, 8, 10, 15, 20 or 27");
       type_ = found;
     }
     set_ = has_parameter("ELSET") ? element_set(parameter("ELSET")) : kNone;

@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
 #include "subvol/io/file_formats.h"
+#include "subvol/io/mesh_formats.h"
 #include "subvol/io/nodal_formats.h"
 
 #include <Eigen/Geometry>
@@ -43,7 +44,7 @@ const NodalFormat* nodal_format(const fs::path& path) {
 bool is_left_handed(const NodalMesh& mesh, std::size_t c) {
   const CellTopology& topology = cell_topology(mesh.kinds[c]);
   const auto cell = mesh.cell(c);
-  for (int i = 0; i < topology.num_vertices; ++i) {
+  for (int i = 0; i < topology.num_trivalent; ++i) {
     const auto& n = topology.corner_neighbors[i];
     const auto edge = [&](int k) -> Vec3 { return mesh.positions[cell[n[k]]] - mesh.positions[cell[i]]; };
     if (!(edge(0).cross(edge(1)).dot(edge(2)) < 0)) return false;
@@ -144,12 +145,14 @@ NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, co
   if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
     mesh.references.clear();
   normalise(mesh.face_groups);
+  if (mesh.max_order() > 1 && std::ranges::find(mesh.kinds, CellKind::pyramid) != mesh.kinds.end())
+    throw InputError(path.string() + ": curved cells beside pyramids: " + kNoCurvedPyramids);
   return mesh;
 }
 
 NodalMesh read_nodal_mesh(const fs::path& path, const std::string& references) {
   NodalMesh mesh = parse_nodal(path, read_file(path), references);
-  if (mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms or tets in the file");
+  if (mesh.num_cells() == 0) throw InputError(path.string() + ": no hexes, prisms, tets or pyramids in the file");
   return mesh;
 }
 

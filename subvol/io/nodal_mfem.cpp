@@ -15,7 +15,7 @@ namespace subvol::internal {
 namespace {
 
 /// MFEM's numbers of shapes.
-constexpr int kTriangle = 2, kSquare = 3, kTet = 4, kCube = 5, kPrism = 6, kPyramidShape = 7;
+constexpr int kTriangle = 2, kSquare = 3, kTet = 4, kCube = 5, kPrism = 6, kPyramid = 7;
 constexpr int kCornersOfShape[] = {1, 2, 3, 4, 4, 8, 6, 5};
 
 /// How the nodes of a curved mesh are stored.
@@ -80,8 +80,7 @@ class MfemParser {
   };
   Entry read_entry() {
     const std::int64_t attribute = scan_.integer("an attribute"), shape = scan_.integer("a shape");
-    if (shape < 0 || shape > kPyramidShape) scan_.fail("expected a shape from 0 to 7");
-    if (shape == kPyramidShape) scan_.fail(std::string("a pyramid: ") + kNoPyramids);
+    if (shape < 0 || shape > kPyramid) scan_.fail("expected a shape from 0 to 7");
     constexpr std::int64_t kMost = std::numeric_limits<int>::max();
     if (attribute < -kMost || attribute > kMost) scan_.fail("expected an attribute of 32 bits");
     Entry entry{static_cast<int>(attribute), static_cast<int>(shape), {}};
@@ -98,8 +97,9 @@ class MfemParser {
     const std::size_t n = scan_.count("the number of elements", 3);
     for (std::size_t e = 0; e < n; ++e) {
       const Entry entry = read_entry();
-      if (entry.shape < kTet) scan_.fail("expected tetrahedra (4), cubes (5) and prisms (6)");
-      kinds_.push_back(entry.shape == kTet ? CellKind::tet : entry.shape == kCube ? CellKind::hex : CellKind::prism);
+      if (entry.shape < kTet) scan_.fail("expected tetrahedra (4), cubes (5), prisms (6) and pyramids (7)");
+      constexpr CellKind kKinds[] = {CellKind::tet, CellKind::hex, CellKind::prism, CellKind::pyramid};
+      kinds_.push_back(kKinds[entry.shape - kTet]);
       corners_.insert(corners_.end(), entry.corners.begin(), entry.corners.end());
       offsets_.push_back(corners_.size());
       mesh_.references.push_back(entry.attribute);
@@ -148,7 +148,8 @@ class MfemParser {
     return p;
   }
 
-  // --- Curved meshes --------------------------------------------------------------------------------------------------
+  // --- Curved meshes
+  // --------------------------------------------------------------------------------------------------
 
   std::string header(const char* key) {
     expect(key);
@@ -175,6 +176,8 @@ class MfemParser {
 
   void read_nodes(std::size_t num_vertices) {
     const NodeSpace space = read_space();
+    if (space.order > 1 && std::find(kinds_.begin(), kinds_.end(), CellKind::pyramid) != kinds_.end())
+      scan_.fail(kNoCurvedPyramids);
     if (header("VDim:") != "3") scan_.fail("expected nodes with three coordinates (VDim: 3)");
     const std::string ordering = header("Ordering:");
     if (ordering != "0" && ordering != "1") scan_.fail("expected Ordering: 0 or 1");

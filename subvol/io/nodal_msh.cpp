@@ -60,7 +60,16 @@ int dimension(Shape shape) {
 }
 
 CellKind kind_of(Shape shape) {
-  return shape == Shape::tet ? CellKind::tet : shape == Shape::hex ? CellKind::hex : CellKind::prism;
+  switch (shape) {
+    case Shape::tet:
+      return CellKind::tet;
+    case Shape::prism:
+      return CellKind::prism;
+    case Shape::pyramid:
+      return CellKind::pyramid;
+    default:
+      return CellKind::hex;
+  }
 }
 
 /// An element with the tags of its nodes still unresolved: nodes may come after elements.
@@ -264,7 +273,8 @@ class MshParser {
     const auto found = std::find_if(std::begin(kMshTypes), std::end(kMshTypes),
                                     [&](const MshType& t) { return t.type == type; });
     if (found == std::end(kMshTypes)) scan_.fail("elements of Gmsh's type " + std::to_string(type) + " are not read");
-    if (found->shape == Shape::pyramid) scan_.fail(std::string("a pyramid: ") + kNoPyramids);
+    if (found->shape == Shape::pyramid && found->order > 1)
+      scan_.fail(std::string("a curved pyramid: ") + kNoCurvedPyramids);
     if (found->shape == Shape::prism && found->order > 2)
       scan_.fail("a prism of order " + std::to_string(found->order) +
                  ", which Gmsh does not evaluate; expected order 1 "

@@ -51,6 +51,7 @@ struct SolidCard {
 const std::vector<SolidCard>& solid_cards() {
   static const std::vector<SolidCard> kCards{
       {"CTETRA", CellKind::tet, 4, 10, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}},
+      {"CPYRAM", CellKind::pyramid, 5, 5, {0, 1, 2, 3, 4}},
       {"CPENTA", CellKind::prism, 6, 15, {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11}},
       {"CHEXA", CellKind::hex, 8, 20, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15}},
   };
@@ -135,8 +136,8 @@ class NastranParser {
     if (name == "grid") read_grid();
     else if (solid != solid_cards().end()) read_solid(*solid);
     else if (name == "cquad4" || name == "cquad8" || name == "cquadr") read_shell(4);
-    else if (name == "ctria3" || name == "ctria6" || name == "ctriar") read_shell(3);
-    else if (name == "cpyram") fail(std::string("a pyramid: ") + kNoPyramids);
+    else if (name == "ctria3" || name == "ctria6" || name == "ctriar")
+      read_shell(3);
     else if (name == "include" || name.starts_with("include ")) fail("INCLUDE is not followed: put the files together");
     else if (name == "grdset") fail("GRDSET is not read: write the coordinate systems of the points themselves");
     else if (std::find(std::begin(kOtherElements), std::end(kOtherElements), name) != std::end(kOtherElements))

@@ -62,13 +62,22 @@ bool has_edge_nodes_only(const NodalMesh& mesh) {
 std::vector<std::vector<int>> inp_faces(CellKind kind) {
   if (kind == CellKind::tet) return {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
   if (kind == CellKind::prism) return {{0, 1, 2}, {3, 5, 4}, {0, 3, 4, 1}, {1, 4, 5, 2}, {2, 5, 3, 0}};
+  if (kind == CellKind::pyramid) return {{0, 1, 2, 3}, {0, 4, 1}, {1, 4, 2}, {2, 4, 3}, {3, 4, 0}};
   return {{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}};
 }
 
 std::vector<std::vector<int>> exodus_faces(CellKind kind) {
   if (kind == CellKind::tet) return {{0, 1, 3}, {1, 2, 3}, {0, 3, 2}, {0, 2, 1}};
   if (kind == CellKind::prism) return {{0, 1, 4, 3}, {1, 2, 5, 4}, {0, 3, 5, 2}, {0, 2, 1}, {3, 4, 5}};
+  if (kind == CellKind::pyramid) return {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {0, 3, 2, 1}};
   return {{0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {0, 4, 7, 3}, {0, 3, 2, 1}, {4, 5, 6, 7}};
+}
+
+std::array<std::vector<std::vector<int>>, kNumCellKinds> faces_by_kind(SideTable table) {
+  std::array<std::vector<std::vector<int>>, kNumCellKinds> faces;
+  for (int kind = 0; kind < kNumCellKinds; ++kind)
+    faces[static_cast<std::size_t>(kind)] = table(static_cast<CellKind>(kind));
+  return faces;
 }
 
 std::vector<Index> face_nodes(const NodalMesh& mesh, std::size_t cell, std::span<const int> corners) {
@@ -95,7 +104,7 @@ std::vector<GroupSides> sides_of_groups(const NodalMesh& mesh, SideTable table, 
   for (const GroupedFace& face : mesh.face_groups.faces) wanted.insert(face.face);
   std::map<FaceKey, Side> sides;
   std::vector<Index> corners;
-  const std::vector<std::vector<int>> faces[] = {table(CellKind::tet), table(CellKind::prism), table(CellKind::hex)};
+  const auto faces = faces_by_kind(table);
   for (std::size_t c = 0; !wanted.empty() && c < mesh.num_cells(); ++c) {
     int number = 0;
     for (const std::vector<int>& face : faces[static_cast<std::size_t>(mesh.kinds[c])]) {

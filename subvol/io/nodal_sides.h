@@ -5,6 +5,7 @@
 
 #include "subvol/io/nodal_mesh.h"
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -32,6 +33,8 @@ bool has_edge_nodes_only(const NodalMesh& mesh);
 using SideTable = std::vector<std::vector<int>> (*)(CellKind kind);
 std::vector<std::vector<int>> inp_faces(CellKind kind);     ///< S1, S2, .. of Abaqus
 std::vector<std::vector<int>> exodus_faces(CellKind kind);  ///< sides of Exodus
+/// The faces of all kinds, by CellKind.
+std::array<std::vector<std::vector<int>>, kNumCellKinds> faces_by_kind(SideTable table);
 
 /// Returns the nodes of a face of a cell of order 1 or 2: its corners in their order, the middles of its edges, and in
 /// order 2 the center of a quad.

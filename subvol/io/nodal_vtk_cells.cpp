@@ -31,6 +31,7 @@ const std::vector<FixedCell>& fixed_cells() {
       {11, CellKind::hex, 1, 8, {0, 1, 3, 2, 4, 5, 7, 6}},
       {12, CellKind::hex, 1, 8, {}},
       {13, CellKind::prism, 1, 6, {0, 2, 1, 3, 5, 4}},
+      {14, CellKind::pyramid, 1, 5, {}},
       {24, CellKind::tet, 2, 10, {}},
       {25, CellKind::hex, 2, 20, {}},
       {26, CellKind::prism, 2, 15, {0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13}},
@@ -48,11 +49,13 @@ std::string refusal(int type) {
   const auto is = [&](std::initializer_list<int> types) { return std::find(types.begin(), types.end(), type) !=
                                                                  types.end(); };
   const std::string text = "has VTK type " + std::to_string(type);
-  if (is({14, 27, 37, 74, 81})) return std::string("is a pyramid: ") + kNoPyramids;
+  if (is({27, 37, 74, 81})) return std::string("is a curved pyramid: ") + kNoCurvedPyramids;
   if (is({78, 79, 80})) return text + ", a Bezier cell, which is not read";
   if (is({41, 42, 15, 16})) return text + ", a polyhedron, which is not read";
-  return text + ", expected 10 (tet), 11 (voxel), 12 (hex), 13 (wedge), their quadratic forms 24, 25, 26, 29 and 32, or "
-                "Lagrange cells 71, 72 and 73";
+  return text +
+         ", expected 10 (tet), 11 (voxel), 12 (hex), 13 (wedge), 14 (pyramid), the quadratic forms 24, 25, 26, 29 and "
+         "32, or "
+         "Lagrange cells 71, 72 and 73";
 }
 
 /// The order of a Lagrange cell of so many nodes; 0 if there is none.

@@ -127,6 +127,7 @@ std::vector<WrittenBlock> blocks_of(const NodalMesh& mesh) {
 std::string type_name(CellKind kind, std::size_t num_nodes) {
   if (kind == CellKind::tet) return num_nodes == 4 ? "TETRA" : "TETRA10";
   if (kind == CellKind::prism) return num_nodes == 6 ? "WEDGE" : "WEDGE" + std::to_string(num_nodes);
+  if (kind == CellKind::pyramid) return "PYRAMID";
   return "HEX" + std::to_string(num_nodes);
 }
 

@@ -93,11 +93,13 @@ std::string mfem_text(const NodalMesh& mesh) {
   if (order > 2 && mesh.spacing != NodeSpacing::lobatto)
     throw InputError("MFEM: expected nodes at the Gauss-Lobatto points");
   const VolumeMesh corners = corner_cells(mesh);
-  std::string text = "MFEM mesh v1.0\n\n# written by subvol; tetrahedra 4, cubes 5, prisms 6\n\ndimension\n3\n\nelements\n" +
-                     std::to_string(mesh.num_cells()) + "\n";
+  std::string text =
+      "MFEM mesh v1.0\n\n# written by subvol; tetrahedra 4, cubes 5, prisms 6, pyramids 7\n\n"
+      "dimension\n3\n\nelements\n" +
+      std::to_string(mesh.num_cells()) + "\n";
   PositiveNumbers attributes(mesh.references);
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
-    constexpr const char* kShapes[] = {" 4", " 6", " 5"};
+    constexpr const char* kShapes[] = {" 4", " 6", " 5", " 7"};
     text += std::to_string(attributes.of(mesh.references.empty() ? 0 : mesh.references[c])) +
             kShapes[static_cast<std::size_t>(mesh.kinds[c])];
     for (const Index v : corners.cell(c)) text += " " + std::to_string(v);

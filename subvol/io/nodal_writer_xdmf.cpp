@@ -19,7 +19,7 @@ struct XdmfShape {
 };
 
 XdmfShape cell_shape(CellKind kind, int order) {
-  constexpr XdmfShape kLinear[] = {{"Tetrahedron", 6}, {"Wedge", 8}, {"Hexahedron", 9}};
+  constexpr XdmfShape kLinear[] = {{"Tetrahedron", 6}, {"Wedge", 8}, {"Hexahedron", 9}, {"Pyramid", 7}};
   constexpr XdmfShape kQuadratic[] = {{"Tetrahedron_10", 38}, {"Wedge_18", 41}, {"Hexahedron_27", 50}};
   return (order == 1 ? kLinear : kQuadratic)[static_cast<std::size_t>(kind)];
 }
@@ -146,8 +146,7 @@ std::string xdmf_faces_text(const NodalMesh& mesh) {
     const std::vector<int>* corners;
     bool is_inner;
   };
-  const std::vector<std::vector<int>> tables[] = {inp_faces(CellKind::tet), inp_faces(CellKind::prism),
-                                                  inp_faces(CellKind::hex)};
+  const auto tables = faces_by_kind(inp_faces);
   std::map<FaceKey, Face> faces;
   std::vector<FaceKey> in_order;
   std::vector<Index> corners;

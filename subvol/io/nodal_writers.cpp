@@ -79,7 +79,7 @@ void append_set(std::string& text, const Numbers& numbers) {
 }
 
 void append_inp_elements(std::string& text, const NodalMesh& mesh, int order) {
-  constexpr const char* kTypes[2][3] = {{"C3D4", "C3D6", "C3D8"}, {"C3D10", "C3D15", "C3D20"}};
+  constexpr const char* kTypes[2][kNumCellKinds] = {{"C3D4", "C3D6", "C3D8", "C3D5"}, {"C3D10", "C3D15", "C3D20"}};
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const CellKind kind = mesh.kinds[c];
     if (c == 0 || mesh.kinds[c - 1] != kind)
@@ -197,7 +197,7 @@ std::string nastran_text(const NodalMesh& mesh) {
   constexpr std::array<std::size_t, 15> kPrism{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11};
   constexpr std::array<std::size_t, 20> kHex{0,  1,  2,  3,  4,  5,  6,  7,  8,  9,
                                              10, 11, 16, 17, 18, 19, 12, 13, 14, 15};
-  constexpr const char* kCards[] = {"CTETRA", "CPENTA", "CHEXA"};
+  constexpr const char* kCards[] = {"CTETRA", "CPENTA", "CHEXA", "CPYRAM"};
   for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
     const CellKind kind = mesh.kinds[c];
     text += padded(kCards[static_cast<std::size_t>(kind)], 8) + padded(std::to_string(c + 1), 8) +

@@ -9,18 +9,18 @@ namespace subvol::internal {
 
 /// Returns the cells as an input file of Abaqus and CalculiX.
 ///
-/// Elements are C3D4, C3D6 and C3D8, or C3D10, C3D15 and C3D20 of cells of order 2, whose nodes inside faces and hexes
-/// are left out. Numbers of nodes and elements are ours and 1; the set EALL holds all elements. Each reference has the
-/// element set REFERENCE_7 (REFERENCE_M7 for -7) and, if it has a name, another one of that name. Each group of faces
-/// becomes a surface of elements and a set of its nodes. Names keep their letters, digits, _ and -; other characters
-/// become _, and a name without any becomes GROUP_7.
+/// Elements are C3D4, C3D5, C3D6 and C3D8, or C3D10, C3D15 and C3D20 of cells of order 2, whose nodes inside faces and
+/// hexes are left out. Numbers of nodes and elements are ours and 1; the set EALL holds all elements. Each reference
+/// has the element set REFERENCE_7 (REFERENCE_M7 for -7) and, if it has a name, another one of that name. Each group of
+/// faces becomes a surface of elements and a set of its nodes. Names keep their letters, digits, _ and -; other
+/// characters become _, and a name without any becomes GROUP_7.
 ///
 /// InputError: orders other than 1 and 2, or both of them; nodes that are not equally spaced.
 std::string inp_text(const NodalMesh& mesh);
 
-/// Returns the cells as bulk data of Nastran, with large fields: GRID, CTETRA, CPENTA and CHEXA, of order 2 with the
-/// middles of edges as above. The number of a property is the reference, or, for those below 1, the first free number.
-/// There are no groups of faces: they would be shells. InputError: as above.
+/// Returns the cells as bulk data of Nastran, with large fields: GRID, CTETRA, CPENTA, CPYRAM and CHEXA, of order 2
+/// with the middles of edges as above. The number of a property is the reference, or, for those below 1, the first free
+/// number. There are no groups of faces: they would be shells. InputError: as above.
 std::string nastran_text(const NodalMesh& mesh);
 
 /// Returns the cells as an MFEM mesh v1.0, curved ones with nodes in the space H1 of their order.

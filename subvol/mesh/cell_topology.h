@@ -19,9 +19,14 @@ namespace subvol {
 ///
 /// Canonical coordinates: hex [0,1]^3 with vertex 1 at (1,0,0), 3 at (0,1,0), 4 at (0,0,1); prism {u+v<=1} x [0,1] with
 /// 1 at (1,0,0), 2 at (0,1,0), 3 at (0,0,1); tet {u+v+w<=1} with 1, 2, 3 at the unit vectors. (Paper: section 3.2.)
-enum class CellKind : std::uint8_t { tet = 0, prism = 1, hex = 2 };
+///
+/// A pyramid has the base 0 1 2 3 of a hex, seen counter-clockwise from its apex 4. It is the hex whose upper side has
+/// collapsed to the apex: x(s, t, w) = (1-w) B(s, t) + w x_4 with B the bilinear base. In the canonical coordinates
+/// u = s (1-w), v = t (1-w), w, its Jacobian J depends on s and t alone, and det J is bilinear in them: the apex has
+/// the values of the base, one for each ray.
+enum class CellKind : std::uint8_t { tet = 0, prism = 1, hex = 2, pyramid = 3 };
 
-inline constexpr int kNumCellKinds = 3;
+inline constexpr int kNumCellKinds = 4;
 inline constexpr int kMaxCellVertices = 8;
 inline constexpr int kMaxCellEdges = 12;
 inline constexpr int kMaxCellFaces = 6;
@@ -33,7 +38,8 @@ struct CellTopology {
   std::array<std::array<std::int8_t, 2>, kMaxCellEdges> edges;     ///< end vertices of each edge
   std::array<std::int8_t, kMaxCellFaces> face_sizes;               ///< 3 or 4
   std::array<std::array<std::int8_t, 4>, kMaxCellFaces> faces;     ///< corners of each face, outward
-  /// The three neighbors of each corner, ordered so that det[n0-c, n1-c, n2-c] > 0 in a cell of positive volume.
+  int num_trivalent;  ///< corners at which three edges meet: all, or the first four of a pyramid
+  /// The three neighbors of each of these, ordered so that det[n0-c, n1-c, n2-c] > 0 in a cell of positive volume.
   std::array<std::array<std::int8_t, 3>, kMaxCellVertices> corner_neighbors;
 };
 

@@ -324,7 +324,7 @@ class Validator {
       const CellTopology& topology = cell_topology(mesh_.kinds[c]);
       const auto position = [&](int corner) -> const Vec3& { return mesh_.positions[mesh_.cell(c)[corner]]; };
       int bad = 0, first = -1;
-      for (int i = 0; i < topology.num_vertices; ++i) {
+      for (int i = 0; i < topology.num_trivalent; ++i) {
         const auto& n = topology.corner_neighbors[i];
         const Vec3 x = position(i), e0 = position(n[0]) - x, e1 = position(n[1]) - x, e2 = position(n[2]) - x;
         if (e0.cross(e1).dot(e2) > 0) continue;
@@ -333,7 +333,7 @@ class Validator {
       if (bad > 0)
         add(Kind::inverted_cell, c,
             cell_name(c) + " is flat or left-handed at " + std::to_string(bad) + " of " +
-                std::to_string(topology.num_vertices) + " corners, first at " + name_of(mesh_.cell(c)[first]));
+                std::to_string(topology.num_trivalent) + " corners, first at " + name_of(mesh_.cell(c)[first]));
     }
   }
 

@@ -13,7 +13,7 @@
 
 namespace subvol {
 
-/// A mesh of linear hexes, prisms and tets as a plain value: flat arrays, no derived data.
+/// A mesh of linear hexes, prisms, tets and pyramids as a plain value: flat arrays, no derived data.
 ///
 /// The corners of a cell follow `CellKind`'s numbering. Anything may be stored; `validate` says what is wrong with it.
 struct VolumeMesh {

@@ -5,6 +5,7 @@
 #include "subvol/mesh/features.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/pyramids.h"
 #include "subvol/subdivision/crease_sheets.h"
 #include "subvol/subdivision/surface_refinement.h"
 #include "subvol/surface/sheets.h"
@@ -98,8 +99,8 @@ CellTables make_tables(CellKind kind) {
 }
 
 const CellTables& cell_tables(CellKind kind) {
-  static const std::array<CellTables, kNumCellKinds> tables = {make_tables(CellKind::tet), make_tables(CellKind::prism),
-                                                               make_tables(CellKind::hex)};
+  static const std::array tables = {make_tables(CellKind::tet), make_tables(CellKind::prism),
+                                    make_tables(CellKind::hex)};
   return tables[static_cast<std::size_t>(kind)];
 }
 
@@ -307,6 +308,7 @@ void require_usable(const VolumeMesh& mesh) {
   if (mesh.cell_offsets.size() != mesh.num_cells() + 1 || mesh.cell_offsets.back() != mesh.cell_vertices.size() ||
       (!mesh.references.empty() && mesh.references.size() != mesh.num_cells()))
     throw InputError("subdivide: control has arrays of inconsistent length");
+  require_no_pyramids(mesh.kinds, "subdivide: pyramids do not split into hexes, because four edges meet at their apex");
   for (Index v : mesh.cell_vertices)
     if (v < 0 || static_cast<std::size_t>(v) >= mesh.num_vertices())
       throw InputError("subdivide: control names vertex " + std::to_string(v) + " of " +

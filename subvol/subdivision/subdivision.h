@@ -29,8 +29,8 @@ struct SubdivisionLevel {
 ///
 /// Unused vertices stay where they are. The two child edges of a crease have its sharpness less 1; infinite ones stay
 /// infinite, and those that reach 0 are dropped. InputError: no cells or too many, arrays of inconsistent length,
-/// vertex numbers out of range, and as `MeshTopology` and `tagged_boundary`. Cost: linear, about 0.2 microseconds per
-/// fine cell.
+/// vertex numbers out of range, pyramids, and as `MeshTopology` and `tagged_boundary`. Cost: linear, about 0.2
+/// microseconds per fine cell.
 SubdivisionLevel subdivide(const VolumeMesh& control, BoundaryRule rule = BoundaryRule::catmull_clark);
 
 /// Returns S alone. InputError: as `subdivide`.

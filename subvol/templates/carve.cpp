@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 
 namespace subvol {
@@ -19,7 +20,7 @@ namespace {
 constexpr std::array<double, 3> kPlaces{1.0 / 6, 0.5, 5.0 / 6};  // centers of thirds
 
 /// Appends 27 points spread over a cell in its canonical coordinates; for prisms and tets, the points of the cube are
-/// folded into the cell.
+/// folded into the cell, and for pyramids its upper side is collapsed.
 void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& points) {
   const auto corner = [&](std::size_t i) -> const Vec3& { return mesh.positions[mesh.cell(c)[i]]; };
   const auto between = [](const Vec3& a, const Vec3& b, double t) -> Vec3 { return a + t * (b - a); };
@@ -40,6 +41,10 @@ void append_points(const VolumeMesh& mesh, std::size_t c, std::vector<Vec3>& poi
             points.push_back(between(at(0), at(3), w));
             break;
           }
+          case CellKind::pyramid:
+            points.push_back(between(between(between(corner(0), corner(1), u), between(corner(3), corner(2), u), v),
+                                     corner(4), 1 - std::cbrt(1 - w)));
+            break;
           case CellKind::tet: {
             std::array<double, 3> cut{u, v, w};  // sorted, they cut [0, 1] into the four barycentric weights of a point
             std::sort(cut.begin(), cut.end());

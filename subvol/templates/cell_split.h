@@ -5,8 +5,8 @@
 
 namespace subvol {
 
-/// Cuts every hex into 6 tets and every prism into 3, without new vertices. Each quad is cut along the diagonal at its
-/// smallest vertex number, so that neighbors agree.
+/// Cuts every hex into 6 tets, every prism into 3 and every pyramid into 2, without new vertices. Each quad is cut
+/// along the diagonal at its smallest vertex number, so that neighbors agree.
 /// Source: Dompierre, Labbe, Vallet, Camarero, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"
 /// (1999).
 ///

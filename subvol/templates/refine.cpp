@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/mesh/pyramids.h"
 #include "subvol/templates/template_edit.h"
 
 #include <Eigen/Geometry>
@@ -365,6 +366,7 @@ LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> mar
   if (marked.size() != mesh.num_vertices())
     throw InputError("refine: marked must have one entry per vertex, " + std::to_string(mesh.num_vertices()));
   require_sound(mesh, "refine");
+  require_no_pyramids(mesh.kinds, "refine: pyramids do not split into hexes, because four edges meet at their apex");
   std::vector<char> marks(marked.begin(), marked.end());
   grow_marks(mesh, marks);
 

@@ -24,7 +24,7 @@ void require_sound(const VolumeMesh& mesh, const std::string& name) {
 bool corners_positive(const VolumeMesh& mesh, std::size_t cell) {
   const CellTopology& topology = cell_topology(mesh.kinds[cell]);
   const auto corners = mesh.cell(cell);
-  for (int i = 0; i < topology.num_vertices; ++i) {
+  for (int i = 0; i < topology.num_trivalent; ++i) {
     const Vec3& x = mesh.positions[corners[i]];
     const auto edge = [&](int n) -> Vec3 { return mesh.positions[corners[topology.corner_neighbors[i][n]]] - x; };
     if (!(edge(0).cross(edge(1)).dot(edge(2)) > 0)) return false;

@@ -184,10 +184,10 @@ TEST_CASE("Surfaces and limit surfaces become what the viewer draws", "[viewer]"
   surface.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 2, 0}};
   surface.face_offsets = {0, 4, 7};
   surface.face_vertices = {0, 1, 2, 3, 3, 2, 4};
-  CHECK(viewer_mesh("s", surface).kinds == std::vector<std::uint8_t>{4, 3});
+  CHECK(viewer_mesh("s", surface).kinds == std::vector<std::uint8_t>{5, 4});
   surface.face_offsets = {0, 5};
   surface.face_vertices = {0, 1, 2, 4, 3};
-  CHECK(viewer_mesh("s", surface).kinds == std::vector<std::uint8_t>{3, 3, 3});
+  CHECK(viewer_mesh("s", surface).kinds == std::vector<std::uint8_t>{4, 4, 4});
 
   const VolumeMesh cage = test::lattice(2, 2, 2);
   const ViewerSurface limit = viewer_limit(cage, std::vector<double>(8, 0.5), 0.01);

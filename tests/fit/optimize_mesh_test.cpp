@@ -21,10 +21,11 @@ using namespace subvol::internal;
 
 namespace {
 
-/// A lattice of n^3 cubes, each cut into cells of one kind: 1 hex, 2 prisms, 6 tets.
+/// A lattice of n^3 cubes, each cut into cells of one kind: 1 hex, 2 prisms, 6 tets, 6 pyramids.
 VolumeMesh cut_lattice(int n, CellKind kind) {
   const VolumeMesh cubes = test::lattice(n, n, n);
   if (kind == CellKind::hex) return cubes;
+  if (kind == CellKind::pyramid) return test::pyramid_lattice(n);
   VolumeMesh mesh;
   mesh.positions = cubes.positions;
   for (std::size_t c = 0; c < cubes.num_cells(); ++c) {
@@ -59,7 +60,7 @@ TriangleMesh surface_of(const VolumeMesh& mesh) {
 
 TEST_CASE("A scrambled lattice of each kind gets back the lattice's quality") {
   constexpr int kSize = 4;
-  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet})
+  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet, CellKind::pyramid})
     for (const bool fixed : {true, false}) {
       const unsigned seed = fixed ? 1 : 2;
       INFO(cell_topology(kind).name << ", seed " << seed << ", fixed " << fixed);

@@ -33,6 +33,7 @@ VolumeMesh small_mesh(CellKind kind) {
   if (kind == CellKind::tet)
     for (const auto& [a, b] : {std::array<Index, 2>{1, 2}, {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}})
       mesh.add_cell(kind, std::array<Index, 4>{0, a, b, 6});
+  if (kind == CellKind::pyramid) mesh.add_cell(kind, std::array<Index, 5>{0, 1, 2, 3, 4});
   mesh.references.assign(mesh.num_cells(), 3);
   mesh.tags.creases = {{0, 1, 2.5}, {1, 2, 100}};
   mesh.tags.corners = {{0, 100}};
@@ -45,7 +46,7 @@ void write(const fs::path& folder, const char* name, std::string_view bytes) {
 }
 
 void write_volumes(const fs::path& folder) {
-  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet}) {
+  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet, CellKind::pyramid}) {
     const VolumeMesh mesh = small_mesh(kind);
     const std::string name = cell_topology(kind).name;
     for (const char* extension : {"mesh", "vtk"}) {
@@ -56,6 +57,7 @@ void write_volumes(const fs::path& folder) {
       fs::create_directories(folder / extension);
       write_volume(folder / extension / (name + '.' + extension), mesh);
     }
+    if (kind == CellKind::pyramid) continue;  // which cannot be curved
     const HighOrderMesh quadratic(ElementSpace(mesh, Basis::legendre, 2), mesh);
     for (const char* extension : {"msh", "inp", "bdf", "mfem", "e"})
       write_volume(folder / extension / (name + "2." + extension), quadratic);

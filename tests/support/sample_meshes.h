@@ -56,6 +56,34 @@ inline VolumeMesh lattice(int nx, int ny, int nz) {
   return voxels(nx, ny, nz, [](int, int, int) { return true; });
 }
 
+/// A lattice of n^3 cubes, each cut into six pyramids around its centre.
+inline VolumeMesh pyramid_lattice(int n) {
+  const VolumeMesh cubes = lattice(n, n, n);
+  VolumeMesh mesh;
+  mesh.positions = cubes.positions;
+  const CellTopology& hex = cell_topology(CellKind::hex);
+  for (std::size_t c = 0; c < cubes.num_cells(); ++c) {
+    const auto v = cubes.cell(c);
+    const auto apex = static_cast<Index>(mesh.positions.size());
+    mesh.positions.push_back(0.5 * (cubes.positions[v[0]] + cubes.positions[v[6]]));
+    for (const auto& face : hex.faces)  // outward, so backwards from the apex
+      mesh.add_cell(CellKind::pyramid, std::array<Index, 5>{v[face[0]], v[face[3]], v[face[2]], v[face[1]], apex});
+  }
+  return mesh;
+}
+
+/// A cube with a pyramid on its top, whose front has a tet beside it, and a prism beside the cube: every kind.
+inline VolumeMesh mixed_cells_with_pyramid() {
+  VolumeMesh mesh = lattice(1, 1, 1);
+  mesh.positions.emplace_back(0.5, 0.5, 1.8);
+  mesh.positions.emplace_back(2.0, 0.5, 0.0);
+  mesh.positions.emplace_back(2.0, 0.5, 1.0);
+  mesh.add_cell(CellKind::pyramid, std::array<Index, 5>{4, 5, 6, 7, 8});
+  mesh.add_cell(CellKind::prism, std::array<Index, 6>{1, 9, 2, 5, 10, 6});
+  mesh.add_cell(CellKind::tet, std::array<Index, 4>{5, 10, 6, 8});
+  return mesh;
+}
+
 /// One hex whose top is turned and moved: inverted in its middle, though its corners are positive.
 inline VolumeMesh hex_inverted_inside() {
   VolumeMesh mesh = lattice(1, 1, 1);
@@ -143,7 +171,7 @@ inline double min_scaled_jacobian(const VolumeMesh& mesh, std::size_t c) {
   const CellTopology& topology = cell_topology(mesh.kinds[c]);
   const auto cell = mesh.cell(c);
   double least = 1;
-  for (int i = 0; i < topology.num_vertices; ++i) {
+  for (int i = 0; i < topology.num_trivalent; ++i) {
     Mat3 jacobian;
     for (int j = 0; j < 3; ++j)
       jacobian.col(j) = (mesh.positions[cell[topology.corner_neighbors[i][j]]] - mesh.positions[cell[i]]).normalized();

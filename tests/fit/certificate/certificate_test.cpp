@@ -21,6 +21,7 @@ using Corners = std::vector<Vec3>;
 Corners reference_corners(CellKind kind) {
   if (kind == CellKind::tet) return {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   if (kind == CellKind::prism) return {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+  if (kind == CellKind::pyramid) return {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}};
   return {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 }
 
@@ -30,6 +31,12 @@ double determinant_at(CellKind kind, const Corners& x, const Vec3& p) {
   Mat3 jacobian = Mat3::Zero();
   for (std::size_t v = 0; v < x.size(); ++v) {
     Vec3 gradient;
+    if (kind == CellKind::pyramid) {  // the hex whose upper corners are the apex, whose det J has a factor (1 - w)^2
+      Corners hex(x.begin(), x.begin() + 4);
+      hex.insert(hex.end(), 4, x[4]);
+      const double below = 1 - p[2];
+      return determinant_at(CellKind::hex, hex, {p[0] / below, p[1] / below, p[2]}) / (below * below);
+    }
     if (kind == CellKind::hex) {
       Vec3 factor, slope;
       for (int d = 0; d < 3; ++d) {
@@ -57,7 +64,8 @@ double dense_minimum(CellKind kind, const Corners& x, int n) {
   for (int i = 0; i <= n; ++i)
     for (int j = 0; j <= n; ++j)
       for (int k = 0; k <= n; ++k) {
-        if (kind != CellKind::hex && i + j > n) continue;
+        if ((kind == CellKind::tet || kind == CellKind::prism) && i + j > n) continue;
+        if (kind == CellKind::pyramid && (k == n || std::max(i, j) + k > n)) continue;
         least = std::min(least, determinant_at(kind, x, Vec3(i, j, k) / n));
       }
   return least;
@@ -102,7 +110,7 @@ Corners twisted_hex(double angle) {
 }  // namespace
 
 TEST_CASE("reference cells have the determinant 1 everywhere", "[certificate]") {
-  for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex}) {
+  for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex, CellKind::pyramid}) {
     const CellCertificate result = certify_cell(kind, reference_corners(kind));
     CHECK(result.validity == CellValidity::valid);
     CHECK(result.boxes == 1);
@@ -143,8 +151,8 @@ TEST_CASE("the certificate never passes an inverted hex with positive corners", 
   CHECK(invalid > 100);
 }
 
-TEST_CASE("the certificate never passes an inverted prism or tet", "[certificate]") {
-  for (const CellKind kind : {CellKind::prism, CellKind::tet}) {
+TEST_CASE("the certificate never passes an inverted prism, tet or pyramid", "[certificate]") {
+  for (const CellKind kind : {CellKind::prism, CellKind::tet, CellKind::pyramid}) {
     std::mt19937_64 engine(7);
     std::size_t wrong = 0, invalid = 0, valid = 0;
     for (int c = 0; c < 40000; ++c) {
@@ -203,7 +211,7 @@ TEST_CASE("a cell that degenerates to determinant zero ends undecided, a mirrore
   const CellCertificate degenerate = certify_cell(CellKind::hex, flat);
   CHECK(degenerate.validity == CellValidity::undecided);
   CHECK(degenerate.witness_determinant == 0);
-  for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex}) {
+  for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex, CellKind::pyramid}) {
     Corners mirrored = reference_corners(kind);
     for (Vec3& p : mirrored) p[2] = -p[2];
     CHECK(certify_cell(kind, mirrored).validity == CellValidity::invalid);
@@ -229,7 +237,7 @@ TEST_CASE("a coordinate that is not finite is never certified", "[certificate]")
 
 TEST_CASE("the batch agrees with the single cells for any number of threads", "[certificate]") {
   std::mt19937_64 engine(11);
-  for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex}) {
+  for (const CellKind kind : {CellKind::tet, CellKind::prism, CellKind::hex, CellKind::pyramid}) {
     std::vector<Corners> cells;
     for (int c = 0; c < 1003; ++c) cells.push_back(shaken(kind, 0.45, engine));
     const VolumeMesh mesh = soup(kind, cells);

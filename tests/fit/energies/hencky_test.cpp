@@ -33,7 +33,8 @@ VolumeMesh ideal_cell(CellKind kind) {
   const std::vector<Vec3> canonical[] = {
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
-      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}}};
   for (const Vec3& p : canonical[static_cast<int>(kind)]) {
     corners.push_back(static_cast<Index>(mesh.positions.size()));
     mesh.positions.push_back(a * p);
@@ -42,7 +43,7 @@ VolumeMesh ideal_cell(CellKind kind) {
   return mesh;
 }
 
-constexpr CellKind kKinds[] = {CellKind::tet, CellKind::prism, CellKind::hex};
+constexpr CellKind kKinds[] = {CellKind::tet, CellKind::prism, CellKind::hex, CellKind::pyramid};
 
 /// Derivatives along d against central differences of step h. No eigenvalue may be clamped at x, as where cells are
 /// half again as large as ideal ones. Blocks of the Hessian are stored in single precision.

@@ -17,7 +17,7 @@ using namespace subvol::internal;
 TEST_CASE("Scaled Jacobians at the points of a rule are those of the columns there", "[point_jacobians]") {
   constexpr double kLeastLength = 1e-9;
   test::RandomPoints random(3);
-  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet})
+  for (const CellKind kind : {CellKind::hex, CellKind::prism, CellKind::tet, CellKind::pyramid})
     for (const int points : {2, 3, 5}) {
       const ElementRule rule = make_element_rule(kind, points);
       const PointJacobians jacobians(rule);

@@ -16,16 +16,18 @@ using namespace subvol::internal;
 
 namespace {
 
-/// Two hexes, two prisms and a tet that share no vertex, disturbed so that all terms of the energy are active.
+/// Two hexes, two prisms, a tet and a pyramid that share no vertex, disturbed so that all terms of the energy are
+/// active.
 VolumeMesh disturbed_cells(double spread) {
   VolumeMesh mesh;
   const std::vector<Vec3> corners[] = {
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
-      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}},
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}}};
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  for (const int kind : {2, 2, 1, 1, 0}) {
+  for (const int kind : {2, 2, 1, 1, 0, 3}) {
     std::vector<Index> cell;
     for (const Vec3& p : corners[kind]) {
       cell.push_back(static_cast<Index>(mesh.positions.size()));

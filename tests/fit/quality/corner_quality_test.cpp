@@ -31,7 +31,9 @@ TEST_CASE("Ideal cells have corner scaled Jacobians of 1", "[quality]") {
   const VolumeMesh prism =
       cell(CellKind::prism, {{0, 0, 0}, {1, 0, 0}, {0.5, h, 0}, {0, 0, 7}, {1, 0, 7}, {0.5, h, 7}});
   const VolumeMesh tet = cell(CellKind::tet, {{0, 0, 0}, {1, 0, 0}, {0.5, h, 0}, {0.5, h / 3, std::sqrt(2.0 / 3)}});
-  for (const VolumeMesh& mesh : {cube(), prism, tet}) {
+  const VolumeMesh pyramid =
+      cell(CellKind::pyramid, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, std::sqrt(0.5)}});
+  for (const VolumeMesh& mesh : {cube(), prism, tet, pyramid}) {
     const CornerQuality quality = measure_corner_quality(mesh);
     CHECK(quality.min_scaled_jacobian == Approx(1).epsilon(1e-12));
     CHECK(quality.mean_scaled_jacobian == Approx(1).epsilon(1e-12));

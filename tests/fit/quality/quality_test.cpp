@@ -43,6 +43,10 @@ VolumeMesh ideal_tet() {
                                   {0.5, std::sqrt(3.0) / 6, std::sqrt(6.0) / 3}});
 }
 
+VolumeMesh ideal_pyramid() {
+  return one_cell(CellKind::pyramid, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, std::sqrt(0.5)}});
+}
+
 VolumeMesh transformed(VolumeMesh mesh, const Mat3& map, const Vec3& shift) {
   for (Vec3& p : mesh.positions) p = map * p + shift;
   return mesh;
@@ -54,7 +58,8 @@ constexpr double kTolerance = 1e-12;  // some hundred roundings of numbers near 
 
 TEST_CASE("ideal cells have scaled Jacobian one wherever they lie", "[quality]") {
   const Mat3 rotation = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
-  for (const VolumeMesh& mesh : {box(1, 1, 1), box(0.1, 3, 70), ideal_prism(1), ideal_prism(9), ideal_tet()}) {
+  for (const VolumeMesh& mesh :
+       {box(1, 1, 1), box(0.1, 3, 70), ideal_prism(1), ideal_prism(9), ideal_tet(), ideal_pyramid()}) {
     for (const double scale : {1e-3, 1.0, 1e3}) {
       const QualityReport report = measure_quality(transformed(mesh, scale * rotation, Vec3(0.1, -2, 5)));
       CHECK(report.min_scaled_jacobian == Approx(1).epsilon(1e-9));

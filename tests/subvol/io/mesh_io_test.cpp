@@ -130,7 +130,7 @@ TEST_CASE("what is malformed in a Medit file is refused with its line") {
   CHECK_THAT(refusal(cube_file("Hexahedra\n99999999999999999999\n")), Contains("whole number"));
   CHECK_THAT(refusal(cube_file(kCubeCell + "1 2 3 4 5 6 7 8 0\n")), Contains(":16:") && Contains("more numbers"));
   CHECK_THAT(refusal(cube_file(kCubeCell + "Vertices\n1\n0 0 0 0\n")), Contains("second section"));
-  CHECK_THAT(refusal(cube_file(kCubeCell + "Pyramids\n1\n1 2 3 4 5 0\n")), Contains(":17:") && Contains("apex"));
+  CHECK_THAT(refusal(cube_file(kCubeCell + "Pyramids\n1\n1 2 3 4 9 0\n")), Contains(":18: vertex number 9"));
   CHECK_THAT(refusal(cube_file(kCubeCell + "Ridges\n1\n1\nEnd\n")), Contains(":18:") && Contains("edge number 1"));
   CHECK_THAT(refusal(cube_file(kCubeCell + "Corners\n1\n9\nEnd\n")), Contains(":18:") && Contains("vertex number 9"));
   CHECK_THAT(refusal(cube_file(kCubeCell + "#subvol:RidgeSharpness 1 x\nEnd\n")), Contains(":16:"));

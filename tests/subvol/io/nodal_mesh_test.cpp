@@ -126,7 +126,8 @@ TEST_CASE("nodal_mesh: what is wrong with a .msh is said with its line", "[io]")
   CHECK_THAT(nodal_refusal("a.msh", changed("90\n3\n0 0 0", "90\n90\n0 0 0")), Contains("second node 90"));
   CHECK_THAT(nodal_refusal("a.msh", changed("2 90 3 50 4\n", "2 90 3 50 5\n")),
              Contains(".msh:") && Contains("names node 5"));
-  CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n2 90 3 50 4", "3 1 7 1\n2 90 3 50 4 3")), Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n2 90 3 50 4", "3 1 19 1\n2 90 3 50 4 3")),
+             Contains("curved pyramid"));
   CHECK_THAT(nodal_refusal("a.msh", changed("3 1 4 1\n", "3 1 4 1000000000\n")), Contains("more than the rest"));
   CHECK_THAT(nodal_refusal("a.msh", changed("0 1 0 .1", "nan 1 0 .1")), Contains("finite"));
 }
@@ -252,7 +253,7 @@ TEST_CASE("nodal_mesh: what is wrong with a .inp is said with its line", "[io]")
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3,5\n"),
              Contains("a.inp:7: ") && Contains("node 5"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4\n1,1,2,3\n"), Contains("ends within an element"));
-  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D5\n"), Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D13\n"), Contains("pyramid"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*INCLUDE, INPUT=a.inp\n"), Contains("8 files in one another"));
   CHECK_THAT(nodal_refusal("a.inp", nodes + "*ELEMENT, TYPE=C3D4, ELSET=e\n1,1,2,3,4\n*ELSET, ELSET=e\ne\n"),
              Contains("includes itself"));
@@ -332,8 +333,11 @@ TEST_CASE("nodal_mesh: MFEM meshes, and what is not read of them", "[io]") {
   CHECK_THAT(nodal_refusal("b.mesh", nodes + "1\n0 0 0\n"), Contains("ends"));
   CHECK_THAT(nodal_refusal("b.mesh", "MFEM NURBS mesh v1.0\n"), Contains("NURBS"));
   CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n2\n"), Contains("dimension 3"));
-  CHECK_THAT(nodal_refusal("b.mesh", "MFEM mesh v1.0\ndimension\n3\nelements\n1\n1 7 0 1 2 3 4\n"),
-             Contains("pyramid"));
+  CHECK_THAT(nodal_refusal("b.mesh",
+                           "MFEM mesh v1.0\ndimension\n3\nelements\n1\n1 7 0 1 2 3 4\nboundary\n0\n"
+                           "vertices\n5\nnodes\nFiniteElementSpace\n"
+                           "FiniteElementCollection: H1_3D_P2\n"),
+             Contains("straight edges only"));
 }
 
 TEST_CASE("nodal_mesh: MFEM's nodes of neighbors are the same on what they share", "[io]") {

@@ -140,7 +140,8 @@ TEST_CASE("CGNS: the nodes of every type of cell go to their places", "[io]") {
   } types[] = {{CGNS_ENUMV(TETRA_4), CellKind::tet, 1, 4},     {CGNS_ENUMV(TETRA_10), CellKind::tet, 2, 10},
                {CGNS_ENUMV(PENTA_6), CellKind::prism, 1, 6},   {CGNS_ENUMV(PENTA_15), CellKind::prism, 2, 15},
                {CGNS_ENUMV(PENTA_18), CellKind::prism, 2, 18}, {CGNS_ENUMV(HEXA_8), CellKind::hex, 1, 8},
-               {CGNS_ENUMV(HEXA_20), CellKind::hex, 2, 20},    {CGNS_ENUMV(HEXA_27), CellKind::hex, 2, 27}};
+               {CGNS_ENUMV(HEXA_20), CellKind::hex, 2, 20},    {CGNS_ENUMV(HEXA_27), CellKind::hex, 2, 27},
+               {CGNS_ENUMV(PYRA_5), CellKind::pyramid, 1, 5}};
   for (const auto& [type, kind, order, size] : types) {
     const auto path = folder / "cell.cgns";
     {
@@ -217,8 +218,8 @@ TEST_CASE("CGNS: what is wrong is told, and no prefix of a file does harm", "[io
   CHECK_THROWS_WITH(read_nodal_mesh(folder / "far.cgns"), Contains("element 1 names vertex 5 of 4"));
   {
     WrittenCgns file(folder / "pyramid.cgns");
-    file.zone("zone", element_points(CellKind::prism, 6), 1);
-    file.section("cells", CGNS_ENUMV(PYRA_5), 1, 1, {1, 2, 3, 4, 5});
+    file.zone("zone", element_points(CellKind::hex, 20), 1);
+    file.section("cells", CGNS_ENUMV(PYRA_13), 1, 1, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13});
   }
   CHECK_THROWS_WITH(read_nodal_mesh(folder / "pyramid.cgns"), Contains("pyramids"));
   CHECK_THROWS_WITH(read_nodal_mesh(folder.file("text.cgns", "CGNS, they say")), Contains("no CGNS file"));
