@@ -12,6 +12,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -186,6 +187,12 @@ class PadChoice {
     return std::move(report_);
   }
 
+  /// Puts a single pad under all patches. Returns nothing if that is not possible.
+  std::optional<PadReport> run_on_all() {
+    if (make(std::vector<std::uint8_t>(patched_.patches.count, 1))) return std::nullopt;
+    return std::move(report_);
+  }
+
  private:
   void unite_over_flat_paths() {
     const PatchFans fans(patched_);
@@ -268,6 +275,15 @@ class PadChoice {
   PadReport report_;
 };
 
+/// Returns how many reasons for pads there are on all patches together.
+double reasons_left(const PatchedMesh& patched, const SignedFeatures& features) {
+  const PatchSets sets(static_cast<std::size_t>(patched.patches.count));
+  const PadScores scores(patched, features, sets, kDirectionReach * diagonal_of(features.curves));
+  double sum = 0;
+  for (Index p = 0; p < static_cast<Index>(patched.patches.count); ++p) sum += scores.of(p);
+  return sum;
+}
+
 }  // namespace
 
 PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features) {
@@ -275,7 +291,13 @@ PadReport add_pads(PatchedMesh& patched, const SignedFeatures& features) {
     if (path.curve < 0 ||
         static_cast<std::size_t>(path.curve) >= std::min(features.angles.size(), features.curves.curves.size()))
       throw InputError("add_pads: there is no curve " + std::to_string(path.curve));
-  return PadChoice(patched, features).run();
+  PatchedMesh all = patched;
+  PadReport report = PadChoice(patched, features).run();
+  if (report.missed.empty()) return report;
+  std::optional<PadReport> report_of_all = PadChoice(all, features).run_on_all();
+  if (!report_of_all || reasons_left(all, features) >= reasons_left(patched, features)) return report;
+  patched = std::move(all);
+  return *std::move(report_of_all);
 }
 
 }  // namespace subvol::internal

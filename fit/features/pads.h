@@ -101,7 +101,8 @@ struct PadReport {
 ///     degrees: after the pad, that patch has one more face there, or one only. Neighbors share this reason evenly.
 ///
 /// The set with the most reasons is padded, together with neighbors without which it cannot be. This is repeated, with
-/// each set at most once, until no reason is left.
+/// each set at most once, until no reason is left. If sets that want a pad cannot have one, because those around them
+/// came first, a single pad under all patches is made instead, if it leaves fewer reasons.
 ///
 /// features  those that were routed.
 /// Deterministic, serial. InputError: as `pad`. Cost: one pass over the mesh per pad.

@@ -31,6 +31,16 @@ TEST_CASE("A ball is filled with well shaped cells, no more than allowed", "[slo
   CHECK(result.trials[result.chosen].cells == result.mesh.num_cells());
 }
 
+TEST_CASE("All oblique faces of a part get pads, also where five of them meet at a corner", "[slow]") {
+  const TriangleMesh target = test::icosahedron_surface();
+  const AutomaticFitResult result = fit_automatically(target, {.cells = 2500});
+  const MeshCheck check = check_mesh(result.mesh, &target, {});
+  CHECK(check.valid());
+  CHECK(result.trials[result.chosen].pads == 1);
+  CHECK(check.quality->min_scaled_jacobian > 0.35);
+  CHECK(check.normals->mean_degrees < 3);
+}
+
 TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow]") {
   const TriangleMesh ball = test::cube_surface(12, true);
   const AutomaticFitResult result =

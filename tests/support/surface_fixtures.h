@@ -76,4 +76,27 @@ inline TriangleMesh triangle_soup(std::size_t n, double size, unsigned seed) {
   return mesh;
 }
 
+/// The regular icosahedron: its vertices lie at distance 2 from five others.
+inline TriangleMesh icosahedron_surface() {
+  const double golden = (1 + std::sqrt(5.0)) / 2;
+  TriangleMesh mesh;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double a : {-1.0, 1.0})
+      for (const double b : {-golden, golden}) {
+        Vec3& p = mesh.positions.emplace_back(Vec3::Zero());
+        p[(axis + 1) % 3] = a;
+        p[(axis + 2) % 3] = b;
+      }
+  const auto is_edge = [&](Index i, Index j) { return (mesh.positions[i] - mesh.positions[j]).norm() < 2.1; };
+  for (Index i = 0; i < 12; ++i)
+    for (Index j = i + 1; j < 12; ++j)
+      for (Index k = j + 1; k < 12; ++k) {
+        if (!is_edge(i, j) || !is_edge(j, k) || !is_edge(k, i)) continue;
+        const Vec3 &x = mesh.positions[i], &y = mesh.positions[j], &z = mesh.positions[k];
+        const bool is_outward = (y - x).cross(z - x).dot(x) > 0;
+        mesh.triangles.push_back(is_outward ? std::array{i, j, k} : std::array{i, k, j});
+      }
+  return mesh;
+}
+
 }  // namespace subvol::test
