@@ -34,6 +34,7 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
+  in_range("quality", options.quality, 0, kMostQuality);
   if (options.tolerance_percent) in_range("tolerance_percent", *options.tolerance_percent, 1e-9, 100);
   return options;
 }
@@ -124,6 +125,10 @@ BoundarySamples HighOrderDriver::sheet_samples(const ElementSpace& space) const 
                                   : make_boundary_samples(space, intervals);
 }
 
+/// The quality aimed at, plus this, is the threshold of the hinge. With 0.05, a bone of 87 hexes at order 4 came to a
+/// least scaled Jacobian of 0.66; with 0.2, to 0.76; with 0.35, others stayed poor.
+constexpr double kHingeAboveQuality = 0.2;
+
 std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space,
                                                                 std::span<const Index> cells) const {
   constexpr int kLeastPoints = 5;
@@ -138,6 +143,7 @@ std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpa
   auto volume = std::make_unique<HighOrderEnergy>(space, boxes, points);
   volume->count_as_part(template_.num_cells());
   volume->set_distortion(options_.distortion);
+  volume->set_hinge(hinge_, std::min(1.0, options_.quality + kHingeAboveQuality));
   return volume;
 }
 
@@ -165,6 +171,7 @@ StageRecord HighOrderDriver::new_record(const Stage& stage) const {
                 (least < order_ ? formatted("orders %d to %d", least, order_) : formatted("order %d", order_)) +
                 formatted(", lambda %g, tangential weight %g", stage.lambda, stage.tangential_weight);
   if (far_length_ > 0) record.name += formatted(", twice as heavy %.3g %% off", 100 * far_length_);
+  if (hinge_ > 0) record.name += formatted(", hinge of weight %g", hinge_);
   if (emphasis_ > 0) record.name += formatted(", poor shape up to %g times as heavy", 1 + emphasis_);
   record.order = order_;
   record.cells = mesh_.space.num_cells();

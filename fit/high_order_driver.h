@@ -93,6 +93,7 @@ class HighOrderDriver : protected StagedFit {
   std::vector<int> points_;  ///< quadrature points of each cell per direction in the last stage
   bool stays_dense_ = false; ///< set after the first orders: cells keep at least points_
   double emphasis_ = 0;      ///< emphasis on places of poor shape in E_W
+  double hinge_ = 0;         ///< weight of low scaled Jacobians in E_W
   double far_length_ = 0;    ///< distance at which places count twice in E_S; 0: all places count alike
   FitReport report_;
   MemoryBudget memory_;

@@ -34,12 +34,17 @@ constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
 /// Share of this distance from which on the surroundings of a place move.
 constexpr double kStartOfFar = 0.5;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
-/// Emphasis on places of poor shape: its first value, doubled each time up to the last, until the least scaled Jacobian
-/// is good.
-constexpr double kFirstEmphasis = 4, kLastEmphasis = 512, kGoodScaledJacobian = 0.5;
+/// Values of a setting that lifts poor cells: the first one, multiplied each time by the factor, up to the last.
+struct LiftValues {
+  double first, factor, last;
+};
+/// Emphasis on places of poor shape, and weight of the hinge.
+constexpr LiftValues kEmphases{4, 2, 512}, kHinges{10, 4, 1e5};
 constexpr int kLiftSteps = 8;
-/// Emphases in a row that may fail to help before no stronger one is attempted.
+/// Values in a row that may fail to help before no higher one is attempted.
 constexpr int kMostFailedLifts = 3;
+/// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
+constexpr double kFairScaledJacobian = 0.5;
 /// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
 constexpr int kMostImprovements = 3;
 constexpr double kMostDistanceGrowth = 1.2;
@@ -69,6 +74,7 @@ class HighOrderFit : HighOrderDriver {
   Again run_again(std::span<const Index> cells, double& setting, double value, int steps);
   Again draw_in_far_places();
   Again lift_worst_places();
+  Again lift(double& setting, const LiftValues& values);
 
   Approach approach_ = Approach::direct;
   Outcome outcome_{};                    ///< of the kept state, while the worst places are improved
@@ -220,7 +226,7 @@ bool HighOrderFit::finish() {
   if (*pairs > 0) pairs = intersecting_pairs();
   if (!pairs || *pairs == 0) return pairs.has_value();
   const std::size_t pairs_before = *pairs;
-  emphasis_ = far_length_ = 0;
+  emphasis_ = hinge_ = far_length_ = 0;
   if (!unfold(starts_.back(), kMostUnfoldingLambdaOfOrders, *pairs)) return false;
   return *pairs == pairs_before || (lower_lambda(*pairs) && improve_worst_places());
 }
@@ -261,9 +267,10 @@ bool HighOrderFit::improve_worst_places() {
     const double far_length_before = far_length_;
     if (draw_in_far_places() == Again::ended) return false;
     if (round > 0 && far_length_ == far_length_before) break;  // the same lifts would fail again
-    const double emphasis_before = emphasis_;
+    const std::pair settings_before(emphasis_, hinge_);
     if (lift_worst_places() == Again::ended) return false;
-    if (emphasis_ == emphasis_before) break;  // otherwise, cells may now tolerate what they could not before
+    if (std::pair(emphasis_, hinge_) == settings_before)
+      break;  // otherwise, cells may now tolerate what they could not before
   }
   return true;
 }
@@ -271,7 +278,8 @@ bool HighOrderFit::improve_worst_places() {
 /// Returns true if the state is within the limits and better by the least scaled Jacobian (capped if good), divided by
 /// the mean and by the largest distance.
 bool HighOrderFit::is_better(const Outcome& next) const {
-  const auto shape = [](const Outcome& x) { return std::min(x.least_scaled_jacobian, kGoodScaledJacobian); };
+  const double good = std::max(kFairScaledJacobian, options_.quality);
+  const auto shape = [&](const Outcome& x) { return std::min(x.least_scaled_jacobian, good); };
   const double gain = outcome_.mean_percent / next.mean_percent * (outcome_.max_percent / next.max_percent);
   return shape(next) > 0 && gain * shape(next) > shape(outcome_) && next.mean_percent <= most_mean_ &&
          next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
@@ -308,26 +316,33 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
   return last;
 }
 
-/// Puts more and more emphasis on places of poor shape, as long as there are any. An emphasis that does not help may be
-/// too weak to change the worst cell, so stronger ones are attempted as well before this ends.
-HighOrderFit::Again HighOrderFit::lift_worst_places() {
+/// Repeats the last stage around poor cells with higher and higher values of a setting. A value that does not help may
+/// be too low to change the worst cell, so higher ones are attempted as well before this ends.
+HighOrderFit::Again HighOrderFit::lift(double& setting, const LiftValues& values) {
   const auto poor_cells = [&] {
     std::vector<Index> cells;
     for (std::size_t c = 0; c < outcome_.cell_minima.size(); ++c)
-      if (outcome_.cell_minima[c] < kGoodScaledJacobian) cells.push_back(static_cast<Index>(c));
+      if (outcome_.cell_minima[c] < options_.quality) cells.push_back(static_cast<Index>(c));
     return cells;
   };
   const auto is_poor = [&] {
-    return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < kGoodScaledJacobian;
+    return outcome_.least_scaled_jacobian > 0 && outcome_.least_scaled_jacobian < options_.quality;
   };
-  double attempted = emphasis_;
-  for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < kLastEmphasis;) {
-    attempted = attempted == 0 ? kFirstEmphasis : 2 * attempted;
-    const Again last = run_again(poor_cells(), emphasis_, attempted, kLiftSteps);
+  double attempted = setting;
+  for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < values.last;) {
+    attempted = attempted == 0 ? values.first : values.factor * attempted;
+    const Again last = run_again(poor_cells(), setting, attempted, kLiftSteps);
     if (last == Again::ended) return last;
     failures = last == Again::kept ? 0 : failures + 1;
   }
   return Again::kept;
+}
+
+/// Weighs places of poor shape more, and then penalizes their scaled Jacobians, as long as there are any. The penalty
+/// comes second: by itself, it does not lift cells that are nearly flat.
+HighOrderFit::Again HighOrderFit::lift_worst_places() {
+  if (lift(emphasis_, kEmphases) == Again::ended) return Again::ended;
+  return lift(hinge_, kHinges);
 }
 
 HighOrderFitResult HighOrderFit::run() {

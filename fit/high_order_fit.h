@@ -28,6 +28,7 @@ struct HighOrderFitOptions {
   /// After the last stage, brings places far from the target closer and improves places of poor shape if that costs
   /// little elsewhere.
   bool improve_worst_places = true;
+  double quality = kUsualQuality;                ///< least scaled Jacobian to aim at then, in [0, 0.8]; 0: none
   int max_iterations = 0;                        ///< per stage; 0: as the schedule says
   double time_limit_seconds = 0;                 ///< 0: no limit
   double memory_limit_bytes = 0;                 ///< for the whole process, see `MemoryBudget`; 0: no limit

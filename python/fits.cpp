@@ -84,9 +84,8 @@ class Fit {
     else
       keywords_.take("cells", template_options_.cells);
     if (curved_) {
-      keywords_.refuse(
-          {"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far", "quality"},
-          "does not go with order");
+      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far"},
+                       "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
     } else {
@@ -232,7 +231,6 @@ cage_only     only the points of the template move
 crease_angle  degrees: keep edges of the target sharper than this sharp
 keep_groups   keep borders between groups of the target's faces in the same way
 lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
-quality       least scaled Jacobian to aim at, as far as distances allow; 0: none
 
 With order, 1 .. 16, curved cells:
 basis     'legendre' or 'fourier'
@@ -240,6 +238,7 @@ adaptive  raise orders only where it pays
 
 And with both:
 tolerance       mean distance to reach, per cent of the diagonal of the target's bounding box
+quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
 lambda_close    weight of the cells' shape in the last stage; None: 0.005, with order 0.05
 correspondence  'closest' or 'voronoi'
 solver          'newton' or 'lbfgs'
@@ -271,6 +270,7 @@ HighOrderFitOptions high_order_options(Keywords& keywords) {
   keywords.take("basis", options.basis, bases());
   keywords.take("adaptive", options.adaptive);
   keywords.take("tolerance", options.tolerance_percent);
+  keywords.take("quality", options.quality);
   take_solver_options(keywords, options);
   return options;
 }

@@ -69,13 +69,14 @@ class Optimization {
   }
 
   void read_curved_options() {
-    keywords_.refuse({"fixed_boundary", "sizes", "crease_angle", "max_tolerance", "quality"}, "does not go with order");
+    keywords_.refuse({"fixed_boundary", "sizes", "crease_angle", "max_tolerance"}, "does not go with order");
     curving_.lambda_close = kCurvingLambda;
     curving_.tolerance_percent = options_.mean_tolerance_percent;
     keywords_.take("order", curving_.order);
     require_in_range("optimize", "order", curving_.order, 2, kMaxOrder);
     keywords_.take("basis", curving_.basis, bases());
     keywords_.take("tolerance", curving_.tolerance_percent);
+    keywords_.take("quality", curving_.quality);
     keywords_.take("lambda_", curving_.lambda_close);
     keywords_.take("max_iterations", curving_.max_iterations);
     keywords_.take("time_limit", curving_.time_limit_seconds);

@@ -250,13 +250,12 @@ void add_method_options(CLI::App& verb, FitArguments& arguments) {
                   "The same for the largest distance; only without a template")
       ->check(number_in(1e-9, 100.0))
       ->type_name("PERCENT");
-  verb.add_option("--quality", arguments.quality,
-                  "Least scaled Jacobian to aim at, as far as distances allow; 0: none; not with --order")
+  verb.add_option("--quality", arguments.quality, "Least scaled Jacobian to aim at, as far as distances allow; 0: none")
       ->check(number_in(0.0, kMostQuality))
       ->type_name("Q")
       ->capture_default_str();
   verb.add_option("--quality-floor", arguments.quality_floor,
-                  "Exit status 4 if the least scaled Jacobian is below this; not with --order")
+                  "Exit status 4 if the least scaled Jacobian is below this")
       ->check(number_in(-1.0, 1.0))
       ->type_name("Q");
   verb.add_option("--surface", arguments.surface,
@@ -298,8 +297,8 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
       ->needs(order)
       ->group(group);
-  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--keep-groups",
-                            "--lambda-far", "--quality", "--quality-floor"})
+  for (const char* other :
+       {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--keep-groups", "--lambda-far"})
     order->excludes(verb.get_option(other));
 }
 
@@ -360,7 +359,9 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const C
 /// Arguments of the same run with curved elements, for which lambda has another default.
 HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
+  result.quality_floor = arguments.quality_floor;
   HighOrderFitOptions& fit = result.fit;
+  fit.quality = arguments.quality;
   fit.order = arguments.order;
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
   fit.adaptive = arguments.adaptive;

@@ -191,6 +191,9 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
   const MeshCheck mesh_check = check_curved(written ? *written : file.mesh);
   hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
+  hold_to_quality(arguments.quality_floor, mesh_check, report);
+  for (std::string& warning : warnings_of_quality(arguments.fit.quality, mesh_check))
+    warnings.push_back(std::move(warning));
   const std::vector<PolynomialCells> polynomials =
       check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, check_curved);
   for (const PolynomialCells& cells : polynomials) {

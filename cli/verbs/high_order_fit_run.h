@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <optional>
 #include <string>
 
 namespace subvol::cli {
@@ -23,6 +24,7 @@ struct HighOrderFitArguments {
   /// True: all invalid cells of the template are untangled first. False: only if the template has few inverted cells.
   bool untangles = false;
   bool takes_points = true;     ///< the target may be points
+  std::optional<double> quality_floor{};  ///< least scaled Jacobian that counts as a success
 };
 
 /// Fits curved elements from files to files; returns an ExitStatus.

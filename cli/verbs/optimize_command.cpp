@@ -159,6 +159,7 @@ HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, cons
   fit.order = arguments.order;
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
   fit.tolerance_percent = arguments.optimize.mean_tolerance_percent;
+  fit.quality = arguments.optimize.quality;
   fit.lambda_close = verb.count("--lambda") > 0 ? arguments.optimize.lambda : kCurvingLambda;
   fit.max_iterations = arguments.optimize.max_iterations;
   fit.time_limit_seconds = arguments.optimize.time_limit_seconds;
@@ -198,11 +199,10 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
           ->check(number_in(1e-9, 100.0))
           ->type_name("PERCENT")
           ->capture_default_str();
-  CLI::Option* quality = verb.add_option("--quality", optimize.quality,
-                                         "Least scaled Jacobian to aim at, as far as distances allow; 0: none")
-                             ->check(number_in(0.0, kMostQuality))
-                             ->type_name("Q")
-                             ->capture_default_str();
+  verb.add_option("--quality", optimize.quality, "Least scaled Jacobian to aim at, as far as distances allow; 0: none")
+      ->check(number_in(0.0, kMostQuality))
+      ->type_name("Q")
+      ->capture_default_str();
   verb.add_option("--lambda", optimize.lambda,
                   "Weight of the cells' shape against the distance; lowered while distances are above the tolerances\n"
                   "(with --order: 0.0025)")
@@ -230,7 +230,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->needs(order)
       ->group(group);
   add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
-  for (CLI::Option* other : {fixed, sizes, angle, max, quality}) order->excludes(other);
+  for (CLI::Option* other : {fixed, sizes, angle, max}) order->excludes(other);
 }
 
 }  // namespace

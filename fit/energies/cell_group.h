@@ -42,6 +42,7 @@ struct CellGroup {
   std::vector<Wide> point_weights;                 ///< one per batch and point; empty: all 1
   bool by_point = false;
   std::vector<Narrow> frozen;                      ///< `frozen_size` entries per batch and point
+  std::vector<Narrow> frozen_hinges;               ///< 9 per batch and point; empty: there is no hinge
   std::vector<Wide> mean_blocks;                   ///< 54 per batch: sum of `add_blocks` over its points
 
   std::size_t num_points() const { return weights.size(); }

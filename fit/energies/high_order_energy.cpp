@@ -6,6 +6,7 @@
 #include "subvol/fit/certificate/high_order_certificate.h"
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/cell_sweep.h"
+#include "subvol/fit/energies/jacobian_hinge.h"
 #include "subvol/fit/energies/step_limit.h"
 
 #include <Eigen/LU>
@@ -19,6 +20,18 @@
 #include <optional>
 
 namespace subvol::internal {
+
+namespace {
+
+JacobianHinge hinge_of(const DistortionBatch& batch, double threshold) {
+  Wide f[9];
+  for (int e = 0; e < 9; ++e) f[e] = load_wide(batch.jacobian[e]);
+  return {f, threshold};
+}
+
+constexpr auto kNothingMore = [](std::size_t, std::size_t, std::size_t, const DistortionBatch&) {};
+
+}  // namespace
 
 HighOrderEnergy::~HighOrderEnergy() = default;
 
@@ -145,6 +158,13 @@ void HighOrderEnergy::find_incidences() {
   for_each_part([&](Index node, std::int64_t place) { incidences_[next[node]++] = place; });
 }
 
+void HighOrderEnergy::set_hinge(double weight, double threshold) {
+  if (!(weight >= 0) || !std::isfinite(weight) || !(threshold <= 1))
+    throw InputError("HighOrderEnergy: a hinge needs a finite weight >= 0 and a threshold of at most 1");
+  hinge_weight_ = weight;
+  hinge_threshold_ = threshold;
+}
+
 void HighOrderEnergy::set_distortion(Distortion distortion, double floor) {
   kernels_ = &kernels_of(distortion);
   floor_ = floor;
@@ -205,6 +225,7 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
   constexpr int kAtOnce = 2;
   return cell_share() * sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
+    const double hinge = hinge_weight_at(group);
     DistortionBatch batches[kAtOnce];
     for (DistortionBatch& batch : batches) batch.floor = floor_;
     Wide sum{};
@@ -219,8 +240,15 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
         const std::size_t q = first + n;
         const Wide weight = group.weight(b, q);
         sum += weight * load_wide(batches[n].energy);
-        if constexpr (kBack) {
+        if constexpr (kBack)
           for (int e = 0; e < 9; ++e) f[e] = weight * load_wide(batches[n].stress[e]);
+        if (hinge > 0) {
+          const JacobianHinge at = hinge_of(batches[n], hinge_threshold_);
+          sum += hinge * at.below * at.below;
+          if constexpr (kBack)
+            for (int e = 0; e < 9; ++e) f[e] += 2 * hinge * at.below * at.slope[e];
+        }
+        if constexpr (kBack) {
           product_with_transpose(f, group.reference(b, q), j[n]);
         }
         per_point(g, b, q, batches[n]);
@@ -237,12 +265,6 @@ double HighOrderEnergy::integrate(std::span<const Vec3> nodes, const Kernel& ker
   });
 }
 
-namespace {
-
-constexpr auto kNothingMore = [](std::size_t, std::size_t, std::size_t, const DistortionBatch&) {};
-
-}  // namespace
-
 double HighOrderEnergy::value(std::span<const Vec3> nodes) const {
   return integrate<false>(nodes, kernels_->energy, kNothingMore);
 }
@@ -253,12 +275,38 @@ double HighOrderEnergy::add_gradient(std::span<const Vec3> nodes, double scale, 
   return energy;
 }
 
+/// Returns the weight of a point's hinge in the sum over its cell.
+double HighOrderEnergy::hinge_weight_at(const CellGroup& group) const {
+  return hinge_weight_ / static_cast<double>(group.num_points());
+}
+
+/// Keeps the square root of the hinge's Gauss-Newton Hessian at a point, in canonical coordinates. weight: of the
+/// squared residual.
+void HighOrderEnergy::freeze_hinge(CellGroup& group, std::size_t batch, std::size_t q, const DistortionBatch& at,
+                                   double weight) const {
+  const JacobianHinge hinge = hinge_of(at, hinge_threshold_);
+  Wide slope[9];
+  product_with_transpose(hinge.slope, group.reference(batch, q), slope);
+  for (Wide& entry : slope) entry *= std::sqrt(2 * weight);
+  keep_frozen(slope, 9, &group.frozen_hinges[9 * (batch * group.num_points() + q)]);
+  Wide* blocks = &group.mean_blocks[54 * batch];
+  for (int pair = 0; pair < 6; ++pair) {
+    const auto [c, d] = kPairs[pair];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) {
+        blocks[9 * pair + 3 * i + k] += slope[3 * i + c] * slope[3 * k + d];
+        if (c != d) blocks[9 * pair + 3 * i + k] += slope[3 * i + d] * slope[3 * k + c];
+      }
+  }
+}
+
 template <bool kCoupled>
 double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, std::span<Vec3> gradient) {
   constexpr int kSize = frozen_size(kCoupled);
   for (CellGroup& group : groups_) {
     group.frozen.resize(kSize * group.num_points() * group.batches.size());
     group.mean_blocks.assign(54 * group.batches.size(), Wide{});
+    group.frozen_hinges.resize(hinge_weight_ > 0 ? 9 * group.num_points() * group.batches.size() : 0);
   }
   const auto keep_point = [&](std::size_t g, std::size_t b, std::size_t q, const DistortionBatch& batch) {
     CellGroup& group = groups_[g];
@@ -267,6 +315,7 @@ double HighOrderEnergy::linearize_as(std::span<const Vec3> nodes, double scale, 
     freeze<kCoupled>(batch, group.reference(b, q), weight, frozen);
     add_blocks<kCoupled>(frozen, &group.mean_blocks[54 * b]);
     keep_frozen(frozen, kSize, &group.frozen[kSize * (b * group.num_points() + q)]);
+    if (hinge_weight_ > 0) freeze_hinge(group, b, q, batch, scale * cell_share() * hinge_weight_at(group));
   };
   const double energy = integrate<true>(nodes, kernels_->hessian, keep_point);
   gather_nodes(scale * cell_share(), gradient);
@@ -283,9 +332,20 @@ void HighOrderEnergy::multiply_as(std::span<const Vec3> in) const {
   sum_batches([&](std::size_t g, std::size_t b, CellSweep& sweep) {
     const CellGroup& group = groups_[g];
     const Narrow* frozen = &group.frozen[kSize * b * group.num_points()];
+    const Narrow* hinges = group.frozen_hinges.empty() ? nullptr : &group.frozen_hinges[9 * b * group.num_points()];
     sweep.load(b, in);
-    sweep.run<true>([&](std::size_t first, int count, Wide (*j)[9]) {
-      for (int n = 0; n < count; ++n) apply_frozen<kCoupled>(frozen + kSize * (first + n), j[n]);
+    sweep.run<true>([&](std::size_t first, int count, Wide(*j)[9]) {
+      for (int n = 0; n < count; ++n) {
+        if (!hinges) {
+          apply_frozen<kCoupled>(frozen + kSize * (first + n), j[n]);
+          continue;
+        }
+        const Narrow* slope = hinges + 9 * (first + n);
+        Wide along{};
+        for (int e = 0; e < 9; ++e) along += widen(slope[e]) * j[n][e];
+        apply_frozen<kCoupled>(frozen + kSize * (first + n), j[n]);
+        for (int e = 0; e < 9; ++e) j[n][e] += along * widen(slope[e]);
+      }
     });
     keep(group, b, sweep.coefficients());
     return 0.0;

@@ -33,6 +33,11 @@ struct CellGroup;
 /// s_cq is that of the nodes when k was set or the quadrature was last refined. k_c is k; in cells with refined
 /// quadrature it is at least 4, doubled with each further refinement, up to 256.
 ///
+/// With a hinge of weight w_h > 0 and threshold t, low scaled Jacobians cost more, each point as much as any other, so
+/// that corners and edges of cells count as much as their inside:
+///
+///   E_W += 1/n sum_c w_h / q_c sum_q max(0, t - s_cq)^2          q_c: number of points; s_cq is that of x
+///
 /// Eight cells of one kind and order are processed side by side. Hexes are sum-factorized: O(n^4) instead of O(n^6) for
 /// n modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept
 /// as 27 numbers per point (30 if stretches are coupled) and never assembled. The results have the same bits for any
@@ -80,6 +85,8 @@ class HighOrderEnergy final : public VolumeTerm {
   static constexpr double kMostEmphasis = 1024;
   /// Sets k and weighs points by their shapes at these nodes. InputError: k is not in [0, kMostEmphasis].
   void emphasize_poor(std::span<const Vec3> nodes, double emphasis);
+  /// Sets w_h and t. InputError: a weight that is negative or not finite, a threshold above 1.
+  void set_hinge(double weight, double threshold);
   /// Sets the largest k_c that repeated quadrature refinement leads to, initially 256; 0: refinement adds no emphasis.
   void set_most_own_emphasis(double most) { most_own_emphasis_ = most; }
 
@@ -92,6 +99,8 @@ class HighOrderEnergy final : public VolumeTerm {
   void weigh_points(std::span<const Vec3> nodes);
   void fill_references(CellGroup& group) const;
   void find_incidences();
+  void freeze_hinge(CellGroup& group, std::size_t batch, std::size_t q, const DistortionBatch& at, double weight) const;
+  double hinge_weight_at(const CellGroup& group) const;
   void stiffen_point(CellGroup& group, std::size_t batch, std::size_t q, int lane);
   template <bool kBack, class Kernel, class PerPoint>
   double integrate(std::span<const Vec3> nodes, const Kernel& kernel, const PerPoint& per_point) const;
@@ -112,6 +121,7 @@ class HighOrderEnergy final : public VolumeTerm {
   const DistortionKernels* kernels_ = &kernels_of(Distortion::hencky);
   double floor_ = kHessianFloor;
   double emphasis_ = 0, most_own_emphasis_ = 256;
+  double hinge_weight_ = 0, hinge_threshold_ = 0;
   std::vector<double> own_emphasis_;  ///< per cell: emphasis by quadrature refinement; 0: not refined
   std::vector<CellGroup> groups_;
   /// Contributions of every batch to the modes of its cells. `incidences_` lists, node by node, their signed places.

@@ -3,6 +3,7 @@
 #include "subvol/fit/elements/element_rule.h"
 #include "subvol/fit/energies/high_order_energy.h"
 #include "subvol/fit/energies/volume_energy.h"
+#include "subvol/fit/quality/quality.h"
 #include "tests/support/element_fixtures.h"
 
 #include <Eigen/LU>
@@ -110,6 +111,51 @@ TEST_CASE("gradient and Hessian of a mesh of all kinds and mixed orders agree wi
   std::vector<Vec3> d(space.num_nodes());
   for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
   check_derivatives(energy, bent(space, mesh, source, 0.01), d);
+}
+
+TEST_CASE("the hinge of curved cells is that of scaled Jacobians, with their derivatives", "[elements]") {
+  PointSource source(6);
+  constexpr double kWeight = 1e6, kBelow = 1e-4, kStep = 1e-6;
+  Mat3 shear = Mat3::Identity();
+  shear(0, 1) = 0.4, shear(1, 2) = -0.3;
+  for (CellKind kind : kAllKinds) {
+    VolumeMesh mesh = single_cell(kind);
+    for (Vec3& p : mesh.positions) p = shear * p;  // s is the same everywhere
+    const double s = measure_quality(mesh).min_scaled_jacobian;
+    const ElementSpace space(mesh, Basis::legendre, 2);
+    const std::vector<Vec3> x = HighOrderMesh(space, mesh).coefficients;
+    HighOrderEnergy plain(space, std::vector{Vec3(1, 1, 1)}, points_of(space, 3)),
+        hinged(space, std::vector{Vec3(1, 1, 1)}, points_of(space, 3));
+    hinged.set_hinge(kWeight, s - kBelow);
+    CHECK(hinged.value(x) == plain.value(x));
+    hinged.set_hinge(kWeight, s + kBelow);
+    CHECK(hinged.value(x) - plain.value(x) == Approx(kWeight * kBelow * kBelow).epsilon(1e-9));
+
+    std::vector<Vec3> d(x.size()), g(x.size(), Vec3::Zero()), h = g, of_plain(x.size()), of_hinged(x.size());
+    for (Vec3& v : d) v = source.vector() - Vec3::Constant(0.5);
+    const auto penalty = [&](double t) {
+      std::vector<Vec3> moved = x;
+      for (std::size_t i = 0; i < x.size(); ++i) moved[i] += t * d[i];
+      return hinged.value(moved) - plain.value(moved);
+    };
+    plain.linearize(x, 1, g);
+    hinged.linearize(x, 1, h);
+    plain.multiply(d, of_plain);
+    hinged.multiply(d, of_hinged);
+    double slope = 0, curvature = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      slope += (h[i] - g[i]).dot(d[i]);
+      curvature += (of_hinged[i] - of_plain[i]).dot(d[i]);
+    }
+    CHECK(slope == Approx((penalty(kStep) - penalty(-kStep)) / (2 * kStep)).epsilon(1e-4));
+    // The Hessian is that of Gauss-Newton, which lacks a term that is proportional to kBelow.
+    const double difference = (penalty(kStep) - 2 * penalty(0) + penalty(-kStep)) / (kStep * kStep);
+    CHECK(curvature == Approx(difference).epsilon(0.01));
+  }
+  const ElementSpace space(single_cell(CellKind::hex), Basis::legendre, 2);
+  HighOrderEnergy energy(space, std::vector{Vec3(1, 1, 1)}, points_of(space, 3));
+  CHECK_THROWS_AS(energy.set_hinge(-1, 0.5), InputError);
+  CHECK_THROWS_AS(energy.set_hinge(1, 1.5), InputError);
 }
 
 TEST_CASE("curved cells are undistorted against references that follow them", "[elements]") {
