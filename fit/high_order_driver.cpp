@@ -18,6 +18,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -207,10 +209,14 @@ bool HighOrderDriver::run_stage(const Stage& stage) {
 bool HighOrderDriver::run_stage_around(std::span<const Index> cells, const Stage& stage) {
   constexpr int kRings = 2;
   constexpr double kMostPatchShare = 0.4;  // larger patches cost about as much as the mesh
+  constexpr std::size_t kMostMovedAsWhole = 3000;  // moving all of so many cells takes seconds, and helps more
   const auto most = static_cast<std::size_t>(kMostPatchShare * static_cast<double>(template_.num_cells()));
   std::optional<HighOrderPatch> patch;
-  if (!cells.empty() && options_.correspondence == Correspondence::closest)
-    patch = high_order_patch(template_, mesh_.space, cells, kRings, most);
+  if (options_.correspondence == Correspondence::closest)
+    for (std::size_t count = cells.size(); count > 0 && !patch; count /= 2) {
+      patch = high_order_patch(template_, mesh_.space, cells.first(count), kRings, most);
+      if (template_.num_cells() <= kMostMovedAsWhole) break;
+    }
   if (!patch) return run_stage(stage);
   if (!runner_.in_time(formatted("order %d", order_), report_)) return false;
   begin_stage(stage);
@@ -316,11 +322,15 @@ std::vector<Index> HighOrderDriver::far_cells(double percent) const {
   const std::unique_ptr<ClosestPointEnergy> surface = closest_point_energy(0);
   surface->assign(samples_.positions.apply(mesh_.coefficients));
   const std::vector<double> distances = surface->triangle_distances();
+  std::map<Index, double> farthest;
+  for (std::size_t t = 0; t < distances.size(); ++t) {
+    if (!(100 * distances[t] > percent)) continue;
+    double& distance = farthest[mesh_.space.topology().face_cells(samples_.triangle_faces[t])[0]];
+    distance = std::max(distance, distances[t]);
+  }
   std::vector<Index> cells;
-  for (std::size_t t = 0; t < distances.size(); ++t)
-    if (100 * distances[t] > percent) cells.push_back(mesh_.space.topology().face_cells(samples_.triangle_faces[t])[0]);
-  std::ranges::sort(cells);
-  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
+  for (const auto& [cell, distance] : farthest) cells.push_back(cell);
+  std::ranges::stable_sort(cells, std::greater{}, [&](Index c) { return farthest.at(c); });
   return cells;
 }
 

@@ -59,7 +59,8 @@ class HighOrderDriver : protected StagedFit {
                      const Stage& stage) const;
   /// Minimizes with the present orders and settings, and adds the stage to the report.
   bool run_stage(const Stage& stage);
-  /// Does the same, but moves only the surroundings of some cells, unless these are most of the mesh.
+  /// Does the same, but moves only the surroundings of some cells, those that need it most first. If these would be more
+  /// than 40 % of the mesh, a small mesh moves as a whole, and a large one around the first of the cells.
   bool run_stage_around(std::span<const Index> cells, const Stage& stage);
   /// Does the same for a stage of the schedule, and remembers the state before it in `starts_`.
   bool run_next_stage(const Stage& stage);
@@ -70,8 +71,8 @@ class HighOrderDriver : protected StagedFit {
   bool meets_tolerance();
   /// moved_only  the state before the last stage had no intersecting pairs, so only what that stage moved is searched.
   std::optional<Outcome> measured_outcome(bool moved_only);
-  /// Returns the cells at the boundary that are farther from the target than this, in per cent of the diagonal,
-  /// ascending.
+  /// Returns the cells at the boundary that are farther from the target than this, in per cent of the diagonal, the
+  /// farthest first.
   std::vector<Index> far_cells(double percent) const;
   std::optional<std::size_t> intersecting_pairs() override;
   std::optional<bool> is_folded();

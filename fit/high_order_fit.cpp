@@ -31,6 +31,9 @@ constexpr double kRaisedShare = 0.7, kLeastOrderGain = 0.02;
 /// largest distance that automatic fits aim at: on flat faces, the mean can be so small that it is no measure. At first,
 /// a place at kFirstFarLength times the mean counts twice.
 constexpr double kFarShare = 8, kFirstFarLength = 8, kNearPercent = 0.05;
+/// Mean distances below this, in per cent of the diagonal, and largest ones below kNearPercent count alike: a quarter
+/// of the mean that automatic fits aim at.
+constexpr double kNearMeanPercent = 0.005;
 /// Share of this distance from which on the surroundings of a place move.
 constexpr double kStartOfFar = 0.5;
 constexpr int kMostDraws = 4, kDrawSteps = 20;
@@ -260,9 +263,9 @@ bool HighOrderFit::improve_worst_places() {
   const std::optional<Outcome> first = measured_outcome(false);
   if (!first) return false;
   outcome_ = *first;
-  most_max_ = kMostDistanceGrowth * outcome_.max_percent;
+  most_max_ = std::max(kMostDistanceGrowth * outcome_.max_percent, kNearPercent);
   most_mean_ = options_.tolerance_percent ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
-                                          : kMostDistanceGrowth * outcome_.mean_percent;
+                                          : std::max(kMostDistanceGrowth * outcome_.mean_percent, kNearMeanPercent);
   for (int round = 0; round < kMostImprovements; ++round) {
     const double far_length_before = far_length_;
     if (draw_in_far_places() == Again::ended) return false;
@@ -280,7 +283,10 @@ bool HighOrderFit::improve_worst_places() {
 bool HighOrderFit::is_better(const Outcome& next) const {
   const double good = std::max(kFairScaledJacobian, options_.quality);
   const auto shape = [&](const Outcome& x) { return std::min(x.least_scaled_jacobian, good); };
-  const double gain = outcome_.mean_percent / next.mean_percent * (outcome_.max_percent / next.max_percent);
+  const auto distances = [](const Outcome& x) {
+    return std::max(x.mean_percent, kNearMeanPercent) * std::max(x.max_percent, kNearPercent);
+  };
+  const double gain = distances(outcome_) / distances(next);
   return shape(next) > 0 && gain * shape(next) > shape(outcome_) && next.mean_percent <= most_mean_ &&
          next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
 }
@@ -319,10 +325,12 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
 /// Repeats the last stage around poor cells with higher and higher values of a setting. A value that does not help may
 /// be too low to change the worst cell, so higher ones are attempted as well before this ends.
 HighOrderFit::Again HighOrderFit::lift(double& setting, const LiftValues& values) {
-  const auto poor_cells = [&] {
+  const auto poor_cells = [&] {  // the poorest first
+    const std::vector<double>& minima = outcome_.cell_minima;
     std::vector<Index> cells;
-    for (std::size_t c = 0; c < outcome_.cell_minima.size(); ++c)
-      if (outcome_.cell_minima[c] < options_.quality) cells.push_back(static_cast<Index>(c));
+    for (std::size_t c = 0; c < minima.size(); ++c)
+      if (minima[c] < options_.quality) cells.push_back(static_cast<Index>(c));
+    std::ranges::stable_sort(cells, {}, [&](Index c) { return minima[c]; });
     return cells;
   };
   const auto is_poor = [&] {

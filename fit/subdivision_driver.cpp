@@ -9,6 +9,7 @@
 #include "subvol/fit/energies/make_surface_term.h"
 #include "subvol/fit/energies/volume_energy.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
@@ -270,11 +271,12 @@ bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional
   return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;
 }
 
-std::optional<SubdivisionDriver::Measured> SubdivisionDriver::measure() {
+std::optional<SubdivisionDriver::Measured> SubdivisionDriver::measure(bool past_limit) {
   const VolumeMesh mesh = current_mesh();
   const QualityReport quality = measure_quality(mesh);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
-  const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, result_.report);
+  const std::optional<std::size_t> pairs =
+      past_limit ? self_intersections(surface).pairs.size() : runner_.intersecting_pairs(surface, result_.report);
   if (!pairs) return std::nullopt;
   Measured result{quality.min_scaled_jacobian, quality.certificate.not_certified.size(), *pairs, {}};
   result.distances.push_back(target_.distance(surface));

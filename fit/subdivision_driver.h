@@ -73,7 +73,8 @@ class SubdivisionDriver : protected StagedFit {
   double mean_scaled_jacobian() const;
   std::optional<std::size_t> intersecting_pairs() override;
   bool meets_tolerance();
-  std::optional<Measured> measure();
+  /// past_limit  the state is measured although the time limit has been reached.
+  std::optional<Measured> measure(bool past_limit = false);
   bool finest() const { return number_ == options_.levels; }
   std::vector<Vec3>& unknowns() override { return unknowns_; }
   FitReport& report() override { return result_.report; }

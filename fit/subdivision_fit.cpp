@@ -127,9 +127,11 @@ bool SubdivisionFit::raise_quality() {
     schedule.lifts_worst_of_cage = attempt.worst_patches;
     if (!is_lift) schedule.lift.steps = std::min(schedule.lift.steps, kLaterLiftSteps);
     const bool going = or_back(best, [&] { return run_quality_stages(schedule); });
-    const std::optional<Measured> now = going ? measure() : std::nullopt;
+    std::optional<Measured> now = going ? measure() : std::nullopt;
     if (!now) {
-      go_back(std::move(best));
+      if (result_.report.stop_reason == StopReason::time_limit) now = measure(true);
+      const bool gains = now && now->gains_on(*before, options_.tolerance_percent);
+      if (!gains || now->least_jacobian <= best_jacobian) go_back(std::move(best));
       return false;
     }
     is_lifted = now->least_jacobian > before->least_jacobian;

@@ -88,7 +88,7 @@ TEST_CASE("A curved mesh, a surface, a cage and a report can be viewed", "[cli][
   const nlohmann::json curved = viewed("curved.vtu");
   if (curved.is_null()) return;
   CHECK(curved["meshes"][0]["intervals"] == 4);
-  CHECK(viewed("target.off")["meshes"][0]["kind"] == 3);
+  CHECK(viewed("target.off")["meshes"][0]["kind"] == 4);
   const nlohmann::json cage = viewed("cage.mesh --limit");
   CHECK(cage["shows_limit"] == true);
   CHECK(cage.contains("cage"));
