@@ -31,27 +31,6 @@ void append_lattice(std::size_t num_corners, int order, const Steps& from, std::
   append_lattice(num_corners, order - (num_corners == 3 ? 3 : 2), {from[0] + 1, from[1] + 1}, points);
 }
 
-/// Canonical coordinates of the corners of a kind.
-std::span<const std::array<int, 3>> canonical_corners(CellKind kind) {
-  static constexpr std::array<std::array<int, 3>, 4> kTet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  static constexpr std::array<std::array<int, 3>, 6> kPrism{
-      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}}};
-  static constexpr std::array<std::array<int, 3>, 8> kHex{
-      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
-  static constexpr std::array<std::array<int, 3>, 5> kPyramid{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}}};
-  switch (kind) {
-    case CellKind::tet:
-      return kTet;
-    case CellKind::prism:
-      return kPrism;
-    case CellKind::pyramid:
-      return kPyramid;
-    case CellKind::hex:
-      break;
-  }
-  return kHex;
-}
-
 /// Places of the points of a cell in its list, by their coordinates on the grid.
 using Places = std::map<std::array<int, 3>, std::size_t>;
 
@@ -65,12 +44,11 @@ Places places_of(CellKind kind, int order) {
 /// Appends the points of a face of a cell. corners: vertices of the face, which are points of the cell.
 void append_points(CellKind kind, int order, std::span<const Index> cell, const Places& places,
                    std::span<const Index> corners, std::vector<Index>& nodes) {
+  const std::vector<LatticePoint> canonical = cell_lattice(kind, 1, NodeOrdering::gmsh);
   std::vector<LatticePoint> at;  // canonical corners of the face
   for (const Index v : corners)
-    for (const auto& corner : canonical_corners(kind)) {
-      const std::array<int, 3> place{order * corner[0], order * corner[1], order * corner[2]};
-      if (cell[places.at(place)] == v) at.emplace_back(corner[0], corner[1], corner[2]);
-    }
+    for (const LatticePoint& corner : canonical)
+      if (cell[places.at({order * corner[0], order * corner[1], order * corner[2]})] == v) at.push_back(corner);
   for (const Steps& steps : gmsh_face_lattice(corners.size(), order)) {
     const LatticePoint point = order * at[0] + steps[0] * (at[1] - at[0]) + steps[1] * (at.back() - at[0]);
     nodes.push_back(cell[places.at({point[0], point[1], point[2]})]);
