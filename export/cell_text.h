@@ -35,7 +35,8 @@ struct CellView {
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {}, const std::string& group_data = {});
 
-/// Largest order for a kind of cell, which Gmsh evaluates: 10 for tets, 2 for prisms, 9 for hexes; 1 for pyramids.
+/// Largest order that is written for a kind of cell: that which Gmsh evaluates (10 for tets, 2 for prisms, 9 for
+/// hexes), and 1 for pyramids.
 int max_gmsh_order(CellKind kind);
 /// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted); VTK's for Lagrange cells of a
 /// kind other than pyramids.

@@ -28,8 +28,8 @@ struct LagrangeMesh {
 /// Samples the cells on grids of the given orders, one per cell, >= 1. Cells that are polynomials of that order
 /// (Legendre: every cell at its order from `lagrange_orders`) are reproduced everywhere, all others only at the points.
 ///
-/// InputError: a wrong number of orders, an order that `cell_lattice` refuses. Parallel; the same bits for any number
-/// of threads.
+/// InputError: a wrong number of orders, an order that `cell_lattice` refuses, pyramids. Parallel; the same bits for
+/// any number of threads.
 LagrangeMesh lagrange_mesh(const HighOrderMesh& mesh, std::span<const int> orders, NodeOrdering ordering);
 
 /// Returns for every cell the largest order of its edges, faces and interior, but no more than `limit`.

@@ -22,8 +22,8 @@ namespace subvol::internal {
 /// Holds buffers: use one object per thread.
 class HighOrderCertifier {
  public:
-  /// `space` must outlive this object, and stay unchanged. InputError: options out of range. A max_depth above 12
-  /// (hexes) or 20 (tets, prisms) is reduced to that.
+  /// `space` must outlive this object, and stay unchanged. InputError: options out of range; pyramids. A max_depth
+  /// above 12 (hexes) or 20 (tets, prisms) is reduced to that.
   explicit HighOrderCertifier(const ElementSpace& space, const CertificateOptions& options = {});
   ~HighOrderCertifier();
   HighOrderCertifier(HighOrderCertifier&&) noexcept;

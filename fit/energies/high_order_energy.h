@@ -40,8 +40,9 @@ struct CellGroup;
 ///
 /// Eight cells of one kind and order are processed side by side. Hexes are sum-factorized: O(n^4) instead of O(n^6) for
 /// n modes per direction; prisms and tets use the gradients of their modes at all points. The second derivative is kept
-/// as 27 numbers per point (30 if stretches are coupled) and never assembled. The results have the same bits for any
-/// number of threads. Only one caller at a time may use an object, const functions included: they share a buffer.
+/// as 27 numbers per point (30 if stretches are coupled, 9 more with a hinge) and never assembled. The results have the
+/// same bits for any number of threads. Only one caller at a time may use an object, const functions included: they
+/// share a buffer.
 class HighOrderEnergy final : public VolumeTerm {
  public:
   /// space  must outlive the energy.

@@ -9,8 +9,8 @@ namespace subvol::internal {
 ///
 ///   below = max(0, t - s),   s = det F / (|F e1| |F e2| |F e3|),   slope = -ds/dF where s < t, else 0
 ///
-/// The penalty below^2 is the hinge of `QualityEnergy`; with the Gauss-Newton Hessian 2 slope slope^T it is convex in
-/// the model of a Newton step. A column of no length makes s 0, and nothing infinite.
+/// The penalty below^2 is the hinge of `QualityEnergy`. Its Gauss-Newton Hessian 2 slope slope^T is positive
+/// semidefinite. If a column has no length, s is 0, and nothing is infinite.
 struct JacobianHinge {
   Wide below;
   Wide slope[9];  ///< laid out like F, row by row

@@ -22,7 +22,8 @@ enum class NodeOrdering {
 };
 
 /// Returns the grid points of one kind of cell of an order >= 1: (p+1)^3 of a hex, (p+1)^2 (p+2)/2 of a prism,
-/// (p+1)(p+2)(p+3)/6 of a tet. InputError: an order below 1; for gmsh, a prism of an order above 2.
+/// (p+1)(p+2)(p+3)/6 of a tet; the corners of a pyramid. InputError: an order below 1; a pyramid of an order above 1;
+/// for gmsh, a prism of an order above 2.
 ///
 /// VTK and Gmsh both list the corners, then the points inside edges, inside faces, and inside the cell. They differ in
 /// the direction of edges and faces and in the order of inner points: rows, or recursively a smaller cell of the same

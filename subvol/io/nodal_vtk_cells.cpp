@@ -54,8 +54,7 @@ std::string refusal(int type) {
   if (is({41, 42, 15, 16})) return text + ", a polyhedron, which is not read";
   return text +
          ", expected 10 (tet), 11 (voxel), 12 (hex), 13 (wedge), 14 (pyramid), the quadratic forms 24, 25, 26, 29 and "
-         "32, or "
-         "Lagrange cells 71, 72 and 73";
+         "32, or Lagrange cells 71, 72 and 73";
 }
 
 /// The order of a Lagrange cell of so many nodes; 0 if there is none.
