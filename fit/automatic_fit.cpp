@@ -271,7 +271,8 @@ std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surfac
 /// Returns how well edges of the present mesh follow those of the target; nothing if there are none to follow.
 std::optional<CreaseDistance> AutomaticFit::distance_of_edges() const {
   if (edges_.features.curves.empty()) return std::nullopt;
-  if (cage_ && layout_) return level_layout_.creases.distance(cage_->limit(), cage_->limit_surface().positions, 1);
+  if (cage_ && layout_)
+    return level_layout_.creases.distance(cage_->limit().crease_edges, cage_->limit_surface().positions, 1);
   const std::vector<CreaseSegment> none;
   return crease_distance(edges_.features.curves, mesh_.positions, layout_ ? layout_->segments : none, 1);
 }

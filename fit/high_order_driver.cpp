@@ -36,7 +36,8 @@ HighOrderFitOptions checked(const HighOrderFitOptions& options) {
     require_in_range("HighOrderFitOptions", name, value, low, high);
   };
   in_range("order", options.order, 1, kMaxOrder);
-  in_range("lambda_close", options.lambda_close, 1e-9, 1e9);
+  if (options.lambda_close) in_range("lambda_close", *options.lambda_close, 1e-9, 1e9);
+  if (options.crease_angle_degrees) in_range("crease_angle_degrees", *options.crease_angle_degrees, 0, 180);
   in_range("max_iterations", options.max_iterations, 0, 1e9);
   in_range("time_limit_seconds", options.time_limit_seconds, 0, 1e12);
   in_range("memory_limit_bytes", options.memory_limit_bytes, 0, 1e18);
@@ -65,18 +66,18 @@ HighOrderDriver::HighOrderDriver(FitTarget target, const VolumeMesh& template_me
                options.log}) {
   target_.normalisation.take_in(template_);
   mesh_.coefficients = template_.positions;
+  creases_ = creases_along_target(target_, crease_rule(), template_);
 }
 
 void HighOrderDriver::look_over_template() {
   const StartComparison start =
       target_.compare_start(refined_triangles(boundary_surface(template_, MeshTopology(template_))));
   report_.note_start(start);
-  schedule_ = make_high_order_schedule(options_.lambda_close, start.mean_distance / target_.surface.length());
-  target_.keep_interfaces(template_);
-  if (target_.has_interfaces())
-    group_of_face_ = groups_of_sheets(template_, mesh_.space.topology());
-  else if (region_references(template_).size() > 1)
-    report_.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
+  const double usual_lambda = creases_.hold_the_surface() ? kCurvingLambda : kLambdaOfOrders;
+  schedule_ = make_high_order_schedule(options_.lambda_close.value_or(usual_lambda),
+                                       start.mean_distance / target_.surface.length());
+  keep_interfaces(crease_rule(), target_, creases_, template_, report_);
+  if (target_.has_interfaces()) group_of_face_ = groups_of_sheets(template_, mesh_.space.topology());
 }
 
 /// Returns the number of sample intervals along an edge: about as fine as the target, and fine enough for the curves'
@@ -124,11 +125,13 @@ void HighOrderDriver::set_orders(const EntityOrders& orders) {
   mean_.reset();
 }
 
-/// Samples the boundary, and the interfaces if they are kept.
+/// Samples the boundary, and the interfaces if they are kept, with the creases that follow curves.
 BoundarySamples HighOrderDriver::sheet_samples(const ElementSpace& space) const {
   const int intervals = sample_intervals(space.max_order());
-  return target_.has_interfaces() ? make_sheet_samples(space, template_, intervals)
-                                  : make_boundary_samples(space, intervals);
+  std::span<const CreaseEdge> creases;
+  if (!creases_.curves().empty()) creases = template_.tags.creases;
+  return target_.has_interfaces() ? make_sheet_samples(space, template_, intervals, creases)
+                                  : make_boundary_samples(space, intervals, creases);
 }
 
 std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpace& space,
@@ -153,9 +156,14 @@ std::unique_ptr<HighOrderEnergy> HighOrderDriver::volume_energy(const ElementSpa
 /// used. So the edges themselves get points (`samples.at_edges`).
 std::unique_ptr<SurfaceTerm> HighOrderDriver::surface_energy(const BoundarySamples& samples,
                                                              double tangential_weight) const {
-  return make_surface_term(target_.surface, samples.triangles, samples.points.size(), tangential_weight,
-                           options_.correspondence, SurfacePull::straight, far_length_, samples.at_edges,
-                           {groups_of_triangles(samples.triangle_faces, group_of_face_), target_.group_of_triangle});
+  std::unique_ptr<SurfaceTerm> term =
+      make_surface_term(target_.surface, samples.triangles, samples.points.size(), tangential_weight,
+                        options_.correspondence, SurfacePull::straight, far_length_, samples.at_edges,
+                        {groups_of_triangles(samples.triangle_faces, group_of_face_), target_.group_of_triangle});
+  if (!creases_.curves().empty())
+    term->add_creases(creases_.energy(samples.crease_edges, samples.points.size(),
+                                      kCreaseWidth * target_.surface.length(), tangential_weight));
+  return term;
 }
 
 FitProblem HighOrderDriver::problem(const ElementSpace& space, std::unique_ptr<HighOrderEnergy> volume,
@@ -286,6 +294,12 @@ std::optional<SurfaceDistance> HighOrderDriver::measured_interfaces() const {
   return target_.interface_distance(surface_at(fine), groups_of_triangles(fine.triangle_faces, group_of_face_));
 }
 
+std::optional<CreaseDistance> HighOrderDriver::measured_creases() const {
+  if (creases_.curves().empty()) return {};
+  const EdgeSamples samples = make_edge_samples(mesh_.space, template_.tags.creases, measured_intervals());
+  return creases_.distance(samples.segments, samples.positions.apply(mesh_.coefficients), 1);
+}
+
 bool HighOrderDriver::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
@@ -302,14 +316,15 @@ std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome(bool m
   const SurfaceDistance distance = target_.distance(surface);
   const std::optional<SurfaceDistance> inner = measured_interfaces();
   const double mean = keep_mean(inner ? std::max(distance.mean(), inner->mean()) : distance.mean());
-  const double largest = inner ? std::max(distance.max(), inner->max()) : distance.max();
+  double max_percent = 100 * (inner ? std::max(distance.max(), inner->max()) : distance.max());
+  if (const auto creases = measured_creases()) max_percent = std::max(max_percent, creases->max_percent());
   std::vector<std::uint8_t> moved;
   if (moved_only && !moved_cells_.empty())
     for (const Index face : fine.triangle_faces)
       moved.push_back(std::ranges::binary_search(moved_cells_, mesh_.space.topology().face_cells(face)[0]));
   const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, report_, moved);
   if (!pairs) return {};
-  return Outcome{std::move(quality.cell_minima), quality.min_scaled_jacobian, mean, 100 * largest, *pairs};
+  return Outcome{std::move(quality.cell_minima), quality.min_scaled_jacobian, mean, max_percent, *pairs};
 }
 
 /// Returns E_S, whose correspondences must be closest points.

@@ -5,12 +5,15 @@
 #include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/features/crease_distance.h"
+#include "subvol/fit/features/followed_creases.h"
 #include "subvol/fit/fits/high_order_schedule.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/solver/fit_problem.h"
 #include "subvol/fit/stages/memory_budget.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/staged_fit.h"
+#include "subvol/fit/stages/target_creases.h"
 #include "subvol/fit/target/fit_target.h"
 
 #include <cstddef>
@@ -32,7 +35,8 @@ class HighOrderDriver : protected StagedFit {
   /// The measures of a state when shape is weighed against distance.
   struct Outcome {
     std::vector<double> cell_minima{};  ///< least scaled Jacobian of each cell
-    double least_scaled_jacobian = 0, mean_percent = 0, max_percent = 0;
+    double least_scaled_jacobian = 0, mean_percent = 0;
+    double max_percent = 0;  ///< of surfaces, and of creases from their curves
     std::size_t pairs = 0;  ///< number of intersecting triangle pairs
   };
 
@@ -69,6 +73,8 @@ class HighOrderDriver : protected StagedFit {
   TriangleMesh measured_boundary() const;
   double measured_mean();
   bool meets_tolerance();
+  /// Measures the distances of the creases; nothing if none follows a curve.
+  std::optional<CreaseDistance> measured_creases() const;
   /// moved_only  the state before the last stage had no intersecting pairs, so only what that stage moved is searched.
   std::optional<Outcome> measured_outcome(bool moved_only);
   /// Returns the cells at the boundary that are farther from the target than this, in per cent of the diagonal, the
@@ -83,7 +89,8 @@ class HighOrderDriver : protected StagedFit {
 
   HighOrderFitOptions options_;
   FitTarget target_;
-  VolumeMesh template_;
+  VolumeMesh template_;  ///< with its creases
+  FollowedCreases creases_;
   HighOrderSchedule schedule_;
   std::vector<Vec3> ideal_boxes_;
   HighOrderMesh mesh_;
@@ -109,6 +116,9 @@ class HighOrderDriver : protected StagedFit {
   TriangleMesh surface_at(const BoundarySamples& samples) const;
   TriangleMesh boundary(int intervals) const;
   std::optional<SurfaceDistance> measured_interfaces() const;
+  CreaseRule crease_rule() const {
+    return {options_.crease_angle_degrees, options_.keeps_groups, options_.follows_all_edges};
+  }
   double keep_mean(double distance);
 
   BoundarySamples samples_;

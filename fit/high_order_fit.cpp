@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/high_order_fit.h"
 
+#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/fit/energies/make_surface_term.h"
@@ -44,6 +45,8 @@ struct LiftValues {
 /// Emphasis on places of poor shape, and weight of the hinge.
 constexpr LiftValues kEmphases{4, 2, 512}, kHinges{10, 4, 1e5};
 constexpr int kLiftSteps = 8;
+/// Such stages change the energy of the mesh little, so that they must not end by themselves.
+constexpr double kNoEnd = 1e-9;
 /// Values in a row that may fail to help before no higher one is attempted.
 constexpr int kMostFailedLifts = 3;
 /// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
@@ -51,6 +54,8 @@ constexpr double kFairScaledJacobian = 0.5;
 /// Largest number of rounds of both improvements, and the factor by which the distances may grow in total.
 constexpr int kMostImprovements = 3;
 constexpr double kMostDistanceGrowth = 1.2;
+/// Largest distance that may be caused in any case, in per cent of the diagonal: half of what automatic fits aim at.
+constexpr double kAllowedMaxPercent = 0.25;
 
 /// The high-order fit: its sequence of orders, and the improvement of the worst places.
 class HighOrderFit : HighOrderDriver {
@@ -196,7 +201,7 @@ bool HighOrderFit::run_adaptive_orders() {
   stays_dense_ = true;
   while (!meets_tolerance() && raise_where_it_pays()) {
     take_own_boxes();
-    if (!run_next_stage(schedule_.final_stage(options_.lambda_close))) return false;
+    if (!run_next_stage(schedule_.final_stage(schedule_.lambda_close))) return false;
   }
   return report_.stop_reason != StopReason::memory_limit;
 }
@@ -205,7 +210,7 @@ bool HighOrderFit::run_adaptive_orders() {
 /// tolerance, only undoes the rise of lambda by unfolding. A stage that is interrupted or leaves more than `pairs`
 /// self-intersections is rolled back.
 bool HighOrderFit::lower_lambda(std::size_t pairs) {
-  const double least = (options_.tolerance_percent ? 1e-3 : 1) * options_.lambda_close;
+  const double least = (options_.tolerance_percent ? 1e-3 : 1) * schedule_.lambda_close;
   for (double lambda = lambda_ / 2; !meets_tolerance() && lambda >= 0.99 * least; lambda /= 2) {
     const double before = measured_mean();
     FitSnapshot stiffer = snapshot();
@@ -263,7 +268,7 @@ bool HighOrderFit::improve_worst_places() {
   const std::optional<Outcome> first = measured_outcome(false);
   if (!first) return false;
   outcome_ = *first;
-  most_max_ = std::max(kMostDistanceGrowth * outcome_.max_percent, kNearPercent);
+  most_max_ = std::max(kMostDistanceGrowth * outcome_.max_percent, kAllowedMaxPercent);
   most_mean_ = options_.tolerance_percent ? std::max(outcome_.mean_percent, *options_.tolerance_percent)
                                           : std::max(kMostDistanceGrowth * outcome_.mean_percent, kNearMeanPercent);
   for (int round = 0; round < kMostImprovements; ++round) {
@@ -298,6 +303,7 @@ HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double
   const double setting_before = std::exchange(setting, value);
   Stage stage = schedule_.final_stage(lambda_);
   stage.max_iterations = steps;
+  stage.relative_decrease = kNoEnd;
   std::optional<Outcome> next = or_back(
       before, [&] { return run_stage_around(cells, stage) ? measured_outcome(outcome_.pairs == 0) : std::nullopt; });
   if (next && is_better(*next)) {
@@ -364,10 +370,12 @@ HighOrderFitResult HighOrderFit::run() {
   } catch (const std::bad_alloc&) {
     end_for_memory(formatted("no memory was left at order %d", order_));
   }
+  report_.creases = measured_creases();
+  if (report_.creases) report_.creases->farthest = target_.normalisation.from_unit({report_.creases->farthest})[0];
   report_.seconds = {{"total", runner_.seconds()}};
   mesh_.coefficients = in_target_units(std::move(mesh_.coefficients));
   for (FitState& state : states_) state.positions = in_target_units(std::move(state.positions));
-  return {std::move(mesh_), std::move(report_), std::move(states_)};
+  return {std::move(mesh_), std::move(report_), schedule_.lambda_close, std::move(states_)};
 }
 
 }  // namespace
@@ -381,6 +389,8 @@ HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& 
 
 HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options) {
+  if (options.crease_angle_degrees)
+    throw InputError("HighOrderFitOptions::crease_angle_degrees: points have no edges to be kept sharp");
   require_closest(options.correspondence);
   return HighOrderFit(FitTarget(target, options.point_weights), template_mesh, options).run();
 }

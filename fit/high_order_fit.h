@@ -10,6 +10,11 @@
 
 namespace subvol {
 
+/// Weight of the cells' shape in the last stage of a high-order fit. The lower one is for meshes that lie on the target
+/// already: those that are to be curved, and templates whose creases follow most of the target's sharp edges. Lowering
+/// the usual weight step by step gets stuck at cells that are nearly flat; starting low gets past them.
+inline constexpr double kLambdaOfOrders = 0.05, kCurvingLambda = 0.0025;
+
 struct HighOrderFitOptions {
   int order = 4;                                 ///< order of the finished mesh, 1..kMaxOrder
   /// Legendre modes are polynomials, which .vtu and .msh store exactly. Fourier modes (paper: section 3.2) are written
@@ -20,7 +25,14 @@ struct HighOrderFitOptions {
   bool adaptive = false;
   /// Lambda is lowered until the mean distance is at most this, in per cent of the diagonal; > 0.
   std::optional<double> tolerance_percent;
-  double lambda_close = 0.05;                    ///< lambda of the last stage, > 0
+  std::optional<double> lambda_close;  ///< lambda of the last stage, > 0; empty: one of the two above
+  /// As in FitOptions: edges of the target sharper than this angle, and borders between groups, that edges of the mesh
+  /// are drawn to. Empty: only creases that the template tags are drawn to target edges above 40 degrees.
+  std::optional<double> crease_angle_degrees;
+  /// False: if the template has creases, only those are followed; if not, edges are followed only on surfaces of
+  /// designed parts (`EdgeCrispness::is_designed`), not on scans.
+  bool follows_all_edges = true;
+  bool keeps_groups = false;
   SolverKind solver = SolverKind::newton;
   Correspondence correspondence = Correspondence::closest;
   PointWeights point_weights = PointWeights::equal;  ///< weights of a point cloud's points
@@ -43,6 +55,7 @@ struct HighOrderFitOptions {
 struct HighOrderFitResult {
   HighOrderMesh mesh;
   FitReport report;
+  double lambda_close;  ///< lambda that was asked for, or chosen
   /// The coefficients before each minimization that was kept, starting with the template; filled if asked for.
   std::vector<FitState> states;
 };
@@ -61,7 +74,8 @@ struct HighOrderFitResult {
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options);
 
-/// Fits curved elements to points, as `fit_subdivision_volume` does. InputError: also for Correspondence::voronoi.
+/// Fits curved elements to points, as `fit_subdivision_volume` does. InputError: also for crease_angle_degrees and
+/// Correspondence::voronoi, which need triangles.
 HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options);
 

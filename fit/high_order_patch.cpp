@@ -115,6 +115,8 @@ FitProblem patch_problem(const HighOrderPatch& patch, std::span<const Vec3> coef
     triangles.push_back(static_cast<Index>(t));
     for (const Index sample : corners) is_used[sample] = 1;
   }
+  if (surface.creases())
+    surface.creases()->mark_moving_curves([&](Index sample) { return is_sample_free[sample] != 0; }, is_used);
   Marks is_free_row;
   std::vector<Vec3> fixed_samples;
   for (std::size_t i = 0; i < is_used.size(); ++i) {

@@ -11,7 +11,6 @@
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/geometry/self_intersection.h"
 #include "subvol/fit/quality/quality.h"
-#include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
@@ -19,7 +18,6 @@
 #include "subvol/surface/boundary.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <stdexcept>
@@ -59,14 +57,7 @@ SubdivisionDriver::SubdivisionDriver(FitTarget target, const VolumeMesh& templat
   require_no_pyramids(template_.kinds,
                       "template mesh: pyramids do not split into hexes, because four edges meet at their apex");
   target_.normalisation.take_in(template_);
-  std::vector<std::array<Index, 2>> borders;
-  if (options.keeps_groups) borders = group_borders(target_.mesh, target_.mesh);
-  constexpr double kNone = 180;  // no edge is sharper
-  const std::optional<double> angle =
-      !borders.empty() && !options.crease_angle_degrees ? kNone : options.crease_angle_degrees;
-  const bool wants_creases = angle || !template_.tags.creases.empty();
-  if (wants_creases && !target_.surface.is_cloud())
-    template_creases_ = FollowedCreases(target_.mesh, angle, template_, borders);
+  template_creases_ = creases_along_target(target_, crease_rule(), template_);
 }
 
 void SubdivisionDriver::look_over_template() {
@@ -77,19 +68,7 @@ void SubdivisionDriver::look_over_template() {
   report.note_start(start);
   schedule_ =
       make_schedule(options_, start.mean_distance / target_.surface.length(), template_creases_.hold_the_surface());
-  keep_interfaces();
-}
-
-/// The interfaces between the template's regions get the shape of the target's, or keep their own, sharp edges
-/// included.
-void SubdivisionDriver::keep_interfaces() {
-  target_.keep_interfaces(template_);
-  if (target_.has_interfaces())
-    template_creases_.keep_interfaces(template_, options_.crease_angle_degrees.value_or(kUsualCreaseAngle),
-                                      target_.region_triangle.empty() ? FollowedCreases::InnerCurves::themselves
-                                                                      : FollowedCreases::InnerCurves::nothing);
-  else if (region_references(template_).size() > 1)
-    result_.report.warnings.push_back("points do not say where regions meet: their interfaces are not kept in place");
+  keep_interfaces(crease_rule(), target_, template_creases_, template_, report);
 }
 
 void SubdivisionDriver::prepare_level() {
@@ -317,7 +296,7 @@ void SubdivisionDriver::store_result() {
   for (FitState& state : stored.states) state.positions = target_.normalisation.from_unit(std::move(state.positions));
   if (!creases_.curves().empty()) {
     const TriangleMesh limit = limit_triangles();
-    CreaseDistance creases = creases_.distance(*limit_check_, limit.positions, 1);
+    CreaseDistance creases = creases_.distance(limit_check_->crease_edges, limit.positions, 1);
     creases.farthest = target_.normalisation.from_unit({creases.farthest})[0];
     result_.report.creases = creases;
   }

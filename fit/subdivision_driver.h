@@ -9,6 +9,7 @@
 #include "subvol/fit/stages/quality_stages.h"
 #include "subvol/fit/stages/stage_runner.h"
 #include "subvol/fit/stages/staged_fit.h"
+#include "subvol/fit/stages/target_creases.h"
 #include "subvol/fit/subdivision_fit.h"
 #include "subvol/fit/target/fit_target.h"
 #include "subvol/subdivision/limit_surface.h"
@@ -95,7 +96,7 @@ class SubdivisionDriver : protected StagedFit {
   StageRunner runner_;
 
  private:
-  void keep_interfaces();
+  CreaseRule crease_rule() const { return {options_.crease_angle_degrees, options_.keeps_groups}; }
   void sample_target();
   std::string stage_name(const Stage& stage) const;
   std::unique_ptr<SurfaceTerm> surface_term(const Stage& stage) const;

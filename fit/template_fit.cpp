@@ -14,18 +14,21 @@ namespace subvol {
 
 using namespace internal;
 
-AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions options) {
+AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions options, TemplateUse use) {
   constexpr double kLeastTime = 1e-3;  // seconds
   const auto begin = std::chrono::steady_clock::now();
   options.mean_tolerance_percent = std::max(options.mean_tolerance_percent, kTemplateMeanPercent);
   options.max_tolerance_percent = std::max(options.max_tolerance_percent, kTemplateMaxPercent);
   options.makes_cage = false;
   std::vector<std::size_t> counts(kTemplateCells.begin(), kTemplateCells.end());
+  if (use == TemplateUse::curved_cells) counts.push_back(kCurvedEdgeCells);
   if (find_regions(target, options.regions)) counts = {kRegionTemplateCells};
   if (options.cells) counts = {*options.cells};
   std::optional<AutomaticFitResult> best;
   const double limit = options.time_limit_seconds;
   for (const std::size_t cells : counts) {
+    const bool has_no_edges = best && !best->trials.empty() && best->trials[best->chosen].curves == 0;
+    if (has_no_edges && cells > kTemplateCells.back()) break;
     options.cells = cells;
     if (limit > 0) {
       const std::chrono::duration<double> used = std::chrono::steady_clock::now() - begin;

@@ -14,6 +14,11 @@ namespace subvol {
 inline constexpr std::array<std::size_t, 3> kTemplateCells{300, 1000, 3000};
 inline constexpr double kTemplateMeanPercent = 0.3, kTemplateMaxPercent = 2;
 
+/// Number that is tried after those for curved cells, which are not subdivided, if the target has sharp edges to
+/// follow.
+inline constexpr std::size_t kCurvedEdgeCells = 10000;
+enum class TemplateUse { subdivision, curved_cells };
+
 /// Number of cells of the template if the target has several regions and no number is given.
 inline constexpr std::size_t kRegionTemplateCells = 1500;
 
@@ -27,6 +32,7 @@ inline constexpr double kTemplateShareOfTime = 0.5;
 /// options  as for `fit_automatically`; distances larger than the two above are aimed at all the same.
 /// returns  the best of the numbers of cells tried; without cells if the fit was ended before there was a mesh.
 /// InputError: as `fit_automatically`. Deterministic, except under a time limit.
-AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions options = {});
+AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions options = {},
+                                TemplateUse use = TemplateUse::subdivision);
 
 }  // namespace subvol

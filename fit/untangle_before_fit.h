@@ -8,11 +8,7 @@
 
 namespace subvol {
 
-// To curve an existing mesh, use it as the template of a high-order fit (`fit_high_order`).
-
-/// Weight of the cells' shape for that purpose. Lowering it step by step from a fit's usual start gets stuck at cells
-/// that are nearly flat; starting low gets past them.
-inline constexpr double kCurvingLambda = 0.0025;
+// To curve an existing mesh, use it as the template of a high-order fit with kCurvingLambda (`fit_high_order`).
 
 struct UntangledStart {
   std::size_t tangled = 0;  ///< number of cells that were not certified

@@ -42,8 +42,6 @@ FitOptions subdivision_options(Keywords& keywords) {
   keywords.take("surface", options.surface, {{"limit", FittedSurface::limit}, {"mesh", FittedSurface::mesh}});
   keywords.take("boundary", options.boundary, boundary_rules());
   keywords.take("cage_only", options.cage_only);
-  keywords.take("crease_angle", options.crease_angle_degrees);
-  keywords.take("keep_groups", options.keeps_groups);
   keywords.take("lambda_far", options.lambda_far);
   keywords.take("quality", options.quality);
   take_solver_options(keywords, options);
@@ -84,21 +82,29 @@ class Fit {
     else
       keywords_.take("cells", template_options_.cells);
     if (curved_) {
-      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "crease_angle", "keep_groups", "lambda_far"},
-                       "does not go with order");
+      keywords_.refuse({"levels", "surface", "boundary", "cage_only", "lambda_far"}, "does not go with order");
       high_order_ = high_order_options(keywords_);
       take_fit_options(keywords_, high_order_);
+      take_edges(high_order_);
     } else {
       keywords_.refuse({"order", "basis", "adaptive"}, "goes with order only");
       subdivision_ = subdivision_options(keywords_);
-      if (subdivision_.crease_angle_degrees) {
-        template_options_.crease_angle_degrees = subdivision_.crease_angle_degrees;
-        template_options_.follows_all_edges = true;
-      }
-      template_options_.keeps_groups = subdivision_.keeps_groups;
+      take_edges(subdivision_);
     }
     take_chord(keywords_, writing_);
     keywords_.finish();
+  }
+
+  /// Takes what says which edges are kept, for the fit and for a template that is made.
+  template <class Options>
+  void take_edges(Options& options) {
+    keywords_.take("crease_angle", options.crease_angle_degrees);
+    keywords_.take("keep_groups", options.keeps_groups);
+    if (options.crease_angle_degrees) {
+      template_options_.crease_angle_degrees = options.crease_angle_degrees;
+      template_options_.follows_all_edges = true;
+    }
+    template_options_.keeps_groups = options.keeps_groups;
   }
 
   /// As in the program: a few inverted cells are made valid; the fit refuses a mesh in which at least half of the cells
@@ -128,7 +134,10 @@ class Fit {
   std::shared_ptr<const VolumeMesh> made_template() {
     template_options_.progress = work_.progress();
     template_options_.cancelled = work_.cancelled();
-    made_ = work_.run("template", [&] { return fit_template(std::get<TriangleMesh>(target_), template_options_); });
+    made_ = work_.run("template", [&] {
+      return fit_template(std::get<TriangleMesh>(target_), template_options_,
+                          curved_ ? TemplateUse::curved_cells : TemplateUse::subdivision);
+    });
     if (made_->mesh.num_cells() == 0) throw InputError("fit: ended before there was a template");
     return std::make_shared<const VolumeMesh>(made_->mesh);
   }
@@ -150,7 +159,6 @@ class Fit {
       return cli::carry_groups(target_, fit.mesh);
     });
     Json json = report_of(fit.report, found, groups);
-    if (fit.report.creases) json["creases"] = cli::creases_json(*fit.report.creases);
     json.update(cli::cage_json(fit.cage, limit, found.target_diagonal));
     json["audit"] = cli::audit_json(audit(*template_));
     finish(result, json, fit.report);
@@ -185,6 +193,7 @@ class Fit {
     if (made_) json["template"] = cli::automatic_fit_json(*made_).at("template");
     json.update(cli::fit_json(report));
     json.update(cli::check_json(found));
+    if (report.creases) json["creases"] = cli::creases_json(*report.creases);
     if (!groups.groups.empty()) json["groups"] = cli::groups_json(groups.groups);
     warnings_.insert(warnings_.end(), groups.warnings.begin(), groups.warnings.end());
     checkpoints_.describe(json);
@@ -228,8 +237,6 @@ levels        times the template is subdivided, 1 .. 6
 surface       what is to agree with the target: the cage's 'limit' surface, or the finest 'mesh'
 boundary      'catmull-clark' or 'averaging'
 cage_only     only the points of the template move
-crease_angle  degrees: keep edges of the target sharper than this sharp
-keep_groups   keep borders between groups of the target's faces in the same way
 lambda_far    largest weight of the cells' shape to which the way from one level to the next may raise it
 
 With order, 1 .. 16, curved cells:
@@ -237,9 +244,12 @@ basis     'legendre' or 'fourier'
 adaptive  raise orders only where it pays
 
 And with both:
+crease_angle    degrees: keep edges of the target sharper than this sharp
+keep_groups     keep borders between groups of the target's faces in the same way
 tolerance       mean distance to reach, per cent of the diagonal of the target's bounding box
 quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
-lambda_close    weight of the cells' shape in the last stage; None: 0.005, with order 0.05
+lambda_close    weight of the cells' shape in the last stage; None: 0.005; with order 0.05, or 0.0025 if creases follow
+                most of the target's sharp edges
 correspondence  'closest' or 'voronoi'
 solver          'newton' or 'lbfgs'
 energy          how cells' distortion is measured: 'hencky', 'inverse_mean_ratio' or 'condition_number'

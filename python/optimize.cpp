@@ -69,7 +69,7 @@ class Optimization {
   }
 
   void read_curved_options() {
-    keywords_.refuse({"fixed_boundary", "sizes", "crease_angle", "max_tolerance"}, "does not go with order");
+    keywords_.refuse({"fixed_boundary", "sizes", "max_tolerance"}, "does not go with order");
     curving_.lambda_close = kCurvingLambda;
     curving_.tolerance_percent = options_.mean_tolerance_percent;
     keywords_.take("order", curving_.order);
@@ -78,6 +78,9 @@ class Optimization {
     keywords_.take("tolerance", curving_.tolerance_percent);
     keywords_.take("quality", curving_.quality);
     keywords_.take("lambda_", curving_.lambda_close);
+    curving_.follows_all_edges = keywords_.has("crease_angle");
+    curving_.crease_angle_degrees = options_.crease_angle_degrees;
+    keywords_.take("crease_angle", curving_.crease_angle_degrees);
     keywords_.take("max_iterations", curving_.max_iterations);
     keywords_.take("time_limit", curving_.time_limit_seconds);
     take_chord(keywords_, writing_);
@@ -139,6 +142,7 @@ class Optimization {
   void add(const FitReport& report, const MeshCheck& checked) {
     json_.update(cli::fit_json(report));
     json_.update(cli::check_json(checked));
+    if (report.creases) json_["creases"] = cli::creases_json(*report.creases);
     checkpoints_.describe(json_);
     json_["not_certified_cells"] = cli::not_certified_cells(checked);
     warnings_.insert(warnings_.end(), report.warnings.begin(), report.warnings.end());

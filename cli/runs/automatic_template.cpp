@@ -13,7 +13,7 @@ namespace subvol::cli {
 using namespace internal;
 
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, AutomaticFitOptions options,
-                             const RunOptions& run, std::vector<std::string>& warnings) {
+                             const RunOptions& run, std::vector<std::string>& warnings, TemplateUse use) {
   if (!source.path.empty()) return {load_volume(source.path, warnings, true, run.references), std::nullopt};
   if (is_cloud(target)) throw UsageError("points do not tell what they enclose: give a coarse mesh with --template");
   if (options.time_limit_seconds > 0 && !run.checkpoint.empty())
@@ -26,7 +26,7 @@ LoadedTemplate load_template(const TemplateSource& source, const Target& target,
     return !interrupted();
   };
   options.cancelled = interrupted;
-  AutomaticFitResult made = fit_template(std::get<TriangleMesh>(target), options);
+  AutomaticFitResult made = fit_template(std::get<TriangleMesh>(target), options, use);
   teller.finish();
   if (interrupted()) return {};
   if (made.mesh.num_cells() == 0) throw EndedEarly("nothing to write: " + made.report.explanation, kNotConverged);

@@ -24,10 +24,11 @@ struct LoadedTemplate {
 
 /// Reads a template, or makes one and reports the progress.
 ///
-/// options  how the template is made; `cells` is taken from the source instead.
+/// options, use  how the template is made; `cells` is taken from the source instead.
 /// UsageError: a template would have to be made from points. EndedEarly: the time limit ended it before there was one.
 LoadedTemplate load_template(const TemplateSource& source, const Target& target, AutomaticFitOptions options,
-                             const RunOptions& run, std::vector<std::string>& warnings);
+                             const RunOptions& run, std::vector<std::string>& warnings,
+                             TemplateUse use = TemplateUse::subdivision);
 
 /// Summary of how a template was made in one line, for people.
 std::string template_text(const AutomaticFitResult& made);

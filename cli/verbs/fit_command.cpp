@@ -80,6 +80,15 @@ std::optional<double> crease_angle(const FitArguments& arguments, std::optional<
   return std::stod(arguments.crease_angle);
 }
 
+/// Which edges a template that is made from the target is to follow.
+AutomaticFitOptions template_options(const FitArguments& arguments) {
+  AutomaticFitOptions options;
+  options.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
+  options.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
+  options.keeps_groups = arguments.fit.keeps_groups;
+  return options;
+}
+
 /// One run of `fit` that makes a subdivision volume, from its input files to its output files.
 class FitRun : public CageRun {
  public:
@@ -116,11 +125,8 @@ void FitRun::load() {
 }
 
 void FitRun::load_template() {
-  AutomaticFitOptions options;
+  AutomaticFitOptions options = template_options(arguments_);
   options.time_limit_seconds = kTemplateShareOfTime * arguments_.fit.time_limit_seconds;
-  options.crease_angle_degrees = crease_angle(arguments_, kUsualCreaseAngle);
-  options.follows_all_edges = arguments_.crease_angle != kAutomaticAngle;
-  options.keeps_groups = arguments_.fit.keeps_groups;
   LoadedTemplate loaded = cli::load_template(arguments_.template_mesh, target_, options, arguments_.run, warnings_);
   template_mesh_ = std::move(loaded.mesh);
   if (has_few_inverted_cells(template_mesh_))
@@ -297,8 +303,7 @@ void add_high_order_options(CLI::App& verb, FitArguments& arguments) {
   verb.add_flag("--adaptive", arguments.adaptive, "Raise orders only where it pays, up to P")
       ->needs(order)
       ->group(group);
-  for (const char* other :
-       {"--levels", "--surface", "--boundary", "--cage-only", "--crease-angle", "--keep-groups", "--lambda-far"})
+  for (const char* other : {"--levels", "--surface", "--boundary", "--cage-only", "--lambda-far"})
     order->excludes(verb.get_option(other));
 }
 
@@ -340,13 +345,11 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const C
                                arguments.target,
                                arguments.wrap_percent,
                                arguments.size};
+  result.fit = template_options(arguments);
   AutomaticFitOptions& fit = result.fit;
   fit.cells = arguments.cells;
   fit.regions = region_rule(arguments.regions);
   fit.quality = arguments.quality;
-  fit.crease_angle_degrees = crease_angle(arguments, kUsualCreaseAngle);
-  fit.follows_all_edges = arguments.crease_angle != kAutomaticAngle;
-  fit.keeps_groups = arguments.fit.keeps_groups;
   fit.makes_cage = makes_cage(arguments, verb);
   if (verb.count("--levels") > 0) fit.levels = arguments.fit.levels;
   fit.mean_tolerance_percent = arguments.fit.tolerance_percent.value_or(kAutomaticMeanPercent);
@@ -360,6 +363,7 @@ AutomaticFitArguments automatic_arguments(const FitArguments& arguments, const C
 HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const CLI::App& verb) {
   HighOrderFitArguments result{arguments.run, arguments.writing, {}, arguments.target, arguments.template_mesh};
   result.quality_floor = arguments.quality_floor;
+  result.template_fit = template_options(arguments);
   HighOrderFitOptions& fit = result.fit;
   fit.quality = arguments.quality;
   fit.order = arguments.order;
@@ -367,6 +371,8 @@ HighOrderFitArguments high_order_arguments(const FitArguments& arguments, const 
   fit.adaptive = arguments.adaptive;
   fit.tolerance_percent = arguments.fit.tolerance_percent;
   if (verb.count("--lambda-close") > 0) fit.lambda_close = arguments.fit.lambda_close;
+  fit.crease_angle_degrees = arguments.fit.crease_angle_degrees;
+  fit.keeps_groups = arguments.fit.keeps_groups;
   fit.solver = solver_kind(arguments);
   fit.correspondence = correspondence(arguments);
   fit.point_weights = point_weights(arguments);

@@ -83,9 +83,9 @@ std::optional<MeshCheck> check_linear(const std::vector<Output>& outputs, const 
   return std::visit([&](const auto& geometry) { return check_mesh(*written, &geometry, options); }, target);
 }
 
-/// Adds lambda, whose default depends on the order.
-Json options_used(const HighOrderFitArguments& arguments, Json options) {
-  options[arguments.untangles ? "lambda" : "lambda-close"] = arguments.fit.lambda_close;
+/// Adds lambda, whose default depends on the template.
+Json options_used(const HighOrderFitArguments& arguments, double lambda_close, Json options) {
+  options[arguments.untangles ? "lambda" : "lambda-close"] = lambda_close;
   return options;
 }
 
@@ -129,9 +129,10 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     require_resumable(arguments.run, run_identity(verb, {{"target", fingerprint(target)}}));
   }
   const Clock::time_point template_start = Clock::now();
-  LoadedTemplate loaded = load_template(arguments.template_mesh, target,
-                                        {.time_limit_seconds = kTemplateShareOfTime * arguments.fit.time_limit_seconds},
-                                        arguments.run, warnings);
+  AutomaticFitOptions making = arguments.template_fit;
+  making.time_limit_seconds = kTemplateShareOfTime * arguments.fit.time_limit_seconds;
+  LoadedTemplate loaded =
+      load_template(arguments.template_mesh, target, making, arguments.run, warnings, TemplateUse::curved_cells);
   const double template_seconds = seconds_since(template_start);
   VolumeMesh& template_mesh = loaded.mesh;
   if (!loaded.made) warn_of_losses(marks_of(template_mesh), marks_of(template_mesh), outputs, warnings, true);
@@ -171,7 +172,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const Clock::time_point write_start = Clock::now();
   WritingOptions writing = arguments.writing;
   writing.source = arguments.target;
-  writing.options = options_used(arguments, options_of_result(verb));
+  writing.options = options_used(arguments, result.lambda_close, options_of_result(verb));
   HighOrderFile file{std::move(result.mesh), template_mesh.references, template_mesh.face_groups,
                      template_mesh.regions};
   const Target outer = outer_target(target, regions_of_target(target, template_mesh));
@@ -211,8 +212,9 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     if (stands_alone) hold_to({.mean_percent = arguments.fit.tolerance_percent}, *linear, report);
   }
   if (!arguments.run.report.empty()) {
-    Json json = report_json(arguments.command, options_used(arguments, options_in_force(verb)), std::move(input),
-                            report, file.mesh, mesh_check);
+    Json json = report_json(arguments.command, options_used(arguments, result.lambda_close, options_in_force(verb)),
+                            std::move(input), report, file.mesh, mesh_check);
+    if (report.creases) json["creases"] = creases_json(*report.creases);
     if (!groups.groups.empty()) json["groups"] = groups_json(groups.groups);
     if (linear) json["linear_cells"] = check_json(*linear);
     if (!polynomials.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials);
@@ -234,6 +236,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   }
   if (!arguments.run.quiet) {
     std::cerr << to_string(report.stop_reason) << ": " << report.explanation << '\n' << to_text(mesh_check);
+    if (report.creases) std::cerr << to_text(*report.creases);
     for (const Output& output : outputs) std::cerr << "wrote " << output.path.string() << '\n';
   }
   require_all_written(failures);

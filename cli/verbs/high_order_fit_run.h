@@ -25,6 +25,7 @@ struct HighOrderFitArguments {
   bool untangles = false;
   bool takes_points = true;     ///< the target may be points
   std::optional<double> quality_floor{};  ///< least scaled Jacobian that counts as a success
+  AutomaticFitOptions template_fit{};     ///< how a template is made if none is given; the time limit is that of `fit`
 };
 
 /// Fits curved elements from files to files; returns an ExitStatus.

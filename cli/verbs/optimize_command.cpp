@@ -160,6 +160,8 @@ HighOrderFitArguments curving_arguments(const OptimizeArguments& arguments, cons
   fit.basis = arguments.basis == "legendre" ? Basis::legendre : Basis::fourier;
   fit.tolerance_percent = arguments.optimize.mean_tolerance_percent;
   fit.quality = arguments.optimize.quality;
+  fit.crease_angle_degrees = arguments.optimize.crease_angle_degrees;
+  fit.follows_all_edges = verb.count("--crease-angle") > 0;
   fit.lambda_close = verb.count("--lambda") > 0 ? arguments.optimize.lambda : kCurvingLambda;
   fit.max_iterations = arguments.optimize.max_iterations;
   fit.time_limit_seconds = arguments.optimize.time_limit_seconds;
@@ -183,11 +185,10 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
           ->check(CLI::IsMember({"uniform", "local"}))
           ->type_name("uniform|local")
           ->capture_default_str();
-  CLI::Option* angle = verb.add_option("--crease-angle", optimize.crease_angle_degrees,
-                                       "Keep edges of the surface sharper than this sharp")
-                           ->check(number_in(0.0, 180.0))
-                           ->type_name("DEGREES")
-                           ->capture_default_str();
+  verb.add_option("--crease-angle", optimize.crease_angle_degrees, "Keep edges of the surface sharper than this sharp")
+      ->check(number_in(0.0, 180.0))
+      ->type_name("DEGREES")
+      ->capture_default_str();
   verb.add_option("--tolerance", optimize.mean_tolerance_percent,
                   "Mean distance from the surface to keep within, in per cent of the diagonal of its bounding box;\n"
                   "exit status 4 if missed")
@@ -230,7 +231,7 @@ void add_options(CLI::App& verb, OptimizeArguments& arguments) {
       ->needs(order)
       ->group(group);
   add_map_tolerance(verb, arguments.writing)->needs(order)->group(group);
-  for (CLI::Option* other : {fixed, sizes, angle, max}) order->excludes(other);
+  for (CLI::Option* other : {fixed, sizes, max}) order->excludes(other);
 }
 
 }  // namespace

@@ -153,6 +153,13 @@ void require_intervals(const char* function, int intervals) {
     throw InputError(std::string(function) + ": intervals must be at least 1, got " + std::to_string(intervals));
 }
 
+/// Returns the number of an edge; kNoIndex if there is none between these vertices, or no such vertex.
+Index edge_between(const MeshTopology& topology, Index v0, Index v1) {
+  const auto num_vertices = static_cast<Index>(topology.num_vertices());
+  const bool known = v0 >= 0 && v1 >= 0 && v0 < num_vertices && v1 < num_vertices;
+  return known ? topology.find_edge(v0, v1) : kNoIndex;
+}
+
 void require_numbers(const char* what, std::span<const Index> numbers, std::size_t limit) {
   for (const Index i : numbers)
     if (i < 0 || static_cast<std::size_t>(i) >= limit)
@@ -168,9 +175,7 @@ BoundarySamples make_boundary_samples(const ElementSpace& space, int intervals, 
   BoundarySampler sampler(space, intervals);
   sampler.add_faces(topology.boundary_faces());
   for (const CreaseEdge& crease : creases) {
-    const auto num_vertices = static_cast<Index>(space.num_vertices());
-    const bool known = crease.v0 >= 0 && crease.v1 >= 0 && crease.v0 < num_vertices && crease.v1 < num_vertices;
-    const Index e = known ? topology.find_edge(crease.v0, crease.v1) : kNoIndex;
+    const Index e = edge_between(topology, crease.v0, crease.v1);
     if (e == kNoIndex || !topology.is_boundary_edge(e))
       throw InputError("make_boundary_samples: crease " + std::to_string(crease.v0) + ' ' + std::to_string(crease.v1) +
                        " is no edge of the boundary");
@@ -206,6 +211,36 @@ BoundarySamples make_sheet_samples(const ElementSpace& space, const VolumeMesh& 
     if (second != kNoIndex && mesh.references[first] > mesh.references[second])
       std::swap(samples.triangles[t][1], samples.triangles[t][2]);
   }
+  return samples;
+}
+
+EdgeSamples make_edge_samples(const ElementSpace& space, std::span<const CreaseEdge> edges, int intervals) {
+  require_intervals("make_edge_samples", intervals);
+  const MeshTopology& topology = space.topology();
+  std::vector<Index> cell_of_edge(topology.num_edges());
+  for (std::size_t c = 0; c < space.num_cells(); ++c)
+    for (const Index e : topology.cell_edges(c)) cell_of_edge[e] = static_cast<Index>(c);
+  EdgeSamples samples;
+  std::vector<CellPoint> points;
+  for (const auto& [v0, v1, sharpness] : edges) {
+    const Index e = edge_between(topology, v0, v1);
+    if (e == kNoIndex)
+      throw InputError("make_edge_samples: " + std::to_string(v0) + ' ' + std::to_string(v1) + " is no edge");
+    const Index cell = cell_of_edge[e];
+    const auto point = [&](Index v) {
+      const auto vertices = space.vertices(cell);
+      return canonical_vertices(space.kind(cell))[std::ranges::find(vertices, v) - vertices.begin()];
+    };
+    const Vec3 from = point(v0), to = point(v1);
+    for (int i = 0; i <= intervals; ++i) {
+      if (i > 0) {
+        const auto last = static_cast<Index>(points.size());
+        samples.segments.push_back({last - 1, last});
+      }
+      points.push_back({cell, from + (static_cast<double>(i) / intervals) * (to - from)});
+    }
+  }
+  samples.positions = point_map(space, points);
   return samples;
 }
 

@@ -49,4 +49,14 @@ BoundarySamples make_face_samples(const ElementSpace& space, std::span<const Ind
 BoundarySamples make_sheet_samples(const ElementSpace& space, const VolumeMesh& mesh, int intervals,
                                    std::span<const CreaseEdge> creases = {});
 
+/// Points of edges, and the segments between them: `intervals` per edge, in the order of the edges, from v0 to v1.
+struct EdgeSamples {
+  SparseMap positions;  ///< nodes -> points
+  std::vector<std::array<Index, 2>> segments;
+};
+
+/// Samples any edges of the mesh. InputError: intervals < 1, something that is not an edge. Cost: a pass over the
+/// cells.
+EdgeSamples make_edge_samples(const ElementSpace& space, std::span<const CreaseEdge> edges, int intervals);
+
 }  // namespace subvol

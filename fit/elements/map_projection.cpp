@@ -124,6 +124,8 @@ class Projector {
       case EntityShape::tet: dimensions = {3}; break;
       case EntityShape::prism: dimensions = {2, 1}; break;
       case EntityShape::hex: dimensions = {1, 1, 1}; break;
+      case EntityShape::pyramid:
+        return;  // it has no modes
     }
     std::vector<Vec3> points = {Vec3::Zero()};  // the first simplex varies fastest
     int axis = 0;

@@ -66,7 +66,9 @@ int order_of_mode(EntityShape shape, const ModeIndex& m) {
     case EntityShape::quad: return std::max(m.i, m.j) + 1;
     case EntityShape::tet: return m.i + m.j + m.k + 1;
     case EntityShape::prism: return std::max(m.i + m.j, m.k) + 1;
-    case EntityShape::hex: break;
+    case EntityShape::hex:
+    case EntityShape::pyramid:
+      break;
   }
   return std::max({m.i, m.j, m.k}) + 1;
 }
@@ -79,7 +81,9 @@ double largest_value(EntityShape shape, const ModeIndex& m) {
     case EntityShape::hex: return largest_mode(m.i) * largest_mode(m.j) * largest_mode(m.k);
     case EntityShape::triangle: return largest_mode(m.i) * largest_vertex_factor(m.j);
     case EntityShape::prism: return largest_mode(m.i) * largest_vertex_factor(m.j) * largest_mode(m.k);
-    case EntityShape::tet: break;
+    case EntityShape::tet:
+    case EntityShape::pyramid:
+      break;
   }
   return largest_mode(m.i) * largest_vertex_factor(m.j) * largest_vertex_factor(m.k);
 }

@@ -156,9 +156,9 @@ CreaseEnergy FollowedCreases::energy(std::span<const std::array<Index, 2>> edges
   return CreaseEnergy(curves_, std::move(following), num_samples, width, tangential_weight);
 }
 
-CreaseDistance FollowedCreases::distance(const BoundaryRefinement& limit, std::span<const Vec3> points,
+CreaseDistance FollowedCreases::distance(std::span<const std::array<Index, 2>> edges, std::span<const Vec3> points,
                                          double diagonal) const {
-  return crease_distance(curves_, points, segments(limit.crease_edges), diagonal);
+  return crease_distance(curves_, points, segments(edges), diagonal);
 }
 
 }  // namespace subvol::internal

@@ -5,7 +5,6 @@
 #include "subvol/fit/features/crease_energy.h"
 #include "subvol/fit/features/crease_paths.h"
 #include "subvol/mesh/volume_mesh.h"
-#include "subvol/subdivision/limit_surface.h"
 #include "subvol/surface/triangle_mesh.h"
 
 #include <array>
@@ -64,8 +63,9 @@ class FollowedCreases {
   /// creases in the order of the creases, equally many for each.
   CreaseEnergy energy(std::span<const std::array<Index, 2>> edges, std::size_t num_samples, double width,
                       double tangential_weight) const;
-  /// Measures the distances of the creases. limit  refinement of the present level's mesh, at `points`.
-  CreaseDistance distance(const BoundaryRefinement& limit, std::span<const Vec3> points, double diagonal) const;
+  /// Measures the distances of the creases. `edges` between points run along them as for `energy`.
+  CreaseDistance distance(std::span<const std::array<Index, 2>> edges, std::span<const Vec3> points,
+                          double diagonal) const;
 
  private:
   void tag(VolumeMesh& template_mesh) const;

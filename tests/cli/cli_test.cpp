@@ -135,6 +135,21 @@ TEST_CASE("What is no report is refused, and nothing is written", "[cli]") {
   CHECK(place.run("report none.json -o page.html").status == 3);
 }
 
+TEST_CASE("Curved cells keep sharp edges, and the report says how far off they are", "[cli]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "cube.mesh", subvol::test::lattice(2, 2, 2));
+  for (const std::string verb : {"fit cube.mesh --template cube.mesh", "optimize cube.mesh --target cube.mesh"}) {
+    const Run run = place.run(verb + " --crease-angle 40 --order 2 -o out.vtu --report report.json --force");
+    INFO(run.err);
+    CHECK(run.status == 0);
+    CHECK(run.err.find("creases follow 12 of 12 curves") != std::string::npos);
+    const auto report = place.json("report.json");
+    CHECK(report.at("creases").at("followed_curves") == 12);
+    CHECK(report.at("creases").at("max_percent") < 1e-3);
+    CHECK(report.at("options").at(verb.starts_with("fit") ? "lambda-close" : "lambda") == 0.0025);
+  }
+}
+
 TEST_CASE("A fit of curved elements goes from files to files that check agrees with", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(kFit + "--order 3 -o out.vtu -o out.glb -o out.mesh --report report.json");
@@ -200,6 +215,7 @@ TEST_CASE("Points are fitted and checked one way, and what makes no sense with t
   };
   refused("fit points.xyz -o no.mesh", 2, "--template");
   refused(fit + "--crease-angle 40 -o no.mesh", 2, "--crease-angle");
+  refused(fit + "--order 2 --crease-angle 40 -o no.vtu", 2, "--crease-angle");
   refused(fit + "--correspondence voronoi -o no.mesh", 2, "voronoi");
   refused(fit + "--order 2 --correspondence voronoi -o no.vtu", 2, "voronoi");
   refused(kFit + "--point-weights area -o no.mesh", 2, "--point-weights");

@@ -10,8 +10,10 @@
 #include "subvol/fit/stages/fit_report.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/surface_io.h"
+#include "subvol/mesh/features.h"
 #include "subvol/templates/auto_template.h"
 #include "tests/support/element_fixtures.h"
+#include "tests/support/feature_fixtures.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
@@ -177,6 +179,37 @@ TEST_CASE("few places far from the target are drawn in where that costs little s
     CHECK(positive(result.mesh, 9));
   }
   CHECK(drawn > 0);
+}
+
+TEST_CASE("curved elements keep sharp edges if they are asked to, or if the template has creases") {
+  const auto barrel = [](Vec3 p) {
+    p.head<2>() *= 1 + 0.2 * (1 - p.z() * p.z());
+    return p;
+  };
+  TriangleMesh target = cube_surface(16, false);
+  for (Vec3& p : target.positions) p = barrel(p);
+  VolumeMesh cells = centred_lattice(2);
+  for (Vec3& p : cells.positions) p *= 0.93;
+
+  const HighOrderFitResult round = fit_high_order(target, cells, of_order(2));
+  CHECK_FALSE(round.report.creases);
+  CHECK(round.lambda_close == kLambdaOfOrders);
+
+  HighOrderFitOptions options = of_order(2);
+  options.crease_angle_degrees = 40;
+  const HighOrderFitResult sharp = fit_high_order(target, cells, options);
+  REQUIRE(sharp.report.creases);
+  CHECK(sharp.report.creases->num_followed == 12);
+  CHECK(sharp.report.creases->max_percent() < 0.1);
+  CHECK(sharp.lambda_close == kCurvingLambda);
+  CHECK(distance(sharp.mesh, target).max() < 0.5 * distance(round.mesh, target).max());
+  CHECK(measure_quality(sharp.mesh).min_scaled_jacobian > 0.65);
+
+  options.follows_all_edges = false;  // the edges are those of a designed part
+  CHECK(fit_high_order(target, cells, options).mesh.coefficients == sharp.mesh.coefficients);
+  cells.tags = features_by_angle(cells, 40);
+  CHECK(fit_high_order(target, cells, of_order(2)).report.creases->num_followed == 12);
+  CHECK_THROWS_AS(fit_high_order(PointCloud{target.positions}, cells, options), InputError);
 }
 
 TEST_CASE("a high-order fit has the same bits for one and two threads", "[slow]") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/energies/high_order_energy.h"
+#include "subvol/fit/features/followed_creases.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/surface/boundary.h"
 #include "tests/support/element_fixtures.h"
@@ -48,10 +49,12 @@ std::vector<Vec3> gradient_of(FitProblem& problem, const std::vector<Vec3>& x) {
 
 TEST_CASE("The gradient of a patch of curved cells is that of the whole", "[elements]") {
   std::mt19937 random(4);
-  const VolumeMesh bar = test::renumbered(test::lattice(9, 3, 3), random);
+  VolumeMesh bar = test::renumbered(test::lattice(9, 3, 3), random);
   TriangleMesh triangles = refined_triangles(boundary_surface(bar, MeshTopology(bar)));
   for (Vec3& p : triangles.positions) p += Vec3(0.02, -0.03, 0.01);
   const TargetSurface target(triangles);
+  const FollowedCreases creases(triangles, kUsualCreaseAngle, bar);
+  REQUIRE(creases.hold_the_surface());
 
   EntityOrders orders = EntityOrders::uniform(MeshTopology(bar), 1);
   for (auto* list : {&orders.edges, &orders.faces, &orders.cells})
@@ -61,9 +64,11 @@ TEST_CASE("The gradient of a patch of curved cells is that of the whole", "[elem
   std::uniform_real_distribution<double> shake(-0.02, 0.02);
   for (Vec3& c : mesh.coefficients) c += Vec3(shake(random), shake(random), shake(random));
 
-  const BoundarySamples samples = make_boundary_samples(mesh.space, 4);
+  const BoundarySamples samples = make_boundary_samples(mesh.space, 4, bar.tags.creases);
   const auto surface = [&] {
-    return std::make_unique<ClosestPointEnergy>(target, samples.triangles, samples.points.size(), 0.1, 3);
+    auto term = std::make_unique<ClosestPointEnergy>(target, samples.triangles, samples.points.size(), 0.1, 3);
+    term->add_creases(creases.energy(samples.crease_edges, samples.points.size(), target.length(), 0.1));
+    return term;
   };
   FitProblem whole(identity_map(mesh.space.num_nodes()), samples.positions, volume_of(mesh.space, bar.num_cells()),
                    surface(), kLambda);

@@ -52,7 +52,7 @@ VolumeMesh scrambled(VolumeMesh mesh, double size, unsigned seed) {
   return mesh;
 }
 
-TriangleMesh surface_of(const VolumeMesh& mesh) {
+TriangleMesh refined_surface(const VolumeMesh& mesh) {
   return refined_triangles(boundary_surface(mesh, MeshTopology(mesh)));
 }
 
@@ -94,7 +94,7 @@ TEST_CASE("Optimisation: fixed boundary vertices stay bit by bit; the others sli
     if (topology.is_boundary_vertex(static_cast<Index>(v))) CHECK(fixed.mesh.positions[v] == start.positions[v]);
 
   const OptimizeResult sliding = optimize_mesh(start, nullptr, {});
-  const TriangleMesh surface = surface_of(lattice);
+  const TriangleMesh surface = refined_surface(lattice);
   const MeshCheck check = check_mesh(sliding.mesh, &surface);
   CHECK(check.valid());
   CHECK(check.max_distance_percent() < 0.1);
@@ -191,7 +191,7 @@ TEST_CASE("Optimisation draws the boundary to a target, and keeps references and
   test::tag_creases(mesh, 40);
   VolumeMesh larger = test::lattice(3, 3, 3);
   for (Vec3& p : larger.positions) p = 1.05 * p - Vec3(0.05, 0.05, 0.05);
-  const TriangleMesh target = surface_of(larger);
+  const TriangleMesh target = refined_surface(larger);
   const OptimizeResult result = optimize_mesh(mesh, &target, {});
   const MeshCheck check = check_mesh(result.mesh, &target);
   CHECK(check.valid());
@@ -220,7 +220,7 @@ TEST_CASE("Optimisation gives the same bits for any number of threads, and can b
 
 TEST_CASE("Optimisation refuses options out of range and meshes that are not sound") {
   const VolumeMesh mesh = test::lattice(2, 2, 2);
-  const TriangleMesh target = surface_of(mesh);
+  const TriangleMesh target = refined_surface(mesh);
   CHECK_THROWS_AS(optimize_mesh(mesh, &target, {.fixed_boundary = true}), InputError);
   CHECK_THROWS_AS(optimize_mesh(mesh, nullptr, {.lambda = 0.0}), InputError);
   CHECK_THROWS_AS(optimize_mesh(mesh, nullptr, {.crease_angle_degrees = 181}), InputError);
@@ -235,7 +235,7 @@ TEST_CASE("Most cells of a real mesh inverted: all become valid, and the boundar
   const auto data = test::require_data();
   if (!data) return;
   const VolumeMesh start = read_volume_mesh(*data / "optimize" / "block_stress" / "input.mesh", {.check = false});
-  const TriangleMesh surface = surface_of(start);
+  const TriangleMesh surface = refined_surface(start);
   const OptimizeResult result = optimize_mesh(start, nullptr, {});
   const MeshCheck check = check_mesh(result.mesh, &surface);
   CHECK(check.valid());

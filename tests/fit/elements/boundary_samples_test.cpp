@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/base/error.h"
 #include "subvol/fit/energies/closest_point_energy.h"
 #include "subvol/io/mesh_io.h"
+#include "subvol/mesh/features.h"
 #include "subvol/surface/boundary.h"
+#include "subvol/templates/cell_split.h"
 #include "tests/support/element_fixtures.h"
 #include "tests/support/require_data.h"
 
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <random>
 #include <set>
 #include <string>
 
@@ -132,9 +135,34 @@ TEST_CASE("boundary samples of real templates of all kinds are closed", "[bounda
   }
 }
 
+TEST_CASE("samples of edges are those of the boundary's creases", "[boundary samples]") {
+  std::mt19937 random(2);
+  for (const VolumeMesh& cells :
+       {lattice(2, 1, 2), split_into_tets(lattice(2, 1, 2)), split_into_prisms(lattice(2, 1, 2), 0, 1)}) {
+    const VolumeMesh mesh = renumbered(cells, random);
+    const FeatureTags tags = features_by_angle(mesh, 40);
+    REQUIRE(tags.creases.size() == 4 * (2 + 1 + 2));
+    HighOrderMesh curved(ElementSpace(mesh, Basis::legendre, 3), mesh);
+    for (Vec3& c : curved.coefficients) c += 0.1 * Vec3::Random();
+    const BoundarySamples whole = make_boundary_samples(curved.space, 5, tags.creases);
+    const EdgeSamples edges = make_edge_samples(curved.space, tags.creases, 5);
+    const std::vector<Vec3> of_whole = whole.positions.apply(curved.coefficients);
+    const std::vector<Vec3> of_edges = edges.positions.apply(curved.coefficients);
+    REQUIRE(edges.segments.size() == whole.crease_edges.size());
+    double largest = 0;
+    for (std::size_t k = 0; k < edges.segments.size(); ++k)
+      for (int end = 0; end < 2; ++end)
+        largest = std::max(largest, (of_edges[edges.segments[k][end]] - of_whole[whole.crease_edges[k][end]]).norm());
+    CHECK(largest < 1e-12);
+  }
+}
+
 TEST_CASE("what cannot be sampled is refused", "[boundary samples]") {
   const ElementSpace space(lattice(2, 2, 2), Basis::fourier, 2);
   CHECK_THROWS_AS(make_boundary_samples(space, 0), InputError);
   CHECK_THROWS_AS(make_boundary_samples(space, 2, std::vector<CreaseEdge>{{0, 99, 1}}), InputError);
   CHECK_THROWS_AS(make_boundary_samples(space, 2, std::vector<CreaseEdge>{{0, 26, 1}}), InputError);
+  CHECK_THROWS_AS(make_edge_samples(space, {}, 0), InputError);
+  CHECK_THROWS_AS(make_edge_samples(space, std::vector<CreaseEdge>{{-1, 1, 1}}, 2), InputError);
+  CHECK_THROWS_AS(make_edge_samples(space, std::vector<CreaseEdge>{{0, 26, 1}}, 2), InputError);
 }
