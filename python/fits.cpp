@@ -249,7 +249,7 @@ keep_groups     keep borders between groups of the target's faces in the same wa
 tolerance       mean distance to reach, per cent of the diagonal of the target's bounding box
 quality         least scaled Jacobian to aim at, as far as distances allow; 0: none
 lambda_close    weight of the cells' shape in the last stage; None: 0.005; with order 0.05, or 0.0025 if creases follow
-                most of the target's sharp edges
+                nearly all of the target's sharp edges
 correspondence  'closest' or 'voronoi'
 solver          'newton' or 'lbfgs'
 energy          how cells' distortion is measured: 'hencky', 'inverse_mean_ratio' or 'condition_number'

@@ -111,12 +111,14 @@ void FollowedCreases::keep_from_folding(VolumeMesh& mesh) {
   find_curves_of_creases(mesh);
 }
 
-bool FollowedCreases::hold_the_surface() const {
+double FollowedCreases::followed_share() const {
   double all = 0, followed = 0;
   for (const FeatureCurve& curve : curves_.curves) all += curve.length();
   for (const CreasePath& path : paths_) followed += curves_.curves[path.curve].length();
-  return followed > kMost * all;
+  return all > 0 ? followed / all : 0;
 }
+
+bool FollowedCreases::hold_the_surface() const { return followed_share() > kMost; }
 
 void FollowedCreases::release(std::span<const std::uint8_t> vertices, VolumeMesh& mesh) {
   std::vector<CreaseEdge>& creases = mesh.tags.creases;

@@ -50,7 +50,9 @@ class FollowedCreases {
   void keep_interfaces(VolumeMesh& mesh, double angle_degrees, InnerCurves drawn_to);
 
   const FeatureCurves& curves() const { return curves_; }
-  /// True if most of the target's sharp edges, by length, are followed: creases then hold the surface in its place.
+  /// Returns the share of the length of the target's sharp edges that is followed; 0 if there are none.
+  double followed_share() const;
+  /// True if most of this length is followed: creases then hold the surface in its place.
   bool hold_the_surface() const;
 
   /// Removes all creases of curves that have a crease at a marked vertex, all other creases there, and marked corners.

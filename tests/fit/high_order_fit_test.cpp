@@ -162,7 +162,8 @@ TEST_CASE("few places far from the target are drawn in where that costs little s
     return stage.kept && stage.name.ends_with("% off");
   };
   std::size_t drawn = 0;
-  for (const samples::Sample& sample : samples::all_samples()) {
+  for (samples::Sample& sample : samples::all_samples()) {
+    sample.template_mesh.tags = {};  // creases would keep the surface near
     HighOrderFitOptions without = of_order(2);
     without.improve_worst_places = false;
     const HighOrderFitResult plain = fit_high_order(sample.target, sample.template_mesh, without);
