@@ -44,10 +44,7 @@ struct LiftValues {
 };
 /// Emphasis on places of poor shape, and weight of the hinge.
 constexpr LiftValues kEmphases{4, 2, 512}, kHinges{10, 4, 1e5};
-/// Steps of a lift, and the least decrease of the energy after which it goes on: lifts change the energy of the mesh
-/// little, and must not end by themselves.
 constexpr int kLiftSteps = 8;
-constexpr double kNoEnd = 1e-9;
 /// Values in a row that may fail to help before no higher one is attempted.
 constexpr int kMostFailedLifts = 3;
 /// When states are compared, scaled Jacobians above this, or above the quality aimed at if that is higher, count alike.
@@ -80,7 +77,7 @@ class HighOrderFit : HighOrderDriver {
   bool lower_lambda(std::size_t pairs);
   bool improve_worst_places();
   bool is_better(const Outcome& next) const;
-  Again run_again(std::span<const Index> cells, double& setting, double value, const Stage& stage);
+  Again run_again(std::span<const Index> cells, double& setting, double value, int steps);
   Again draw_in_far_places();
   Again lift_worst_places();
   Again lift(double& setting, const LiftValues& values);
@@ -297,12 +294,13 @@ bool HighOrderFit::is_better(const Outcome& next) const {
          next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
 }
 
-/// Runs a stage around some cells with one setting changed; if the result is not better, rolls back the stage
+/// Repeats the last stage around some cells with one setting changed; if the result is not better, rolls back the stage
 /// and the setting.
-HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double& setting, double value,
-                                            const Stage& stage) {
+HighOrderFit::Again HighOrderFit::run_again(std::span<const Index> cells, double& setting, double value, int steps) {
   FitSnapshot before = snapshot();
   const double setting_before = std::exchange(setting, value);
+  Stage stage = schedule_.final_stage(lambda_);
+  stage.max_iterations = steps;
   std::optional<Outcome> next = or_back(
       before, [&] { return run_stage_around(cells, stage) ? measured_outcome(outcome_.pairs == 0) : std::nullopt; });
   if (next && is_better(*next)) {
@@ -322,9 +320,7 @@ HighOrderFit::Again HighOrderFit::draw_in_far_places() {
     const double far = std::max(kFarShare * outcome_.mean_percent, kNearPercent);
     if (!(outcome_.max_percent > far)) break;
     const double first = kFirstFarLength * outcome_.mean_percent / 100;
-    Stage stage = schedule_.final_stage(lambda_);
-    stage.max_iterations = kDrawSteps;
-    last = run_again(far_cells(kStartOfFar * far), far_length_, far_length_ == 0 ? first : far_length_ / 2, stage);
+    last = run_again(far_cells(kStartOfFar * far), far_length_, far_length_ == 0 ? first : far_length_ / 2, kDrawSteps);
   }
   return last;
 }
@@ -346,10 +342,7 @@ HighOrderFit::Again HighOrderFit::lift(double& setting, const LiftValues& values
   double attempted = setting;
   for (int failures = 0; failures < kMostFailedLifts && is_poor() && attempted < values.last;) {
     attempted = attempted == 0 ? values.first : values.factor * attempted;
-    Stage stage = schedule_.final_stage(lambda_);
-    stage.max_iterations = kLiftSteps;
-    stage.relative_decrease = kNoEnd;
-    const Again last = run_again(poor_cells(), setting, attempted, stage);
+    const Again last = run_again(poor_cells(), setting, attempted, kLiftSteps);
     if (last == Again::ended) return last;
     failures = last == Again::kept ? 0 : failures + 1;
   }
