@@ -33,7 +33,7 @@ constexpr double kHingeAboveQuality = 0.2;
 
 /// Share of the target's sharp edges, by length, that creases must follow for the lower of the two usual lambdas: soft
 /// cells are pressed flat where the surface is drawn into an edge that they do not follow. Of a wedge of 15 degrees
-/// whose tip is not followed, they kept a least scaled Jacobian of 0.02 instead of 0.70.
+/// whose tip is not followed, they kept a least scaled Jacobian of 0.02 instead of 0.73.
 constexpr double kNearlyAllEdges = 0.98;
 
 HighOrderFitOptions checked(const HighOrderFitOptions& options) {

@@ -30,6 +30,7 @@ inline constexpr double kTemplateShareOfTime = 0.5;
 /// its subdivision surface from folding (`unfolding_tags`).
 ///
 /// options  as for `fit_automatically`; distances larger than the two above are aimed at all the same.
+/// use      what the template is for: curved cells may need more cells.
 /// returns  the best of the numbers of cells tried; without cells if the fit was ended before there was a mesh.
 /// InputError: as `fit_automatically`. Deterministic, except under a time limit.
 AutomaticFitResult fit_template(const TriangleMesh& target, AutomaticFitOptions options = {},

@@ -64,7 +64,7 @@ struct FitReport {
   std::vector<StageRecord> stages;
   double initial_distance_mean_percent = 0, initial_distance_max_percent = 0;
   TargetReport target;                     ///< state of the target
-  std::optional<CreaseDistance> creases;   ///< for the limit surface; empty if no sharp edges are followed
+  std::optional<CreaseDistance> creases;   ///< of the result's surface; empty if there are no edges to follow
   std::vector<std::string> warnings;       ///< findings of the template's audit, a topology mismatch, ...
   std::vector<std::pair<std::string, double>> seconds;  ///< by part: "levels", "solve", "distance" or just "total"
 
