@@ -313,7 +313,10 @@ void append_node_data(std::string& text, const VertexField& field) {
 
 }  // namespace
 
-std::uint8_t vtk_type(CellKind kind) { return kind == CellKind::tet ? 71 : kind == CellKind::hex ? 72 : 73; }
+std::uint8_t vtk_type(CellKind kind, bool is_bezier) {
+  const int first = is_bezier ? 78 : 71;
+  return static_cast<std::uint8_t>(first + (kind == CellKind::tet ? 0 : kind == CellKind::hex ? 1 : 2));
+}
 
 std::uint8_t vtk_linear_type(CellKind kind) {
   constexpr std::uint8_t kTypes[] = {10, 13, 12, 14};
@@ -354,7 +357,8 @@ std::string vtu_document(const CellView& mesh, std::span<const double> cell_mini
   const std::vector<std::int64_t> ends(mesh.offsets.begin() + 1, mesh.offsets.end());
   const std::vector<std::int32_t> references(mesh.references.begin(), mesh.references.end());
   std::vector<std::uint8_t> types;
-  for (const CellKind kind : mesh.kinds) types.push_back(is_linear ? vtk_linear_type(kind) : vtk_type(kind));
+  for (const CellKind kind : mesh.kinds)
+    types.push_back(is_linear ? vtk_linear_type(kind) : vtk_type(kind, mesh.has_control_points));
   std::string text = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"") +
                      (is_linear ? "1.0" : "2.2") +
                      "\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  <UnstructuredGrid>\n";

@@ -23,6 +23,7 @@ struct CellView {
   std::span<const int> references;  ///< one per cell, or empty: all 0
   const GroupedFaces* faces = nullptr;  ///< for a .msh; may be null
   std::span<const Group> regions{};     ///< names of references, for a .msh
+  bool has_control_points = false;      ///< the nodes of cells with orders are control points, for a .vtu
 
   std::size_t num_cells() const { return kinds.size(); }
   int order(std::size_t c) const { return orders.empty() ? 1 : orders[c]; }
@@ -30,20 +31,21 @@ struct CellView {
 };
 
 /// Text of a .vtu: of version 1.0 with plain cells (10, 12, 13, 14) without `orders`, else of version 2.2 with Lagrange
-/// cells and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty. They stand
-/// behind the grid, because some readers stop at field data before it; the groups of plain cells stand at its end.
+/// or Bezier cells and the cell data `order`. field_data, group_data: `<DataArray>` elements of our own, or empty. They
+/// stand behind the grid, because some readers stop at field data before it; the groups of plain cells stand at its
+/// end.
 std::string vtu_document(const CellView& mesh, std::span<const double> cell_minima, std::span<const VertexField> fields,
                          const std::string& field_data = {}, const std::string& group_data = {});
 
 /// Largest order that is written for a kind of cell: that which Gmsh evaluates (10 for tets, 2 for prisms, 9 for
 /// hexes), and 1 for pyramids.
 int max_gmsh_order(CellKind kind);
-/// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted); VTK's for Lagrange cells of a
-/// kind other than pyramids.
+/// Gmsh's type number for cells of a kind and order, 1 .. max_gmsh_order (asserted).
 int gmsh_type(CellKind kind, int order);
 /// Returns Gmsh's type number of a face of 3 or 4 corners, of an order from 1 to 10.
 int gmsh_face_type(std::size_t num_corners, int order);
-std::uint8_t vtk_type(CellKind kind);
+/// VTK's type number of a Lagrange cell, or of a Bezier cell, of a kind other than pyramids.
+std::uint8_t vtk_type(CellKind kind, bool is_bezier = false);
 /// VTK's type number of a linear cell.
 std::uint8_t vtk_linear_type(CellKind kind);
 /// Renumbers the six corners of a prism to VTK's plain wedge, or back: the normal of its first triangle points outward.

@@ -12,6 +12,7 @@
 #include "subvol/export/text_format.h"
 #include "subvol/export/vtu_reader.h"
 #include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/io/bezier_cells.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/inherited_groups.h"
 #include "subvol/mesh/validate.h"
@@ -121,10 +122,17 @@ void require_gmsh_orders(const ElementSpace& space) {
 
 // --- Reading --------------------------------------------------------------------------------------------------------
 
-CellKind kind_of(const VtuArrays& file, std::uint8_t type) {
-  if (type != 71 && type != 72 && type != 73)
-    file.fail("types: expected 71, 72 and 73 (Lagrange cells), found " + std::to_string(type));
-  return type == 71 ? CellKind::tet : type == 72 ? CellKind::hex : CellKind::prism;
+struct VtuType {
+  CellKind kind;
+  bool is_bezier;
+};
+
+VtuType vtu_type(const VtuArrays& file, std::uint8_t type) {
+  for (const CellKind kind : {CellKind::tet, CellKind::hex, CellKind::prism})
+    for (const bool is_bezier : {false, true})
+      if (type == vtk_type(kind, is_bezier)) return {kind, is_bezier};
+  file.fail("types: expected 71, 72 and 73 (Lagrange cells) or 78, 79 and 80 (Bezier cells), found " +
+            std::to_string(type));
 }
 
 /// Reads the corners of the cells; positions are those of the points.
@@ -139,7 +147,7 @@ VolumeMesh read_corners(const VtuArrays& file, std::int64_t num_vertices) {
   for (std::int64_t v = 0; v < num_vertices; ++v) mesh.positions.emplace_back(&points[3 * static_cast<std::size_t>(v)]);
   std::vector<Index> corners;
   for (std::size_t c = 0; c < types.size(); ++c) {
-    const CellKind kind = kind_of(file, types[c]);
+    const CellKind kind = vtu_type(file, types[c]).kind;
     const std::int64_t begin = c ? ends[c - 1] : 0, size = cell_topology(kind).num_vertices;
     if (begin < 0 || ends[c] < begin || ends[c] - begin < size || ends[c] > static_cast<std::int64_t>(nodes.size()))
       file.fail("offsets: cell " + std::to_string(c) + ": expected at least its corners");
@@ -285,8 +293,13 @@ std::string vtu_text(const HighOrderMesh& mesh, const HighOrderFileOptions& opti
   require_writable(mesh, options);
   const PolynomialMap written = file_cells(mesh, ".vtu", options.map_tolerance_percent);
   const std::vector<int> orders = lagrange_orders(written.mesh.space, kMaxVtkOrder);
-  const LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::vtk);
-  return vtu_document(view_of(cells, options.references), minima_of(written, options),
+  LagrangeMesh cells = lagrange_mesh(written.mesh, orders, NodeOrdering::vtk);
+  const bool has_control_points = options.vtu_cells == VtuCells::bezier;
+  if (has_control_points) use_control_points(cells);
+  CellView view = view_of(cells, options.references);
+  view.has_control_points = has_control_points;
+  // Bernstein polynomials reproduce linear functions: a field's control values are its values at the grid's points.
+  return vtu_document(view, minima_of(written, options),
                       fields_at_points(mesh, orders, NodeOrdering::vtk, options.fields),
                       field_data(mesh, written.distance_bound),
                       group_data(options.face_groups ? *options.face_groups : VolumeFaceGroups{}, options.regions));
@@ -357,7 +370,7 @@ HighOrderFile read_high_order(const std::filesystem::path& path) {
   }
 }
 
-HighOrderMesh read_lagrange_cells(const std::filesystem::path& path) {
+HighOrderMesh read_polynomial_cells(const std::filesystem::path& path) {
   if (lower_case_extension(path) != ".vtu") throw InputError(path.string() + ": expected the extension .vtu");
   const std::string bytes = read_file(path);
   const VtuArrays file(path.string(), bytes);
@@ -366,35 +379,40 @@ HighOrderMesh read_lagrange_cells(const std::filesystem::path& path) {
   const auto types = file.get<std::uint8_t>("types");
   if (coordinates.size() % 3 != 0) file.fail("Points: expected three coordinates for each point");
   if (ends.size() != types.size() || types.empty()) file.fail("expected one offset and one type for each cell");
-  std::vector<Vec3> points;
+  NodalMesh cells;
   for (std::size_t i = 0; i < coordinates.size(); i += 3) {
-    points.emplace_back(&coordinates[i]);
-    if (!points.back().allFinite()) file.fail("Points: expected finite numbers");
+    cells.positions.emplace_back(&coordinates[i]);
+    if (!cells.positions.back().allFinite()) file.fail("Points: expected finite numbers");
   }
-  std::vector<CellKind> kinds;
-  std::vector<int> orders;
-  std::vector<std::size_t> offsets{0};
-  std::vector<Index> nodes;
   for (const std::int64_t node : connectivity) {
-    if (node < 0 || node >= static_cast<std::int64_t>(points.size()))
+    if (node < 0 || node >= static_cast<std::int64_t>(cells.positions.size()))
       file.fail("connectivity: expected a number of a point, found " + std::to_string(node));
-    nodes.push_back(static_cast<Index>(node));
+    cells.nodes.push_back(static_cast<Index>(node));
   }
+  std::vector<std::size_t> beziers;
   for (std::size_t c = 0; c < types.size(); ++c) {
-    const CellKind kind = kind_of(file, types[c]);
-    if (ends[c] < static_cast<std::int64_t>(offsets.back()) || ends[c] > static_cast<std::int64_t>(nodes.size()))
+    const auto [kind, is_bezier] = vtu_type(file, types[c]);
+    if (is_bezier) beziers.push_back(c);
+    const std::size_t begin = cells.offsets.back();
+    if (ends[c] < static_cast<std::int64_t>(begin) || ends[c] > static_cast<std::int64_t>(cells.nodes.size()))
       file.fail("offsets: cell " + std::to_string(c) + ": expected ascending numbers within the connectivity");
-    const auto size = static_cast<std::size_t>(ends[c]) - offsets.back();
+    const auto size = static_cast<std::size_t>(ends[c]) - begin;
     int order = 1;
     while (order < kMaxVtkOrder && num_lattice_points(kind, order) < size) ++order;
     if (num_lattice_points(kind, order) != size)
       file.fail("offsets: cell " + std::to_string(c) + ": " + std::to_string(size) + " nodes are those of no " +
                 cell_topology(kind).name + " of an order from 1 to " + std::to_string(kMaxVtkOrder));
-    kinds.push_back(kind);
-    orders.push_back(order);
-    offsets.push_back(static_cast<std::size_t>(ends[c]));
+    cells.kinds.push_back(kind);
+    cells.orders.push_back(order);
+    cells.offsets.push_back(static_cast<std::size_t>(ends[c]));
   }
-  return polynomials_of({points, kinds, orders, offsets, nodes, {}}, NodeOrdering::vtk);
+  try {
+    control_points_to_nodes(cells, beziers);
+  } catch (const InputError& error) {
+    file.fail(error.what());
+  }
+  return polynomials_of({cells.positions, cells.kinds, cells.orders, cells.offsets, cells.nodes, {}},
+                        NodeOrdering::vtk);
 }
 
 }  // namespace subvol

@@ -17,6 +17,10 @@ namespace subvol {
 /// Default of `map_tolerance_percent`: far below the distances to targets that fits reach (0.01 to 0.03 %).
 inline constexpr double kMapTolerancePercent = 0.001;
 
+/// Cells of VTK that hold polynomials in a .vtu: by points on the cell, or by control points in the Bernstein basis,
+/// which programs of isogeometric analysis take.
+enum class VtuCells { lagrange, bezier };
+
 /// Data written to a file of a high-order mesh besides the mesh, and the resolution of its linear or polynomial cells.
 struct HighOrderFileOptions {
   std::span<const double> cell_minima{};  ///< one scaled Jacobian per cell, or empty: cell data `scaled_jacobian`
@@ -25,6 +29,7 @@ struct HighOrderFileOptions {
   const VolumeFaceGroups* face_groups = nullptr;  ///< named faces of the cells; may be null
   std::span<const Group> regions{};       ///< names of references
   MshVersion msh_version = MshVersion::v4_1;  ///< of a .msh
+  VtuCells vtu_cells = VtuCells::lagrange;    ///< of a .vtu
   /// Fields with one number per vertex of the mesh: point data of .vtu and .msh, interpolated linearly (order 1 of the
   /// cell's kind).
   std::span<const VertexField> fields{};
@@ -57,15 +62,15 @@ NodalMesh written_nodes(const HighOrderMesh& mesh, const std::string& extension,
 
 /// Returns the mesh as a VTK XML unstructured grid, version 2.2, with arrays in base64.
 ///
-/// Cells are Lagrange tets, wedges and hexes (71, 73, 72): those of `file_cells`, each with the largest order of its
-/// edges, faces and interior (cell data `order`). `scaled_jacobian` is that of these cells: it is measured again if
-/// they differ from the map. Points that cells of equal order have in common are written once; the first points are the
-/// mesh's vertices, and the first of every cell are its corners. The map itself is in the field data, for
-/// `read_high_order`:
+/// Cells are Lagrange or Bezier tets, wedges and hexes (71, 73, 72, or 78, 80, 79): those of `file_cells`, each with
+/// the largest order of its edges, faces and interior (cell data `order`). `scaled_jacobian` is that of these cells: it
+/// is measured again if they differ from the map. Points that cells of equal order have in common are written once; the
+/// first points are the mesh's vertices, and the first of every cell are its corners. The map itself is in the field
+/// data, for `read_high_order`:
 ///
 ///   subvol_format        Int64: 1, basis (0 fourier, 1 legendre), number of vertices
-///   subvol_cells_distance  Float64: upper bound of the distance between the Lagrange cells and the map, 0 if they are
-///                        the same
+///   subvol_cells_distance  Float64: upper bound of the distance between the cells of the file and the map, 0 if they
+///                        are the same
 ///   subvol_edge_orders, subvol_face_orders, subvol_cell_orders      UInt8, numbered as in MeshTopology
 ///   subvol_coefficients  Float64, 3 per node, numbered as in ElementSpace
 ///
@@ -103,8 +108,8 @@ struct HighOrderFile {
 /// be inverted). Memory: a few times the size of the file.
 HighOrderFile read_high_order(const std::filesystem::path& path);
 
-/// Reads the Lagrange cells of such a file and ignores its field data: the result holds the polynomials that any other
-/// reader reconstructs (`polynomials_of`), cell by cell in the same order. InputError: as `read_high_order`.
-HighOrderMesh read_lagrange_cells(const std::filesystem::path& path);
+/// Reads the Lagrange or Bezier cells of such a file and ignores its field data: the result holds the polynomials that
+/// any other reader reconstructs (`polynomials_of`), cell by cell in the same order. InputError: as `read_high_order`.
+HighOrderMesh read_polynomial_cells(const std::filesystem::path& path);
 
 }  // namespace subvol

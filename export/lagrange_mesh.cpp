@@ -4,6 +4,7 @@
 #include "subvol/base/error.h"
 #include "subvol/base/parallel_errors.h"
 #include "subvol/fit/elements/pattern_table.h"
+#include "subvol/io/bezier_cells.h"
 #include "subvol/mesh/pyramids.h"
 
 #include <algorithm>
@@ -234,6 +235,10 @@ LagrangeMesh lagrange_mesh(const HighOrderMesh& mesh, std::span<const int> order
   std::copy_n(mesh.coefficients.begin(), space.num_vertices(), out.positions.begin());
   evaluate(mesh, lattices, out);
   return out;
+}
+
+void use_control_points(LagrangeMesh& mesh) {
+  nodes_to_control_points(mesh.positions, {mesh.kinds, mesh.orders, mesh.cell_offsets, mesh.cell_nodes});
 }
 
 std::vector<int> lagrange_orders(const ElementSpace& space, int limit) {

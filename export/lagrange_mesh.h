@@ -32,6 +32,10 @@ struct LagrangeMesh {
 /// any number of threads.
 LagrangeMesh lagrange_mesh(const HighOrderMesh& mesh, std::span<const int> orders, NodeOrdering ordering);
 
+/// Makes the points of a mesh in the order of VTK the control points of the same polynomials
+/// (`nodes_to_control_points`). Numbers and orders stay the same.
+void use_control_points(LagrangeMesh& mesh);
+
 /// Returns for every cell the largest order of its edges, faces and interior, but no more than `limit`.
 std::vector<int> lagrange_orders(const ElementSpace& space, int limit);
 

@@ -150,7 +150,8 @@ void compare_vtu(const WrittenFile& file, const CellView& wanted) {
     file.same(std::equal(wanted.positions[v].begin(), wanted.positions[v].end(), &points[3 * v]), "point", v);
   for (std::size_t c = 0; c < wanted.num_cells(); ++c) {
     const bool is_linear = wanted.orders.empty();
-    file.same(types[c] == (is_linear ? vtk_linear_type(wanted.kinds[c]) : vtk_type(wanted.kinds[c])),
+    const CellKind kind = wanted.kinds[c];
+    file.same(types[c] == (is_linear ? vtk_linear_type(kind) : vtk_type(kind, wanted.has_control_points)),
               "the kind of cell", c);
     file.same(ends[c] == static_cast<std::int64_t>(wanted.offsets[c + 1]), "the end of cell", c);
     std::vector<std::int64_t> cell(wanted.cell(c).begin(), wanted.cell(c).end());
@@ -484,15 +485,24 @@ void require_written(const fs::path& path, const HighOrderMesh& mesh, const High
   read_back(path, [&](const WrittenFile& file) {
     const bool is_vtu = extension == ".vtu";
     const HighOrderMesh written = file_cells(mesh, extension, options.map_tolerance_percent).mesh;
-    const LagrangeMesh cells = lagrange_mesh(written, lagrange_orders(written.space, kMaxOrder),
-                                             is_vtu ? NodeOrdering::vtk : NodeOrdering::gmsh);
+    const bool has_control_points = is_vtu && options.vtu_cells == VtuCells::bezier;
+    LagrangeMesh cells = lagrange_mesh(written, lagrange_orders(written.space, kMaxOrder),
+                                       is_vtu ? NodeOrdering::vtk : NodeOrdering::gmsh);
+    if (has_control_points) use_control_points(cells);
     const GroupedFaces faces = options.face_groups && !is_vtu
                                    ? grouped_faces(cells, mesh.space.topology(), *options.face_groups)
                                    : GroupedFaces{};
-    compare_cells(
-        file, extension,
-        {cells.positions, cells.kinds, cells.orders, cells.cell_offsets, cells.cell_nodes, options.references, &faces},
-        options.msh_version);
+    compare_cells(file, extension,
+                  {cells.positions,
+                   cells.kinds,
+                   cells.orders,
+                   cells.cell_offsets,
+                   cells.cell_nodes,
+                   options.references,
+                   &faces,
+                   {},
+                   has_control_points},
+                  options.msh_version);
     if (is_vtu) compare_map(file, mesh, options);
   });
 }

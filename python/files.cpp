@@ -46,6 +46,7 @@ struct Writing {
     keywords.take("limit", limit);
     keywords.take("intervals", options.linear_intervals);
     keywords.take("msh_version", options.msh_version, {{"2.2", MshVersion::v2_2}, {"4.1", MshVersion::v4_1}});
+    keywords.take("vtu_cells", options.vtu_cells, {{"lagrange", VtuCells::lagrange}, {"bezier", VtuCells::bezier}});
     keywords.take("map_tolerance", options.map_tolerance_percent);
     if (!(options.map_tolerance_percent >= 0)) throw InputError("map_tolerance: expected 0 or more");
     keywords.finish();
@@ -163,7 +164,7 @@ of curved ones, or SurfaceMesh.
 check  refuse volume meshes that are not sound, but for inverted cells and unused points)");
   module.def("write", &write, py::arg("path"), py::arg("what"),
              R"(write(path, what, *, chord=0.05, unit=1.0, up='y', limit=False, intervals=0, cut=None, wireframe=True,
-    quantize=False, map_tolerance=0.001, msh_version='4.1')
+    quantize=False, map_tolerance=0.001, msh_version='4.1', vtu_cells='lagrange')
 --
 
 Writes a mesh or a result; the extension chooses the format (`subvol formats` lists them). A file of that name is
@@ -183,7 +184,8 @@ limit      a VolumeMesh is a control mesh: scenes show its limit surface
 intervals  of each edge of a curved cell where it becomes linear ones (.mesh, .vtk); 0: the largest order
 map_tolerance  largest distance between curved cells and the polynomials that stand for them in .vtu and .msh, per cent
            of the diagonal; a warning tells if it is larger, or if these cells are not valid
-msh_version  of a .msh: '4.1', or '2.2', which more programs read)");
+msh_version  of a .msh: '4.1', or '2.2', which more programs read
+vtu_cells  curved cells of a .vtu: 'lagrange', or 'bezier', whose points are control points)");
 }
 
 }  // namespace subvol::python

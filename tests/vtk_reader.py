@@ -14,6 +14,7 @@ import sys
 POSITION_TOLERANCE = 1e-10
 EXODUS_TOLERANCE = 1e-6  # VTK reads the points of Exodus in single precision
 DERIVATIVE_TOLERANCE = 1e-8
+FIRST_BEZIER = 78  # VTK 9.1 leaves the derivatives of Bezier cells uninitialized: only their positions are compared
 
 try:
     import numpy as np
@@ -61,7 +62,7 @@ def main():
             found = [0.0, 0.0, 0.0]
             cell.EvaluateLocation(mutable(0), at, found, [0.0] * num_points)
             errors = [np.abs(np.array(found) - expected[:3]).max(), 0.0]
-            if len(expected) > 3:
+            if len(expected) > 3 and cell_type < FIRST_BEZIER:
                 points = vtk_to_numpy(cell.GetPoints().GetData())
                 jacobian = points.T @ derivatives(cell, at, num_points)
                 errors[1] = np.abs(jacobian.T.reshape(9) - expected[3:]).max()

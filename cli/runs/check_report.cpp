@@ -38,7 +38,7 @@ LagrangeCheck check_lagrange_cells(const std::filesystem::path& path, const High
   // Covers the rounding of points and of the interpolation through them (`polynomials_of`), far below any distance that
   // matters.
   constexpr double kRoundingPercent = 1e-7;
-  const HighOrderMesh cells = read_lagrange_cells(path);
+  const HighOrderMesh cells = read_polynomial_cells(path);
   LagrangeCheck check;
   const int samples = 2 * std::max(mesh.space.max_order(), cells.space.max_order()) + 1;
   check.difference_percent = 100 * sampled_distance(mesh, cells, samples) / vertex_diagonal(mesh);

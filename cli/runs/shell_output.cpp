@@ -172,6 +172,7 @@ void write_shell(const Output& output, const ShellResult& shell, const CurvedShe
                                .references = shell.mesh.references,
                                .face_groups = &shell.mesh.face_groups,
                                .msh_version = options.msh_version,
+                               .vtu_cells = options.vtu_cells,
                                .fields = fields,
                                .map_tolerance_percent = options.map_tolerance_percent});
   }

@@ -141,6 +141,7 @@ HighOrderFileOptions file_options(const HighOrderFile& file, std::span<const dou
           .face_groups = &file.face_groups,
           .regions = file.regions,
           .msh_version = options.msh_version,
+          .vtu_cells = options.vtu_cells,
           .linear_intervals = options.linear_intervals,
           .map_tolerance_percent = options.map_tolerance_percent};
 }

@@ -29,6 +29,7 @@ struct WritingOptions {
   bool quantize = false;          ///< writes scenes with small integers
   double map_tolerance_percent = kMapTolerancePercent;  ///< of polynomial cells in place of curved ones
   MshVersion msh_version = MshVersion::v4_1;
+  VtuCells vtu_cells = VtuCells::lagrange;
   int linear_intervals = 0;       ///< per edge of a curved cell in .mesh and .vtk; 0: its mesh's largest order
 };
 

@@ -160,6 +160,15 @@ void add_msh_version_option(CLI::App& verb, WritingOptions& options) {
 
 void add_writing_options(CLI::App& verb, WritingOptions& options) {
   add_msh_version_option(verb, options);
+  verb.add_option_function<std::string>(
+          "--vtu-cells",
+          [&options](const std::string& text) {
+            options.vtu_cells = text == "bezier" ? VtuCells::bezier : VtuCells::lagrange;
+          },
+          "How a .vtu holds curved cells: Lagrange cells, or Bezier cells, whose points are control points")
+      ->check(CLI::IsMember({"lagrange", "bezier"}))
+      ->type_name("lagrange|bezier")
+      ->default_str("lagrange");
   const auto group = "Surfaces for DCC tools";
   options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,

@@ -32,7 +32,7 @@ void add_long_run_options(CLI::App& verb, RunOptions& options);
 void add_checkpoint_options(CLI::App& verb, RunOptions& options);
 /// --msh-version.
 void add_msh_version_option(CLI::App& verb, WritingOptions& options);
-/// --msh-version, --chord, --unit, --up, --cut, --no-wireframe, --quantize.
+/// --msh-version, --vtu-cells, --chord, --unit, --up, --cut, --no-wireframe, --quantize.
 void add_writing_options(CLI::App& verb, WritingOptions& options);
 
 /// --regions. Its value is empty unless it is given, so that it is not among the options that files record.

@@ -378,4 +378,5 @@ def write(
     quantize: bool = False,
     map_tolerance: float = 0.001,
     msh_version: Literal["2.2", "4.1"] = "4.1",
+    vtu_cells: Literal["lagrange", "bezier"] = "lagrange",
 ) -> None: ...

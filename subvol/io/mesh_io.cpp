@@ -162,7 +162,7 @@ void turn_over_mirrored(ParsedMesh& parsed, bool mend) {
 
 FileCells read_cells(const fs::path& path, const ReadOptions& options) {
   const std::string name = path.string(), bytes = read_file(path);
-  const bool is_medit = lower_case(path.extension().string()) == ".mesh" && !is_mfem(bytes);
+  const bool is_medit = lower_case(path.extension().string()) == ".mesh" && !is_mfem(bytes) && !is_gmsh(bytes);
   ParsedMesh parsed;
   if (is_medit) {
     parsed = parse_medit(name, bytes, options.references);

@@ -387,7 +387,10 @@ class VtkParser {
       for (const std::int64_t node : nodes)  // nodes that complete cells come after those of the file
         if (node < 0 || static_cast<std::uint64_t>(node) >= num_points)
           fail("names point " + std::to_string(node) + " of " + std::to_string(num_points));
-      if (add_vtk_cell(mesh_, cells, type, nodes, old_numbers_, fail) == VtkCellUse::lower_dimension)
+      const VtkCellUse use = add_vtk_cell(mesh_, cells, type, nodes, old_numbers_, fail);
+      if (use == VtkCellUse::bezier)
+        fail("has VTK type " + std::to_string(type) + ", a Bezier cell, which is only read from a .vtu");
+      if (use == VtkCellUse::lower_dimension)
         ++num_skipped_;
       else
         add_reference(c);

@@ -28,13 +28,15 @@ NodalMesh parse_cgns(const std::string& name, std::string_view bytes, const std:
 /// also an unknown extension.
 NodalMesh parse_nodal(const std::filesystem::path& path, std::string_view bytes, const std::string& references);
 
-/// True if the bytes begin as an MFEM mesh; a .mesh may also be Medit's.
+/// True if the bytes begin as an MFEM mesh, or as Gmsh's; a .mesh may be of either program or Medit's.
 bool is_mfem(std::string_view bytes);
+bool is_gmsh(std::string_view bytes);
 
-/// Tells if `add_vtk_cell` added a cell, or left it out because it is a point, a line or a face.
-enum class VtkCellUse { added, lower_dimension };
+/// Tells if `add_vtk_cell` added a cell, added one whose nodes are control points so far, or left it out because it is
+/// a point, a line or a face.
+enum class VtkCellUse { added, bezier, lower_dimension };
 
-/// Appends a cell of a VTK type, linear, quadratic or Lagrange, to a mesh.
+/// Appends a cell of a VTK type, linear, quadratic, Lagrange or Bezier, to a mesh.
 ///
 /// nodes        the cell's points, in VTK's order.
 /// old_numbers  true if the file is older than XML 2.1 or legacy 5.1: the last two edges of a Lagrange hex are swapped.

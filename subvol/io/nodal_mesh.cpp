@@ -141,7 +141,8 @@ NodalMesh internal::parse_nodal(const fs::path& path, std::string_view bytes, co
   if (!format)
     throw InputError(path.string() + ": unknown volume mesh extension " + in_quotes(path.extension().string()) +
                      ", expected " + readable_formats(true));
-  NodalMesh mesh = format->parse(path.string(), bytes, references);
+  const bool is_gmsh_mesh = format->parse == parse_mfem && is_gmsh(bytes);
+  NodalMesh mesh = (is_gmsh_mesh ? parse_msh : format->parse)(path.string(), bytes, references);
   if (std::all_of(mesh.references.begin(), mesh.references.end(), [](int r) { return r == 0; }))
     mesh.references.clear();
   normalise(mesh.face_groups);

@@ -77,8 +77,8 @@ class NodalCells {
 
 /// Reads cells of any order; the extension chooses the format (docs/file-formats.md).
 ///
-///   .msh                 Gmsh 2.2, 4.0 and 4.1, ASCII or binary
-///   .vtu                 VTK XML, 0.1 to 2.2, ASCII, base64 or appended, compressed or not
+///   .msh, or a .mesh that begins with "$MeshFormat"      Gmsh 2.2, 4.0 and 4.1, ASCII or binary
+///   .vtu                 VTK XML, 0.1 to 2.2, ASCII, base64 or appended, compressed or not; Bezier cells, too
 ///   .vtk                 legacy VTK
 ///   .inp                 Abaqus and CalculiX
 ///   .bdf .nas .fem       Nastran bulk data

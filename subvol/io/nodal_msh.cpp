@@ -455,6 +455,8 @@ class MshParser {
 
 }  // namespace
 
+bool is_gmsh(std::string_view bytes) { return bytes.starts_with("$MeshFormat"); }
+
 NodalMesh parse_msh(const std::string& name, std::string_view bytes, const std::string&) {
   return MshParser(name, bytes).parse();
 }

@@ -50,15 +50,18 @@ std::string refusal(int type) {
                                                                  types.end(); };
   const std::string text = "has VTK type " + std::to_string(type);
   if (is({27, 37, 74, 81})) return std::string("is a curved pyramid: ") + kNoCurvedPyramids;
-  if (is({78, 79, 80})) return text + ", a Bezier cell, which is not read";
   if (is({41, 42, 15, 16})) return text + ", a polyhedron, which is not read";
   return text +
          ", expected 10 (tet), 11 (voxel), 12 (hex), 13 (wedge), 14 (pyramid), the quadratic forms 24, 25, 26, 29 and "
-         "32, or Lagrange cells 71, 72 and 73";
+         "32, Lagrange cells 71, 72 and 73, or Bezier cells 78, 79 and 80";
 }
 
-/// The order of a Lagrange cell of so many nodes; 0 if there is none.
-int lagrange_order(CellKind kind, std::size_t num_nodes) {
+/// A cell of any order, by its first type; Bezier cells are numbered alike.
+constexpr int kFirstLagrange = 71, kFirstBezier = 78;
+constexpr CellKind kHigherKinds[] = {CellKind::tet, CellKind::hex, CellKind::prism};
+
+/// The order of a Lagrange or Bezier cell of so many nodes; 0 if there is none.
+int order_of(CellKind kind, std::size_t num_nodes) {
   constexpr int kMostOrder = 16;
   for (int order = 1; order <= kMostOrder; ++order)
     if (num_lattice_points(kind, order) == num_nodes) return order;
@@ -84,10 +87,11 @@ VtkCellUse add_vtk_cell(NodalMesh& mesh, NodalCells& cells, int type, std::span<
   const auto fixed = std::find_if(fixed_cells().begin(), fixed_cells().end(),
                                   [&](const FixedCell& cell) { return cell.type == type; });
   const bool is_fixed = fixed != fixed_cells().end();
-  if (!is_fixed && (type < 71 || type > 73)) fail(refusal(type));
-  const CellKind kind = is_fixed ? fixed->kind
-                        : type == 71 ? CellKind::tet : type == 72 ? CellKind::hex : CellKind::prism;
-  const int order = is_fixed ? fixed->order : lagrange_order(kind, nodes.size());
+  const bool is_bezier = type >= kFirstBezier && type < kFirstBezier + 3;
+  const int higher_kind = type - (is_bezier ? kFirstBezier : kFirstLagrange);
+  if (!is_fixed && (higher_kind < 0 || higher_kind > 2)) fail(refusal(type));
+  const CellKind kind = is_fixed ? fixed->kind : kHigherKinds[higher_kind];
+  const int order = is_fixed ? fixed->order : order_of(kind, nodes.size());
   if (is_fixed && nodes.size() != fixed->size)
     fail("of VTK type " + std::to_string(type) + " has " + std::to_string(nodes.size()) + " points, expected " +
          std::to_string(fixed->size));
@@ -101,9 +105,9 @@ VtkCellUse add_vtk_cell(NodalMesh& mesh, NodalCells& cells, int type, std::span<
       fail("names point " + std::to_string(v) + " of " + std::to_string(mesh.positions.size()));
     own.push_back(static_cast<Index>(v));
   }
-  if (type == 72 && old_numbers && order > 1) swap_last_edges(order, own);
+  if (!is_fixed && kind == CellKind::hex && old_numbers && order > 1) swap_last_edges(order, own);
   cells.add(kind, order, NodeOrdering::vtk, own);
-  return VtkCellUse::added;
+  return is_bezier ? VtkCellUse::bezier : VtkCellUse::added;
 }
 
 }  // namespace subvol::internal

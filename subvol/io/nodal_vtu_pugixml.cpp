@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
+#include "subvol/io/bezier_cells.h"
 #include "subvol/io/cell_values.h"
 #include "subvol/io/left_out.h"
 #include "subvol/io/nodal_formats.h"
@@ -35,6 +36,7 @@ class VtuParser {
                                " pieces: points that they have in common are not merged");
     if (num_skipped_ > 0)
       mesh_.warnings.push_back(std::to_string(num_skipped_) + " cells of lower dimension are skipped");
+    if (!beziers_.empty()) read_control_points();
     choose_references();
     if (num_pieces == 1) read_groups();
     mesh_size_ = mesh_.positions.size();
@@ -89,6 +91,23 @@ class VtuParser {
     num_cells_read_ += num_cells;
   }
 
+  /// Bezier cells are polynomials if all weights of their points are 1, or if there are none.
+  void read_control_points() {
+    for (const pugi::xml_node piece : file_.grid().children("Piece")) {
+      const pugi::xml_node data = piece.child("PointData");
+      const std::string name = data.attribute("RationalWeights").as_string("RationalWeights");
+      const pugi::xml_node weights = data.find_child_by_attribute("DataArray", "Name", name.c_str());
+      if (!weights) continue;
+      for (const double weight : decode_vtk_xml_array(described(weights), file_.storage()))
+        if (weight != 1) fail(name + ": expected weights of 1 only: rational Bezier cells are no polynomials");
+    }
+    try {
+      control_points_to_nodes(mesh_, beziers_);
+    } catch (const InputError& error) {
+      fail(error.what());
+    }
+  }
+
   void add_cells(const std::vector<std::int64_t>& nodes, const std::vector<std::int64_t>& ends,
                  const std::vector<std::int64_t>& types, std::size_t first_point) {
     NodalCells cells(mesh_);
@@ -106,9 +125,10 @@ class VtuParser {
         node += static_cast<std::int64_t>(first_point);
       }
       const int type = static_cast<int>(std::clamp<std::int64_t>(types[c], -1, 1000000));
-      const bool added = add_vtk_cell(mesh_, cells, type, cell, file_.old_numbers(), refuse) == VtkCellUse::added;
-      num_skipped_ += !added;
-      is_volume_.push_back(added);
+      const VtkCellUse use = add_vtk_cell(mesh_, cells, type, cell, file_.old_numbers(), refuse);
+      if (use == VtkCellUse::bezier) beziers_.push_back(mesh_.num_cells() - 1);
+      num_skipped_ += use == VtkCellUse::lower_dimension;
+      is_volume_.push_back(use != VtkCellUse::lower_dimension);
     }
   }
 
@@ -221,6 +241,7 @@ class VtuParser {
   std::string asked_;
   NodalMesh mesh_;
   std::vector<bool> is_volume_;           ///< of all cells of the file: whether it is one of the mesh
+  std::vector<std::size_t> beziers_;      ///< cells that are given by their control points
   std::vector<CellNumbers> arrays_;
   std::vector<std::string> others_;
   std::size_t num_arrays_ = 0, num_left_out_ = 0, num_skipped_ = 0, num_cells_read_ = 0, mesh_size_ = 0;

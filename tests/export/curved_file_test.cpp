@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes of other programs: every node of a sheared, bent cell has one right place.
 
+#include "subvol/export/curved_file.h"
 #include "subvol/base/error.h"
 #include "subvol/base/text_scanner.h"
-#include "subvol/export/curved_file.h"
 #include "subvol/export/nodal_export.h"
 #include "subvol/export/volume_writer.h"
+#include "subvol/io/bezier_cells.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/io/nodal_writers.h"
 #include "subvol/io/node_points.h"
@@ -239,6 +240,40 @@ TEST_CASE("curved_file: curved meshes come back as the same polynomials", "[expo
       CHECK(sampled_distance(mesh, read.mesh, 7) < 1e-12);
     }
   }
+}
+
+TEST_CASE("curved_file: Bezier cells of a foreign .vtu are read as their polynomials", "[export]") {
+  const TemporaryFolder folder;
+  const HighOrderMesh mesh = curved_cells(3);
+  std::string text = vtu_text(mesh, {.vtu_cells = VtuCells::bezier});
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    REQUIRE(text.find(from) != std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("subvol_format", "foreign_format");  // the exact map is not taken
+  CHECK(sampled_distance(mesh, read_curved(folder.file("a.vtu", text)).mesh, 7) < 1e-12);
+  const auto with_weights = [&](const std::string& weights) {
+    replace("<CellData>", "<PointData><DataArray type=\"Float64\" Name=\"RationalWeights\" format=\"ascii\">" +
+                              weights + "</DataArray></PointData><CellData>");
+    return folder.file("b.vtu", text);
+  };
+  CHECK_THROWS_WITH(read_curved(with_weights("1 1 0.5")), Contains("rational Bezier cells are no polynomials"));
+}
+
+TEST_CASE("curved_file: Bezier cells that share a point, but no edge or face, are refused", "[export]") {
+  NodalMesh mesh;
+  NodalCells cells(mesh);
+  for (const double x : {0.0, 2.0}) {
+    std::vector<Index> nodes;
+    for (const LatticePoint& at : cell_lattice(CellKind::hex, 2, NodeOrdering::vtk)) {
+      nodes.push_back(static_cast<Index>(mesh.positions.size()));
+      mesh.positions.push_back(at.cast<double>() / 2 + Vec3(x + 0.2 * at[1] * at[1], 0, 0));
+    }
+    if (x > 0) nodes[8] = 8;  // the middle of an edge of the first cell
+    cells.add(CellKind::hex, 2, NodeOrdering::vtk, nodes);
+  }
+  const std::vector<std::size_t> both{0, 1};
+  CHECK_THROWS_WITH(control_points_to_nodes(mesh, both), Contains("cells 0 and 1 share point 8"));
 }
 
 TEST_CASE("curved_file: an order-2 mesh becomes C3D20 with its edges on the curve", "[export]") {

@@ -81,6 +81,11 @@ TEST_CASE("nodal_mesh: Gmsh 4.1 with sparse tags, parametric nodes, groups and n
   CHECK(mesh.face_groups.faces[0].face == FaceKey{0, 1, 2, kNoIndex});
 }
 
+TEST_CASE("nodal_mesh: a .mesh may be Gmsh's", "[io]") {
+  require_unit_tet(read("a.mesh", kMsh41));
+  CHECK(read_volume_mesh(nodal_folder() / "a.mesh").num_cells() == 1);
+}
+
 TEST_CASE("nodal_mesh: Gmsh 4.0 and 2.2 in text", "[io]") {
   require_unit_tet(read("a.msh", "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n0 0 0 1\n1 0 0 0 1 1 1 1 7 0\n"
                                  "$EndEntities\n$Nodes\n1 4\n1 3 0 4\n9 0 0 0\n3 1 0 0\n5 0 1 0\n4 0 0 1\n$EndNodes\n"
