@@ -10,6 +10,7 @@
 #include "subvol/fit/geometry/boundary_triangles.h"
 #include "subvol/fit/high_order_patch.h"
 #include "subvol/fit/quality/high_order_quality.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/pyramids.h"
 #include "subvol/mesh/validate.h"
@@ -309,6 +310,15 @@ bool HighOrderDriver::meets_tolerance() {
   return options_.tolerance_percent && measured_mean() <= *options_.tolerance_percent;
 }
 
+double HighOrderDriver::volume_percent() const {
+  if (target_.region_volumes.empty()) return 0;
+  double largest = 0;
+  const RegionReport found = measure_regions(mesh_, {template_.references, {}}, nullptr);
+  for (std::size_t r = 0; r < found.regions.size(); ++r)
+    largest = std::max(largest, 100 * std::abs(found.regions[r].volume / target_.region_volumes[r] - 1));
+  return largest;
+}
+
 void HighOrderDriver::take_own_boxes() {
   ideal_boxes_ = ideal_boxes(template_, std::span(mesh_.coefficients).first(template_.num_vertices()),
                              target_.surface.volume(), 1);
@@ -329,7 +339,8 @@ std::optional<HighOrderDriver::Outcome> HighOrderDriver::measured_outcome(bool m
       moved.push_back(std::ranges::binary_search(moved_cells_, mesh_.space.topology().face_cells(face)[0]));
   const std::optional<std::size_t> pairs = runner_.intersecting_pairs(surface, report_, moved);
   if (!pairs) return {};
-  return Outcome{std::move(quality.cell_minima), quality.min_scaled_jacobian, mean, max_percent, *pairs};
+  return Outcome{
+      std::move(quality.cell_minima), quality.min_scaled_jacobian, mean, max_percent, *pairs, volume_percent()};
 }
 
 /// Returns E_S, whose correspondences must be closest points.

@@ -38,6 +38,7 @@ class HighOrderDriver : protected StagedFit {
     double least_scaled_jacobian = 0, mean_percent = 0;
     double max_percent = 0;  ///< of surfaces, and of creases from their curves
     std::size_t pairs = 0;  ///< number of intersecting triangle pairs
+    double volume_percent = 0;  ///< `volume_percent()`
   };
 
   /// InputError: options out of range; the template has defects.
@@ -73,6 +74,9 @@ class HighOrderDriver : protected StagedFit {
   TriangleMesh measured_boundary() const;
   double measured_mean();
   bool meets_tolerance();
+  /// Returns the largest difference of a region's volume from the target's, in per cent; 0 if the target has no
+  /// regions.
+  double volume_percent() const;
   /// Measures the distances of the creases; nothing if none follows a curve.
   std::optional<CreaseDistance> measured_creases() const;
   /// moved_only  the state before the last stage had no intersecting pairs, so only what that stage moved is searched.

@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/elements/ideal_boxes.h"
 #include "subvol/fit/energies/make_surface_term.h"
 #include "subvol/fit/fits/order_indicator.h"
@@ -204,12 +205,19 @@ bool HighOrderFit::run_adaptive_orders() {
   return report_.stop_reason != StopReason::memory_limit;
 }
 
-/// Repeats the last stage with less and less weight on the cells' shape until the tolerance is met; without a
-/// tolerance, only undoes the rise of lambda by unfolding. A stage that is interrupted or leaves more than `pairs`
-/// self-intersections is rolled back.
+/// Repeats the last stage with less and less weight on the cells' shape until the tolerance is met and the regions have
+/// their volumes; if nothing is missed, only undoes the rise of lambda by unfolding. A stage that is interrupted or
+/// leaves more than `pairs` self-intersections is rolled back.
 bool HighOrderFit::lower_lambda(std::size_t pairs) {
-  const double least = (options_.tolerance_percent ? 1e-3 : 1) * schedule_.lambda_close;
-  for (double lambda = lambda_ / 2; !meets_tolerance() && lambda >= 0.99 * least; lambda /= 2) {
+  constexpr double kLeastShare = 1e-3;
+  const bool has_volumes = volume_percent() <= kAutomaticVolumePercent;
+  const bool is_asked = options_.tolerance_percent || !has_volumes;
+  const double least = (is_asked ? kLeastShare : 1) * schedule_.lambda_close;
+  const auto is_reached = [&] {
+    return is_asked && (!options_.tolerance_percent || meets_tolerance()) &&
+           (has_volumes || volume_percent() <= kAutomaticVolumePercent);
+  };
+  for (double lambda = lambda_ / 2; !is_reached() && lambda >= 0.99 * least; lambda /= 2) {
     const double before = measured_mean();
     FitSnapshot stiffer = snapshot();
     const std::optional<std::size_t> pairs_now =
@@ -291,7 +299,8 @@ bool HighOrderFit::is_better(const Outcome& next) const {
   };
   const double gain = distances(outcome_) / distances(next);
   return shape(next) > 0 && gain * shape(next) > shape(outcome_) && next.mean_percent <= most_mean_ &&
-         next.max_percent <= most_max_ && next.pairs <= outcome_.pairs;
+         next.max_percent <= most_max_ && next.pairs <= outcome_.pairs &&
+         next.volume_percent <= std::max(outcome_.volume_percent, kAutomaticVolumePercent);
 }
 
 /// Repeats the last stage around some cells with one setting changed; if the result is not better, rolls back the stage

@@ -281,7 +281,8 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
 }
 
 MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const Compare& compare,
-                       const WorkProgress& progress, int samples_per_direction) {
+                       const MeshCheckOptions& options, int samples_per_direction) {
+  const WorkProgress& progress = options.progress;
   if (samples_per_direction != 0) require_samples(samples_per_direction);
   const VolumeMesh straight = mesh.straight_sided();
   require_extent(mesh.coefficients, "mesh check: mesh");
@@ -296,6 +297,8 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
       [&](Index c, const Vec3& point) { return mesh.position(c, point); });
   if (!begins("topology", 0.2, progress, check)) return check;
   check_topology(straight, mesh.space.topology(), check);
+  if (RegionReport regions = measure_regions(mesh, options.labels, &*check.quality); regions.regions.size() > 1)
+    check.regions = std::move(regions);
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
   if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
     check_boundary(boundary.triangles, boundary.faces, compare, progress, check);
@@ -369,12 +372,12 @@ MeshCheck check_mesh(const VolumeMesh& mesh, const PointCloud* target, const Mes
 
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target,
                      const MeshCheckOptions& options, int samples_per_direction) {
-  return check_curved(mesh, boundary, comparison(target, options), options.progress, samples_per_direction);
+  return check_curved(mesh, boundary, comparison(target, options), options, samples_per_direction);
 }
 
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const PointCloud* target,
                      const MeshCheckOptions& options, int samples_per_direction) {
-  return check_curved(mesh, boundary, comparison(target), options.progress, samples_per_direction);
+  return check_curved(mesh, boundary, comparison(target), options, samples_per_direction);
 }
 
 std::string to_text(const MeshCheck& check) {

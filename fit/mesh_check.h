@@ -32,6 +32,7 @@ struct MeshCheckOptions {
   int samples_per_direction = 5;   ///< for the scaled Jacobian, >= 2
   QuadTriangles quad_triangles = QuadTriangles::bilinear;
   int distance_samples = SurfaceDistanceOptions{}.num_samples;  ///< as in `SurfaceDistanceOptions`
+  CellLabels labels{};  ///< of curved cells, whose mesh does not hold them; empty: one region
   /// Called before each part with its name: "quality", "topology", "self-intersections" and, if there are a target and
   /// a boundary, "distance". Also called repeatedly during the search for self-intersections.
   WorkProgress progress{};
@@ -76,7 +77,7 @@ struct MeshCheck {
   std::optional<SubdivisionAudit> subdivision_audit;  ///< findings that degrade a subdivision of the mesh; not defects
 
   std::optional<QualityReport> quality;                      ///< includes the certificate
-  std::optional<RegionReport> regions;  ///< of linear cells with several references; area and volume of each, interfaces
+  std::optional<RegionReport> regions;  ///< if the cells have several references; area and volume of each, interfaces
   std::vector<InversionWitness> witnesses;                   ///< one for each of the first ten refuted cells
 
   bool has_boundary_geometry = false;                        ///< true if the numbers below are set
@@ -131,7 +132,8 @@ inline MeshCheck check_mesh(const VolumeMesh& mesh, std::nullptr_t, const MeshCh
 /// boundary               the triangles that represent the mesh's surface in the parts that need triangles; must belong
 ///                        to the mesh.
 /// samples_per_direction  as for `measure_quality` of a high-order mesh. The fields `samples_per_direction` and
-///                        `quad_triangles` of `options` are ignored.
+///                        `quad_triangles` of `options` are ignored. InputError: also another number of references
+///                        than of cells.
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const TriangleMesh* target = nullptr,
                      const MeshCheckOptions& options = {}, int samples_per_direction = 0);
 MeshCheck check_mesh(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const PointCloud* target,

@@ -55,8 +55,9 @@ py::dict check(const py::object& object, const py::object& target_object, const 
   std::optional<cli::Target> target;
   if (!target_object.is_none()) target = target_from(target_object, "target");
   const auto check_against = [&](auto against) {
-    const MeshCheckOptions options{.progress = work.parts()};
+    MeshCheckOptions options{.progress = work.parts()};
     if (mesh.linear) return check_mesh(*mesh.linear, against, options);
+    options.labels = {mesh.curved->references, mesh.curved->regions};
     return check_mesh(mesh.curved->mesh, curved_boundary(mesh.curved->mesh, writing.chord_percent), against, options);
   };
   MeshCheck found = work.run("check", [&] {

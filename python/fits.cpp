@@ -176,7 +176,8 @@ class Fit {
     });
     const MeshCheck found = work_.run("check", [&] {
       const CurvedBoundary boundary = curved_boundary(fit.mesh, writing_.chord_percent);
-      return std::visit([&](const auto& target) { return check_mesh(fit.mesh, boundary, &target); }, target_);
+      const MeshCheckOptions options{.labels = {template_->references, template_->regions}};
+      return std::visit([&](const auto& target) { return check_mesh(fit.mesh, boundary, &target, options); }, target_);
     });
     auto curved = std::make_shared<CurvedMesh>(
         CurvedMesh{std::move(fit.mesh), template_->references, template_->face_groups, template_->regions});

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/check_report.h"
 #include "python/arrays.h"
 #include "python/fit_options.h"
 #include "python/groups.h"
 #include "python/meshes.h"
 #include "python/module.h"
+#include "python/report.h"
 #include "subvol/base/error.h"
 #include "subvol/export/export.h"
 #include "subvol/export/lagrange_mesh.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/mesh/pyramids.h"
 #include "subvol/surface/boundary.h"
 
@@ -75,6 +78,12 @@ Straight cells to begin with.)");
   add_groups(type);
   type.def_property_readonly("region_names", [](const CurvedMesh& curved) { return region_names(curved.regions); },
                              "Names of references: dict of number and name.");
+  type.def_property_readonly(
+      "regions",
+      [](const CurvedMesh& curved) {
+        return to_python(cli::regions_json(measure_regions(curved.mesh, {curved.references, curved.regions}, nullptr)));
+      },
+      "Cells, volume and boundary area of each region, and the area of each interface, as in the report of a check.");
   type.def("point_map", [](const CurvedMesh& curved, const py::object& cells, const py::object& points) {
     return std::make_shared<SparseMap>(point_map(curved.mesh.space, cell_points(cells, points, curved)));
   }, py::arg("cells"), py::arg("points"),

@@ -126,7 +126,8 @@ class Optimization {
       return fit_high_order(*target_, start, curving_);
     });
     const MeshCheck checked = work_.run("check", [&] {
-      return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent), &*target_);
+      return check_mesh(found.mesh, curved_boundary(found.mesh, writing_.chord_percent), &*target_,
+                        {.labels = {mesh_->references, mesh_->regions}});
     });
     add(found.report, checked);
     result.curved = std::make_shared<CurvedMesh>(

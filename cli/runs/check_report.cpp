@@ -4,11 +4,13 @@
 #include "cli/runs/run_options.h"
 #include "subvol/base/format.h"
 #include "subvol/export/high_order_file.h"
+#include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/elements/polynomial_map.h"
 #include "subvol/fit/quality/high_order_quality.h"
 #include "subvol/mesh/validate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 namespace subvol::cli {
@@ -159,6 +161,27 @@ Json regions_json(const RegionReport& report, const RegionReport* start, const c
     interfaces.push_back(std::move(one));
   }
   return {{"cells", std::move(regions)}, {"interfaces", std::move(interfaces)}};
+}
+
+Json regions_json(const RegionReport& report, const std::optional<RegionSurface>& target, const VolumeMesh& start) {
+  const RegionReport before = target ? measure_regions(*target) : measure_regions(start, nullptr);
+  return regions_json(report, &before, target ? "target" : "start");
+}
+
+std::vector<std::string> warnings_of_volumes(const MeshCheck& check, const std::optional<RegionSurface>& target) {
+  std::vector<std::string> warnings;
+  if (!check.regions || !target) return warnings;
+  for (const RegionQuality& region : check.regions->regions)
+    for (std::size_t r = 0; r < target->regions.size(); ++r) {
+      if (target->regions[r].number != region.reference) continue;
+      const double percent = 100 * (region.volume / target->volumes[r] - 1);
+      if (std::abs(percent) <= kAutomaticVolumePercent) continue;
+      warnings.push_back(internal::formatted(
+          "the volume of %s is %.6g, in the target it is %.6g (%+.2g %%)",
+          region.name.empty() ? internal::formatted("region %d", region.reference).c_str() : region.name.c_str(),
+          region.volume, target->volumes[r], percent));
+    }
+  return warnings;
 }
 
 Json audit_json(const SubdivisionAudit& found) {

@@ -55,12 +55,13 @@ Checked check_linear(const CheckArguments& arguments, const VolumeMesh& mesh, co
   return checked;
 }
 
-Checked check_high_order(const CheckArguments& arguments, const HighOrderMesh& mesh,
+Checked check_high_order(const CheckArguments& arguments, const HighOrderFile& file,
                          const std::optional<Target>& target, const WorkProgress& progress) {
+  const HighOrderMesh& mesh = file.mesh;
   const CurvedBoundary boundary = curved_boundary(mesh, arguments.chord_percent);
-  Checked checked{
-      against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, {.progress = progress}); }),
-      describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
+  const MeshCheckOptions options{.labels = {file.references, file.regions}, .progress = progress};
+  Checked checked{against(target, [&](auto geometry) { return check_mesh(mesh, boundary, geometry, options); }),
+                  describe(arguments.mesh, mesh), std::nullopt, std::nullopt};
   if (holds_exact_map(arguments.mesh)) checked.lagrange = check_lagrange_cells(arguments.mesh, mesh);
   return checked;
 }
@@ -143,7 +144,7 @@ int run_check(const CheckArguments& arguments, const CLI::App& verb) {
   if (!arguments.target.empty()) target = load_target(arguments.target, warnings);
   ProgressTeller teller(arguments.run.progress, arguments.run.quiet || arguments.json);
   const auto* curved = std::get_if<HighOrderFile>(&mesh);
-  const Checked checked = curved ? check_high_order(arguments, curved->mesh, target, teller.work())
+  const Checked checked = curved ? check_high_order(arguments, *curved, target, teller.work())
                                  : check_linear(arguments, std::get<VolumeMesh>(mesh), target, teller.work());
   teller.finish();
   tell_check(arguments, warnings, report_json(arguments, verb, checked, warnings), text_of(checked));

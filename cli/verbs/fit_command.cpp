@@ -189,6 +189,7 @@ void FitRun::check() {
   hold_to({.mean_percent = arguments_.fit.tolerance_percent}, mesh_check_, result_.report);
   hold_to_quality(arguments_.quality_floor, mesh_check_, result_.report);
   add_warnings(warnings_of_quality(arguments_.fit.quality, mesh_check_));
+  add_warnings(warnings_of_volumes(mesh_check_, regions_));
   if (arguments_.surface == "limit")
     hold_to(arguments_.fit.tolerance_percent, "the limit surface's mean",
             limit_.mean_percent(mesh_check_.target_diagonal), result_.report);
@@ -205,10 +206,7 @@ Json FitRun::report() const {
   if (made_) json["template"] = automatic_fit_json(*made_).at("template");
   json.update(fit_json(report));
   json.update(check_json(mesh_check_));
-  if (mesh_check_.regions) {
-    const RegionReport wanted = regions_ ? measure_regions(*regions_) : measure_regions(template_mesh_, nullptr);
-    json["regions"] = regions_json(*mesh_check_.regions, &wanted, regions_ ? "target" : "start");
-  }
+  if (mesh_check_.regions) json["regions"] = regions_json(*mesh_check_.regions, regions_, template_mesh_);
   if (!groups_.groups.empty()) json["groups"] = groups_json(groups_.groups);
   if (report.creases) json["creases"] = creases_json(*report.creases);
   json.update(cage_json(result_.cage, limit_, mesh_check_.target_diagonal));

@@ -67,10 +67,11 @@ HighOrderFitResult fit(const HighOrderFitArguments& arguments, StageLog* log, bo
   return result;
 }
 
-MeshCheck check(const HighOrderMesh& mesh, const Target& target, const WritingOptions& writing, const RunOptions& run) {
+MeshCheck check(const HighOrderMesh& mesh, const CellLabels& labels, const Target& target,
+                const WritingOptions& writing, const RunOptions& run) {
   ProgressTeller teller(run.progress, run.quiet);
   const CurvedBoundary boundary = curved_boundary(mesh, measured_chord_percent(writing));
-  const MeshCheckOptions options{.progress = teller.work()};
+  const MeshCheckOptions options{.labels = labels, .progress = teller.work()};
   return std::visit([&](const auto& geometry) { return check_mesh(mesh, boundary, &geometry, options); }, target);
 }
 
@@ -175,7 +176,8 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   writing.options = options_used(arguments, result.lambda_close, options_of_result(verb));
   HighOrderFile file{std::move(result.mesh), template_mesh.references, template_mesh.face_groups,
                      template_mesh.regions};
-  const Target outer = outer_target(target, regions_of_target(target, template_mesh));
+  const std::optional<RegionSurface> regions = regions_of_target(target, template_mesh);
+  const Target outer = outer_target(target, regions);
   const GroupsFound groups = carry_groups(outer, file);
   warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
   tell_warnings();
@@ -188,13 +190,16 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   const double write_seconds = seconds_since(write_start);
 
   const Clock::time_point check_start = Clock::now();
-  const auto check_curved = [&](const HighOrderMesh& mesh) { return check(mesh, outer, writing, arguments.run); };
+  const auto check_curved = [&](const HighOrderMesh& mesh) {
+    return check(mesh, {file.references, file.regions}, outer, writing, arguments.run);
+  };
   const std::optional<HighOrderMesh> written = written_curved_cells(outputs);
   const MeshCheck mesh_check = check_curved(written ? *written : file.mesh);
   hold_to({.mean_percent = arguments.fit.tolerance_percent}, mesh_check, report);
   hold_to_quality(arguments.quality_floor, mesh_check, report);
   for (std::string& warning : warnings_of_quality(arguments.fit.quality, mesh_check))
     warnings.push_back(std::move(warning));
+  for (std::string& warning : warnings_of_volumes(mesh_check, regions)) warnings.push_back(std::move(warning));
   const std::vector<PolynomialCells> polynomials =
       check_polynomial_cells(outputs, file.mesh, writing.map_tolerance_percent, check_curved);
   for (const PolynomialCells& cells : polynomials) {
@@ -215,6 +220,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     Json json = report_json(arguments.command, options_used(arguments, result.lambda_close, options_in_force(verb)),
                             std::move(input), report, file.mesh, mesh_check);
     if (report.creases) json["creases"] = creases_json(*report.creases);
+    if (mesh_check.regions) json["regions"] = regions_json(*mesh_check.regions, regions, template_mesh);
     if (!groups.groups.empty()) json["groups"] = groups_json(groups.groups);
     if (linear) json["linear_cells"] = check_json(*linear);
     if (!polynomials.empty()) json["polynomial_cells"] = polynomial_cells_json(polynomials);

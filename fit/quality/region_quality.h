@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/elements/high_order_mesh.h"
 #include "subvol/fit/quality/quality.h"
 #include "subvol/mesh/volume_mesh.h"
 #include "subvol/surface/region_surface.h"
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,19 @@ struct RegionReport {
 /// Volumes are those of the cells with bilinear quads. Areas are those of four triangles for each quad. Index-correct
 /// cells are expected. Cost: linear.
 RegionReport measure_regions(const VolumeMesh& mesh, const QualityReport* quality);
+
+/// References of the cells of a mesh that does not hold them, and their names.
+struct CellLabels {
+  std::span<const int> references{};  ///< one per cell, or empty: all 0
+  std::span<const Group> regions{};
+};
+
+/// Measures the regions of a mesh of curved cells in the same way.
+///
+/// Volumes and areas are integrals over the curved faces between regions and on the boundary, by Gauss quadrature. With
+/// Legendre modes, volumes are exact up to rounding. InputError: another number of references than of cells. Parallel;
+/// the same bits for any number of threads. Cost: that of a few dozen points per face at order 4.
+RegionReport measure_regions(const HighOrderMesh& mesh, const CellLabels& labels, const QualityReport* quality);
 
 /// Measures the regions of a surface: names, volumes and areas; the numbers of faces are those of triangles.
 RegionReport measure_regions(const RegionSurface& surface);

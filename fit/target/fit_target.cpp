@@ -104,6 +104,7 @@ FitTarget::FitTarget(const RegionSurface& target) : FitTarget(outer_surface(targ
   for (const bool inner : {false, true})
     for (std::size_t t = 0; t < target.sides.size(); ++t)
       if (target.is_inner(t) == inner && has_area(t)) region_triangle.push_back(static_cast<Index>(t));
+  for (const double volume : target.volumes) region_volumes.push_back(volume / std::pow(normalisation.diagonal, 3));
   add_interfaces();
 }
 

@@ -51,6 +51,7 @@ struct FitTarget {
   std::vector<Index> group_of_triangle;
   /// Number of each triangle of `surface` in the `RegionSurface`; empty if the target has no regions.
   std::vector<Index> region_triangle;
+  std::vector<double> region_volumes;  ///< `RegionSurface::volumes` in normalized coordinates
 
   /// InputError: as for `Normalisation`.
   explicit FitTarget(const TriangleMesh& target);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
 #include "subvol/fit/elements/boundary_samples.h"
+#include "subvol/fit/elements/quadrature.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
+#include "subvol/fit/geometry/curved_boundary.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/optimize_mesh.h"
@@ -12,6 +14,7 @@
 #include "subvol/mesh/interfaces.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/region_surface.h"
+#include "tests/support/element_fixtures.h"
 #include "tests/support/require_data.h"
 #include "tests/support/sample_meshes.h"
 
@@ -220,6 +223,71 @@ TEST_CASE("regions are measured: volumes, areas, interfaces, quality", "[regions
   mesh.references.clear();
   CHECK_FALSE(check_mesh(mesh).regions);
   CHECK(region_volumes(mesh) == std::vector<double>{64});
+}
+
+TEST_CASE("regions of curved cells are measured: volumes are integrals of det J", "[regions]") {
+  PointSource source(21);
+  const VolumeMesh mesh = mixed_cells();
+  const std::vector<int> references{1, 2, 2, 3};
+  REQUIRE(mesh.num_cells() == references.size());
+  for (const Basis basis : kBothBases)
+    for (const int order : {1, 2, 3, 5}) {
+      CAPTURE(to_string(basis), order);
+      const HighOrderMesh curved = random_mesh(ElementSpace(mesh, basis, order), source);
+      const RegionReport report = measure_regions(curved, {references, {}}, nullptr);
+      std::vector<double> wanted(3, 0.0);
+      for (std::size_t c = 0; c < mesh.num_cells(); ++c) {
+        constexpr int kPoints = 12;
+        const CellKind kind = mesh.kinds[c];
+        const Quadrature rule = make_quadrature(kind, QuadratureRule::gauss_lobatto, kPoints);
+        const double size = kind == CellKind::tet ? 1.0 / 6 : kind == CellKind::prism ? 0.5 : 1;
+        for (std::size_t q = 0; q < rule.points.size(); ++q)
+          wanted[references[c] - 1] += size * rule.weights[q] * curved.jacobian(c, rule.points[q]).determinant();
+      }
+      REQUIRE(report.regions.size() == 3);
+      const double tolerance = basis == Basis::legendre || order == 1 ? 1e-12 : 1e-3;
+      for (std::size_t r = 0; r < 3; ++r)
+        CHECK(report.regions[r].volume == Approx(wanted[r]).margin(tolerance).epsilon(tolerance));
+    }
+}
+
+TEST_CASE("regions of curved cells are those of linear ones at order 1", "[regions]") {
+  VolumeMesh mesh = cube_in_cube();
+  mesh.regions = {{"core", 2, 3}};
+  const HighOrderMesh curved(ElementSpace(mesh, Basis::legendre, 2), mesh);
+  const MeshCheck check = check_mesh(curved, curved_boundary(curved, 1), static_cast<const TriangleMesh*>(nullptr),
+                                     {.labels = {mesh.references, mesh.regions}});
+  const QualityReport quality = measure_quality(mesh);
+  const RegionReport wanted = measure_regions(mesh, &quality);
+  REQUIRE(check.regions);
+  for (std::size_t r = 0; r < 2; ++r) {
+    const RegionQuality &found = check.regions->regions[r], &of_linear = wanted.regions[r];
+    CHECK(found.name == of_linear.name);
+    CHECK(found.num_cells == of_linear.num_cells);
+    CHECK(found.volume == Approx(of_linear.volume));
+    CHECK(found.area == Approx(of_linear.area).margin(1e-12));
+    CHECK(found.min_scaled_jacobian == Approx(1));
+  }
+  REQUIRE(check.regions->interfaces.size() == 1);
+  CHECK(check.regions->interfaces[0].num_faces == 24);
+  CHECK(check.regions->interfaces[0].area == Approx(24));
+  const std::vector<int> too_few(3, 1);
+  CHECK_THROWS_AS(measure_regions(curved, {too_few, {}}, nullptr), InputError);
+}
+
+TEST_CASE("a curved fit lowers lambda until the regions have their volumes", "[regions]") {
+  // The inner cube of the target is larger than that of the template, and not in the middle.
+  VolumeMesh wanted = cube_in_cube();
+  for (Vec3& p : wanted.positions)
+    for (double& x : p) x = x == 1 ? 0.8 : x == 2 ? 1.9 : x;
+  HighOrderFitOptions options;
+  options.order = 2;
+  options.lambda_close = 1;
+  const VolumeMesh mesh = cube_in_cube();
+  const HighOrderFitResult result = fit_high_order(surface_of_regions(wanted).mesh, mesh, options);
+  const RegionReport report = measure_regions(result.mesh, {mesh.references, {}}, nullptr);
+  const std::vector<double> aim = region_volumes(wanted);
+  for (std::size_t r = 0; r < 2; ++r) CHECK(report.regions[r].volume == Approx(aim[r]).epsilon(kMostVolumeChange));
 }
 
 TEST_CASE("meshes of several materials that people reported keep their regions", "[regions][data][slow]") {
