@@ -244,10 +244,12 @@ bool AutomaticDriver::keep_if_best(AutomaticFitTrial trial, const QualityReport&
                                    const FeatureCurves& curves) {
   trial.least_share = state_.cells.least_share;
   if (edges) edges->farthest = target_.normalisation.from_unit({edges->farthest})[0];
+  std::vector<MissedEdge> missed = missed_edges(unfollowed, curves, target_.normalisation);
+  trial.long_edges_lost = num_long_edges_lost(missed);
   if (!add_trial(std::move(trial), mesh_, quality, edges, options_, result_)) return false;
   result_.cage = cage_ ? cage_->cage : VolumeMesh();
   result_.states = states_;
-  result_.missed_edges = missed_edges(unfollowed, curves, target_.normalisation);
+  result_.missed_edges = std::move(missed);
   return true;
 }
 

@@ -17,6 +17,8 @@ constexpr double kQualityWeight = 5;  // of the share of the quality in the meri
 /// Cost of a boundary that meets itself, and of cells that are not certified: so much that a valid trial wins, however
 /// many edges an invalid one follows.
 constexpr double kNotValid = 10;
+/// Cost of long edges that are not followed: such a trial is never good, and is worth a refinement.
+constexpr double kLongEdgeLost = 0.6;
 
 }  // namespace
 
@@ -48,7 +50,8 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
          kQualityWeight * (1 - trial.least_share) +
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
-         kEdgeWeight * (1 - trial.within_share) + (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) +
+         kEdgeWeight * (1 - trial.within_share) + (trial.long_edges_lost > 0 ? kLongEdgeLost : 0) +
+         (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) +
          (trial.uncertified > 0 ? kNotValid : 0);
 }
 
@@ -70,6 +73,8 @@ bool is_good_enough(const AutomaticFitTrial& trial) {
 }
 
 namespace {
+
+bool is_long(const MissedEdge& edge) { return edge.length_percent > kLongEdgePercent; }
 
 /// Returns true if a trial is better than the best one before. If it is that one polished and still good, the quality
 /// decides.
@@ -112,6 +117,11 @@ std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed
   return missed;
 }
 
+std::size_t num_long_edges_lost(std::span<const MissedEdge> missed) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      missed, [](const MissedEdge& edge) { return is_long(edge) && edge.reason != NotFollowed::too_acute; }));
+}
+
 void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_curves, const char* name,
                           FitReport& report) {
   if (missed.empty()) return;
@@ -130,8 +140,7 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
   const double most = kFarOffFactor * options.max_tolerance_percent;
   if (chosen.max_percent > most)
     reasons.push_back(formatted("the largest distance is above %.3g %% of the diagonal", most));
-  const auto is_long = [](const MissedEdge& edge) { return edge.length_percent > kLongEdgePercent; };
-  const auto num_long = std::count_if(result.missed_edges.begin(), result.missed_edges.end(), is_long);
+  const auto num_long = std::ranges::count_if(result.missed_edges, is_long);
   if (num_long > 0)
     reasons.push_back(formatted("%s longer than %.3g %% of the diagonal that are not followed: %td", name,
                                 kLongEdgePercent, num_long));

@@ -59,6 +59,10 @@ bool add_trial(AutomaticFitTrial trial, const VolumeMesh& mesh, const QualityRep
 std::vector<MissedEdge> missed_edges(std::span<const UnfollowedCurve> unfollowed, const FeatureCurves& curves,
                                      const Normalisation& normalisation);
 
+/// Returns the number of edges longer than `kLongEdgePercent` that cells could follow: all but those that are too
+/// acute.
+std::size_t num_long_edges_lost(std::span<const MissedEdge> missed);
+
 /// Adds a warning about missed edges to a report, if there are any, with the place of the longest.
 /// num_curves  number of those to be followed.  name  what they are called.
 void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_curves, const char* name,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/feature_routing.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/routing_graph.h"
@@ -29,7 +30,7 @@ constexpr double kWrongEdgePenalty = 0.15, kFewEdgesPenalty = 3;
 constexpr double kFarPenalty = 4;
 /// Keeps paths short where the distance says nothing; and the distance at which edges are not looked at.
 constexpr double kSoftness = 0.12, kSearchReach = 3;
-/// Largest distance between a path and its curve; for paths that join another one, which start beside their curve.
+/// Largest distance between a path and its curve; and for curves that would be lost otherwise.
 constexpr double kFollowDistance = 1.1, kJoinDistance = 2.2;
 /// Largest length of a path in units of its curve's: longer ones go to and fro.
 constexpr double kMostStretch = 1.8;
@@ -82,6 +83,26 @@ struct Found {
 };
 
 using Paths = std::vector<std::vector<Index>>;  ///< by curve; empty: none
+
+/// Marks the vertices of a graph that no closed path passes through: those with fewer than two neighbors, and those left
+/// with fewer once these are taken away.
+std::vector<std::uint8_t> dead_ends(const std::vector<std::vector<Index>>& neighbors) {
+  std::vector<std::uint8_t> is_dead(neighbors.size());
+  std::vector<std::size_t> degrees;
+  std::vector<Index> next;
+  for (std::size_t i = 0; i < neighbors.size(); ++i) {
+    degrees.push_back(neighbors[i].size());
+    if (degrees[i] < 2) next.push_back(static_cast<Index>(i));
+  }
+  while (!next.empty()) {
+    const Index dead = next.back();
+    next.pop_back();
+    if (std::exchange(is_dead[dead], 1)) continue;
+    for (const Index other : neighbors[dead])
+      if (--degrees[other] < 2 && !is_dead[other]) next.push_back(other);
+  }
+  return is_dead;
+}
 
 class Router {
  public:
@@ -287,7 +308,9 @@ class Router {
   }
 
   /// Returns a vertex for each anchor: none of them twice, none occupied but fixed ones. Empty if there is none.
-  std::vector<Index> anchor_vertices(const Course& course, double h, const Occupied& occupied) const {
+  /// allowed  vertices to choose from, ascending; empty: all.
+  std::vector<Index> anchor_vertices(const Course& course, double h, const Occupied& occupied,
+                                     std::span<const Index> allowed) const {
     std::vector<Index> chosen;
     for (const Anchor& anchor : course.anchors) chosen.push_back(anchor.fixed);
     for (std::size_t i = 0; i < chosen.size(); ++i) {
@@ -295,6 +318,7 @@ class Router {
       if (course.anchors[i].fixed != kNoIndex) continue;
       for (Index v : graph_.vertices_near(course.anchors[i].point, kCornerReach * h)) {
         if (occupied.vertices[v] || std::ranges::find(chosen, v) != chosen.end()) continue;
+        if (!allowed.empty() && !std::ranges::binary_search(allowed, v)) continue;
         const double d = (graph_.position(v) - course.anchors[i].point).norm();
         if (d < distance) distance = d, chosen[i] = v;
       }
@@ -303,9 +327,10 @@ class Router {
     return chosen;
   }
 
-  std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied) const {
+  std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied,
+                             std::span<const Index> allowed = {}) const {
     const bool closed = curves_[c].closed();
-    const std::vector<Index> anchors = anchor_vertices(course, curve_h_[c], occupied);
+    const std::vector<Index> anchors = anchor_vertices(course, curve_h_[c], occupied, allowed);
     if (anchors.empty()) return {};
     Occupied taken = occupied;
     for (Index v : anchors) taken.vertices[v] = 1;
@@ -326,11 +351,52 @@ class Router {
     return vertex_of(curve.vertices.front()) == kNoIndex || vertex_of(curve.vertices.back()) == kNoIndex;
   }
 
-  std::optional<Found> find(Index c, const Occupied& occupied) {
+  /// Returns the free vertices near a curve that a closed path could pass through, by the sides on which they lie: paths
+  /// of other curves are between those of different sides. Each side is ascending.
+  std::vector<std::vector<Index>> sides_of(Index c, const Occupied& occupied) const {
+    std::vector<Index> near;
+    for (const Vec3& point : sampled_polyline(curves_[c].points, curve_h_[c] / 2))
+      for (const Index v : graph_.vertices_near(point, kCornerReach * curve_h_[c]))
+        if (!occupied.vertices[v]) near.push_back(v);
+    std::ranges::sort(near);
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    std::vector<std::vector<Index>> neighbors(near.size());  // places in `near`
+    for (std::size_t i = 0; i < near.size(); ++i)
+      for (const Index e : graph_.edges_at(near[i])) {
+        const auto at = std::ranges::lower_bound(near, graph_.other_end(e, near[i]));
+        if (at != near.end() && *at == graph_.other_end(e, near[i]) && !occupied.edges[e])
+          neighbors[i].push_back(static_cast<Index>(at - near.begin()));
+      }
+    const std::vector<std::uint8_t> is_dead = dead_ends(neighbors);
+    DisjointSets sides(near.size());
+    for (std::size_t i = 0; i < near.size(); ++i)
+      for (const Index other : neighbors[i])
+        if (!is_dead[i] && !is_dead[other]) sides.join(static_cast<Index>(i), other);
+    std::map<Index, std::vector<Index>> by_side;
+    for (std::size_t i = 0; i < near.size(); ++i)
+      if (!is_dead[i]) by_side[sides.of(static_cast<Index>(i))].push_back(near[i]);
+    std::vector<std::vector<Index>> result;
+    for (auto& [side, vertices] : by_side) result.push_back(std::move(vertices));
+    return result;
+  }
+
+  /// Looks for a path of a closed curve on one side of the paths that are there: the vertices nearest to its anchors may
+  /// lie on different ones or in dead ends, as along the two edges of a chamfer that is narrower than a cell.
+  std::optional<Found> find_on_one_side(Index c, const Occupied& occupied, double most) {
+    std::optional<Found> best;
+    for (const std::vector<Index>& side : sides_of(c, occupied))
+      for (Course& course : courses(c))
+        if (auto found = judged(path_on(course, c, occupied, side), c, most))
+          if (!best || found->gap < best->gap) best = std::move(found);
+    return best;
+  }
+
+  /// most  largest distance between the path and the curve, in units of h.
+  std::optional<Found> find(Index c, const Occupied& occupied, double most = kFollowDistance) {
     if (!(h_ > 0) || lacks_corner(c)) return std::nullopt;
     for (Course& course : courses(c))
-      if (auto found = judged(path_on(course, c, occupied), c, kFollowDistance)) return found;
-    return std::nullopt;
+      if (auto found = judged(path_on(course, c, occupied), c, most)) return found;
+    return curves_[c].closed() ? find_on_one_side(c, occupied, most) : std::nullopt;
   }
 
   // All curves
@@ -447,8 +513,12 @@ class Router {
     Occupied occupied = occupied_by_best();
     auto joinable = joinable_vertices();
     for (Index c : lost_by_length()) {
-      if (!joinable_[c] || curves_[c].closed() || !(h_ > 0)) continue;
-      best_[c] = joining_path(c, occupied, joinable);
+      if (!joinable_[c] || !(h_ > 0)) continue;
+      if (curves_[c].closed()) {
+        if (auto found = find(c, occupied, kJoinDistance)) best_[c] = std::move(found->path);
+      } else {
+        best_[c] = joining_path(c, occupied, joinable);
+      }
       if (best_[c].empty()) continue;
       occupied.add(graph_, best_[c]);
       joinable = joinable_vertices();

@@ -41,6 +41,17 @@ TEST_CASE("All oblique faces of a part get pads, also where five of them meet at
   CHECK(check.normals->mean_degrees < 3);
 }
 
+TEST_CASE("Both edges of a chamfer narrower than a cell are followed", "[slow]") {
+  const TriangleMesh target = test::plate_with_chamfered_hole(0.2);
+  const AutomaticFitResult result = fit_automatically(target, {.cells = 2000});
+  CHECK(result.report.stop_reason == StopReason::converged);
+  CHECK(result.missed_edges.empty());
+  CHECK(result.trials[result.chosen].followed_curves == result.trials[result.chosen].curves);
+  const MeshCheck check = check_mesh(result.mesh, &target, {});
+  CHECK(check.valid());
+  CHECK(check.quality->min_scaled_jacobian > 0.5);
+}
+
 TEST_CASE("A good automatic fit is polished beyond the quality aimed at", "[slow]") {
   const TriangleMesh ball = test::cube_surface(12, true);
   const AutomaticFitResult result =

@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <random>
 #include <utility>
@@ -73,6 +75,35 @@ inline TriangleMesh triangle_soup(std::size_t n, double size, unsigned seed) {
     const auto v = static_cast<Index>(3 * t);
     mesh.triangles.push_back({v, v + 1, v + 2});
   }
+  return mesh;
+}
+
+/// A square plate from z = 0 to 3 with a round hole in its middle, whose two rims have chamfers of some width.
+inline TriangleMesh plate_with_chamfered_hole(double width) {
+  constexpr Index kSides = 64, kRings = 6;
+  constexpr double kHalf = 5, kHeight = 3, kRadius = 2.5;
+  TriangleMesh mesh;
+  const auto add_ring = [&](double z, const auto& radius) {
+    for (Index i = 0; i < kSides; ++i) {
+      const double angle = 2 * std::acos(-1.0) * i / kSides, x = std::cos(angle), y = std::sin(angle);
+      const double r = radius(std::max(std::abs(x), std::abs(y)));
+      mesh.positions.emplace_back(r * x, r * y, z);
+    }
+  };
+  const auto square = [](double largest) { return kHalf / largest; };
+  const auto circle = [](double radius) { return [radius](double) { return radius; }; };
+  add_ring(kHeight, square);
+  add_ring(kHeight, circle(kRadius + width));
+  add_ring(kHeight - width, circle(kRadius));
+  add_ring(width, circle(kRadius));
+  add_ring(0, circle(kRadius + width));
+  add_ring(0, square);
+  for (Index ring = 0; ring < kRings; ++ring)
+    for (Index i = 0; i < kSides; ++i) {
+      const Index a = ring * kSides, b = (ring + 1) % kRings * kSides, j = (i + 1) % kSides;
+      mesh.triangles.push_back({a + i, b + j, b + i});
+      mesh.triangles.push_back({a + i, a + j, b + j});
+    }
   return mesh;
 }
 
