@@ -30,7 +30,7 @@ constexpr double kWrongEdgePenalty = 0.15, kFewEdgesPenalty = 3;
 constexpr double kFarPenalty = 4;
 /// Keeps paths short where the distance says nothing; and the distance at which edges are not looked at.
 constexpr double kSoftness = 0.12, kSearchReach = 3;
-/// Largest distance between a path and its curve; and for curves that would be lost otherwise.
+/// Largest distance between a path and its curve; and for open curves that would be lost otherwise.
 constexpr double kFollowDistance = 1.1, kJoinDistance = 2.2;
 /// Largest length of a path in units of its curve's: longer ones go to and fro.
 constexpr double kMostStretch = 1.8;
@@ -382,21 +382,20 @@ class Router {
 
   /// Looks for a path of a closed curve on one side of the paths that are there: the vertices nearest to its anchors may
   /// lie on different ones or in dead ends, as along the two edges of a chamfer that is narrower than a cell.
-  std::optional<Found> find_on_one_side(Index c, const Occupied& occupied, double most) {
+  std::optional<Found> find_on_one_side(Index c, const Occupied& occupied) {
     std::optional<Found> best;
     for (const std::vector<Index>& side : sides_of(c, occupied))
       for (Course& course : courses(c))
-        if (auto found = judged(path_on(course, c, occupied, side), c, most))
+        if (auto found = judged(path_on(course, c, occupied, side), c, kFollowDistance))
           if (!best || found->gap < best->gap) best = std::move(found);
     return best;
   }
 
-  /// most  largest distance between the path and the curve, in units of h.
-  std::optional<Found> find(Index c, const Occupied& occupied, double most = kFollowDistance) {
+  std::optional<Found> find(Index c, const Occupied& occupied) {
     if (!(h_ > 0) || lacks_corner(c)) return std::nullopt;
     for (Course& course : courses(c))
-      if (auto found = judged(path_on(course, c, occupied), c, most)) return found;
-    return curves_[c].closed() ? find_on_one_side(c, occupied, most) : std::nullopt;
+      if (auto found = judged(path_on(course, c, occupied), c, kFollowDistance)) return found;
+    return curves_[c].closed() ? find_on_one_side(c, occupied) : std::nullopt;
   }
 
   // All curves
@@ -513,12 +512,8 @@ class Router {
     Occupied occupied = occupied_by_best();
     auto joinable = joinable_vertices();
     for (Index c : lost_by_length()) {
-      if (!joinable_[c] || !(h_ > 0)) continue;
-      if (curves_[c].closed()) {
-        if (auto found = find(c, occupied, kJoinDistance)) best_[c] = std::move(found->path);
-      } else {
-        best_[c] = joining_path(c, occupied, joinable);
-      }
+      if (!joinable_[c] || curves_[c].closed() || !(h_ > 0)) continue;
+      best_[c] = joining_path(c, occupied, joinable);
       if (best_[c].empty()) continue;
       occupied.add(graph_, best_[c]);
       joinable = joinable_vertices();
