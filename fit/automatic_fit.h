@@ -86,7 +86,7 @@ struct AutomaticFitTrial {
   std::size_t pads = 0;                         ///< layers of cells under patches between sharp edges
   std::size_t curves = 0, followed_curves = 0;  ///< of the target's sharp edges
   double within_share = 1;                      ///< share of their length within `kSharpPercent` of edges of the mesh
-  std::size_t long_edges_lost = 0;               ///< longer than `kLongEdgePercent`, but for those that are too acute
+  std::size_t long_edges_lost = 0;              ///< longer than `kLongEdgePercent`, but for those that are too acute
   int level = 0;                                ///< times the template was subdivided
   double mean_percent = 0, max_percent = 0;     ///< distance, percent of the target's diagonal
   std::optional<FeatureMiss> feature_miss;      ///< in the target's unit; empty: there are no small features
@@ -138,7 +138,8 @@ struct AutomaticFitResult {
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
 ///         + 5 (1 - least share of the quality that a cell reaches) + 5 max(0, 1 - least scaled Jacobian / 0.3)
-///         + 3 (1 - share of the edges within 0.1 %) + 0.6 if edges longer than 10 % are not followed, but for acute ones
+///         + 3 (1 - share of the edges within 0.1 %) + 0.6 if edges longer than 10 % are not followed, but for acute
+///         ones
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
 /// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.

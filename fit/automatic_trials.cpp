@@ -51,8 +51,7 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          kQualityWeight * (1 - trial.least_share) +
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
          kEdgeWeight * (1 - trial.within_share) + (trial.long_edges_lost > 0 ? kLongEdgeLost : 0) +
-         (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) +
-         (trial.uncertified > 0 ? kNotValid : 0);
+         (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
 }
 
 double merit_if_relaxed(AutomaticFitTrial trial, const AutomaticFitOptions& options) {

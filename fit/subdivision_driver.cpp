@@ -230,21 +230,25 @@ double SubdivisionDriver::Measured::largest() const {
 
 bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional<double> tolerance_percent) const {
   // Distances may rise by 5 %, but not past the tolerance; those of the surface that is nearer by a quarter. It gives
-  // way first, because the stages before put it as near as they could.
-  constexpr double kFarther = 1.05, kNearerFarther = 1.25;
+  // way first, because the stages before put it as near as they could. If no mean rises, largest distances may rise by
+  // 10 %: joint129 at level 2 rises from 0.08 to 0.62 so, with a mean that falls by 2 %, where the largest distance rises
+  // by 7 % at a single place.
+  constexpr double kFarther = 1.05, kNearerFarther = 1.25, kFartherPlace = 1.1;
   double farthest_mean = 0, farthest_max = 0;
-  for (const SurfaceDistance& distance : before.distances) {
-    farthest_mean = std::max(farthest_mean, distance.mean());
-    farthest_max = std::max(farthest_max, distance.max());
+  bool is_nearer = true;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    farthest_mean = std::max(farthest_mean, before.distances[i].mean());
+    farthest_max = std::max(farthest_max, before.distances[i].max());
+    is_nearer = is_nearer && distances[i].mean() <= before.distances[i].mean();
   }
-  const auto most = [](double distance, double farthest) {
-    return std::max(kFarther * distance, std::min(kNearerFarther * distance, farthest));
+  const auto most = [](double distance, double farthest, double factor) {
+    return std::max(factor * distance, std::min(kNearerFarther * distance, farthest));
   };
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const double mean = distances[i].mean(), mean_before = before.distances[i].mean();
     const bool misses = tolerance_percent && 100 * mean > *tolerance_percent && mean > mean_before;
-    if (misses || mean > most(mean_before, farthest_mean) ||
-        distances[i].max() > most(before.distances[i].max(), farthest_max))
+    if (misses || mean > most(mean_before, farthest_mean, kFarther) ||
+        distances[i].max() > most(before.distances[i].max(), farthest_max, is_nearer ? kFartherPlace : kFarther))
       return false;
   }
   return least_jacobian > before.least_jacobian && uncertified <= before.uncertified && pairs <= before.pairs;

@@ -84,8 +84,8 @@ struct Found {
 
 using Paths = std::vector<std::vector<Index>>;  ///< by curve; empty: none
 
-/// Marks the vertices of a graph that no closed path passes through: those with fewer than two neighbors, and those left
-/// with fewer once these are taken away.
+/// Marks the vertices of a graph that no closed path passes through: those with fewer than two neighbors, and those
+/// left with fewer once these are taken away.
 std::vector<std::uint8_t> dead_ends(const std::vector<std::vector<Index>>& neighbors) {
   std::vector<std::uint8_t> is_dead(neighbors.size());
   std::vector<std::size_t> degrees;
@@ -351,8 +351,8 @@ class Router {
     return vertex_of(curve.vertices.front()) == kNoIndex || vertex_of(curve.vertices.back()) == kNoIndex;
   }
 
-  /// Returns the free vertices near a curve that a closed path could pass through, by the sides on which they lie: paths
-  /// of other curves are between those of different sides. Each side is ascending.
+  /// Returns the free vertices near a curve that a closed path could pass through, by the sides on which they lie:
+  /// paths of other curves are between those of different sides. Each side is ascending.
   std::vector<std::vector<Index>> sides_of(Index c, const Occupied& occupied) const {
     std::vector<Index> near;
     for (const Vec3& point : sampled_polyline(curves_[c].points, curve_h_[c] / 2))
@@ -380,8 +380,8 @@ class Router {
     return result;
   }
 
-  /// Looks for a path of a closed curve on one side of the paths that are there: the vertices nearest to its anchors may
-  /// lie on different ones or in dead ends, as along the two edges of a chamfer that is narrower than a cell.
+  /// Looks for a path of a closed curve on one side of the paths that are there: the vertices nearest to its anchors
+  /// may lie on different ones or in dead ends, as along the two edges of a chamfer that is narrower than a cell.
   std::optional<Found> find_on_one_side(Index c, const Occupied& occupied) {
     std::optional<Found> best;
     for (const std::vector<Index>& side : sides_of(c, occupied))

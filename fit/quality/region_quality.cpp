@@ -69,7 +69,7 @@ class Regions {
     if (labels.references.empty() && num_cells > 0) numbers_ = {0};
     numbers_.insert(numbers_.end(), labels.references.begin(), labels.references.end());
     std::ranges::sort(numbers_);
-    numbers_.erase(std::ranges::unique(numbers_).begin(), numbers_.end());
+    numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
   }
 
   std::size_t size() const { return numbers_.size(); }

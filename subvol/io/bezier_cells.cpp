@@ -84,7 +84,8 @@ class BernsteinChange {
   }
   void to_nodes(Eigen::MatrixX3d& rows) const {
     for (const Factor& factor : factors_)
-      for (const std::vector<int>& line : factor.lines) rows(line, Eigen::all) = (factor.values * gather(rows, line)).eval();
+      for (const std::vector<int>& line : factor.lines)
+        rows(line, Eigen::all) = (factor.values * gather(rows, line)).eval();
   }
 
  private:

@@ -18,8 +18,9 @@ struct CellNodes {
   std::span<const Index> cell(std::size_t c) const { return nodes.subspan(offsets[c], offsets[c + 1] - offsets[c]); }
 };
 
-/// Replaces the nodes of cells (at equal distances, `NodeSpacing::equal`) by the control points of the same polynomials:
-/// their coefficients in the Bernstein basis, which VTK's Bezier cells 78, 79 and 80 hold in the places of the nodes.
+/// Replaces the nodes of cells (at equal distances, `NodeSpacing::equal`) by the control points of the same
+/// polynomials: their coefficients in the Bernstein basis, which VTK's Bezier cells 78, 79 and 80 hold in the places of
+/// the nodes.
 ///
 /// Corners stay to the bit. A control point on an edge or face depends on the nodes of that edge or face only, so cells
 /// that share these nodes share the control points up to rounding; the first of the cells decides. Relative errors are

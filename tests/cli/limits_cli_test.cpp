@@ -82,7 +82,7 @@ TEST_CASE("A run that was interrupted before anything was done leaves a checkpoi
   kill(child, SIGINT);
   REQUIRE(place.finish(child).status == 130);
   CHECK(content_of(place / "c") != "something else");
-  CHECK(place.run(kFit + "--levels 3 --time-limit 1 -o out.mesh --resume c --force").status == 4);
+  CHECK(place.run(kFit + "--levels 3 --time-limit 0.3 -o out.mesh --resume c --force").status == 4);
 }
 
 TEST_CASE("A checkpoint whose template depends on the time is kept with a warning", "[cli][checkpoint][slow]") {
