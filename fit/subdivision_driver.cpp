@@ -231,8 +231,8 @@ double SubdivisionDriver::Measured::largest() const {
 bool SubdivisionDriver::Measured::gains_on(const Measured& before, std::optional<double> tolerance_percent) const {
   // Distances may rise by 5 %, but not past the tolerance; those of the surface that is nearer by a quarter. It gives
   // way first, because the stages before put it as near as they could. If no mean rises, largest distances may rise by
-  // 10 %: joint129 at level 2 rises from 0.08 to 0.62 so, with a mean that falls by 2 %, where the largest distance rises
-  // by 7 % at a single place.
+  // 10 %: so joint129 at level 2 rises from 0.08 to 0.62 while its mean distance falls by 2 % and its largest one, at a
+  // single place, rises by 7 %.
   constexpr double kFarther = 1.05, kNearerFarther = 1.25, kFartherPlace = 1.1;
   double farthest_mean = 0, farthest_max = 0;
   bool is_nearer = true;
