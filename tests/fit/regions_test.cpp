@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/base/error.h"
+#include "subvol/export/export.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/elements/quadrature.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/geometry/boundary_triangles.h"
-#include "subvol/fit/geometry/curved_boundary.h"
 #include "subvol/fit/high_order_fit.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/optimize_mesh.h"
