@@ -24,7 +24,8 @@ struct HighOrderFitOptions {
   /// p-adaptive: orders are raised, up to `order`, only where the energy gains from it and only until the tolerance is
   /// met.
   bool adaptive = false;
-  /// Lambda is lowered until the mean distance is at most this, in per cent of the diagonal; > 0.
+  /// Lambda is lowered until the mean distance is at most this, in per cent of the diagonal; > 0. It is also lowered
+  /// until the volumes of the target's regions are within `kAutomaticVolumePercent`.
   std::optional<double> tolerance_percent;
   std::optional<double> lambda_close;  ///< lambda of the last stage, > 0; empty: one of the two above
   /// As in FitOptions: edges of the target sharper than this angle, and borders between groups, that edges of the mesh

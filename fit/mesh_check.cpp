@@ -283,6 +283,10 @@ MeshCheck check_linear(const VolumeMesh& mesh, const Compare& compare, const Mes
 MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary, const Compare& compare,
                        const MeshCheckOptions& options, int samples_per_direction) {
   const WorkProgress& progress = options.progress;
+  if (const auto& references = options.labels.references;
+      !references.empty() && references.size() != mesh.space.num_cells())
+    throw InputError("mesh check: " + std::to_string(references.size()) + " references for " +
+                     std::to_string(mesh.space.num_cells()) + " cells");
   if (samples_per_direction != 0) require_samples(samples_per_direction);
   const VolumeMesh straight = mesh.straight_sided();
   require_extent(mesh.coefficients, "mesh check: mesh");
@@ -297,8 +301,8 @@ MeshCheck check_curved(const HighOrderMesh& mesh, const CurvedBoundary& boundary
       [&](Index c, const Vec3& point) { return mesh.position(c, point); });
   if (!begins("topology", 0.2, progress, check)) return check;
   check_topology(straight, mesh.space.topology(), check);
-  if (RegionReport regions = measure_regions(mesh, options.labels, &*check.quality); regions.regions.size() > 1)
-    check.regions = std::move(regions);
+  if (std::ranges::adjacent_find(options.labels.references, std::not_equal_to{}) != options.labels.references.end())
+    check.regions = measure_regions(mesh, options.labels, &*check.quality);
   const auto finite = [](const Vec3& x) { return x.allFinite(); };
   if (std::all_of(mesh.coefficients.begin(), mesh.coefficients.end(), finite))
     check_boundary(boundary.triangles, boundary.faces, compare, progress, check);

@@ -45,8 +45,8 @@ inline constexpr double kMeanShareOfTolerance = 0.9, kMaxShareOfTolerance = 0.8;
 class OptimizeDriver {
  protected:
   enum class Boundary { fixed, sliding };
-  /// What is held for the sake of the regions' volumes, each after all before: nothing; the volumes, by lowering
-  /// lambda; the vertices of interfaces; those of the boundary.
+  /// An attempt holds more than the one before if that changed the volumes of regions: first nothing, then the volumes
+  /// (lambda is lowered for them), then also the vertices of interfaces, and at last those of the boundary.
   enum class Held { nothing, volumes, interfaces, sheets };
   /// Properties of a state that the quality stages must not spoil.
   struct Measured {

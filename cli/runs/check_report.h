@@ -23,10 +23,10 @@ Json check_json(const MeshCheck& check);
 /// reference, for `start_volume` and `start_area`; null: without these.
 /// prefix: of these names, "start" or "target".
 Json regions_json(const RegionReport& report, const RegionReport* start = nullptr, const char* prefix = "start");
-/// The same beside the target's, if it has the same regions, else beside those of the mesh that the result was made
-/// from.
+/// Returns the same with the volumes and areas of the target, if it has the same regions, or else of the mesh that the
+/// result was made from.
 Json regions_json(const RegionReport& report, const std::optional<RegionSurface>& target, const VolumeMesh& start);
-/// A warning for each region whose volume differs from the target's by more than `kAutomaticVolumePercent`.
+/// Returns a warning for each region whose volume differs from the target's by more than `kAutomaticVolumePercent`.
 std::vector<std::string> warnings_of_volumes(const MeshCheck& check, const std::optional<RegionSurface>& target);
 
 /// Check of the Lagrange cells of a .vtu, which VTK and other programs read, against the curved cells in its field

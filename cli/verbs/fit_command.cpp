@@ -409,7 +409,7 @@ void add_solver_options(CLI::App& verb, FitArguments& arguments) {
           "--lambda-close", fit.lambda_close,
           "Weight of the cells' shape in the last stage; lowered further while the mean distance is above --tolerance\n"
           "(0.015 where none is given) and falls by more than the cells' distortion rises. With --order: 0.05, or\n"
-          "0.0025 if creases follow nearly all sharp edges, lowered for a --tolerance alone")
+          "0.0025 if creases follow nearly all sharp edges, lowered for a --tolerance and volumes of regions")
       ->check(number_in(1e-9, 1e9))
       ->type_name("W")
       ->capture_default_str()

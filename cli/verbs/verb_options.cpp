@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
 namespace subvol::cli {
 namespace {
@@ -29,6 +30,21 @@ constexpr std::size_t kLeastMemoryLimit = std::size_t{64} << 20, kMostMemoryLimi
 bool is_excluded(const CLI::Option& option) {
   const auto& others = option.get_excludes();
   return std::any_of(others.begin(), others.end(), [](const CLI::Option* other) { return other->count() > 0; });
+}
+
+/// Adds an option with two values by their names, of which the first is the default.
+template <class Value>
+void add_choice(CLI::App& verb, const char* name, Value& value, const std::pair<std::string, Value>& first,
+                const std::pair<std::string, Value>& second, const std::string& help) {
+  verb.add_option_function<std::string>(
+          name,
+          [&value, first, second](const std::string& text) {
+            value = text == second.first ? second.second : first.second;
+          },
+          help)
+      ->check(CLI::IsMember({first.first, second.first}))
+      ->type_name(first.first + '|' + second.first)
+      ->default_str(first.first);
 }
 
 }  // namespace
@@ -147,28 +163,14 @@ void add_checkpoint_options(CLI::App& verb, RunOptions& options) {
 }
 
 void add_msh_version_option(CLI::App& verb, WritingOptions& options) {
-  verb.add_option_function<std::string>(
-          "--msh-version",
-          [&options](const std::string& text) {
-            options.msh_version = text == "2.2" ? MshVersion::v2_2 : MshVersion::v4_1;
-          },
-          "Version of .msh files: 4.1, or 2.2, which more programs read")
-      ->check(CLI::IsMember({"2.2", "4.1"}))
-      ->type_name("2.2|4.1")
-      ->default_str("4.1");
+  add_choice(verb, "--msh-version", options.msh_version, {"4.1", MshVersion::v4_1}, {"2.2", MshVersion::v2_2},
+             "Version of .msh files: 4.1, or 2.2, which more programs read");
 }
 
 void add_writing_options(CLI::App& verb, WritingOptions& options) {
   add_msh_version_option(verb, options);
-  verb.add_option_function<std::string>(
-          "--vtu-cells",
-          [&options](const std::string& text) {
-            options.vtu_cells = text == "bezier" ? VtuCells::bezier : VtuCells::lagrange;
-          },
-          "How a .vtu holds curved cells: Lagrange cells, or Bezier cells, whose points are control points")
-      ->check(CLI::IsMember({"lagrange", "bezier"}))
-      ->type_name("lagrange|bezier")
-      ->default_str("lagrange");
+  add_choice(verb, "--vtu-cells", options.vtu_cells, {"lagrange", VtuCells::lagrange}, {"bezier", VtuCells::bezier},
+             "How a .vtu holds curved cells: Lagrange cells, or Bezier cells, whose points are control points");
   const auto group = "Surfaces for DCC tools";
   options.chord_percent = kSceneChordPercent;
   verb.add_option("--chord", options.chord_percent,
