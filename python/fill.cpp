@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/face_groups.h"
 #include "cli/runs/report.h"
 #include "python/arrays.h"
@@ -10,9 +11,14 @@
 #include "python/results.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/fit/target/surface_wrap.h"
 #include "subvol/subdivision/audit.h"
+
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace subvol::python {
 namespace {
@@ -41,13 +47,15 @@ class Filling {
     target_ = triangles_from(target, "target");
     if (wrap_percent)
       target_ = work_.run("wrap", [&] { return wrap_surface(target_, {.voxel_percent = *wrap_percent}); });
+    else
+      repair();
     checkpoints_.begin("fill", keywords_, {{"target", cli::fingerprint(target_)}});
   }
 
   std::shared_ptr<Filled> run() {
     options_.progress = work_.progress();
     options_.cancelled = work_.cancelled();
-    std::vector<std::string> warnings;
+    std::vector<std::string> warnings = std::move(remarks_);
     AutomaticFitResult found = checkpoints_.run(work_, "fit", warnings, [&](internal::StageLog* log) {
       options_.log = log;
       return fit_automatically(target_, options_);
@@ -59,7 +67,7 @@ class Filling {
     const MeshCheck checked = work_.run("check", [&] { return check_mesh(found.mesh, &outer); });
     const bool has_cage = found.cage.num_cells() > 0;
     if (has_cage) cli::carry_groups(outer, found.cage);
-    Json json{{"input", {{"target", cli::describe("", target_)}}}};
+    Json json{{"input", {{"target", cli::describe("", target_)}}}, {"repairs", repairs_}};
     json.update(cli::automatic_fit_json(found));
     json.update(cli::fit_json(found.report));
     json.update(cli::check_json(checked));
@@ -84,6 +92,16 @@ class Filling {
   }
 
  private:
+  /// Makes the target bound a solid. Regions are looked for once: what was repaired has one.
+  void repair() {
+    SurfaceRepair repair =
+        work_.run("repair", [&] { return repair_surface(target_, work_.cancelled(), options_.regions); });
+    cli::add_remarks(repair, remarks_);
+    if (!repair.regions) options_.regions = RegionRule::merge;
+    target_ = std::move(repair.surface);
+    repairs_ = std::move(repair.done);
+  }
+
   /// An angle is followed on every surface, "auto" on designed parts only; a negative one means none.
   void take_crease_angle() {
     std::optional<double> angle;
@@ -99,6 +117,7 @@ class Filling {
   AutomaticFitOptions options_;
   cli::WritingOptions writing_;
   TriangleMesh target_;
+  std::vector<std::string> repairs_, remarks_;  ///< what was done to the target; that, and what was left
 };
 
 constexpr const char* kFillHelp =
@@ -115,8 +134,8 @@ quality        least scaled Jacobian to aim at, at most 0.8
 crease_angle   degrees: edges of the target sharper than this stay sharp; negative: none; None: 40, if the target is a
                designed part and no scan
 regions        what becomes of closed parts inside others and of sheets inside a solid: 'auto', 'keep' or 'merge'
-wrap           fill a closed surface that follows the target, for targets with holes or with parts that cross: made of
-               voxels this large, in per cent of the diagonal; usually 0.5
+wrap           fill a closed surface that follows the target, made of voxels this large, in per cent of the diagonal;
+               None: 0.5 if the target bounds no solid after its repair (parts united, holes covered), else none
 keep_groups    follow borders between groups of the target's faces like sharp edges
 cage           make a subdivision volume: a cage, whose points are the only unknowns, and the mesh it is subdivided to
 levels         times the template of a cage is subdivided to the mesh, 1 .. 6; always once if edges are followed

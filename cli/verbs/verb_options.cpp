@@ -94,9 +94,9 @@ void add_regions_option(CLI::App& verb, std::string& rule) {
 void add_wrap_option(CLI::App& verb, std::optional<double>& percent) {
   verb.add_option(
           "--wrap", percent,
-          "Fill a closed surface that follows this one, for surfaces with holes, or with parts and sheets that\n"
-          "cross: made of voxels this large, in percent of the diagonal; usually 0.5. What is thinner or\n"
-          "narrower than two of them may be lost or closed, and sharp edges are cut off by up to one")
+          "Fill a closed surface that follows this one, made of voxels this large, in percent of the diagonal\n"
+          "(default: 0.5 if the surface bounds no solid, although parts are united and holes covered). What is\n"
+          "thinner or narrower than two voxels may be lost or closed, and sharp edges are cut off by up to one")
       ->check(CLI::Range(kLeastWrapPercent, kMostWrapPercent))
       ->type_name("PERCENT")
       ->excludes(verb.get_option("--regions"));  // the wrap has one region

@@ -2,13 +2,14 @@
 #include "subvol/fit/mending/surface_repair.h"
 
 #include "subvol/base/error.h"
-#include "subvol/fit/geometry/self_intersection.h"
-#include "subvol/fit/geometry/surface_union.h"
-#include "subvol/fit/geometry/triangle_meeting.h"
+#include "subvol/base/format.h"
+#include "subvol/fit/geometry/hole_covers.h"
+#include "subvol/fit/mending/fins.h"
 #include "subvol/fit/mending/mend_surface.h"
+#include "subvol/fit/mending/part_union.h"
+#include "subvol/fit/mending/solid_wrap.h"
 #include "subvol/fit/target/carried_groups.h"
 #include "subvol/surface/boundary.h"
-#include "subvol/surface/part_nesting.h"
 #include "subvol/surface/surface_parts.h"
 #include "subvol/templates/auto_template.h"
 
@@ -18,7 +19,6 @@
 #include <array>
 #include <cmath>
 #include <exception>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,120 +29,6 @@ namespace subvol {
 using namespace internal;
 
 namespace {
-
-/// The parts of a surface, some of which are to be united.
-class Union {
- public:
-  Union(SurfaceParts parts, const std::function<bool()>& cancelled) : parts_(std::move(parts)), cancelled_(cancelled) {
-    nesting_ = part_nesting(mesh(), parts_.part, static_cast<int>(parts_.num_parts()));
-    turn_parts_outward(parts_);
-    group_.resize(parts_.num_parts());
-    std::iota(group_.begin(), group_.end(), 0);
-  }
-  /// Finds out which parts cross or overlap. Returns false if cancelled.
-  bool group();
-  /// Returns the surface of the union, and a sentence for each group in `done`.
-  TriangleMesh made(std::vector<std::string>& done) const;
-
- private:
-  struct Meeting {
-    std::size_t a, b;  ///< parts
-    Vec3 place;
-  };
-  const TriangleMesh& mesh() const { return parts_.surface.mesh; }
-  std::size_t root(std::size_t p) const {
-    while (group_[p] != p) p = group_[p];
-    return p;
-  }
-  TriangleMesh part(std::size_t p) const;
-  TriangleMesh united_group(std::size_t group) const;
-  std::string text_of(const Meeting& meeting) const {
-    return "parts " + std::to_string(meeting.a) + " and " + std::to_string(meeting.b) + " meet at " +
-           to_text(meeting.place);
-  }
-
-  SurfaceParts parts_;
-  PartNesting nesting_;
-  const std::function<bool()>& cancelled_;
-  std::vector<std::size_t> group_;  ///< another part of the same group, or the part itself
-  std::vector<Meeting> meetings_;   ///< those that joined groups
-};
-
-bool Union::group() {
-  const SelfIntersections found = self_intersections(mesh(), cancelled_);
-  if (cancelled_ && cancelled_()) return false;
-  for (const auto& [t, s] : found.pairs) {
-    const auto a = static_cast<std::size_t>(parts_.part[t]), b = static_cast<std::size_t>(parts_.part[s]);
-    if (root(a) == root(b) || !parts_.is_closed[a] || !parts_.is_closed[b]) continue;
-    const auto corners = [&](Index triangle) {
-      const auto& [i, j, k] = mesh().triangles[triangle];
-      return std::array<Vec3, 3>{mesh().positions[i], mesh().positions[j], mesh().positions[k]};
-    };
-    const TriangleMeeting meeting = meeting_of(corners(t), corners(s));
-    if (meeting.kind != MeetingKind::crossing && meeting.kind != MeetingKind::face) continue;
-    meetings_.push_back({a, b, meeting.place});
-    group_[std::max(root(a), root(b))] = std::min(root(a), root(b));
-  }
-  return true;
-}
-
-TriangleMesh Union::part(std::size_t p) const {
-  TriangleMesh result;
-  std::vector<Index> number(mesh().positions.size(), kNoIndex);
-  for (std::size_t t = 0; t < mesh().triangles.size(); ++t) {
-    if (static_cast<std::size_t>(parts_.part[t]) != p) continue;
-    std::array<Index, 3> corners = mesh().triangles[t];
-    for (Index& v : corners) {
-      if (number[v] == kNoIndex) {
-        number[v] = static_cast<Index>(result.positions.size());
-        result.positions.push_back(mesh().positions[v]);
-      }
-      v = number[v];
-    }
-    result.triangles.push_back(corners);
-  }
-  return result;
-}
-
-TriangleMesh Union::united_group(std::size_t group) const {
-  std::optional<TriangleMesh> whole;
-  for (const bool voids : {false, true})
-    for (std::size_t p = 0; p < group_.size(); ++p) {
-      if (root(p) != group || nesting_.is_void(p) != voids) continue;
-      TriangleMesh next = part(p);
-      if (voids)
-        for (auto& t : next.triangles) std::swap(t[1], t[2]);
-      if (!whole)
-        whole = std::move(next);
-      else
-        whole = voids ? without(*whole, next) : united(*whole, next);
-      if (whole) continue;
-      const auto meeting =
-          std::find_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return m.a == p || m.b == p; });
-      throw InputError("target: " + text_of(meeting == meetings_.end() ? meetings_.front() : *meeting) +
-                       " and cannot be united: a part meets itself, or parts also touch along an edge or at a vertex");
-    }
-  return std::move(*whole);
-}
-
-TriangleMesh Union::made(std::vector<std::string>& done) const {
-  TriangleMesh result;
-  for (std::size_t p = 0; p < group_.size(); ++p) {
-    if (root(p) != p) continue;
-    const auto members =
-        std::count_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return root(m.a) == p; });
-    TriangleMesh one = members == 0 ? part(p) : united_group(p);
-    const auto first = static_cast<Index>(result.positions.size());
-    result.positions.insert(result.positions.end(), one.positions.begin(), one.positions.end());
-    for (const auto& [a, b, c] : one.triangles) result.triangles.push_back({first + a, first + b, first + c});
-    if (members == 0) continue;
-    const auto meeting =
-        std::find_if(meetings_.begin(), meetings_.end(), [&](const Meeting& m) { return root(m.a) == p; });
-    done.push_back("target: " + text_of(*meeting) + "; " + std::to_string(members + 1) +
-                   " parts that cross or overlap are united");
-  }
-  return result;
-}
 
 /// The number of places at which a surface cannot be filled as it is.
 std::size_t num_obstacles(const SurfaceDiagnosis& diagnosis) {
@@ -178,7 +64,7 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
           sheets + ", and " +
           words(diagnosis.find(SurfaceFault::crossing) ? SurfaceFault::crossing : SurfaceFault::face_contact)
               .substr(std::string("target: ").size()) +
-          ": sheets must meet along edges that they share");
+          ": sheets must meet along edges that they share. A wrap makes one region of such a surface");
     if (!regions) throw InputError(sheets + ", but an edge of one triangle leaves them open");
     surface = outer_surface(*regions);
     repair.surface = surface;
@@ -187,7 +73,7 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
   const std::string turned = words(SurfaceFault::wall_outward);
   bool united = false;
   if (diagnosis.parts.size() > 1 && !diagnosis.find(SurfaceFault::fin) && (crosses || !turned.empty())) {
-    Union parts(surface_parts(surface), cancelled);
+    PartUnion parts(surface_parts(surface), cancelled);
     if (!parts.group()) return repair;
     const std::size_t before = repair.done.size();
     TriangleMesh made = parts.made(repair.done);
@@ -198,15 +84,17 @@ SurfaceRepair rearranged(const TriangleMesh& given, const SurfaceDiagnosis& diag
       repair.surface = std::move(made);
     }
   }
+  const SurfaceDiagnosis after = united ? diagnose(repair.surface, cancelled) : SurfaceDiagnosis{};
+  const SurfaceDiagnosis& left = united ? after : diagnosis;
   const auto is_repaired = [&](SurfaceFault fault) {
-    if (fault == SurfaceFault::crossing || fault == SurfaceFault::face_contact) return united;
     return fault == SurfaceFault::wall_outward ? !repair.done.empty() : fault == SurfaceFault::pinhole;
   };
-  repair.is_fillable = std::ranges::all_of(diagnosis.findings, [&](const SurfaceFinding& finding) {
+  repair.is_fillable = !left.is_cancelled && std::ranges::all_of(left.findings, [&](const SurfaceFinding& finding) {
     return !prevents_filling(finding.fault) || is_repaired(finding.fault);
   });
   for (const SurfaceFault fault : {SurfaceFault::crossing, SurfaceFault::face_contact})
-    if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": left as it is");
+    if (const SurfaceFinding* found = left.find(fault))
+      repair.notes.push_back("target: " + to_text(*found, left.diagonal) + ": left as it is");
   for (const SurfaceFault fault : {SurfaceFault::edge_contact, SurfaceFault::vertex_contact})
     if (!united && diagnosis.find(fault)) repair.notes.push_back(words(fault) + ": what touches stays apart");
   if (diagnosis.find(SurfaceFault::pinhole)) repair.notes.push_back(words(SurfaceFault::pinhole) + ": closed");
@@ -255,6 +143,73 @@ std::optional<SurfaceRepair> mended(const TriangleMesh& given, const SurfaceDiag
   return repair;
 }
 
+/// A repair, or the error that it ended with.
+struct RepairAttempt {
+  std::optional<SurfaceRepair> repair;
+  std::exception_ptr error;  ///< null if there is a repair
+  bool is_successful() const { return repair && repair->is_fillable; }
+};
+
+/// Repairs a surface without covers for its holes.
+RepairAttempt attempt_repair(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
+                             const std::function<bool()>& cancelled, RegionRule rule) {
+  RepairAttempt attempt;
+  try {
+    attempt.repair = rearranged(given, diagnosis, cancelled, rule);
+    if (attempt.is_successful()) return attempt;
+  } catch (const InputError&) {
+    attempt.error = std::current_exception();
+  }
+  try {
+    if (std::optional<SurfaceRepair> better = mended(given, diagnosis, cancelled, rule))
+      attempt = {std::move(better), nullptr};
+  } catch (const InputError&) {
+    attempt = {std::nullopt, std::current_exception()};
+  }
+  return attempt;
+}
+
+/// Repairs a surface after a change. Returns nothing unless it bounds a solid then.
+/// before  the repair without the change; done: what was changed.
+std::optional<SurfaceRepair> repaired_after(const TriangleMesh& changed, const SurfaceRepair& before,
+                                            const std::string& done, const std::function<bool()>& cancelled,
+                                            RegionRule rule) {
+  const SurfaceDiagnosis diagnosis = diagnose(changed, cancelled);
+  if (diagnosis.is_cancelled) return std::nullopt;
+  RepairAttempt attempt = attempt_repair(changed, diagnosis, cancelled, rule);
+  if (!attempt.is_successful()) return std::nullopt;
+  std::vector<std::string>& all = attempt.repair->done;
+  all.insert(all.begin(), "target: " + done);
+  all.insert(all.begin(), before.done.begin(), before.done.end());
+  return std::move(attempt.repair);
+}
+
+/// Returns the repair of a surface without its fins, if these are a small part of it and the rest bounds a solid.
+std::optional<SurfaceRepair> repaired_without_fins(const SurfaceRepair& before, const std::function<bool()>& cancelled,
+                                                   RegionRule rule) {
+  constexpr double kMostFinShare = 0.25;  // of the area
+  const std::optional<SurfaceWithoutFins> rest = without_fins(before.surface);
+  if (!rest || rest->area_share > kMostFinShare) return std::nullopt;
+  return repaired_after(rest->surface, before,
+                        formatted("%zu %s of fins left out, with %.3g %% of the surface's area", rest->triangles,
+                                  rest->triangles == 1 ? "triangle" : "triangles", 100 * rest->area_share),
+                        cancelled, rule);
+}
+
+/// Area of the covers of a solid's holes, as a share of the surface's. The disk under half a sphere has 0.5; covers of
+/// a sheet have about its own area, and say nothing about a solid.
+constexpr double kMostCoverShare = 0.5;
+
+/// Returns the repair of a surface whose holes are covered, if it bounds a solid: covers may cross it.
+std::optional<SurfaceRepair> repaired_with_covers(const CoveredHoles& covered, const SurfaceRepair& before,
+                                                  const std::function<bool()>& cancelled, RegionRule rule) {
+  if (covered.area_share > kMostCoverShare) return std::nullopt;
+  return repaired_after(covered.surface, before,
+                        formatted("%zu %s covered, with %.3g %% of the surface's area", covered.count,
+                                  covered.count == 1 ? "hole is" : "holes are", 100 * covered.area_share),
+                        cancelled, rule);
+}
+
 /// Returns the edge length of the smallest cells that `auto_templates` tries if so many are wanted.
 double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
   return std::cbrt(std::abs(diagnosis.volume) / static_cast<double>(kMostTemplateGrowth * cells));
@@ -265,18 +220,28 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
 SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
   if (diagnosis.is_cancelled) return {.surface = given};
-  std::optional<SurfaceRepair> repair;
-  std::exception_ptr error;
-  try {
-    repair = rearranged(given, diagnosis, cancelled, rule);
-    if (repair->is_fillable) return std::move(*repair);
-  } catch (const InputError&) {
-    error = std::current_exception();
-  }
-  std::optional<SurfaceRepair> better = mended(given, diagnosis, cancelled, rule);
-  if (better) return std::move(*better);
-  if (error) std::rethrow_exception(error);
-  return std::move(*repair);
+  RepairAttempt attempt = attempt_repair(given, diagnosis, cancelled, rule);
+  if (attempt.is_successful()) return std::move(*attempt.repair);
+  if (cancelled && cancelled()) return {.surface = given};
+  const SurfaceRepair before = attempt.repair ? *attempt.repair : SurfaceRepair{.surface = given};
+  if (diagnosis.find(SurfaceFault::fin))
+    if (std::optional<SurfaceRepair> repair = repaired_without_fins(before, cancelled, rule)) return std::move(*repair);
+  const SurfaceFinding* holes = diagnosis.find(SurfaceFault::open_rim);
+  std::optional<CoveredHoles> covered;
+  if (holes) covered = cover_holes(before.surface);
+  if (covered)
+    if (std::optional<SurfaceRepair> repair = repaired_with_covers(*covered, before, cancelled, rule))
+      return std::move(*repair);
+  if (rule != RegionRule::keep && needs_wrap(attempt.repair ? &attempt.repair->surface : nullptr, diagnosis))
+    if (std::optional<SurfaceRepair> repair = wrapped_to_fill(given, diagnosis, cancelled)) return std::move(*repair);
+  if (!attempt.repair) std::rethrow_exception(attempt.error);
+  if (covered && covered->area_share > kMostCoverShare)
+    throw InputError(
+        "target: " + to_text(*holes, diagnosis.diagonal) +
+        formatted(": a cover would have %.3g %% of the surface's area. A sheet bounds no solid; layers can "
+                  "be grown on it (`shell`)",
+                  100 * covered->area_share));
+  return std::move(*attempt.repair);
 }
 
 std::string why_no_grid(const SurfaceDiagnosis& diagnosis, std::size_t cells, const BettiNumbers& wanted) {

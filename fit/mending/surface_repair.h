@@ -23,8 +23,8 @@ struct SurfaceRepair {
   bool is_fillable = false;        ///< no fault that `prevents_filling` is left but pinholes, which filling closes
 };
 
-/// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting, and
-/// removes small faults.
+/// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting,
+/// removes small faults, and covers holes.
 ///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
@@ -33,14 +33,23 @@ struct SurfaceRepair {
 /// Crossings, contacts of faces, repeated triangles and edges of three triangles that remain are mended if that is
 /// possible within `kMendingShare` of the diagonal (`mend_surface`) and leaves fewer places that prevent filling.
 ///
+/// If the surface bounds no solid then, three things are tried, in this order:
+/// - fins are left out (`without_fins`) if they have at most a quarter of the area and the rest bounds a solid;
+/// - holes are covered (`cover_holes`) if the covers have at most half of the surface's area and it bounds a solid with
+///   them; covers are in no group;
+/// - the surface is wrapped (`wrapped_to_fill`), unless RegionRule::keep is given, if it has edges of three triangles
+/// or
+///   parts that cross and cannot be united.
+///
 /// Where there are several regions by the rule (`find_regions`) and nothing crosses, there is nothing to repair. With
 /// RegionRule::merge, sheets inside a solid are left out.
 ///
 /// surface    in any state; a surface that needs no repair is returned bit by bit.
 /// cancelled  asked now and then, from the calling thread; if it returns true, the surface is returned as it was given.
 /// InputError: as `diagnose`; sheets that divide the inside into several regions, if something crosses or an edge has
-/// only one triangle; parts that cross and cannot be united, with the place. Cost: that of `diagnose`, and again if
-/// parts are united.
+/// only one triangle; parts that cross and can be neither united nor wrapped, with the place; a sheet with a rim, whose
+/// cover would have more than half of its area. Cost: that of `diagnose`, again after each step that changes something,
+/// and that of `wrap_surface` as a last resort.
 SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {},
                              RegionRule rule = RegionRule::automatic);
 

@@ -5,6 +5,7 @@
 #include "subvol/surface/corner_fans.h"
 #include "subvol/surface/crowded_edges.h"
 #include "subvol/surface/part_nesting.h"
+#include "subvol/surface/rim_loops.h"
 #include "subvol/surface/welded_surface.h"
 
 #include <Eigen/Dense>
@@ -122,38 +123,16 @@ void drop_loners(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary&
   component.resize(kept);
 }
 
-/// Closes every loop of boundary edges, those with one triangle, by a fan.
+/// Closes every hole by a fan around the mean of its rim's vertices.
 void close_holes(TriangleMesh& mesh, std::vector<int>& component, SolidBoundary& result) {
-  std::vector<std::array<Index, 3>> rims;  // from, to, triangle
-  const std::vector<SurfaceHalfEdge> sides = sorted_half_edges(mesh.triangles, mesh.positions.size());
-  for_each_edge(std::span(sides), [&](std::span<const SurfaceHalfEdge> run) {
-    if (run.size() == 1)
-      rims.push_back(
-          {run[0].forward ? run[0].low : run[0].high, run[0].forward ? run[0].high : run[0].low, run[0].triangle});
-  });
-  std::sort(rims.begin(), rims.end());
-  std::vector<std::size_t> left(mesh.positions.size(), rims.size());  // each vertex's first unused edge
-  for (std::size_t i = rims.size(); i-- > 0;) left[rims[i][0]] = i;
-  for (std::size_t start = 0; start < rims.size(); ++start) {
-    if (start < left[rims[start][0]]) continue;
-    std::vector<std::size_t> loop;
+  for (const std::vector<RimEdge>& loop : rim_loops(mesh)) {
     Vec3 mean = Vec3::Zero();
-    // As many boundary edges leave a vertex as enter it, so a walk returns to its start.
-    for (std::size_t at = start;;) {
-      left[rims[at][0]] = at + 1;
-      loop.push_back(at);
-      mean += mesh.positions[rims[at][0]];
-      const Index next = rims[at][1];
-      if (next == rims[start][0]) break;
-      at = left[next];
-      if (at == rims.size() || rims[at][0] != next)
-        throw InputError("surface: the rim of a hole does not close at vertex " + std::to_string(next));
-    }
-    const auto centre = static_cast<Index>(mesh.positions.size());
+    for (const RimEdge& edge : loop) mean += mesh.positions[edge.from];
+    const auto center = static_cast<Index>(mesh.positions.size());
     mesh.positions.push_back(mean / static_cast<double>(loop.size()));
-    for (std::size_t at : loop) {
-      mesh.triangles.push_back({rims[at][1], rims[at][0], centre});
-      component.push_back(component[rims[at][2]]);
+    for (const RimEdge& edge : loop) {
+      mesh.triangles.push_back({edge.to, edge.from, center});
+      component.push_back(component[edge.triangle]);
       if (!mesh.face_groups.empty()) mesh.face_groups.of_face.push_back(kNoIndex);
     }
     ++result.closed_holes;

@@ -11,7 +11,10 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 using namespace subvol;
 using namespace subvol::test;
@@ -91,16 +94,91 @@ TEST_CASE("Cracks between the faces of a part close before it is filled", "[mend
   CHECK(mend_surface(polygons, {}, distance, MendingGoal::solid).surface.positions.size() == cracked.positions.size());
   CHECK(mend_surface(polygons, {}, distance, MendingGoal::solid_with_cracks).surface.positions.size() ==
         cube.positions.size());
-  // A hole is none.
-  TriangleMesh open = cube;
-  open.triangles.resize(open.triangles.size() - 20);
-  CHECK(repair_surface(open).surface.triangles == open.triangles);
 }
 
-TEST_CASE("A surface that can be filled as it is is not mended", "[mending]") {
-  const TriangleMesh cube = cube_surface(4, false);
+TEST_CASE("A plane hole gets a plane cover before a surface is filled", "[mending]") {
+  TriangleMesh cube = cube_surface(4, false);
+  double top = -kInfinity;
+  for (const Vec3& p : cube.positions) top = std::max(top, p.z());
+  std::erase_if(cube.triangles, [&](const auto& t) {
+    return std::ranges::all_of(t, [&](Index v) { return cube.positions[v].z() > top - 1e-9; });
+  });
+  const std::size_t left = cube.triangles.size();
+  REQUIRE(diagnose(cube).find(SurfaceFault::open_rim));
   const SurfaceRepair repair = repair_surface(cube);
   CHECK(repair.is_fillable);
-  CHECK(repair.done.empty());
-  CHECK(repair.surface.positions == cube.positions);
+  CHECK(repair.surface.triangles.size() == left + 14);  // 16 vertices on the rim
+  CHECK(internal::signed_volume_of(repair.surface) == Approx(8));
+  REQUIRE(repair.done.size() == 1);
+  CHECK(repair.done[0] == "target: 1 hole is covered, with 20 % of the surface's area");
+}
+
+TEST_CASE("A sheet is refused, and the message says what can be made of it", "[mending]") {
+  TriangleMesh sheet;
+  constexpr int kSide = 6;
+  for (int i = 0; i <= kSide; ++i)
+    for (int j = 0; j <= kSide; ++j) sheet.positions.emplace_back(i, j, 0.3 * std::sin(i + 0.5 * j));
+  for (Index i = 0; i < kSide; ++i)
+    for (Index j = 0; j < kSide; ++j) {
+      const Index a = i * (kSide + 1) + j, b = a + kSide + 1;
+      sheet.triangles.push_back({a, b, b + 1});
+      sheet.triangles.push_back({a, b + 1, a + 1});
+    }
+  CHECK_THROWS_WITH(repair_surface(sheet), Catch::Contains("A sheet bounds no solid") && Catch::Contains("`shell`"));
+}
+
+TEST_CASE("A fin is left out before a surface is filled", "[mending]") {
+  TriangleMesh cube = cube_surface(4, false);
+  const auto [a, b, c] = cube.triangles[0];
+  cube.triangles.push_back({a, b, static_cast<Index>(cube.positions.size())});
+  cube.positions.push_back(1.5 * cube.positions[a]);
+  REQUIRE(diagnose(cube).find(SurfaceFault::fin));
+  const SurfaceRepair repair = repair_surface(cube);
+  CHECK(repair.is_fillable);
+  CHECK(repair.surface.triangles.size() + 1 == cube.triangles.size());
+  REQUIRE(repair.done.size() == 1);
+  CHECK_THAT(repair.done[0], Catch::StartsWith("target: 1 triangle of fins left out"));
+}
+
+TEST_CASE("What crosses after parts are united is told", "[mending]") {
+  // Two cubes that cross; a spike of one goes through its opposite side.
+  TriangleMesh both = cube_surface(6, false);
+  const TriangleMesh cube = both;
+  const auto first = static_cast<Index>(cube.positions.size());
+  for (const Vec3& p : cube.positions) both.positions.push_back(p + Vec3(1.1, 0.3, 0.2));
+  for (const auto& [a, b, c] : cube.triangles) both.triangles.push_back({first + a, first + b, first + c});
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : cube.positions) box.extend(p);
+  for (Index v = 0; v < first; ++v)
+    if ((cube.positions[v] - Vec3(box.center().x(), box.center().y(), box.max().z())).norm() < 1e-9)
+      both.positions[v].z() -= 1.2 * box.sizes().z();
+  const SurfaceRepair repair = repair_surface(both);
+  CHECK_FALSE(repair.is_fillable);
+  CHECK_THAT(repair.done.back(), Catch::EndsWith("are united"));
+  REQUIRE(repair.notes.size() == 1);
+  CHECK_THAT(repair.notes[0], Catch::EndsWith("left as it is"));
+}
+
+TEST_CASE("A surface that bounds no solid after its repair is wrapped", "[mending]") {
+  // A cube with a sheet on an edge that is too large for a fin.
+  TriangleMesh cube = cube_surface(4, false);
+  const auto [a, b, c] = cube.triangles[0];
+  const auto m = static_cast<Index>(cube.positions.size());
+  cube.positions.push_back(4 * cube.positions[a]);
+  cube.positions.push_back(cube.positions[m] + Vec3(3, -5, 0));
+  cube.triangles.push_back({a, b, m});
+  cube.triangles.push_back({b, m + 1, m});
+  for (const bool inward : {false, true}) {
+    if (inward)
+      for (auto& t : cube.triangles) std::swap(t[1], t[2]);
+    const SurfaceRepair repair = repair_surface(cube);
+    CHECK(repair.is_fillable);
+    REQUIRE(repair.done.size() == 1);
+    CHECK_THAT(repair.done[0],
+               Catch::EndsWith("it bounds no solid, and is wrapped with voxels of 0.5 % of its diagonal"));
+    CHECK(diagnose(repair.surface).is_fillable());
+    CHECK(internal::signed_volume_of(repair.surface) == Approx(8).epsilon(0.03));
+  }
+  // Where every enclosed part is to be a region, nothing is wrapped.
+  CHECK_FALSE(repair_surface(cube, {}, RegionRule::keep).is_fillable);
 }

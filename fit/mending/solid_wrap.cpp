@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/fit/mending/solid_wrap.h"
+
+#include "subvol/base/error.h"
+#include "subvol/base/format.h"
+#include "subvol/fit/target/surface_wrap.h"
+#include "subvol/surface/part_nesting.h"
+#include "subvol/surface/solid_topology.h"
+#include "subvol/surface/surface_parts.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace subvol::internal {
+
+namespace {
+
+bool bounds_solid(const TriangleMesh& surface) {
+  try {
+    return solid_boundary(surface).volume > 0;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+bool has_sheets(const SurfaceDiagnosis& diagnosis) {
+  const SurfaceFinding* edges = diagnosis.find(SurfaceFault::interface);
+  if (!edges) return false;
+  double length = 0;
+  for (const SurfacePlace& place : edges->places)
+    if (place.to) length += (*place.to - place.at).norm();
+  return edges->count > edges->places.size() || length > kPinholePercent / 100 * diagnosis.diagonal;
+}
+
+/// Returns the first finding that prevents filling, in words, or "".
+std::string cause(const SurfaceDiagnosis& diagnosis) {
+  for (const SurfaceFinding& finding : diagnosis.findings)
+    if (prevents_filling(finding.fault)) return to_text(finding, diagnosis.diagonal) + "; ";
+  return "";
+}
+
+}  // namespace
+
+bool needs_wrap(const TriangleMesh* repaired, const SurfaceDiagnosis& diagnosis) {
+  if (has_sheets(diagnosis)) return false;
+  const bool crosses = diagnosis.find(SurfaceFault::crossing) || diagnosis.find(SurfaceFault::face_contact);
+  return !repaired || (crosses && surface_parts(*repaired).num_parts() > 1) || !bounds_solid(*repaired);
+}
+
+std::optional<SurfaceRepair> wrapped_to_fill(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
+                                             const std::function<bool()>& cancelled) {
+  TriangleMesh outward = given;
+  if (signed_volume_of(given) < 0)
+    for (auto& triangle : outward.triangles) std::swap(triangle[1], triangle[2]);
+  const WrapOptions options;
+  SurfaceRepair repair;
+  try {
+    repair.surface = wrap_surface(outward, options, cancelled);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+  if (repair.surface.triangles.empty() || surface_parts(repair.surface).num_parts() > diagnosis.parts.size())
+    return std::nullopt;
+  repair.done.push_back(
+      "target: " + cause(diagnosis) +
+      formatted("it bounds no solid, and is wrapped with voxels of %g %% of its diagonal", options.voxel_percent));
+  repair.is_fillable = true;
+  return repair;
+}
+
+}  // namespace subvol::internal
