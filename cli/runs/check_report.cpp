@@ -168,20 +168,24 @@ Json regions_json(const RegionReport& report, const std::optional<RegionSurface>
   return regions_json(report, &before, target ? "target" : "start");
 }
 
-std::vector<std::string> warnings_of_volumes(const MeshCheck& check, const std::optional<RegionSurface>& target) {
+std::vector<std::string> warnings_of_volumes(const RegionReport& result, const RegionReport& wanted,
+                                             const std::string& whose) {
   std::vector<std::string> warnings;
-  if (!check.regions || !target) return warnings;
-  for (const RegionQuality& region : check.regions->regions)
-    for (std::size_t r = 0; r < target->regions.size(); ++r) {
-      if (target->regions[r].number != region.reference) continue;
-      const double percent = 100 * (region.volume / target->volumes[r] - 1);
-      if (std::abs(percent) <= kAutomaticVolumePercent) continue;
-      warnings.push_back(internal::formatted(
-          "the volume of %s is %.6g, in the target it is %.6g (%+.2g %%)",
-          region.name.empty() ? internal::formatted("region %d", region.reference).c_str() : region.name.c_str(),
-          region.volume, target->volumes[r], percent));
-    }
+  for (const RegionQuality& region : result.regions) {
+    const auto other = std::ranges::find(wanted.regions, region.reference, &RegionQuality::reference);
+    if (other == wanted.regions.end()) continue;
+    const double percent = 100 * (region.volume / other->volume - 1);
+    if (std::abs(percent) <= kAutomaticVolumePercent) continue;
+    const std::string name = region.name.empty() ? "region " + std::to_string(region.reference) : region.name;
+    warnings.push_back(formatted("the volume of %s is %.6g, in the %s it is %.6g (%+.2g %%)", name.c_str(),
+                                 region.volume, whose.c_str(), other->volume, percent));
+  }
   return warnings;
+}
+
+std::vector<std::string> warnings_of_volumes(const MeshCheck& check, const std::optional<RegionSurface>& target) {
+  if (!check.regions || !target) return {};
+  return warnings_of_volumes(*check.regions, measure_regions(*target), "target");
 }
 
 Json audit_json(const SubdivisionAudit& found) {

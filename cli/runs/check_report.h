@@ -26,7 +26,11 @@ Json regions_json(const RegionReport& report, const RegionReport* start = nullpt
 /// Returns the same with the volumes and areas of the target, if it has the same regions, or else of the mesh that the
 /// result was made from.
 Json regions_json(const RegionReport& report, const std::optional<RegionSurface>& target, const VolumeMesh& start);
-/// Returns a warning for each region whose volume differs from the target's by more than `kAutomaticVolumePercent`.
+/// Returns a warning for each region whose volume differs by more than `kAutomaticVolumePercent` from that of the
+/// region of the same reference in another mesh, or in the target. whose: what the other one is called, such as
+/// "target".
+std::vector<std::string> warnings_of_volumes(const RegionReport& result, const RegionReport& wanted,
+                                             const std::string& whose);
 std::vector<std::string> warnings_of_volumes(const MeshCheck& check, const std::optional<RegionSurface>& target);
 
 /// Check of the Lagrange cells of a .vtu, which VTK and other programs read, against the curved cells in its field

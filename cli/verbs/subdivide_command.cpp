@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "cli/runs/check_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/losses.h"
@@ -7,14 +8,18 @@
 #include "cli/runs/written_result.h"
 #include "cli/verbs/commands.h"
 #include "cli/verbs/verb_options.h"
+#include "subvol/fit/quality/region_quality.h"
 #include "subvol/io/mesh_io.h"
 #include "subvol/mesh/features.h"
+#include "subvol/mesh/interfaces.h"
 #include "subvol/subdivision/repeated_subdivision.h"
 
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace subvol::cli {
 
@@ -28,6 +33,14 @@ struct SubdivideArguments {
   int levels = 1;
   std::optional<double> crease_angle_degrees;
 };
+
+/// Warns of regions that subdivision makes smaller or larger, as it rounds their corners off.
+void warn_of_volumes(const VolumeMesh& cage, const VolumeMesh& fine, std::vector<std::string>& warnings) {
+  if (region_references(cage).size() < 2) return;
+  for (const std::string& warning :
+       warnings_of_volumes(measure_regions(fine, nullptr), measure_regions(cage, nullptr), "control mesh"))
+    warnings.push_back(warning + "; creases (--crease-angle) keep the shape of edges");
+}
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.run.outputs.empty()) throw UsageError("subdivide: nothing to write; give -o FILE");
@@ -45,6 +58,7 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   const VolumeMesh fine = subdivide_repeatedly(cage, arguments.levels, rule);
 
   warn_of_losses(read, marks_of(fine), outputs, warnings);
+  warn_of_volumes(cage, fine, warnings);
   WritingOptions writing = arguments.writing;
   writing.source = arguments.mesh;
   writing.options = options_of_result(verb);

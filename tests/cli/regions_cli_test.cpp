@@ -8,6 +8,8 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include <string>
+
 using subvol::test::content_of;
 using subvol::test::Run;
 using subvol::test::Workplace;
@@ -50,6 +52,18 @@ TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions]") {
   const Run check = place.run("check layers.mesh");
   CHECK(check.status == 0);
   CHECK(check.out.find("interface           between 3 and 8: 4 faces, area 4") != std::string::npos);
+}
+
+TEST_CASE("subdivide warns of regions that lose volume", "[cli][regions]") {
+  const Workplace place;
+  subvol::write_volume_mesh(place / "layers.mesh", two_layers());
+  const Run rounded = place.run("subdivide layers.mesh -o out.mesh --force");
+  CHECK(rounded.status == 0);
+  CHECK_THAT(rounded.err, Catch::Contains("the volume of region 3 is") &&
+                              Catch::Contains("in the control mesh it is 8") &&
+                              Catch::Contains("the volume of region 8 is") && Catch::Contains("--crease-angle"));
+  CHECK(place.run("subdivide layers.mesh --crease-angle 40 -o out.mesh --force").err.find("the volume of") ==
+        std::string::npos);
 }
 
 TEST_CASE("convert writes one region, and lists the regions if there is no such one",
