@@ -15,13 +15,18 @@ namespace subvol::python {
 using namespace internal;
 namespace {
 
+enum class Refinement { catmull_clark, averaging, linear };
+
 /// Arguments of `subdivide` and `subdivision_matrix`.
 struct Subdivision {
   Subdivision(const char* name, const py::object& object, const py::kwargs& given) {
     Keywords keywords(name, given);
     std::optional<double> crease_angle;
     keywords.take("levels", levels);
-    keywords.take("boundary", rule, boundary_rules());
+    keywords.take("boundary", refinement,
+                  {{"catmull-clark", Refinement::catmull_clark},
+                   {"averaging", Refinement::averaging},
+                   {"linear", Refinement::linear}});
     keywords.take("crease_angle", crease_angle);
     keywords.finish();
     mesh = sound_volume_from(object, "mesh");
@@ -31,22 +36,29 @@ struct Subdivision {
     mesh = std::make_shared<const VolumeMesh>(std::move(creased));
   }
 
+  VolumeMesh refined(SparseMap* matrix = nullptr) const {
+    if (refinement == Refinement::linear) return split_repeatedly(*mesh, levels, matrix);
+    const bool averages = refinement == Refinement::averaging;
+    return subdivide_repeatedly(*mesh, levels, averages ? BoundaryRule::averaging : BoundaryRule::catmull_clark,
+                                matrix);
+  }
+
   std::shared_ptr<const VolumeMesh> mesh;
   int levels = 1;
-  BoundaryRule rule = BoundaryRule::catmull_clark;
+  Refinement refinement = Refinement::catmull_clark;
 };
 
 std::shared_ptr<VolumeMesh> subdivide_mesh(const py::object& object, const py::kwargs& given) {
   const Subdivision asked("subdivide", object, given);
   const py::gil_scoped_release unlocked;
-  return std::make_shared<VolumeMesh>(subdivide_repeatedly(*asked.mesh, asked.levels, asked.rule));
+  return std::make_shared<VolumeMesh>(asked.refined());
 }
 
 std::shared_ptr<SparseMap> matrix_of(const py::object& object, const py::kwargs& given) {
   const Subdivision asked("subdivision_matrix", object, given);
   const py::gil_scoped_release unlocked;
   auto matrix = std::make_shared<SparseMap>();
-  subdivide_repeatedly(*asked.mesh, asked.levels, asked.rule, matrix.get());
+  asked.refined(matrix.get());
   return matrix;
 }
 
@@ -126,7 +138,7 @@ Refines a control mesh: VolumeMesh of hexes.
 
 mesh          VolumeMesh or its path
 levels        times it is refined, 0 .. 8
-boundary      'catmull-clark' or 'averaging'
+boundary      'catmull-clark', 'averaging', or 'linear': cells are only split, and no vertex moves
 crease_angle  degrees: boundary edges sharper than this become creases as well)");
   module.def("subdivision_matrix", &matrix_of, py::arg("mesh"),
              R"(subdivision_matrix(mesh, *, levels=1, boundary='catmull-clark', crease_angle=None)

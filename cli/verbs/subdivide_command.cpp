@@ -39,7 +39,8 @@ void warn_of_volumes(const VolumeMesh& cage, const VolumeMesh& fine, std::vector
   if (region_references(cage).size() < 2) return;
   for (const std::string& warning :
        warnings_of_volumes(measure_regions(fine, nullptr), measure_regions(cage, nullptr), "control mesh"))
-    warnings.push_back(warning + "; creases (--crease-angle) keep the shape of edges");
+    warnings.push_back(warning +
+                       "; creases (--crease-angle) keep the shape of edges, --boundary linear that of all faces");
 }
 
 int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
@@ -53,9 +54,11 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   if (arguments.crease_angle_degrees) {
     cage.tags = merge_tags(cage.tags, features_by_angle(cage, *arguments.crease_angle_degrees));
   }
-  const BoundaryRule rule =
-      arguments.boundary == "averaging" ? BoundaryRule::averaging : BoundaryRule::catmull_clark;
-  const VolumeMesh fine = subdivide_repeatedly(cage, arguments.levels, rule);
+  const bool has_limit = arguments.boundary == "catmull-clark";  // the others converge to other surfaces
+  const VolumeMesh fine = arguments.boundary == "linear"
+                              ? split_repeatedly(cage, arguments.levels)
+                              : subdivide_repeatedly(cage, arguments.levels,
+                                                     has_limit ? BoundaryRule::catmull_clark : BoundaryRule::averaging);
 
   warn_of_losses(read, marks_of(fine), outputs, warnings);
   warn_of_volumes(cage, fine, warnings);
@@ -63,7 +66,6 @@ int run_subdivide(const SubdivideArguments& arguments, const CLI::App& verb) {
   writing.source = arguments.mesh;
   writing.options = options_of_result(verb);
   TessellatedSurface limit;
-  const bool has_limit = rule == BoundaryRule::catmull_clark;  // averaging converges to another surface
   if (has_limit && std::any_of(outputs.begin(), outputs.end(), shows_surface)) limit = tessellated_limit(cage, writing);
   return write_checked(
       arguments.run, std::move(outputs), fine,
@@ -90,9 +92,10 @@ void add_subdivide_command(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 8))
       ->type_name("L")
       ->capture_default_str();
-  verb->add_option("--boundary", arguments->boundary, "How boundary vertices are subdivided")
-      ->check(CLI::IsMember({"catmull-clark", "averaging"}))
-      ->type_name("catmull-clark|averaging")
+  verb->add_option("--boundary", arguments->boundary,
+                   "How boundary vertices are subdivided; linear: cells are only split, and no vertex moves")
+      ->check(CLI::IsMember({"catmull-clark", "averaging", "linear"}))
+      ->type_name("catmull-clark|averaging|linear")
       ->capture_default_str();
   verb->add_option("--crease-angle", arguments->crease_angle_degrees,
                    "Boundary edges sharper than this become creases (default: only those the file tags)")

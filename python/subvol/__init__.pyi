@@ -341,10 +341,18 @@ def shell(
     threads: Optional[int] = None,
 ) -> ShellResult: ...
 def subdivide(
-    mesh: Volume, *, levels: int = 1, boundary: BoundaryRule = "catmull-clark", crease_angle: Optional[float] = None
+    mesh: Volume,
+    *,
+    levels: int = 1,
+    boundary: Literal["catmull-clark", "averaging", "linear"] = "catmull-clark",
+    crease_angle: Optional[float] = None,
 ) -> VolumeMesh: ...
 def subdivision_matrix(
-    mesh: Volume, *, levels: int = 1, boundary: BoundaryRule = "catmull-clark", crease_angle: Optional[float] = None
+    mesh: Volume,
+    *,
+    levels: int = 1,
+    boundary: Literal["catmull-clark", "averaging", "linear"] = "catmull-clark",
+    crease_angle: Optional[float] = None,
 ) -> SparseMap: ...
 def limit_matrix(mesh: Volume) -> SparseMap: ...
 def limit_surface(cage: Volume, *, chord: float = 0.005) -> SurfaceMesh: ...

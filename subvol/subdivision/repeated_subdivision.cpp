@@ -22,20 +22,35 @@ void require_numberable(const VolumeMesh& mesh, int levels) {
                      " cells; at most " + std::to_string(most) + " can be numbered");
 }
 
-}  // namespace
-
-VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule, SparseMap* matrix) {
+/// Refines several times with step(mesh), which refines once.
+template <class Step>
+VolumeMesh repeated(const VolumeMesh& control, int levels, SparseMap* matrix, const Step& step) {
   if (levels < 0 || levels > kMostLevels)
     throw InputError("levels must be in [0, " + std::to_string(kMostLevels) + "], got " + std::to_string(levels));
   require_numberable(control, levels);
   VolumeMesh fine = control;
   if (matrix) *matrix = identity_map(control.num_vertices());
   for (int level = 0; level < levels; ++level) {
-    SubdivisionLevel refined = subdivide(fine, rule);
+    SubdivisionLevel refined = step(fine);
     if (matrix) *matrix = compose(refined.matrix, *matrix);
     fine = std::move(refined.fine);
   }
   return fine;
+}
+
+}  // namespace
+
+VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule, SparseMap* matrix) {
+  return repeated(control, levels, matrix, [&](const VolumeMesh& mesh) { return subdivide(mesh, rule); });
+}
+
+VolumeMesh split_repeatedly(const VolumeMesh& control, int levels, SparseMap* matrix) {
+  return repeated(control, levels, matrix, [](const VolumeMesh& mesh) {
+    SubdivisionLevel refined = subdivide(mesh);
+    refined.matrix = linear_split(mesh);
+    refined.fine.positions = refined.matrix.apply(mesh.positions);
+    return refined;
+  });
 }
 
 }  // namespace subvol::internal

@@ -13,4 +13,9 @@ namespace subvol::internal {
 VolumeMesh subdivide_repeatedly(const VolumeMesh& control, int levels, BoundaryRule rule = BoundaryRule::catmull_clark,
                                 SparseMap* matrix = nullptr);
 
+/// Splits the cells several times, as `linear_split` does: vertices stay, and children are midpoints. So boundaries,
+/// interfaces and the volumes of regions stay, and a mesh that is valid stays valid. Cells, groups and tags are those
+/// of `subdivide_repeatedly`. Arguments and InputError: as there.
+VolumeMesh split_repeatedly(const VolumeMesh& control, int levels, SparseMap* matrix = nullptr);
+
 }  // namespace subvol::internal

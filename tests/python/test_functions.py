@@ -19,7 +19,8 @@ def times(matrix, points):
 
 class Subdivision(InFolder):
     def test_the_matrix_makes_the_fine_points(self):
-        for options in ({}, {"levels": 2}, {"boundary": "averaging"}, {"crease_angle": 40, "levels": 2}, {"levels": 0}):
+        for options in ({}, {"levels": 2}, {"boundary": "averaging"}, {"boundary": "linear", "levels": 2},
+                        {"crease_angle": 40, "levels": 2}, {"levels": 0}):
             mesh = subvol.read("torus_template.mesh")
             fine, matrix = subvol.subdivide(mesh, **options), subvol.subdivision_matrix(mesh, **options)
             self.assertEqual(len(fine.hexes), 60 * 8 ** options.get("levels", 1))
