@@ -39,6 +39,8 @@ constexpr double kJoinPenalty = 0.3;
 /// Number of edges along another path, from their corner, within which a path may join it; no farther than its middle.
 constexpr std::size_t kJoinEdges = 3;
 constexpr int kRounds = 8;
+/// Cost of a corner's vertex on the path of another curve, for corners that give way.
+constexpr double kOnWayPenalty = 1;
 /// Curves at which the solid is thinner than this angle, in degrees, are left alone: 0.93 sin(19) = 0.3 is the scaled
 /// Jacobian at which cells are given up.
 constexpr double kLeastAngle = 19;
@@ -122,6 +124,28 @@ class Router {
     for (std::size_t c = 0; c < curves_.size(); ++c) trees_.push_back(polyline_tree(curves_[c].points));
     place_corners();
   }
+
+  /// Moves vertices of corners out of the way of curves that no path follows otherwise, the longest curves first: the
+  /// ends of small features may lie on the only path along a long edge. Returns false if none was moved.
+  bool clear_ways() {
+    const std::map<Index, CornerNeeds> needs = corner_needs();
+    const Occupied nothing{std::vector<std::uint8_t>(base_.vertices.size(), 0),
+                           std::vector<std::uint8_t>(base_.edges.size(), 0)};
+    std::vector<std::uint8_t> is_on_way(base_.vertices.size(), 0);
+    bool has_moved = false;
+    for (const Index c : eligible_by_length()) {
+      auto found = find(c, base_);
+      if (!found) {
+        found = find(c, nothing);
+        if (found) has_moved |= move_corners_off(found->path, needs, is_on_way);
+      }
+      if (found)
+        for (const Index v : found->path) is_on_way[v] = 1;
+    }
+    return has_moved;
+  }
+
+  double followed_length() const { return total_length(best_); }
 
   FeatureRouting run() {
     std::vector<Index> order = order_by_gap();
@@ -217,6 +241,45 @@ class Router {
       vertex_of_corner_[corner] = v;
       base_.vertices[v] = 1;
     }
+  }
+
+  /// Curves to be followed, the longest first.
+  std::vector<Index> eligible_by_length() const {
+    std::vector<std::pair<double, Index>> order;
+    for (std::size_t c = 0; c < curves_.size(); ++c)
+      if (is_eligible(static_cast<Index>(c))) order.push_back({-curves_[c].length(), static_cast<Index>(c)});
+    std::sort(order.begin(), order.end());
+    std::vector<Index> curves;
+    for (const auto& [length, c] : order) curves.push_back(c);
+    return curves;
+  }
+
+  /// Gives the corners at inner vertices of a path other vertices near them, if there are some: those of the least
+  /// cost, which is higher on other paths. Returns false if all stay.
+  bool move_corners_off(std::span<const Index> path, const std::map<Index, CornerNeeds>& needs,
+                        std::span<const std::uint8_t> is_on_way) {
+    bool has_moved = false;
+    for (const Index v : path.subspan(1, path.size() - 2)) {
+      const auto at = std::ranges::find_if(vertex_of_corner_, [&](const auto& placed) { return placed.second == v; });
+      if (at == vertex_of_corner_.end()) continue;
+      const CornerNeeds& need = needs.at(at->first);
+      double least = kInfinity;
+      Index best = kNoIndex;
+      for (const Index w : graph_.vertices_near(need.position, kFollowDistance * vertex_h(v))) {
+        if (base_.vertices[w] || std::ranges::find(path, w) != path.end()) continue;
+        const double cost = corner_cost(need, w) + (is_on_way[w] ? kOnWayPenalty : 0);
+        if (cost < least) least = cost, best = w;
+      }
+      if (best == kNoIndex) continue;
+      base_.vertices[v] = 0;
+      base_.vertices[best] = 1;
+      at->second = best;
+      for (std::size_t c = 0; c < curves_.size(); ++c)
+        if (corner_at(static_cast<Index>(c), 0) == at->first || corner_at(static_cast<Index>(c), 1) == at->first)
+          courses_[c].clear();
+      has_moved = true;
+    }
+    return has_moved;
   }
 
   Index vertex_of(Index corner) const {
@@ -625,7 +688,13 @@ void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, const Jun
 }  // namespace
 
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options) {
-  return Router(mesh, features, options).run();
+  Router router(mesh, features, options);
+  FeatureRouting routing = router.run();
+  if (routing.unfollowed.empty()) return routing;
+  Router cleared(mesh, features, options);
+  if (!cleared.clear_ways()) return routing;
+  FeatureRouting other = cleared.run();
+  return cleared.followed_length() > router.followed_length() ? other : routing;
 }
 
 FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing) {
