@@ -254,29 +254,48 @@ class Router {
     return curves;
   }
 
+  /// Returns the free vertex of the least cost within reach of paths for a corner, or kNoIndex. extra(v): a cost that
+  /// is added.
+  template <class Extra>
+  Index free_vertex_for(const CornerNeeds& needs, const Extra& extra) const {
+    double least = kInfinity;
+    Index best = kNoIndex;
+    for (const Index v : graph_.vertices_near(needs.position, kFollowDistance * h_)) {
+      if (base_.vertices[v] || (graph_.position(v) - needs.position).norm() > kFollowDistance * vertex_h(v)) continue;
+      const double cost = corner_cost(needs, v) + extra(v);
+      if (cost < least) least = cost, best = v;
+    }
+    return best;
+  }
+
+  void move_corner(Index corner, Index from, Index to) {
+    base_.vertices[from] = 0;
+    base_.vertices[to] = 1;
+    vertex_of_corner_[corner] = to;
+    for (std::size_t c = 0; c < curves_.size(); ++c)
+      if (corner_at(static_cast<Index>(c), 0) == corner || corner_at(static_cast<Index>(c), 1) == corner)
+        courses_[c].clear();
+  }
+
+  Index corner_of(Index vertex) const {
+    const auto at =
+        std::ranges::find_if(vertex_of_corner_, [&](const auto& placed) { return placed.second == vertex; });
+    return at == vertex_of_corner_.end() ? kNoIndex : at->first;
+  }
+
   /// Gives the corners at inner vertices of a path other vertices near them, if there are some: those of the least
   /// cost, which is higher on other paths. Returns false if all stay.
   bool move_corners_off(std::span<const Index> path, const std::map<Index, CornerNeeds>& needs,
                         std::span<const std::uint8_t> is_on_way) {
     bool has_moved = false;
     for (const Index v : path.subspan(1, path.size() - 2)) {
-      const auto at = std::ranges::find_if(vertex_of_corner_, [&](const auto& placed) { return placed.second == v; });
-      if (at == vertex_of_corner_.end()) continue;
-      const CornerNeeds& need = needs.at(at->first);
-      double least = kInfinity;
-      Index best = kNoIndex;
-      for (const Index w : graph_.vertices_near(need.position, kFollowDistance * vertex_h(v))) {
-        if (base_.vertices[w] || std::ranges::find(path, w) != path.end()) continue;
-        const double cost = corner_cost(need, w) + (is_on_way[w] ? kOnWayPenalty : 0);
-        if (cost < least) least = cost, best = w;
-      }
-      if (best == kNoIndex) continue;
-      base_.vertices[v] = 0;
-      base_.vertices[best] = 1;
-      at->second = best;
-      for (std::size_t c = 0; c < curves_.size(); ++c)
-        if (corner_at(static_cast<Index>(c), 0) == at->first || corner_at(static_cast<Index>(c), 1) == at->first)
-          courses_[c].clear();
+      const Index corner = corner_of(v);
+      if (corner == kNoIndex) continue;
+      const Index other = free_vertex_for(needs.at(corner), [&](Index w) {
+        return std::ranges::find(path, w) != path.end() ? kInfinity : is_on_way[w] ? kOnWayPenalty : 0;
+      });
+      if (other == kNoIndex) continue;
+      move_corner(corner, v, other);
       has_moved = true;
     }
     return has_moved;
