@@ -3,6 +3,7 @@
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
+#include "subvol/fit/features/corner_placement.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/routing_graph.h"
 #include "subvol/fit/geometry/closest_point.h"
@@ -22,16 +23,12 @@ namespace subvol::internal {
 namespace {
 
 // Found on twelve CAD parts, as all constants here without another reason. Lengths are in units of h.
-/// Corners farther from a vertex get none: the smooth fit rounds them off by about half an edge.
-constexpr double kCornerReach = 1.6;
-/// Costs of a corner's vertex: for each curve without an edge of the wanted number of cells; if edges are missing.
-constexpr double kWrongEdgePenalty = 0.15, kFewEdgesPenalty = 3;
-/// Cost of a vertex so far from the corner that only joining paths may end there: more than that of missing edges.
-constexpr double kFarPenalty = 4;
+/// Distance within which vertices are looked for, where a path is to pass by a point.
+constexpr double kAnchorReach = 1.6;
 /// Keeps paths short where the distance says nothing; and the distance at which edges are not looked at.
 constexpr double kSoftness = 0.12, kSearchReach = 3;
-/// Largest distance between a path and its curve; and for open curves that would be lost otherwise.
-constexpr double kFollowDistance = 1.1, kJoinDistance = 2.2;
+/// Largest distance between a path and its curve for open curves that would be lost otherwise.
+constexpr double kJoinDistance = 2.2;
 /// Largest length of a path in units of its curve's: longer ones go to and fro.
 constexpr double kMostStretch = 1.8;
 /// Distance that one end which joins another path counts as, in the choice among joins.
@@ -116,19 +113,22 @@ class Router {
         reasons_(curves_.size()),
         joinable_(curves_.size(), 1),
         courses_(curves_.size()),
-        base_{std::vector<std::uint8_t>(mesh.num_vertices(), 0), std::vector<std::uint8_t>(graph_.edges().size(), 0)},
         best_(curves_.size()) {
     for (const FeatureCurve& curve : curves_)
       curve_h_.push_back(h_ * graph_.mean_size(sampled_polyline(curve.points, h_ / 2)));
     take(options);
     for (std::size_t c = 0; c < curves_.size(); ++c) trees_.push_back(polyline_tree(curves_[c].points));
-    place_corners();
+    std::vector<std::uint8_t> followed;
+    for (std::size_t c = 0; c < curves_.size(); ++c) followed.push_back(is_eligible(static_cast<Index>(c)));
+    corners_.emplace(graph_, features, followed);
+    base_ = {corners_->taken(), std::vector<std::uint8_t>(graph_.edges().size(), 0)};
   }
+  Router(const Router&) = delete;
+  Router& operator=(const Router&) = delete;
 
   /// Moves vertices of corners out of the way of curves that no path follows otherwise, the longest curves first: the
   /// ends of small features may lie on the only path along a long edge. Returns false if none was moved.
   bool clear_ways() {
-    const std::map<Index, CornerNeeds> needs = corner_needs();
     const Occupied nothing{std::vector<std::uint8_t>(base_.vertices.size(), 0),
                            std::vector<std::uint8_t>(base_.edges.size(), 0)};
     std::vector<std::uint8_t> is_on_way(base_.vertices.size(), 0);
@@ -137,7 +137,7 @@ class Router {
       auto found = find(c, base_);
       if (!found) {
         found = find(c, nothing);
-        if (found) has_moved |= move_corners_off(found->path, needs, is_on_way);
+        if (found) has_moved |= move_corners_off(found->path, is_on_way);
       }
       if (found)
         for (const Index v : found->path) is_on_way[v] = 1;
@@ -188,7 +188,6 @@ class Router {
     along_curves_.resize(curves_.size(), 0);
   }
 
-  double vertex_h(Index v) const { return h_ * graph_.size(v); }
   bool is_eligible(Index c) const { return !reasons_[c]; }
   bool is_corner(Index v) const { return std::ranges::binary_search(features_.curves.corners, v); }
   Index corner_at(Index c, int end) const {
@@ -197,51 +196,7 @@ class Router {
 
   // Corners
 
-  struct CornerNeeds {
-    Vec3 position = Vec3::Zero();
-    int curves = 0, convex = 0;
-  };
-
-  std::map<Index, CornerNeeds> corner_needs() const {
-    std::map<Index, CornerNeeds> needs;
-    for (std::size_t c = 0; c < curves_.size(); ++c)
-      for (int end = 0; end < 2; ++end) {
-        const Index corner = corner_at(static_cast<Index>(c), end);
-        if (!is_eligible(static_cast<Index>(c)) || !is_corner(corner)) continue;
-        CornerNeeds& n = needs[corner];
-        n.position = end == 0 ? curves_[c].points.front() : curves_[c].points.back();
-        ++n.curves;
-        n.convex += features_.is_convex(static_cast<Index>(c));
-      }
-    return needs;
-  }
-
-  double corner_cost(const CornerNeeds& needs, Index v) const {
-    int of_one = 0, of_three = 0;
-    for (Index e : graph_.edges_at(v)) {
-      of_one += graph_.edges()[e].cells == 1;
-      of_three += graph_.edges()[e].cells == 3;
-    }
-    const int wrong = std::max(0, needs.convex - of_one) + std::max(0, needs.curves - needs.convex - of_three);
-    const double distance = (graph_.position(v) - needs.position).norm() / vertex_h(v);
-    const bool few = std::ssize(graph_.edges_at(v)) < needs.curves;
-    return distance * distance + kWrongEdgePenalty * wrong + (few ? kFewEdgesPenalty : 0) +
-           (distance > kFollowDistance ? kFarPenalty : 0);
-  }
-
-  void place_corners() {
-    std::vector<std::tuple<double, Index, Index>> pairs;  // cost, corner, vertex
-    for (const auto& [corner, needs] : corner_needs())
-      for (Index v : graph_.vertices_near(needs.position, kCornerReach * h_))
-        if ((graph_.position(v) - needs.position).norm() <= kCornerReach * vertex_h(v))
-          pairs.push_back({corner_cost(needs, v), corner, v});
-    std::sort(pairs.begin(), pairs.end());
-    for (const auto& [cost, corner, v] : pairs) {
-      if (base_.vertices[v] || vertex_of_corner_.contains(corner)) continue;
-      vertex_of_corner_[corner] = v;
-      base_.vertices[v] = 1;
-    }
-  }
+  Index vertex_of(Index corner) const { return corners_->vertex_of(corner); }
 
   /// Curves to be followed, the longest first.
   std::vector<Index> eligible_by_length() const {
@@ -254,56 +209,24 @@ class Router {
     return curves;
   }
 
-  /// Returns the free vertex of the least cost within reach of paths for a corner, or kNoIndex. extra(v): a cost that
-  /// is added.
-  template <class Extra>
-  Index free_vertex_for(const CornerNeeds& needs, const Extra& extra) const {
-    double least = kInfinity;
-    Index best = kNoIndex;
-    for (const Index v : graph_.vertices_near(needs.position, kFollowDistance * h_)) {
-      if (base_.vertices[v] || (graph_.position(v) - needs.position).norm() > kFollowDistance * vertex_h(v)) continue;
-      const double cost = corner_cost(needs, v) + extra(v);
-      if (cost < least) least = cost, best = v;
-    }
-    return best;
-  }
-
-  void move_corner(Index corner, Index from, Index to) {
-    base_.vertices[from] = 0;
-    base_.vertices[to] = 1;
-    vertex_of_corner_[corner] = to;
-    for (std::size_t c = 0; c < curves_.size(); ++c)
-      if (corner_at(static_cast<Index>(c), 0) == corner || corner_at(static_cast<Index>(c), 1) == corner)
-        courses_[c].clear();
-  }
-
-  Index corner_of(Index vertex) const {
-    const auto at =
-        std::ranges::find_if(vertex_of_corner_, [&](const auto& placed) { return placed.second == vertex; });
-    return at == vertex_of_corner_.end() ? kNoIndex : at->first;
-  }
-
-  /// Gives the corners at inner vertices of a path other vertices near them, if there are some: those of the least
-  /// cost, which is higher on other paths. Returns false if all stay.
-  bool move_corners_off(std::span<const Index> path, const std::map<Index, CornerNeeds>& needs,
-                        std::span<const std::uint8_t> is_on_way) {
+  /// Moves the corners at inner vertices of a path to other vertices near them, if there are some: rather to those that
+  /// are not on the ways of other curves. Returns false if all stay.
+  bool move_corners_off(std::span<const Index> path, std::span<const std::uint8_t> is_on_way) {
     bool has_moved = false;
     for (const Index v : path.subspan(1, path.size() - 2)) {
-      const Index corner = corner_of(v);
+      const Index corner = corners_->corner_at(v);
       if (corner == kNoIndex) continue;
-      const Index other = free_vertex_for(needs.at(corner), [&](Index w) {
+      const bool moves = corners_->move(corner, [&](Index w) {
         return std::ranges::find(path, w) != path.end() ? kInfinity : is_on_way[w] ? kOnWayPenalty : 0;
       });
-      if (other == kNoIndex) continue;
-      move_corner(corner, v, other);
+      if (!moves) continue;
       has_moved = true;
+      for (std::size_t c = 0; c < curves_.size(); ++c)
+        if (corner_at(static_cast<Index>(c), 0) == corner || corner_at(static_cast<Index>(c), 1) == corner)
+          courses_[c].clear();
     }
+    if (has_moved) base_.vertices = corners_->taken();
     return has_moved;
-  }
-
-  Index vertex_of(Index corner) const {
-    const auto at = vertex_of_corner_.find(corner);
-    return at == vertex_of_corner_.end() ? kNoIndex : at->second;
   }
 
   // One curve
@@ -398,7 +321,7 @@ class Router {
     for (std::size_t i = 0; i < chosen.size(); ++i) {
       double distance = kInfinity;
       if (course.anchors[i].fixed != kNoIndex) continue;
-      for (Index v : graph_.vertices_near(course.anchors[i].point, kCornerReach * h)) {
+      for (Index v : graph_.vertices_near(course.anchors[i].point, kAnchorReach * h)) {
         if (occupied.vertices[v] || std::ranges::find(chosen, v) != chosen.end()) continue;
         if (!allowed.empty() && !std::ranges::binary_search(allowed, v)) continue;
         const double d = (graph_.position(v) - course.anchors[i].point).norm();
@@ -438,7 +361,7 @@ class Router {
   std::vector<std::vector<Index>> sides_of(Index c, const Occupied& occupied) const {
     std::vector<Index> near;
     for (const Vec3& point : sampled_polyline(curves_[c].points, curve_h_[c] / 2))
-      for (const Index v : graph_.vertices_near(point, kCornerReach * curve_h_[c]))
+      for (const Index v : graph_.vertices_near(point, kAnchorReach * curve_h_[c]))
         if (!occupied.vertices[v]) near.push_back(v);
     std::ranges::sort(near);
     near.erase(std::unique(near.begin(), near.end()), near.end());
@@ -661,11 +584,11 @@ class Router {
   bool on_sheets_ = false;
   std::vector<std::uint8_t> along_curves_;
   std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed
-  Occupied base_;                             ///< the vertices of corners
+  std::optional<CornerPlacement> corners_;
+  Occupied base_;  ///< the vertices of corners
   Paths best_;
   double best_length_ = 0;
   std::vector<ClosestPoint> trees_;  ///< of the curves
-  std::map<Index, Index> vertex_of_corner_;
   std::vector<Index> alone_;  ///< curves that have a path if no other one has
 };
 

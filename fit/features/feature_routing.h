@@ -69,8 +69,10 @@ struct FeatureRouting {
 /// on one side of the paths that are there, for each side: both edges of a chamfer narrower than a cell find one so. A
 /// path is accepted if it and the curve stay within 1.1 h of one another. No two paths share an edge, or a vertex but
 /// corners and joins. Up to eight rounds start with the curves that failed in the round before; the round that follows
-/// the greatest length counts. An open curve that is still lost may then stray up to 2.2 h, and start up to three edges
-/// along the path of another curve of the same corner, in its first half ("join").
+/// the greatest length counts. If some failed, all is done again with corners moved out of the way: vertices of corners
+/// on the path of another curve that finds no other, the longest curves first; the greater length counts. An open curve
+/// that is still lost may then stray up to 2.2 h, and start up to three edges along the path of another curve of the
+/// same corner, in its first half ("join").
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.

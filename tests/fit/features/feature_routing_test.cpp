@@ -62,6 +62,34 @@ TEST_CASE("a lattice in a cube follows all of its edges, corner to corner") {
     CHECK(cube.fitted.positions[placed.vertex].isApprox(target.positions[placed.corner]));
 }
 
+TEST_CASE("corners of small features give way to a long edge") {
+  VolumeMesh mesh = voxels(8, 8, 8, [](int, int, int) { return true; });
+  // A long edge, and three curves that start beside it: their corners' nearest vertices block the edge and all ways
+  // around that are near it.
+  SignedFeatures features;
+  const auto add = [&](const Vec3& from, const Vec3& to, double angle) {
+    const auto first = static_cast<Index>(2 * features.angles.size());
+    features.curves.curves.push_back({{first, first + 1}, {from, to}});
+    features.curves.corners.insert(features.curves.corners.end(), {first, first + 1});
+    features.curves.corner_edges.insert(features.curves.corner_edges.end(), {1, 1});
+    features.segment_angles.push_back({angle});
+    features.angles.push_back(angle);
+  };
+  add({0, 0, 8}, {8, 0, 8}, 90);
+  add({4.1, 0.45, 8}, {7, 4, 8}, 170);
+  add({4, 1.1, 8}, {4, 6, 8}, 170);
+  add({4, 0, 6.9}, {4, 0, 2}, 170);
+  const FeatureRouting routing = route_features(mesh, features);
+  REQUIRE(routing.paths.size() == 4);
+  CHECK(routing.unfollowed.empty());
+  require_apart(routing);
+  CHECK(routing.paths[0].vertices.size() == 9);
+  for (const Index v : routing.paths[0].vertices) CHECK(mesh.positions[v].tail<2>() == Eigen::Vector2d(0, 8));
+  const auto corner = std::ranges::find(routing.corners, 2, &PlacedCorner::corner);
+  REQUIRE(corner != routing.corners.end());
+  CHECK(mesh.positions[corner->vertex] == Vec3(5, 1, 8));
+}
+
 TEST_CASE("paths follow the edges of a prism, a tetrahedron and the rims of a cylinder") {
   CHECK(RoutedLattice(prism_surface(3, 0.2), 6).routing.unfollowed.empty());
   CHECK(RoutedLattice(tetrahedron_surface(), 6).routing.unfollowed.empty());
