@@ -16,6 +16,8 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
+#include <variant>
 
 namespace subvol::cli {
 
@@ -222,6 +224,14 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
   if (reasons.empty()) text << "can be filled as it is\n";
   else text << "CANNOT BE FILLED AS IT IS: " << reasons << '\n';
   return text.str();
+}
+
+void repair_to_fill(Target& target, RegionRule rule, std::vector<std::string>& warnings) {
+  auto* surface = std::get_if<TriangleMesh>(&target);
+  if (!surface) return;
+  SurfaceRepair repair = repair_surface(*surface, interrupted, rule);
+  add_remarks(repair, warnings);
+  if (!repair.regions) *surface = std::move(repair.surface);
 }
 
 void add_remarks(const SurfaceRepair& repair, std::vector<std::string>& warnings) {

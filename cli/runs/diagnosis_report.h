@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "cli/runs/loading.h"
 #include "cli/runs/run_options.h"
 #include "subvol/fit/mending/surface_repair.h"
 #include "subvol/fit/target/surface_diagnosis.h"
@@ -30,6 +31,10 @@ struct FillingOptions {
 /// to be filled. With RegionRule::merge, all labels are one region. An interrupt ends the repair (`interrupted`).
 SurfaceRepair load_to_fill(const std::filesystem::path& path, const FillingOptions& options,
                            std::vector<std::string>& warnings);
+
+/// Repairs a surface for which a template is to be made (`repair_surface`), and adds what was done to warnings. Other
+/// targets, and surfaces of several regions, are left as they are. An interrupt ends the repair.
+void repair_to_fill(Target& target, RegionRule rule, std::vector<std::string>& warnings);
 
 /// Return the numbers, names and volumes of a surface's regions, as text and as an entry of a report.
 std::string to_text(const RegionSurface& regions);

@@ -3,6 +3,7 @@
 #include "cli/runs/automatic_template.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/face_groups.h"
 #include "cli/runs/loading.h"
@@ -119,8 +120,11 @@ class FitRun : public CageRun {
 void FitRun::load() {
   target_ = load_target(arguments_.target, warnings_);
   require_fitting_options(verb_, is_cloud(target_));
-  if (arguments_.template_mesh.path.empty())  // checked before minutes are spent on making one
+  if (arguments_.template_mesh.path.empty()) {
+    repair_to_fill(target_, template_options(arguments_).regions, warnings_);
+    // Checked before minutes are spent on making one.
     require_resumable(run_, run_identity(verb_, {{"target", fingerprint(target_)}}));
+  }
   tell_warnings();
 }
 

@@ -4,6 +4,7 @@
 #include "cli/runs/automatic_fit_report.h"
 #include "cli/runs/check_report.h"
 #include "cli/runs/checkpointing.h"
+#include "cli/runs/diagnosis_report.h"
 #include "cli/runs/exit_status.h"
 #include "cli/runs/face_groups.h"
 #include "cli/runs/interrupt.h"
@@ -122,11 +123,12 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     for (; !arguments.run.quiet && told < warnings.size(); ++told)
       std::cerr << "subvol: warning: " << warnings[told] << '\n';
   };
-  const Target target = arguments.takes_points ? load_target(arguments.target, warnings)
-                                               : Target(load_surface(arguments.target, warnings));
+  Target target = arguments.takes_points ? load_target(arguments.target, warnings)
+                                         : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
   if (arguments.template_mesh.path.empty()) {  // made templates consist of hexes, and making one takes minutes
     refuse_impossible(outputs, arguments, voxel_mesh(box_grid(Vec3::Zero(), Vec3::Ones(), {1, 1, 1})));
+    repair_to_fill(target, arguments.template_fit.regions, warnings);
     require_resumable(arguments.run, run_identity(verb, {{"target", fingerprint(target)}}));
   }
   const Clock::time_point template_start = Clock::now();

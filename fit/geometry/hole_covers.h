@@ -16,7 +16,7 @@ struct CoveredHoles {
 };
 
 /// Covers every hole of a surface by triangles between the vertices of its rim: among those of the Delaunay
-/// triangulation of these vertices (or among all if it has none, and the rim has at most a thousand vertices) the ones
+/// triangulation of these vertices (or among all if it has none, and the rim has at most 300 vertices) the ones
 /// that bend least at their common edges, and then the ones of least area (CGAL). A plane rim gets a plane cover.
 ///
 /// returns  nothing if a hole cannot be covered, if there is none, or if the surface is not oriented consistently along

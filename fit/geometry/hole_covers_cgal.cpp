@@ -20,8 +20,8 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 
-/// Longest rim, in vertices, for which all triangulations are compared: the cost is cubic.
-constexpr std::size_t kMostCubic = 1000;
+/// Longest rim, in vertices, for which all triangulations are compared: the cost is cubic, about a second here.
+constexpr std::size_t kMostCubic = 300;
 
 /// Returns the triangles of a cover, as places in its rim; empty if there is none.
 std::vector<std::array<Index, 3>> cover(const std::vector<Kernel::Point_3>& rim) {

@@ -557,3 +557,18 @@ TEST_CASE("A fin is left out before a surface is filled, and told", "[cli]") {
   CHECK(place.run("fit fin.off --wrap 0 -o c.mesh").status == 2);
   CHECK(place.run("fit fin.off --wrap 2 --regions keep -o c.mesh").status == 2);
 }
+
+TEST_CASE("A target without a template is repaired, whatever is fitted", "[cli][slow]") {
+  // A cube without its top.
+  const Workplace place;
+  place.file("open.off",
+             "OFF\n8 10 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+             "3 0 2 1\n3 0 3 2\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
+  for (const char* options : {"--cells 300", "--order 2 --cells 100", "--levels 1 -o cage:cage.mesh"}) {
+    const Run run = place.run("fit open.off -o a.mesh --report r.json --force " + std::string(options));
+    CAPTURE(options, run.err);
+    CHECK(run.status == 0);
+    CHECK_THAT(run.err, Catch::Contains("1 hole is covered, with 20 % of the surface's area"));
+    CHECK(place.json("r.json")["volume"].get<double>() == Approx(1).epsilon(1e-3));
+  }
+}
