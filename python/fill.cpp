@@ -6,6 +6,7 @@
 #include "cli/runs/report.h"
 #include "python/arrays.h"
 #include "python/checkpoints.h"
+#include "python/fit_options.h"
 #include "python/limit.h"
 #include "python/module.h"
 #include "python/results.h"
