@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/edge_layout.h"
+#include "subvol/fit/features/joined_curves.h"
 
 #include "subvol/mesh/mesh_topology.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/feature_routing.h"
 
-#include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"
 #include "subvol/fit/features/corner_placement.h"
+#include "subvol/fit/features/path_sides.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/features/routing_graph.h"
 #include "subvol/fit/geometry/closest_point.h"
@@ -11,11 +11,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <cstdint>
 #include <map>
-#include <numeric>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 namespace subvol::internal {
@@ -82,26 +80,6 @@ struct Found {
 };
 
 using Paths = std::vector<std::vector<Index>>;  ///< by curve; empty: none
-
-/// Marks the vertices of a graph that no closed path passes through: those with fewer than two neighbors, and those
-/// left with fewer once these are taken away.
-std::vector<std::uint8_t> dead_ends(const std::vector<std::vector<Index>>& neighbors) {
-  std::vector<std::uint8_t> is_dead(neighbors.size());
-  std::vector<std::size_t> degrees;
-  std::vector<Index> next;
-  for (std::size_t i = 0; i < neighbors.size(); ++i) {
-    degrees.push_back(neighbors[i].size());
-    if (degrees[i] < 2) next.push_back(static_cast<Index>(i));
-  }
-  while (!next.empty()) {
-    const Index dead = next.back();
-    next.pop_back();
-    if (std::exchange(is_dead[dead], 1)) continue;
-    for (const Index other : neighbors[dead])
-      if (--degrees[other] < 2 && !is_dead[other]) next.push_back(other);
-  }
-  return is_dead;
-}
 
 class Router {
  public:
@@ -356,40 +334,12 @@ class Router {
     return vertex_of(curve.vertices.front()) == kNoIndex || vertex_of(curve.vertices.back()) == kNoIndex;
   }
 
-  /// Returns the free vertices near a curve that a closed path could pass through, by the sides on which they lie:
-  /// paths of other curves are between those of different sides. Each side is ascending.
-  std::vector<std::vector<Index>> sides_of(Index c, const Occupied& occupied) const {
-    std::vector<Index> near;
-    for (const Vec3& point : sampled_polyline(curves_[c].points, curve_h_[c] / 2))
-      for (const Index v : graph_.vertices_near(point, kAnchorReach * curve_h_[c]))
-        if (!occupied.vertices[v]) near.push_back(v);
-    std::ranges::sort(near);
-    near.erase(std::unique(near.begin(), near.end()), near.end());
-    std::vector<std::vector<Index>> neighbors(near.size());  // places in `near`
-    for (std::size_t i = 0; i < near.size(); ++i)
-      for (const Index e : graph_.edges_at(near[i])) {
-        const auto at = std::ranges::lower_bound(near, graph_.other_end(e, near[i]));
-        if (at != near.end() && *at == graph_.other_end(e, near[i]) && !occupied.edges[e])
-          neighbors[i].push_back(static_cast<Index>(at - near.begin()));
-      }
-    const std::vector<std::uint8_t> is_dead = dead_ends(neighbors);
-    DisjointSets sides(near.size());
-    for (std::size_t i = 0; i < near.size(); ++i)
-      for (const Index other : neighbors[i])
-        if (!is_dead[i] && !is_dead[other]) sides.join(static_cast<Index>(i), other);
-    std::map<Index, std::vector<Index>> by_side;
-    for (std::size_t i = 0; i < near.size(); ++i)
-      if (!is_dead[i]) by_side[sides.of(static_cast<Index>(i))].push_back(near[i]);
-    std::vector<std::vector<Index>> result;
-    for (auto& [side, vertices] : by_side) result.push_back(std::move(vertices));
-    return result;
-  }
-
   /// Looks for a path of a closed curve on one side of the paths that are there: the vertices nearest to its anchors
   /// may lie on different ones or in dead ends, as along the two edges of a chamfer that is narrower than a cell.
   std::optional<Found> find_on_one_side(Index c, const Occupied& occupied) {
     std::optional<Found> best;
-    for (const std::vector<Index>& side : sides_of(c, occupied))
+    for (const std::vector<Index>& side :
+         path_sides(graph_, sampled_polyline(curves_[c].points, curve_h_[c] / 2), kAnchorReach * curve_h_[c], occupied))
       for (Course& course : courses(c))
         if (auto found = judged(path_on(course, c, occupied, side), c, kFollowDistance))
           if (!best || found->gap < best->gap) best = std::move(found);
@@ -592,41 +542,6 @@ class Router {
   std::vector<Index> alone_;  ///< curves that have a path if no other one has
 };
 
-/// A path that another one joins, and how far from the corner, as a share of its length.
-struct Junction {
-  Index curve;
-  bool at_front;
-  double share;
-};
-
-std::optional<Junction> junction_at(const VolumeMesh& mesh, const FeatureRouting& routing, Index joined, Index vertex,
-                                    Index corner) {
-  for (const CreasePath& path : routing.paths) {
-    if (path.curve == joined) continue;
-    const auto at = std::ranges::find(path.vertices, vertex);
-    if (at == path.vertices.begin() || at == path.vertices.end()) continue;
-    std::vector<Vec3> points;
-    for (Index v : path.vertices) points.push_back(mesh.positions[v]);
-    const double length = polyline_length(points);
-    const double before = polyline_length(std::span(points).first(at - path.vertices.begin() + 1));
-    const auto corner_vertex = std::ranges::find(routing.corners, corner, &PlacedCorner::corner);
-    const bool at_front = corner_vertex == routing.corners.end() || corner_vertex->vertex == path.vertices.front();
-    const double share = length > 0 ? before / length : 0;
-    return Junction{path.curve, at_front, at_front ? share : 1 - share};
-  }
-  return std::nullopt;
-}
-
-/// Replaces the beginning of a curve, as far as the junction lies from the corner, by the junction.
-void start_at_junction(FeatureCurve& curve, const FeatureCurve& other, const Junction& junction) {
-  const ArcLength arc(other.points), own(curve.points);
-  const double before = junction.share * arc.length();
-  const double most = 0.5 * own.length();  // the rest must not vanish
-  std::vector<Vec3> points = own.part(std::min(before, most), own.length());
-  points.front() = arc.at(junction.at_front ? before : arc.length() - before);
-  curve.points = std::move(points);
-}
-
 }  // namespace
 
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features, const RoutingOptions& options) {
@@ -637,29 +552,6 @@ FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& feat
   if (!cleared.clear_ways()) return routing;
   FeatureRouting other = cleared.run();
   return cleared.followed_length() > router.followed_length() ? other : routing;
-}
-
-FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing) {
-  FeatureCurves result = features.curves;
-  for (Index c : routing.joined) {
-    const auto path = std::ranges::lower_bound(routing.paths, c, {}, &CreasePath::curve);
-    FeatureCurve& curve = result.curves[c];
-    for (int end = 0; end < 2; ++end) {
-      const Index vertex = end == 0 ? path->vertices.front() : path->vertices.back();
-      const Index corner = end == 0 ? curve.vertices.front() : curve.vertices.back();
-      const bool at_corner = std::ranges::find(routing.corners, PlacedCorner{corner, vertex}) != routing.corners.end();
-      const auto junction = at_corner ? std::nullopt : junction_at(mesh, routing, c, vertex, corner);
-      if (!junction) continue;
-      if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
-      start_at_junction(curve, features.curves.curves[junction->curve], *junction);
-      if (end == 1) std::reverse(curve.points.begin(), curve.points.end());
-    }
-    // Only the ends' numbers still matter: they tell open curves from closed ones.
-    const Index last = curve.vertices.back();
-    curve.vertices.resize(curve.points.size(), last);
-    curve.vertices.back() = last;
-  }
-  return result;
 }
 
 }  // namespace subvol::internal

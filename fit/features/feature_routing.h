@@ -85,9 +85,4 @@ struct FeatureRouting {
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features,
                               const RoutingOptions& options = {});
 
-/// Returns the curves as far as their paths can follow them: the curve of a joined path starts on the curve whose path
-/// it joins, as far from the corner as the two paths part, and goes on along its own; all others are unchanged.
-/// mesh, features, routing  as above.
-FeatureCurves followed_parts(const VolumeMesh& mesh, const SignedFeatures& features, const FeatureRouting& routing);
-
 }  // namespace subvol::internal

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/features/sheet_layout.h"
+#include "subvol/fit/features/joined_curves.h"
 
 #include "subvol/base/disjoint_sets.h"
 #include "subvol/base/error.h"

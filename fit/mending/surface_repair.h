@@ -24,7 +24,7 @@ struct SurfaceRepair {
 };
 
 /// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting,
-/// removes small faults, and covers holes.
+/// removes small faults and fins, covers holes, and wraps what bounds no solid all the same.
 ///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
@@ -37,9 +37,8 @@ struct SurfaceRepair {
 /// - fins are left out (`without_fins`) if they have at most a quarter of the area and the rest bounds a solid;
 /// - holes are covered (`cover_holes`) if the covers have at most half of the surface's area and it bounds a solid with
 ///   them; covers are in no group;
-/// - the surface is wrapped (`wrapped_to_fill`), unless RegionRule::keep is given, if it has edges of three triangles
-/// or
-///   parts that cross and cannot be united.
+/// - the surface is wrapped (`wrapped_to_fill`) if it has edges of three triangles, or parts that cross and cannot be
+///   united, unless RegionRule::keep is given.
 ///
 /// Where there are several regions by the rule (`find_regions`) and nothing crosses, there is nothing to repair. With
 /// RegionRule::merge, sheets inside a solid are left out.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "subvol/base/error.h"
 #include "subvol/fit/features/feature_routing.h"
+#include "subvol/base/error.h"
+#include "subvol/fit/features/joined_curves.h"
 #include "subvol/fit/features/not_followed.h"
 #include "subvol/fit/geometry/closest_point.h"
 #include "tests/support/feature_fixtures.h"
