@@ -83,13 +83,6 @@ double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) 
   return all > 0 ? routed / all : 1;
 }
 
-/// Returns true if the target has sharp edges that the mesh is to follow.
-bool has_edges_to_follow(const TriangleMesh& target, const AutomaticFitOptions& options) {
-  if (!options.crease_angle_degrees) return false;
-  const FeatureCurves curves = feature_curves(target, *options.crease_angle_degrees);
-  return options.follows_all_edges ? !curves.empty() : edge_crispness(target, curves).is_designed();
-}
-
 /// Tells which curves of the target a fit follows.
 struct EdgeChoice {
   bool sharp = false, borders = false;  ///< sharp edges; borders of groups
@@ -572,7 +565,8 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
           "fit_subdivision_volume");
     return fit_regions(*regions, options);
   }
-  const EdgeChoice follows{has_edges_to_follow(target, checked_options(options)),
+  const AutomaticFitOptions checked = checked_options(options);
+  const EdgeChoice follows{has_edges_to_follow(target, checked.crease_angle_degrees, checked.follows_all_edges),
                            options.keeps_groups && !group_borders(target, target).empty()};
   if (!follows.any()) return AutomaticFit(target, follows, options).run();
   return AutomaticFit(solid_boundary(target).surface, follows, options).run();

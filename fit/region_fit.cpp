@@ -77,10 +77,7 @@ class RegionFit : AutomaticDriver {
 };
 
 void RegionFit::find_curves() {
-  if (options_.crease_angle_degrees) {
-    const FeatureCurves curves = feature_curves(unit_.mesh, *options_.crease_angle_degrees);
-    follows_edges_ = options_.follows_all_edges ? !curves.empty() : edge_crispness(unit_.mesh, curves).is_designed();
-  }
+  follows_edges_ = has_edges_to_follow(unit_.mesh, options_.crease_angle_degrees, options_.follows_all_edges);
   if (follows_edges_) curves_ = sheet_curves(unit_, options_.crease_angle_degrees);
 }
 

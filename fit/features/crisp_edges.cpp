@@ -90,4 +90,10 @@ EdgeCrispness edge_crispness(const TriangleMesh& mesh, const FeatureCurves& curv
   return result;
 }
 
+bool has_edges_to_follow(const TriangleMesh& mesh, std::optional<double> angle_degrees, bool follows_all_edges) {
+  if (!angle_degrees) return false;
+  const FeatureCurves curves = feature_curves(mesh, *angle_degrees);
+  return follows_all_edges ? !curves.empty() : edge_crispness(mesh, curves).is_designed();
+}
+
 }  // namespace subvol::internal

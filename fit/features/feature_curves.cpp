@@ -153,6 +153,8 @@ std::vector<std::array<Index, 2>> group_borders(const TriangleMesh& mesh, const 
 
 double FeatureCurve::length() const { return polyline_length(points); }
 
+bool FeatureCurves::is_corner(Index vertex) const { return std::ranges::binary_search(corners, vertex); }
+
 FeatureCurves feature_curves(const TriangleMesh& mesh, double angle_degrees,
                              std::span<const std::array<Index, 2>> tagged) {
   if (!(angle_degrees >= 0 && angle_degrees <= 180))

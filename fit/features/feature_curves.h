@@ -29,6 +29,7 @@ struct FeatureCurves {
   std::vector<Index> corners;
   std::vector<int> corner_edges;  ///< number of sharp edges at each corner
   bool empty() const { return curves.empty(); }
+  bool is_corner(Index vertex) const;
 };
 
 /// A straight piece of a fitted crease between two points, and the curve it follows: an index into

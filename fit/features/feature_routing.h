@@ -65,14 +65,16 @@ struct FeatureRouting {
 ///   f = 1, 1.5, 3 at edges of 1, 2, 3 cells if the angle is below 125 degrees; 3, 1.5, 1 if it is reflex;
 ///       3, 1, 1.5 if it is within 20 degrees of 180; else 1.5, and 1 at edges of 3 cells
 ///
-/// Closed curves pass through the vertices nearest to three of their points; if there is no such path, through vertices
-/// on one side of the paths that are there, for each side: both edges of a chamfer narrower than a cell find one so. A
-/// path is accepted if it and the curve stay within 1.1 h of one another. No two paths share an edge, or a vertex but
-/// corners and joins. Up to eight rounds start with the curves that failed in the round before; the round that follows
-/// the greatest length counts. If some failed, all is done again with corners moved out of the way: vertices of corners
-/// on the path of another curve that finds no other, the longest curves first; the greater length counts. An open curve
-/// that is still lost may then stray up to 2.2 h, and start up to three edges along the path of another curve of the
-/// same corner, in its first half ("join").
+/// where d is the distance to the part of the curve that the path has come to (`CurveWalk`): it takes no short cut where
+/// the curve comes close to itself. Closed curves pass through the vertices nearest to three of their points; if there
+/// is no such path, through vertices on one side of the paths that are there, for each side: both edges of a chamfer
+/// narrower than a cell find one so. A path is accepted if it and the curve stay within 1.1 h of one another. No two
+/// paths share an edge, or a vertex but corners and joins. Up to eight rounds start with the curves that failed in the
+/// round before; the round that follows the greatest length counts. An open curve that is still lost may then stray up
+/// to 2.2 h, and start up to three edges along the path of another curve of the same corner, in its first half ("join").
+/// If curves are lost that have a path alone, all negotiate (`negotiated_paths`), and the greater length counts. If some
+/// are lost then, all is done again with corners moved out of the way: vertices of corners on the path of another curve
+/// that finds no other, the longest curves first; the greater length counts.
 ///
 /// mesh      passes `validate` except for unused vertices, and its boundary lies roughly on the target.
 /// features  of the target, in the coordinates of the mesh.
@@ -80,7 +82,7 @@ struct FeatureRouting {
 /// per curve; a position on the boundary that is not finite. Without curves, everything is empty. Cost: some
 /// shortest-path searches near each curve in each round.
 ///
-/// Limits: open curves that run closer than an edge to each other may exclude each other. At corners of five or more
+/// Limits: curves that run closer than an edge to each other may exclude each other. At corners of five or more
 /// curves, joins leave paths far from their curves: an icosahedron of 1,000 cells has 74 % of its edges within 0.1 %.
 FeatureRouting route_features(const VolumeMesh& mesh, const SignedFeatures& features,
                               const RoutingOptions& options = {});

@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
-#include <queue>
 #include <string>
 #include <utility>
 
@@ -83,59 +82,6 @@ void Occupied::add(const RoutingGraph& graph, std::span<const Index> path) {
     vertices[path[i]] = 1;
     if (i > 0) edges[graph.edge_between(path[i - 1], path[i])] = 1;
   }
-}
-
-FollowingCost::FollowingCost(std::span<const Vec3> points, std::array<double, 3> factors, double softness, double reach)
-    : tree_(polyline_tree(points)), factors_(factors), softness_(softness), reach_(reach) {}
-
-double FollowingCost::squared_distance(const Vec3& p) const {
-  const double distance = tree_.closest(p).distance;
-  return distance * distance;
-}
-
-double FollowingCost::operator()(const RoutingGraph& graph, Index edge) {
-  const auto [at, added] = costs_.try_emplace(edge, kInfinity);
-  if (!added) return at->second;
-  const RoutingGraph::Edge& e = graph.edges()[edge];
-  const Vec3 &a = graph.position(e.ends[0]), &b = graph.position(e.ends[1]);
-  const double da = squared_distance(a), db = squared_distance(b), middle = squared_distance(0.5 * (a + b));
-  if (std::max(da, db) > reach_ * reach_) return kInfinity;
-  const double mean = (da + 2 * middle + db) / 4 + softness_ * softness_;
-  at->second = (b - a).norm() * mean * factors_[std::clamp(e.cells, 1, 3) - 1];
-  return at->second;
-}
-
-std::vector<Index> cheapest_path(const RoutingGraph& graph, FollowingCost& cost, Index from, Index to,
-                                 const Occupied& occupied) {
-  struct Reached {
-    double cost;
-    Index from;
-  };
-  std::unordered_map<Index, Reached> reached = {{from, {0, kNoIndex}}};
-  using Entry = std::pair<double, Index>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  queue.push({0, from});
-  while (!queue.empty()) {
-    const auto [so_far, v] = queue.top();
-    queue.pop();
-    if (v == to) break;
-    if (so_far > reached.at(v).cost) continue;
-    for (Index e : graph.edges_at(v)) {
-      const Index w = graph.other_end(e, v);
-      if (occupied.edges[e] || (w != to && occupied.vertices[w])) continue;
-      const double next = so_far + cost(graph, e);
-      if (next == kInfinity) continue;
-      const auto [at, added] = reached.try_emplace(w, Reached{kInfinity, kNoIndex});
-      if (next >= at->second.cost) continue;
-      at->second = {next, v};
-      queue.push({next, w});
-    }
-  }
-  if (!reached.contains(to)) return {};
-  std::vector<Index> path = {to};
-  while (path.back() != from) path.push_back(reached.at(path.back()).from);
-  std::reverse(path.begin(), path.end());
-  return path;
 }
 
 }  // namespace subvol::internal

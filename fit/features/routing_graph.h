@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "subvol/fit/geometry/closest_point.h"
 #include "subvol/fit/geometry/site_tree.h"
 #include "subvol/mesh/volume_mesh.h"
 
 #include <array>
 #include <cstdint>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 namespace subvol::internal {
@@ -59,34 +57,11 @@ class RoutingGraph {
   SiteTree tree_;
 };
 
-/// The vertices and edges that paths may not touch.
+/// The vertices and edges that paths may not touch, and what those cost that they may.
 struct Occupied {
   std::vector<std::uint8_t> vertices, edges;
+  std::vector<double> vertex_prices, edge_prices;  ///< added to the cost of a path through them; empty: 0
   void add(const RoutingGraph& graph, std::span<const Index> path);
 };
-
-/// A polyline in space and the costs of edges that are to follow it.
-class FollowingCost {
- public:
-  /// factors  of edges of one, two, and any other number of cells, > 0.
-  /// softness length that is added to the distance, as the root of the sum of squares, > 0.  reach: edges farther away
-  /// have no cost.
-  FollowingCost(std::span<const Vec3> points, std::array<double, 3> factors, double softness, double reach);
-
-  /// Returns the integral of (d^2 + softness^2) along an edge, times its factor; infinity if it is out of reach.
-  double operator()(const RoutingGraph& graph, Index edge);
-
- private:
-  double squared_distance(const Vec3& p) const;
-
-  ClosestPoint tree_;
-  std::array<double, 3> factors_;
-  double softness_, reach_;
-  std::unordered_map<Index, double> costs_;  ///< of the edges asked for
-};
-
-/// Returns the vertices of the cheapest path, or none. Only its ends may be occupied.
-std::vector<Index> cheapest_path(const RoutingGraph& graph, FollowingCost& cost, Index from, Index to,
-                                 const Occupied& occupied);
 
 }  // namespace subvol::internal

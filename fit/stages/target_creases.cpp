@@ -16,10 +16,9 @@ FollowedCreases creases_along_target(const FitTarget& target, const CreaseRule& 
   if (rule.keeps_groups) borders = group_borders(target.mesh, target.mesh);
   constexpr double kNone = 180;  // no edge is sharper
   std::optional<double> angle = rule.angle_degrees;
-  const auto is_designed = [&] {
-    return edge_crispness(target.mesh, feature_curves(target.mesh, *angle)).is_designed();
-  };
-  if (angle && !rule.follows_all_edges && (!template_mesh.tags.creases.empty() || !is_designed())) angle.reset();
+  if (!rule.follows_all_edges &&
+      (!template_mesh.tags.creases.empty() || !has_edges_to_follow(target.mesh, angle, rule.follows_all_edges)))
+    angle.reset();
   if (!angle && !borders.empty()) angle = kNone;
   if (!angle && template_mesh.tags.creases.empty()) return {};
   return {target.mesh, angle, template_mesh, borders};
