@@ -85,7 +85,7 @@ class Filling {
     checkpoints_.describe(json);
     warnings.insert(warnings.end(), found.report.warnings.begin(), found.report.warnings.end());
     warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
-    const auto result = std::make_shared<Filled>();
+    auto result = std::make_shared<Filled>();
     result->report = make_report("fill", json, keywords_, work_, warnings);
     if (has_cage) result->cage = std::make_shared<VolumeMesh>(std::move(found.cage));
     result->mesh = std::make_shared<VolumeMesh>(std::move(found.mesh));

@@ -67,7 +67,7 @@ class Fit {
                        {{"target", cli::fingerprint(target_)}, {"template", cli::fingerprint(*template_)}});
   }
   std::shared_ptr<Fitted> run() {
-    const auto result = std::make_shared<Fitted>();
+    auto result = std::make_shared<Fitted>();
     // The result exposes the template through writable arrays, so it needs its own copy.
     result->template_mesh = std::make_shared<VolumeMesh>(*template_);
     curved_ ? fit_curved(*result) : fit_subdivision(*result);

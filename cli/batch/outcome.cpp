@@ -77,8 +77,8 @@ Verdict judge_signal(int signal) {
 }
 
 Verdict judge_exit(int status, const Remains& remains) {
-  const auto said = [&](std::string otherwise) {
-    return remains.last_message.empty() ? std::move(otherwise) : remains.last_message;
+  const auto said = [&](const std::string& otherwise) {
+    return remains.last_message.empty() ? otherwise : remains.last_message;
   };
   const auto not_valid = [&] {
     const std::string defects = defects_of(remains.report);

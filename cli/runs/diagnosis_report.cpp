@@ -226,6 +226,33 @@ std::string to_text(const SurfaceDiagnosis& diagnosis) {
   return text.str();
 }
 
+FillingForecast forecast_filling(const std::filesystem::path& path) {
+  std::vector<std::string> told_before;
+  try {
+    return {load_to_fill(path, {}, told_before), ""};
+  } catch (const InputError& e) {
+    return {{}, e.what()};
+  }
+}
+
+std::string to_text(const FillingForecast& forecast) {
+  const auto without_subject = [](const std::string& remark) {
+    constexpr std::string_view kSubject = "target: ";
+    return remark.starts_with(kSubject) ? remark.substr(kSubject.size()) : remark;
+  };
+  if (!forecast.refusal.empty()) return "a fit refuses it:   " + without_subject(forecast.refusal) + '\n';
+  std::string text;
+  for (const std::string& done : forecast.repair.done) text += "a fit repairs it:   " + without_subject(done) + '\n';
+  if (!forecast.repair.is_fillable)
+    text += "a fit goes on with what is left, and may be far off or meet itself there\n";
+  return text;
+}
+
+Json filling_json(const FillingForecast& forecast) {
+  if (!forecast.refusal.empty()) return {{"refused", as_utf8(forecast.refusal)}};
+  return {{"repairs", forecast.repair.done}, {"complete", forecast.repair.is_fillable}};
+}
+
 void repair_to_fill(Target& target, RegionRule rule, std::vector<std::string>& warnings) {
   auto* surface = std::get_if<TriangleMesh>(&target);
   if (!surface) return;

@@ -49,6 +49,19 @@ Json diagnosis_json(const SurfaceDiagnosis& diagnosis);
 /// Text for people: a line for each finding, the places of those that prevent filling, and a verdict.
 std::string to_text(const SurfaceDiagnosis& diagnosis);
 
+/// What a fit without a template does to a surface that cannot be filled as it is.
+struct FillingForecast {
+  SurfaceRepair repair;
+  std::string refusal;  ///< why the fit refuses the surface; empty: it does not
+};
+
+/// Tries what `load_to_fill` does without options. An interrupt ends it.
+FillingForecast forecast_filling(const std::filesystem::path& path);
+
+/// Return the forecast as text, a line for each repair, and as an entry of a report.
+std::string to_text(const FillingForecast& forecast);
+Json filling_json(const FillingForecast& forecast);
+
 /// Adds what was repaired, and what was left, to warnings.
 void add_remarks(const SurfaceRepair& repair, std::vector<std::string>& warnings);
 

@@ -153,7 +153,7 @@ void write_timeline(const Output& output, std::span<const Moment> moments) {
 }  // namespace
 
 std::string parse_cut(const std::string& text, CutPlane& cut) {
-  const std::string error = "must be x, y or z, or with a share between 0 and 1 as x:0.3, not " + text;
+  std::string error = "must be x, y or z, or with a share between 0 and 1 as x:0.3, not " + text;
   if (text.empty() || text[0] < 'x' || text[0] > 'z' || (text.size() > 1 && text[1] != ':')) return error;
   cut.axis = text[0] - 'x';
   if (text.size() == 1) return {};

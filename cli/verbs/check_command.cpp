@@ -120,10 +120,17 @@ int check_surface(const CheckArguments& arguments, const PolygonMesh& polygons, 
       json["regions"] = regions_json(*regions);
       text = to_text(*regions) + text;
     }
+  if (!diagnosis.is_cancelled && !diagnosis.is_fillable()) {
+    const FillingForecast forecast = forecast_filling(arguments.mesh);
+    if (!interrupted()) {
+      json["filling"] = filling_json(forecast);
+      text += to_text(forecast);
+    }
+  }
   json["warnings"] = warnings;
   json["peak_memory_bytes"] = internal::peak_memory_bytes();
   tell_check(arguments, warnings, json, text);
-  if (diagnosis.is_cancelled) return kInterrupted;
+  if (diagnosis.is_cancelled || interrupted()) return kInterrupted;
   return diagnosis.is_fillable() ? kDone : kFailed;
 }
 

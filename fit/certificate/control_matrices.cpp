@@ -54,6 +54,7 @@ Mat3 variation(const Matrices& matrices, const Mat3& mean, const Mat3& rotation,
   const std::size_t vectors = (matrices.size() + kWide - 1) / kWide, sampled = std::min(vectors, kMost);
   using Vector = typename Matrices::Vector;
   using Number = NumberOf<Vector>;
+  // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): only of doubles is it a copy
   const Eigen::Matrix<Number, 3, 3> middle = mean.cast<Number>(), turn = rotation.cast<Number>();
   MatrixOf<Vector> squares{};
   for (std::size_t i = 0; i < sampled; ++i) {
@@ -135,43 +136,44 @@ Mat3 turned(Mat3 l, const Mat3& scaled_matrix) {
 
 /// Lowest leading minors and largest entries of many symmetric matrices 2 T_b, T_b = sym(m_b) - diag(shift).
 template <class Vector>
-struct Extremes {
+class Extremes {
+ public:
   explicit Extremes(const Vec3& shift)
-      : start0(number(-2 * shift[0])), start1(number(-2 * shift[1])), start2(number(-2 * shift[2])) {
-    first = second = third = Vector{} + std::numeric_limits<Number>::infinity();
+      : start0_(number(-2 * shift[0])), start1_(number(-2 * shift[1])), start2_(number(-2 * shift[2])) {
+    first_ = second_ = third_ = Vector{} + std::numeric_limits<Number>::infinity();
   }
   void take(const MatrixOf<Vector>& m) {
-    const Vector t00 = (m[0][0] + m[0][0]) + start0, t11 = (m[1][1] + m[1][1]) + start1,
-                 t22 = (m[2][2] + m[2][2]) + start2;
+    const Vector t00 = (m[0][0] + m[0][0]) + start0_, t11 = (m[1][1] + m[1][1]) + start1_,
+                 t22 = (m[2][2] + m[2][2]) + start2_;
     const Vector t01 = m[0][1] + m[1][0], t02 = m[0][2] + m[2][0], t12 = m[1][2] + m[2][1];
     const Vector minor = t00 * t11 - t01 * t01;
-    take_lower(first, t00);
-    take_lower(second, minor);
-    take_lower(third, t22 * minor - t12 * (t00 * t12 - t01 * t02) + t02 * (t01 * t12 - t02 * t11));
-    take_higher_size(sizes[0], t00);
-    take_higher_size(sizes[1], t11);
-    take_higher_size(sizes[2], t22);
-    take_higher_size(sizes[3], t02);
-    take_higher_size(sizes[4], t12);
+    take_lower(first_, t00);
+    take_lower(second_, minor);
+    take_lower(third_, t22 * minor - t12 * (t00 * t12 - t01 * t02) + t02 * (t01 * t12 - t02 * t11));
+    take_higher_size(sizes_[0], t00);
+    take_higher_size(sizes_[1], t11);
+    take_higher_size(sizes_[2], t22);
+    take_higher_size(sizes_[3], t02);
+    take_higher_size(sizes_[4], t12);
   }
   bool are_positive() const { return !lanes_within(lowest_minor(), 0); }
   Vector lowest_minor() const {
-    Vector result = first;
-    take_lower(result, second);
-    take_lower(result, third);
+    Vector result = first_;
+    take_lower(result, second_);
+    take_lower(result, third_);
     return result;
   }
   /// Returns a lower bound of det S_b, S_b = D T_b D, if all are certainly positive definite; else 0. scale: D.
   double determinant(const Vec3& scale) const {
     constexpr double kRoundoff = std::numeric_limits<Number>::epsilon() / 2;
-    const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes[e]) * scale[i] * scale[k]; };
+    const auto scaled_size = [&](int e, int i, int k) { return highest_lane(sizes_[e]) * scale[i] * scale[k]; };
     const double largest = std::max({scaled_size(0, 0, 0), scaled_size(1, 1, 1), scaled_size(2, 2, 2),
                                      scaled_size(3, 0, 2), scaled_size(4, 1, 2)});
     const double to_second = scale[0] * scale[0] * scale[1] * scale[1], to_third = to_second * scale[2] * scale[2];
     // A second minor has products of two entries with at most 3 roundings each, a third minor six of three with 5 or 6.
-    const double least = to_third * lowest_lane(third) - 100 * kRoundoff * largest * largest * largest;
-    return largest < 1e30 && lowest_lane(first) > 0 &&
-                   to_second * lowest_lane(second) > 9 * kRoundoff * largest * largest && least > 0
+    const double least = to_third * lowest_lane(third_) - 100 * kRoundoff * largest * largest * largest;
+    return largest < 1e30 && lowest_lane(first_) > 0 &&
+                   to_second * lowest_lane(second_) > 9 * kRoundoff * largest * largest && least > 0
                ? least / 8
                : 0;
   }
@@ -180,9 +182,9 @@ struct Extremes {
   using Number = NumberOf<Vector>;
   static Number number(double x) { return static_cast<Number>(x); }
 
-  Number start0, start1, start2;
-  Vector first, second, third;
-  Vector sizes[5] = {};  // without t01, which is less than t00 or t11 if the second minor is positive
+  Number start0_, start1_, start2_;
+  Vector first_, second_, third_;
+  Vector sizes_[5] = {};  // without t01, which is less than t00 or t11 if the second minor is positive
 };
 
 /// Result for a box if T_b is not positive definite for some of these matrices. begin: number of the first matrix.
@@ -282,6 +284,7 @@ Bound bound_by(Mat3 l, const Scaling& scaling, Matrices& matrices, const BoundOp
   const Vec3 unscaled_shift = shift.cwiseProduct(scaling.squared_unscaling);
   const std::size_t count = matrices.size();
   using Vector = typename Matrices::Vector;
+  // NOLINTNEXTLINE(performance-unnecessary-copy-initialization): only of doubles is it a copy
   const Eigen::Matrix<NumberOf<Vector>, 3, 3> factors = unscaled.template cast<NumberOf<Vector>>();
   const auto failed_near = [&](std::size_t b) -> std::optional<Bound> {
     if (b == kNone) return {};

@@ -34,17 +34,17 @@ struct LegendreRecurrence {
   double t, value, first = 1, second = 0;  // P_i, P_i', P_i'' for i = 1
 
   void raise() {
-    const double next_value = ((2 * i + 1) * t * value - i * old_value) / (i + 1);
-    const double next_first = old_first + (2 * i + 1) * value;
-    const double next_second = old_second + (2 * i + 1) * first;
-    old_value = value, old_first = first, old_second = second;
+    const double next_value = ((2 * i_ + 1) * t * value - i_ * old_value_) / (i_ + 1);
+    const double next_first = old_first_ + (2 * i_ + 1) * value;
+    const double next_second = old_second_ + (2 * i_ + 1) * first;
+    old_value_ = value, old_first_ = first, old_second_ = second;
     value = next_value, first = next_first, second = next_second;
-    ++i;
+    ++i_;
   }
 
  private:
-  int i = 1;
-  double old_value = 1, old_first = 0, old_second = 0;
+  int i_ = 1;
+  double old_value_ = 1, old_first_ = 0, old_second_ = 0;
 };
 
 /// Both families at x <= 1/2, where there is no cancellation; the other half follows by parity.

@@ -84,7 +84,7 @@ class Projector {
 
  private:
   Vec3 asked(std::size_t c, const Vec3& point) const {
-    const Vec3 x = map_(c, point);
+    Vec3 x = map_(c, point);
     if (!x.allFinite())
       throw InputError("project_map: the map is not finite at a point of cell " + std::to_string(c));
     return x;

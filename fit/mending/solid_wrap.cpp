@@ -3,6 +3,7 @@
 
 #include "subvol/base/error.h"
 #include "subvol/base/format.h"
+#include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/target/surface_wrap.h"
 #include "subvol/surface/part_nesting.h"
 #include "subvol/surface/solid_topology.h"
@@ -40,6 +41,15 @@ std::string cause(const SurfaceDiagnosis& diagnosis) {
   return "";
 }
 
+/// Returns how far a wrap is from the surface that was given, in words.
+std::string how_far(const TriangleMesh& wrap, const TriangleMesh& given, double diagonal) {
+  const SurfaceDistance distance = surface_distance(wrap, given);
+  const SurfaceDistance::Extreme& farthest = distance.max_a_to_b;
+  return formatted("the wrap is %.3g %% off the surface on average, and at most %.3g %%, at (%.6g, %.6g, %.6g)",
+                   100 * distance.mean_a_to_b / diagonal, 100 * farthest.distance / diagonal, farthest.from.x(),
+                   farthest.from.y(), farthest.from.z());
+}
+
 }  // namespace
 
 bool needs_wrap(const TriangleMesh* repaired, const SurfaceDiagnosis& diagnosis) {
@@ -64,7 +74,8 @@ std::optional<SurfaceRepair> wrapped_to_fill(const TriangleMesh& given, const Su
     return std::nullopt;
   repair.done.push_back(
       "target: " + cause(diagnosis) +
-      formatted("it bounds no solid, and is wrapped with voxels of %g %% of its diagonal", options.voxel_percent));
+      formatted("it bounds no solid, and is wrapped with voxels of %g %% of its diagonal; ", options.voxel_percent) +
+      how_far(repair.surface, given, diagnosis.diagonal));
   repair.is_fillable = true;
   return repair;
 }

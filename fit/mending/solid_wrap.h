@@ -21,6 +21,8 @@ bool needs_wrap(const TriangleMesh* repaired, const SurfaceDiagnosis& diagnosis)
 /// Wraps a surface that bounds no solid, with voxels of the usual size (`wrap_surface`). A surface that points inward
 /// as a whole is turned before.
 ///
+/// The sentence in `done` tells how far the wrap is from the surface: covers of holes count, parts that the wrap hides
+/// inside do not.
 /// returns  nothing if the wrap is empty, or in more pieces than the surface has parts; it does not follow it then.
 std::optional<SurfaceRepair> wrapped_to_fill(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
                                              const std::function<bool()>& cancelled);

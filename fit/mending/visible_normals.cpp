@@ -58,7 +58,7 @@ Cap smallest_cap(std::span<const Vec3> points) {
   if (points.size() <= kFew) return smallest_cap_of_few(points);
   std::vector<Vec3> few = {points[0]};
   for (;;) {
-    const Cap cap = smallest_cap_of_few(few);
+    Cap cap = smallest_cap_of_few(few);
     if (!sees(cap.axis, few)) return cap;
     const Vec3& out = *std::ranges::min_element(points, {}, [&](const Vec3& p) { return cap.axis.dot(p); });
     if (cap.holds(out) || std::find(few.begin(), few.end(), out) != few.end()) return cap;

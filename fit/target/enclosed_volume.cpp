@@ -70,7 +70,7 @@ class Grid {
 
 double signed_volume(std::span<const Vec3> positions, std::span<const std::array<Index, 3>> triangles) {
   if (triangles.empty()) return 0;
-  const Vec3 origin = positions[triangles[0][0]];
+  const Vec3& origin = positions[triangles[0][0]];
   double sum = 0;
   for (const auto& t : triangles)
     sum += (positions[t[0]] - origin).dot((positions[t[1]] - origin).cross(positions[t[2]] - origin));

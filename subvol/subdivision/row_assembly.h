@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -76,10 +78,11 @@ class RowBuilder {
 template <class T>
 void prefer_large_pages([[maybe_unused]] std::vector<T>& reserved) {
 #ifdef MADV_HUGEPAGE
-  constexpr std::uintptr_t kPage = 4096;
-  const auto begin = (reinterpret_cast<std::uintptr_t>(reserved.data()) + kPage - 1) / kPage * kPage;
-  const auto end = reinterpret_cast<std::uintptr_t>(reserved.data() + reserved.capacity()) / kPage * kPage;
-  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);  // failure does no harm
+  constexpr std::size_t kPage = 4096;
+  void* begin = reserved.data();
+  std::size_t size = reserved.capacity() * sizeof(T);
+  if (std::align(kPage, kPage, begin, size))
+    madvise(begin, size / kPage * kPage, MADV_HUGEPAGE);  // failure does no harm
 #endif
 }
 

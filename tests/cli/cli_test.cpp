@@ -329,7 +329,7 @@ TEST_CASE("Ctrl-C ends a fit with the best result and status 130", "[cli]") {
   CHECK(place.json("report.json").at("stop_reason") == "cancelled");
 }
 
-TEST_CASE("What stands in no file is refused before any work, and nothing is written", "[cli]") {
+TEST_CASE("What stands in no file is refused before any work, and nothing is written", "[cli][slow]") {
   const Workplace place;
   const auto before = place.names();
   const auto refuses = [&](const std::string& arguments, int status, const std::string& word) {

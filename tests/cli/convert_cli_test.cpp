@@ -79,7 +79,7 @@ TEST_CASE("The option --references chooses the cell data that become references,
   CHECK(place.run("convert target.off --references x -o c.obj").status == 2);
 }
 
-TEST_CASE("an input that cannot be read is told as what it is, by every verb", "[cli]") {
+TEST_CASE("an input that cannot be read is told as what it is, by every verb", "[cli][slow]") {
   const Workplace place;
   for (const char* name : {"a.med", "a.su2", "a.vol", "a"}) {
     place.file(name, "x");

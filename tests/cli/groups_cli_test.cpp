@@ -127,7 +127,7 @@ TEST_CASE("Without groups, results are as before, and groups that no output hold
   CHECK(place.run("convert template.mesh -o boundary:faces.obj").status == 2);
 }
 
-TEST_CASE("Groups go through every format that holds them, on the command line", "[cli]") {
+TEST_CASE("Groups go through every format that holds them, on the command line", "[cli][slow]") {
   const Workplace place;
   write_volume_mesh(place / "b.mesh", test::with_floor_and_roof(test::lattice(1, 1, 1), 1));
   const auto run = [&](const std::string& words) {

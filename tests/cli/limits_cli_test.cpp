@@ -186,7 +186,7 @@ TEST_CASE("A process that gets no memory ends in order, wherever that is", "[cli
     }
 }
 
-TEST_CASE("A disk without room leaves what stood there, for every kind of output", "[cli][disk]") {
+TEST_CASE("A disk without room leaves what stood there, for every kind of output", "[cli][disk][slow]") {
   const Workplace place;
   // The thread sanitizer starts with a large file there, if it can, and dies of the limit.
   const subvol::test::Environment no_temporary_files("TMPDIR", (place / "none").string());

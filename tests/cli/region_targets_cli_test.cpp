@@ -28,7 +28,7 @@ std::string npy(const LabelGrid& grid) {
 }  // namespace
 
 TEST_CASE("A surface with sheets inside is filled region by region, with the target's volumes beside the result's",
-          "[cli][regions]") {
+          "[cli][regions][slow]") {
   const Workplace place;
   place.file("slabs.off", samples::off_text(slabs_surface(5)));
   const Run check = place.run("check slabs.off");

@@ -38,7 +38,7 @@ TEST_CASE("Options from a file without a verb are a usage error", "[cli]") {
   CHECK(place.run("--config options.toml template").status == 2);
 }
 
-TEST_CASE("Names that are not UTF-8 are written with a sign in place of what is not text", "[cli]") {
+TEST_CASE("Names that are not UTF-8 are written with a sign in place of what is not text", "[cli][slow]") {
   const Workplace place;
   place.file("t\xff.off", content_of(place / "target.off"));
   const Run run = place.run(
@@ -111,7 +111,7 @@ TEST_CASE("Outputs that are pipes are written to and not read back", "[cli]") {
   }
 }
 
-TEST_CASE("A link to the standard output is written through, to a file and to a pipe", "[cli]") {
+TEST_CASE("A link to the standard output is written through, to a file and to a pipe", "[cli][slow]") {
   const Workplace place;
   fs::create_symlink("/dev/stdout", place / "out.obj");
   CHECK(shell(place, "\"$SUBVOL\" convert template.mesh -o out.obj --force --quiet > to_file.obj") == 0);
@@ -171,7 +171,7 @@ TEST_CASE("What cannot be done is said before a template is made", "[cli][templa
   refuses("--order 2 --max-iterations 1 --resume c -o x.vtu", 3, "--order was");
 }
 
-TEST_CASE("A second Ctrl-C ends the program at once, with nothing half-written", "[cli]") {
+TEST_CASE("A second Ctrl-C ends the program at once, with nothing half-written", "[cli][slow]") {
   const int signal = GENERATE(SIGINT, SIGTERM);
   const Workplace place(subvol::samples::torus_sample());
   const pid_t child = place.start(kFit + "--levels 4 --progress json -o out.mesh --report report.json");

@@ -42,7 +42,7 @@ nlohmann::json found_in(const Workplace& place, const std::string& file) {
 
 }  // namespace
 
-TEST_CASE("A shell goes from a surface to cells, named sheets and a report that tells the truth", "[cli]") {
+TEST_CASE("A shell goes from a surface to cells, named sheets and a report that tells the truth", "[cli][slow]") {
   const Workplace place;
   const Run run = place.run(
       "shell target.off --thickness 2% --layers 2 --side both -o shell.mesh -o shell.vtu -o shell.glb --report "
@@ -531,13 +531,22 @@ TEST_CASE("check of a surface tells whether it can be filled", "[cli]") {
   CHECK(open.status == 1);
   CHECK(nlohmann::json::parse(open.out)["findings"]["open_rim"]["count"] == 1);
   CHECK(place.run("check open.off --target target.off").status == 2);
+  // What a fit would do about it: a cover of this tetrahedron would be larger than half of the rest; that of a box is
+  // smaller.
+  CHECK(nlohmann::json::parse(open.out)["filling"]["refused"].is_string());
+  CHECK_THAT(place.run("check open.off").out, Catch::Contains("a fit refuses it:   1 hole"));
+  place.file("box.off",
+             "OFF\n8 10 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+             "3 0 2 1\n3 0 3 2\n3 0 1 5\n3 0 5 4\n3 1 2 6\n3 1 6 5\n3 2 3 7\n3 2 7 6\n3 3 0 4\n3 3 4 7\n");
+  CHECK_THAT(place.run("check box.off").out, Catch::Contains("a fit repairs it:   1 hole is covered"));
+  CHECK(nlohmann::json::parse(place.run("check box.off --json").out)["filling"]["complete"] == true);
   const subvol::test::Run late = place.run("template auto target.off --cells 100000 --time-limit 0.2 -o late.mesh");
   CHECK(late.status == 4);
   CHECK(late.err.find("time limit") != std::string::npos);
   CHECK(!place.has("late.mesh"));
 }
 
-TEST_CASE("A fin is left out before a surface is filled, and told", "[cli]") {
+TEST_CASE("A fin is left out before a surface is filled, and told", "[cli][slow]") {
   const Workplace place;
   // A cube, and a sheet that stands on one of its edges.
   place.file("fin.off",

@@ -132,7 +132,7 @@ TEST_CASE("What cannot be viewed is refused, and nothing is written", "[cli]") {
   CHECK(gone.err.find("gone.mesh") != std::string::npos);
 }
 
-TEST_CASE("The course of a fit becomes a page with a timeline", "[cli]") {
+TEST_CASE("The course of a fit becomes a page with a timeline", "[cli][slow]") {
   const Workplace place;
   const Run linear = place.run(kFit + "--levels 1 -o animation:course.html");
   INFO(linear.err);

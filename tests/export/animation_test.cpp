@@ -83,7 +83,7 @@ TEST_CASE("the animation of a fit goes from the template's limit surface to the 
   check_with_validator({folder / "ball.glb"});
 }
 
-TEST_CASE("a fit of curved cells is animated as well", "[animation]") {
+TEST_CASE("a fit of curved cells is animated as well", "[animation][slow]") {
   const TemporaryFolder folder;
   const HighOrderFitResult fit =
       fit_high_order(ball().target, ball().template_mesh, {.order = 3, .max_iterations = 3, .keep_states = true});

@@ -111,7 +111,7 @@ TEST_CASE("exodus: cells of order 2 are exact, and have nodes on edges only if t
   CHECK_THROWS_WITH(write_volume(folder / "high.e", high), Contains("order 2 at most"));
 }
 
-TEST_CASE("exodus: VTK sees the same cells, curved and straight", "[export][consumer]") {
+TEST_CASE("exodus: VTK sees the same cells, curved and straight", "[export][consumer][slow]") {
   if (is_missing()) return;
   const TemporaryFolder folder;
   PointSource source(4);

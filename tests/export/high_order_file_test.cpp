@@ -258,7 +258,7 @@ TEST_CASE("high_order_file: Gmsh reconstructs the cells that are certified, betw
   }
 }
 
-TEST_CASE("high_order_file: the cells of a file are read as they stand", "[export]") {
+TEST_CASE("high_order_file: the cells of a file are read as they stand", "[export][slow]") {
   PointSource source(14);
   const TemporaryFolder folder;
   for (const Basis basis : kBothBases)

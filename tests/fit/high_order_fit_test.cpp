@@ -182,7 +182,7 @@ TEST_CASE("few places far from the target are drawn in where that costs little s
   CHECK(drawn > 0);
 }
 
-TEST_CASE("curved elements keep sharp edges if they are asked to, or if the template has creases") {
+TEST_CASE("curved elements keep sharp edges if they are asked to, or if the template has creases", "[slow]") {
   const auto barrel = [](Vec3 p) {
     p.head<2>() *= 1 + 0.2 * (1 - p.z() * p.z());
     return p;

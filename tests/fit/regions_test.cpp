@@ -139,7 +139,7 @@ TEST_CASE("a fit of a template with regions keeps flat interfaces flat and volum
   CHECK_THROWS_AS(fit_subdivision_volume(own_boundary(mesh), mesh, options), InputError);
 }
 
-TEST_CASE("a fit of a template with regions draws interfaces to those of the target", "[regions]") {
+TEST_CASE("a fit of a template with regions draws interfaces to those of the target", "[regions][slow]") {
   // The inner cube of the target is larger than that of the template, and not in the middle.
   VolumeMesh wanted = cube_in_cube();
   for (Vec3& p : wanted.positions)
@@ -275,7 +275,7 @@ TEST_CASE("regions of curved cells are those of linear ones at order 1", "[regio
   CHECK_THROWS_AS(measure_regions(curved, {too_few, {}}, nullptr), InputError);
 }
 
-TEST_CASE("a curved fit lowers lambda until the regions have their volumes", "[regions]") {
+TEST_CASE("a curved fit lowers lambda until the regions have their volumes", "[regions][slow]") {
   // The inner cube of the target is larger than that of the template, and not in the middle.
   VolumeMesh wanted = cube_in_cube();
   for (Vec3& p : wanted.positions)

@@ -112,7 +112,7 @@ bool any_process_named(const std::string& words) {
 
 }  // namespace
 
-TEST_CASE("A batch runs verbs, keeps what they write, and records what is true of it", "[cli][batch]") {
+TEST_CASE("A batch runs verbs, keeps what they write, and records what is true of it", "[cli][batch][slow]") {
   const Workplace place;
   place.file("bad.off", "OFF\nnonsense\n");
   place.file("m.csv",
@@ -187,7 +187,7 @@ TEST_CASE("A crash, a signal and a time limit cost one record", "[cli][batch][sl
   CHECK(place.runs()["crash"] == 2);
 }
 
-TEST_CASE("A limit on memory is one for each model", "[cli][batch]") {
+TEST_CASE("A limit on memory is one for each model", "[cli][batch][slow]") {
   if (kSanitized) return;
   const Workplace place;
   const Run run = place.run("batch target.off -o out --memory-limit 64M --quiet -- --cells 200000 --time-limit 60");

@@ -151,7 +151,7 @@ TEST_CASE("the certificate never passes an inverted hex with positive corners", 
   CHECK(invalid > 100);
 }
 
-TEST_CASE("the certificate never passes an inverted prism, tet or pyramid", "[certificate]") {
+TEST_CASE("the certificate never passes an inverted prism, tet or pyramid", "[certificate][slow]") {
   for (const CellKind kind : {CellKind::prism, CellKind::tet, CellKind::pyramid}) {
     std::mt19937_64 engine(7);
     std::size_t wrong = 0, invalid = 0, valid = 0;

@@ -26,7 +26,7 @@ double bernstein_sum(const double* b, int degree, double t, double& slope) {
 
 }  // namespace
 
-TEST_CASE("Models of functions along a line are as close to them as they say", "[certificate]") {
+TEST_CASE("Models of functions along a line are as close to them as they say", "[certificate][slow]") {
   const Basis basis = GENERATE(Basis::fourier, Basis::legendre);
   const int order = GENERATE(1, 2, 4, 8, 12, kMaxOrder), degree = GENERATE(1, 3, 5, 7, 8);
   CAPTURE(order, degree);

@@ -208,7 +208,7 @@ TEST_CASE("affine maps are reproduced at every order, kind and basis", "[element
     }
 }
 
-TEST_CASE("polynomial maps are reproduced by the legendre basis at every order and kind", "[elements]") {
+TEST_CASE("polynomial maps are reproduced by the legendre basis at every order and kind", "[elements][slow]") {
   PointSource source(31);
   for (int order = 1; order <= kMaxOrder; ++order)
     for (const CellKind kind : kAllKinds) {

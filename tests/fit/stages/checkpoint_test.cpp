@@ -162,7 +162,7 @@ TEST_CASE("A fit of curved elements that goes on from a checkpoint ends at the s
     });
 }
 
-TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits") {
+TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits", "[slow]") {
   VolumeMesh mesh = test::lattice(4, 4, 4);
   const MeshTopology topology(mesh);
   for (std::size_t v = 0; v < mesh.num_vertices(); ++v)
@@ -177,7 +177,7 @@ TEST_CASE("An optimisation that goes on from a checkpoint ends at the same bits"
   });
 }
 
-TEST_CASE("An optimisation whose boundary is far from its target goes on to the same bits") {
+TEST_CASE("An optimisation whose boundary is far from its target goes on to the same bits", "[slow]") {
   // Beyond the edges of a convex boundary two triangles are equally far.
   const VolumeMesh mesh = test::lattice(3, 3, 3);
   TriangleMesh target = triangulate(boundary_surface(mesh, MeshTopology(mesh)));

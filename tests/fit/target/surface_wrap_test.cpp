@@ -41,7 +41,7 @@ TriangleMesh open_ball_with_bar(double height) {
 
 }  // namespace
 
-TEST_CASE("A wrap closes holes and unites what crosses", "[surface_wrap]") {
+TEST_CASE("A wrap closes holes and unites what crosses", "[surface_wrap][slow]") {
   const TriangleMesh open = open_ball_with_bar(0.9);
   const TriangleMesh wrap = wrap_surface(open, {.voxel_percent = 1});
   const SolidBoundary solid = solid_boundary(wrap);

@@ -194,7 +194,7 @@ TEST_CASE("A triangle without a neighbour is no part of a solid and no void in i
   }
 }
 
-TEST_CASE("Holes that meet at one vertex are closed each by itself, however many", "[templates]") {
+TEST_CASE("Holes that meet at one vertex are closed each by itself, however many", "[templates][slow]") {
   // A cone of which every second triangle at the top is missing.
   constexpr Index kHoles = 200000;
   TriangleMesh cone;

@@ -147,7 +147,7 @@ TEST_CASE("A grid through an L-block's planes is exact, with a pillow as well", 
   }
 }
 
-TEST_CASE("A thin plate becomes one layer of flat cells", "[templates]") {
+TEST_CASE("A thin plate becomes one layer of flat cells", "[templates][slow]") {
   const TriangleMesh plate = box(Vec3(200, 100, 1));
   for (const std::size_t cells : {50, 130, 1000}) {
     INFO(cells);

@@ -228,7 +228,7 @@ TEST_CASE("Merging refuses a distance at which cells would go or change their ki
   CHECK(glue(wedge, 0.004).kinds == wedge.kinds);
 }
 
-TEST_CASE("Merging takes boundaries of many vertices in one plane", "[templates]") {
+TEST_CASE("Merging takes boundaries of many vertices in one plane", "[templates][slow]") {
   const VolumeMesh below = test::lattice(300, 300, 1);
   VolumeMesh above = below;
   for (Vec3& p : above.positions) p.z() += 1;
