@@ -5,6 +5,7 @@
 #include "cli/runs/interrupt.h"
 #include "cli/runs/loading.h"
 #include "cli/runs/writing.h"
+#include "subvol/base/error.h"
 #include "subvol/base/format.h"
 #include "subvol/fit/target/surface_wrap.h"
 #include "subvol/io/label_grid_io.h"
