@@ -115,7 +115,7 @@ TEST_CASE("A report becomes a page that needs nothing else", "[cli][slow]") {
   CHECK(without.err.find("the result is not shown") != std::string::npos);
 }
 
-TEST_CASE("What is no report is refused, and nothing is written", "[cli]") {
+TEST_CASE("What is no report is refused, and nothing is written", "[cli][slow]") {
   const Workplace place;
   const std::string head = R"({"subvol": "1", "command": "fit", )";
   const std::string deep = head + "\"stages\": " + std::string(200000, '[') + std::string(200000, ']') + '}';
@@ -135,7 +135,7 @@ TEST_CASE("What is no report is refused, and nothing is written", "[cli]") {
   CHECK(place.run("report none.json -o page.html").status == 3);
 }
 
-TEST_CASE("Curved cells keep sharp edges, and the report says how far off they are", "[cli]") {
+TEST_CASE("Curved cells keep sharp edges, and the report says how far off they are", "[cli][slow]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "cube.mesh", subvol::test::lattice(2, 2, 2));
   for (const std::string verb : {"fit cube.mesh --template cube.mesh", "optimize cube.mesh --target cube.mesh"}) {
@@ -314,7 +314,7 @@ TEST_CASE("A time limit ends with status 4 and the best result", "[cli][slow]") 
   CHECK(place.json("report.json").at("stop_reason") == "time_limit");
 }
 
-TEST_CASE("Ctrl-C ends a fit with the best result and status 130", "[cli]") {
+TEST_CASE("Ctrl-C ends a fit with the best result and status 130", "[cli][slow]") {
   const Workplace place(subvol::samples::torus_sample());
   const pid_t child = place.start(kFit + "--levels 4 --progress json -o out.mesh --report report.json");
   // The first line of progress says that the fit is under way.
@@ -472,7 +472,7 @@ TEST_CASE("Options may come from a file; the command line wins and unknown keys 
   CHECK(subvol::read_volume_mesh(place / "d.mesh").num_cells() == 10 * 8);
 }
 
-TEST_CASE("Every verb explains itself", "[cli]") {
+TEST_CASE("Every verb explains itself", "[cli][slow]") {
   const Workplace place;
   const Run all = place.run("--help");
   CHECK(all.status == 0);

@@ -50,7 +50,8 @@ TEST_CASE("convert writes every format, and what can be read back is the same", 
   CHECK(place.run("convert target.off --limit -o t2.glb").status == 2);
 }
 
-TEST_CASE("The option --references chooses the cell data that become references, and names those there are", "[cli]") {
+TEST_CASE("The option --references chooses the cell data that become references, and names those there are",
+          "[cli][slow]") {
   const Workplace place;
   subvol::VolumeMesh mesh = subvol::test::lattice(1, 1, 2);
   mesh.references = {7, 9};
@@ -117,7 +118,7 @@ TEST_CASE("an input that cannot be read is told as what it is, by every verb", "
   }
 }
 
-TEST_CASE("what was read and is in none of the outputs is told once, by every verb", "[cli]") {
+TEST_CASE("what was read and is in none of the outputs is told once, by every verb", "[cli][slow]") {
   const Workplace place(subvol::samples::bracket_sample());
   subvol::VolumeMesh mesh = subvol::read_volume_mesh(place / "template.mesh");
   REQUIRE(!mesh.tags.creases.empty());

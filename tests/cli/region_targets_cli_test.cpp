@@ -80,7 +80,7 @@ TEST_CASE("A surface with sheets inside is filled region by region, with the tar
   CHECK(region_references(read_volume_mesh(place / "c.mesh")).size() == 5);
 }
 
-TEST_CASE("A segmentation becomes a template with a region for each label", "[cli][regions]") {
+TEST_CASE("A segmentation becomes a template with a region for each label", "[cli][regions][slow]") {
   const Workplace place;
   place.file("a.npy", npy(Phantom{32}.grid()));
   const Run run = place.run("template auto a.npy --cells 2000 --pillow -o a.mesh");

@@ -25,7 +25,7 @@ subvol::VolumeMesh two_layers() {
 
 }  // namespace
 
-TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions]") {
+TEST_CASE("the verbs keep regions and report their volumes", "[cli][regions][slow]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "layers.mesh", two_layers());
   for (const char* command :

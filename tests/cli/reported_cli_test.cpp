@@ -55,7 +55,7 @@ TEST_CASE("Reported STL files are read as what they are, or refused by their byt
 }
 
 TEST_CASE("Reported files of cells give the references that are meant, and are told when they cannot be read",
-          "[cli]") {
+          "[cli][slow]") {
   const auto inputs = reported_inputs();
   if (!inputs) return;
   const Workplace place;

@@ -106,7 +106,7 @@ TEST_CASE("Groups of a surface arrive on its shell, and can be left out by name,
   CHECK(place.run(words + "--skip bottom --skip top --skip left --skip right --skip front --skip back").status == 3);
 }
 
-TEST_CASE("The first height, the layers and the growth of a shell follow from one another", "[cli]") {
+TEST_CASE("The first height, the layers and the growth of a shell follow from one another", "[cli][slow]") {
   const Workplace place;
   place.file("box.obj", kBox);
   const std::string words = "shell box.obj --thickness 0.31 --straight --force -o a.mesh --report r.json ";

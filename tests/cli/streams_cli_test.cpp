@@ -99,7 +99,7 @@ TEST_CASE("Inputs that are pipes, devices or folders are refused, not waited for
   refuses(kFit + "-o out.mesh --config zero.mesh", 2, "zero.mesh: expected a file");
 }
 
-TEST_CASE("Outputs that are pipes are written to and not read back", "[cli]") {
+TEST_CASE("Outputs that are pipes are written to and not read back", "[cli][slow]") {
   const Workplace place(subvol::samples::bracket_sample());
   for (const std::string& words : {kFit + "--levels 1 --max-iterations 1", std::string("subdivide template.mesh")}) {
     fs::remove(place / "pipe.mesh");

@@ -113,7 +113,7 @@ TEST_CASE("check calls a mesh valid or counts its defects, never both", "[cli]")
   CHECK(found.at("unused_vertices").size() == 24);
 }
 
-TEST_CASE("No verb takes a mesh that is a point", "[cli]") {
+TEST_CASE("No verb takes a mesh that is a point", "[cli][slow]") {
   const Workplace place;
   place.file("point.mesh", "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n1 2 3 0\n1 2 3 0\n1 2 3 0\n1 2 3 0\n"
                            "Tetrahedra\n1\n1 2 3 4 0\nEnd\n");
@@ -153,7 +153,7 @@ TEST_CASE("A shell of curved cells goes to its files with its thickness, and is 
   CHECK(content_of(place / "shell.glb").find("_THICKNESS") != std::string::npos);
 }
 
-TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property of the surface", "[cli]") {
+TEST_CASE("Thicknesses may differ from vertex to vertex, by a file or a property of the surface", "[cli][slow]") {
   const Workplace place;
   const std::string faces = "3 0 1 2\n3 0 3 1\n3 1 3 2\n3 2 3 0\n";
   place.file("tet.ply",
@@ -208,7 +208,7 @@ TEST_CASE("A shell of hexes and prisms numbers its cells layer by layer", "[cli]
   }
 }
 
-TEST_CASE("A shell refuses what it cannot use before it writes", "[cli]") {
+TEST_CASE("A shell refuses what it cannot use before it writes", "[cli][slow]") {
   const Workplace place;
   CHECK(place.run("shell target.off -o a.mesh").status == 2);
   CHECK(place.run("shell target.off --thickness 2%% -o a.mesh").status == 2);
@@ -305,7 +305,7 @@ TEST_CASE("optimize untangles a mesh, proves it, and says which cells it could n
   CHECK(place.run("optimize tangled.mesh --order 2 -o a.vtu").status == 2);
 }
 
-TEST_CASE("Reports number cells as their file does", "[cli]") {
+TEST_CASE("Reports number cells as their file does", "[cli][slow]") {
   const Workplace place;
   subvol::write_volume_mesh(place / "mixed.vtk", inverted_tet_and_cube());
   for (const std::string verb : {"template carve mixed.vtk --list 0,1", "optimize mixed.vtk --fixed-boundary"})
@@ -519,7 +519,7 @@ TEST_CASE("A surface alone is enough for a fit", "[cli][templates][slow]") {
   CHECK(place.run("fit target.off --template template.mesh --cells 60 -o x.mesh").status == 2);
 }
 
-TEST_CASE("check of a surface tells whether it can be filled", "[cli]") {
+TEST_CASE("check of a surface tells whether it can be filled", "[cli][slow]") {
   const subvol::test::Workplace place;
   const subvol::test::Run closed = place.run("check target.off --report r.json");
   CAPTURE(closed.err);

@@ -57,7 +57,7 @@ TEST_CASE("A mesh becomes a page with its quality, its distance and its inverted
   CHECK(place.run("view tangled.mesh --force --quiet").err.empty());
 }
 
-TEST_CASE("Other fields of a .vtu are there to color by", "[cli]") {
+TEST_CASE("Other fields of a .vtu are there to color by", "[cli][slow]") {
   const Workplace place;
   REQUIRE(place.run("shell target.off --thickness 2% --layers 2 -o shell.vtu --report shell.json").status == 0);
   const Run run = place.run("view shell.vtu -o shell.html");
@@ -104,7 +104,7 @@ TEST_CASE("A curved mesh, a surface, a cage and a report can be viewed", "[cli][
   CHECK(check["meshes"][0]["name"] == "Result");
 }
 
-TEST_CASE("What cannot be viewed is refused, and nothing is written", "[cli]") {
+TEST_CASE("What cannot be viewed is refused, and nothing is written", "[cli][slow]") {
   const Workplace place;
   place.file("points.xyz", "0 0 0\n1 0 0\n0 1 0\n");
   place.file("no.json", "{}");

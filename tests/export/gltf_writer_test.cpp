@@ -271,7 +271,7 @@ TEST_CASE("shapes become morph targets that an animation goes through to the sce
   refused([](Scene& s) { s.seconds_per_shape = 3e38; });
 }
 
-TEST_CASE("times of an animation start at 0 and rise, whatever the shapes are") {
+TEST_CASE("times of an animation start at 0 and rise, whatever the shapes are", "[slow]") {
   Scene scene = two_quads();
   const ScenePrimitive& surface = scene.nodes[0].primitive;
   for (std::size_t num_shapes = 1; num_shapes <= 3; ++num_shapes) {

@@ -91,7 +91,7 @@ TEST_CASE("a tessellation is closed, of quads only, and its normals are unit and
   }
 }
 
-TEST_CASE("the stated chord error holds against a dense refinement") {
+TEST_CASE("the stated chord error holds against a dense refinement", "[slow]") {
   VolumeMesh semi_sharp = bumpy();
   tag_creases(semi_sharp, 40, 1.7);
   for (const VolumeMesh& cage : {bumpy(), mixed_cells(), semi_sharp})

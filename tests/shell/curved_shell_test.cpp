@@ -134,7 +134,7 @@ TEST_CASE("A curved shell has the same bits for one thread and for two", "[shell
   CHECK(one.mesh.coefficients == two.mesh.coefficients);
 }
 
-TEST_CASE("A shell whose curving is stopped is valid", "[shell]") {
+TEST_CASE("A shell whose curving is stopped is valid", "[shell][slow]") {
   const ShellResult shell = make_shell(as_polygons(cube_surface(5, false)), {.thickness = 0.5, .layers = 2});
   const CurvedShell curved = curve_shell(shell, {.order = 2, .progress = [](const FitProgress&) { return false; }});
   CHECK(curved.report.stop_reason == StopReason::cancelled);

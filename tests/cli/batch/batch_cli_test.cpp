@@ -321,7 +321,7 @@ TEST_CASE("A row on the command line is a batch of one, whose record can be prin
   CHECK(place.run("batch target.off -o out --verb check --quiet -- --json").status == 0);
 }
 
-TEST_CASE("Command lines of batches that make no sense are refused before any work", "[cli][batch]") {
+TEST_CASE("Command lines of batches that make no sense are refused before any work", "[cli][batch][slow]") {
   const Workplace place;
   place.file("file", "");
   const auto refuses = [&](const std::string& words, int status, const std::string& why) {

@@ -80,7 +80,7 @@ TEST_CASE("A wrap keeps voids, and a sheet that sticks out does not matter", "[s
   CHECK(solid.volume == Approx(7).epsilon(0.02));
 }
 
-TEST_CASE("A wrap refuses what has no inside, and can be cancelled", "[surface_wrap]") {
+TEST_CASE("A wrap refuses what has no inside, and can be cancelled", "[surface_wrap][slow]") {
   TriangleMesh inward = test::cube_surface(2, false);
   for (auto& triangle : inward.triangles) std::swap(triangle[1], triangle[2]);
   CHECK_THROWS_WITH(wrap_surface(inward), Catch::Contains("nothing is inside"));
