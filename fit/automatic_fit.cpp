@@ -353,6 +353,7 @@ bool AutomaticFit::fit_smoothly(SizedMesh grid, AutomaticAttempt::Kind kind) {
 
 /// Routes the edges on the grid that was brought near the target.
 void AutomaticFit::lay_out(RoutingOptions routing) {
+  routing.cancelled = [this] { return runner_.is_to_end(); };
   routing.sizes = vertex_sizes(start_.grid.mesh, start_.grid.sizes);
   layout_ = edge_layout(start_.grid.mesh, start_.fitted, edges_.mesh, edges_.features, routing);
   cage_.reset();

@@ -5,6 +5,7 @@
 #include "subvol/fit/automatic_fit.h"
 #include "subvol/fit/elements/boundary_samples.h"
 #include "subvol/fit/features/crisp_edges.h"
+#include "subvol/fit/features/feature_routing.h"
 #include "subvol/fit/features/sheet_layout.h"
 #include "subvol/fit/fits/flat_faces.h"
 #include "subvol/fit/fits/local_cells.h"
@@ -260,7 +261,9 @@ bool RegionFit::run_curves(std::size_t cells) {
       if (result_.trials.empty()) judge({.template_cells = grid->num_cells()});
       return false;
     }
-    layout_ = sheet_layout(mesh_, unit_, curves_, {});
+    RoutingOptions routing;
+    routing.cancelled = [this] { return runner_.is_to_end(); };
+    layout_ = sheet_layout(mesh_, unit_, curves_, routing);
     mesh_ = std::move(padded);
     mesh_.tags = layout_->tagged_mesh.tags;
     return fit_edges({.template_cells = grid->num_cells()}, 1) && relax_last_trial();

@@ -47,12 +47,14 @@ double edge_length_near(const RoutingGraph& graph, const FeatureCurve& curve) {
 }
 
 CurveSearch::CurveSearch(const RoutingGraph& graph, const SignedFeatures& features, const CornerPlacement& corners,
-                         std::optional<std::span<const std::uint8_t>> along_sheet_curves)
+                         std::optional<std::span<const std::uint8_t>> along_sheet_curves,
+                         std::function<bool()> cancelled)
     : graph_(graph),
       features_(features),
       curves_(features.curves.curves),
       corners_(corners),
       along_sheet_curves_(along_sheet_curves),
+      cancelled_(std::move(cancelled)),
       courses_(curves_.size()) {
   for (const FeatureCurve& curve : curves_) {
     h_.push_back(edge_length_near(graph, curve));
@@ -202,7 +204,7 @@ std::optional<CurveSearch::Found> CurveSearch::find_on_one_side(Index c, const O
 }
 
 std::optional<CurveSearch::Found> CurveSearch::find(Index c, const Occupied& occupied) {
-  if (!(graph_.edge_length() > 0) || lacks_corner(c)) return std::nullopt;
+  if (!(graph_.edge_length() > 0) || lacks_corner(c) || is_cancelled()) return std::nullopt;
   for (Course& course : courses(c))
     if (auto found = judged(path_on(course, c, occupied), c, kFollowDistance)) return found;
   return curves_[c].closed() ? find_on_one_side(c, occupied) : std::nullopt;
@@ -212,6 +214,7 @@ CurveSearch::Straying::Straying(const CurveSearch& search, Index c, double most)
     : search_(search), curve_(c), most_(most), walk_(search.walk_along(c, search.curves_[c].points, most)) {}
 
 std::optional<CurveSearch::Found> CurveSearch::Straying::find(Index from, Index to, const Occupied& occupied) {
+  if (search_.is_cancelled()) return std::nullopt;
   return search_.judged(walk_.cheapest_path(search_.graph_, from, to, occupied), curve_, most_);
 }
 

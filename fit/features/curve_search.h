@@ -8,6 +8,7 @@
 #include "subvol/fit/geometry/closest_point.h"
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -29,8 +30,9 @@ class CurveSearch {
 
   /// graph, features, corners  must outlive the object.
   /// along_sheet_curves  as in `RoutingOptions` if paths run along all sheets; nothing: they run along the boundary.
+  /// cancelled  as in `RoutingOptions`.
   CurveSearch(const RoutingGraph& graph, const SignedFeatures& features, const CornerPlacement& corners,
-              std::optional<std::span<const std::uint8_t>> along_sheet_curves);
+              std::optional<std::span<const std::uint8_t>> along_sheet_curves, std::function<bool()> cancelled = {});
   CurveSearch(const CurveSearch&) = delete;
   CurveSearch& operator=(const CurveSearch&) = delete;
 
@@ -81,6 +83,7 @@ class CurveSearch {
   std::vector<Index> path_on(Course& course, Index c, const Occupied& occupied,
                              std::span<const Index> allowed = {}) const;
   std::optional<Found> find_on_one_side(Index c, const Occupied& occupied);
+  bool is_cancelled() const { return cancelled_ && cancelled_(); }
   std::optional<Found> judged(std::vector<Index> path, Index c, double most) const;
 
   const RoutingGraph& graph_;
@@ -88,6 +91,7 @@ class CurveSearch {
   const std::vector<FeatureCurve>& curves_;
   const CornerPlacement& corners_;
   std::optional<std::span<const std::uint8_t>> along_sheet_curves_;
+  std::function<bool()> cancelled_;
   std::vector<double> h_;                     ///< near each curve
   std::vector<ClosestPoint> trees_;           ///< of the curves
   std::vector<std::vector<Course>> courses_;  ///< by curve, made when first needed

@@ -53,7 +53,8 @@ class Router {
     for (std::size_t c = 0; c < curves_.size(); ++c) followed.push_back(is_eligible(static_cast<Index>(c)));
     corners_.emplace(graph_, features, followed);
     search_.emplace(graph_, features, *corners_,
-                    options.on_sheets ? std::optional(std::span<const std::uint8_t>(along_curves_)) : std::nullopt);
+                    options.on_sheets ? std::optional(std::span<const std::uint8_t>(along_curves_)) : std::nullopt,
+                    options.cancelled);
     base_ = {corners_->taken(), std::vector<std::uint8_t>(graph_.edges().size(), 0)};
   }
   Router(const Router&) = delete;

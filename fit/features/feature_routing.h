@@ -7,6 +7,7 @@
 #include "subvol/mesh/volume_mesh.h"
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -39,6 +40,8 @@ struct RoutingOptions {
   std::vector<std::uint8_t> along_sheet_curves;
   /// One entry per vertex: the length of its edges beside that of others, > 0, where a mesh is refined. Empty: all 1.
   std::vector<double> sizes;
+  /// Asked before each search; if it returns true, no more paths are found. Empty: never.
+  std::function<bool()> cancelled;
 };
 
 struct FeatureRouting {

@@ -11,8 +11,9 @@ namespace subvol::internal {
 
 namespace {
 
+/// In units of h^3, an edge on its curve costs about 0.02, and one that is h off costs 1. The first price of another
+/// path makes no detour; that of the last round, 44, makes every detour within reach. Not tuned.
 constexpr int kMostRounds = 20;
-/// A sharp bend of a path costs about 1; an edge on its curve about 0.02. All in units of h^3.
 constexpr double kFirstPrice = 0.02, kGrowth = 1.5, kPriceOfHistory = 0.1;
 
 /// Number of paths at each vertex or edge, and the number of rounds that ended with several there.

@@ -190,6 +190,17 @@ TEST_CASE("where a vertex has fewer edges than its corner, a curve joins its nei
   CHECK(apart.unfollowed[0].curve == routing.joined[0]);
 }
 
+TEST_CASE("routing that is cancelled finds no more paths") {
+  const SignedFeatures features = features_of(cube_surface(2, false));
+  RoutingOptions options;
+  int asked = 0;
+  options.cancelled = [&] { return ++asked > 20; };
+  const FeatureRouting routing = route_features(centred_lattice(4), features, options);
+  CHECK(routing.paths.size() < 12);
+  CHECK(routing.paths.size() + routing.unfollowed.size() == 12);
+  CHECK(asked < 500);
+}
+
 TEST_CASE("routing is the same for any number of threads") {
   const int threads = omp_get_max_threads();
   omp_set_num_threads(1);
