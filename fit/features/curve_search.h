@@ -43,6 +43,7 @@ class CurveSearch {
 
   /// Looks for a path of a curve that touches nothing occupied but its corners.
   std::optional<Found> find(Index c, const Occupied& occupied);
+
   /// Looks for paths of an open curve between two vertices that may stray from it by up to `most`, in units of h.
   class Straying {
    public:
