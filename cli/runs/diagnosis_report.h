@@ -49,7 +49,7 @@ Json diagnosis_json(const SurfaceDiagnosis& diagnosis);
 /// Text for people: a line for each finding, the places of those that prevent filling, and a verdict.
 std::string to_text(const SurfaceDiagnosis& diagnosis);
 
-/// What a fit without a template does to a surface that cannot be filled as it is.
+/// Tells what a fit without a template does to a surface that cannot be filled as it is.
 struct FillingForecast {
   SurfaceRepair repair;
   std::string refusal;  ///< why the fit refuses the surface; empty: it does not

@@ -90,7 +90,7 @@ CurveSearch::Course CurveSearch::straight_course(Index c) const {
   return course;
 }
 
-/// For curves whose ends are so close that the cheapest path is a short cut.
+/// Serves curves that come so close to themselves that the cheapest path passes through a vertex twice.
 CurveSearch::Course CurveSearch::course_by_middle(Index c) const {
   Course course = straight_course(c);
   const ArcLength arc(curves_[c].points);

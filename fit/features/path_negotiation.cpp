@@ -96,6 +96,7 @@ class Negotiation {
     return any;
   }
 
+  /// Keeps the paths that share nothing with more important ones if they are longer than those of the rounds before.
   void keep_if_longest(std::span<const Index> curves) {
     std::vector<std::uint8_t> vertices(vertices_.size()), edges(edges_.size());
     std::vector<std::vector<Index>> kept(paths_.size());

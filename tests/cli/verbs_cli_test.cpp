@@ -531,8 +531,8 @@ TEST_CASE("check of a surface tells whether it can be filled", "[cli][slow]") {
   CHECK(open.status == 1);
   CHECK(nlohmann::json::parse(open.out)["findings"]["open_rim"]["count"] == 1);
   CHECK(place.run("check open.off --target target.off").status == 2);
-  // What a fit would do about it: a cover of this tetrahedron would be larger than half of the rest; that of a box is
-  // smaller.
+  // The check also says what a fit would do: it refuses the tetrahedron, whose cover would be larger than half of the
+  // rest, and covers the box.
   CHECK(nlohmann::json::parse(open.out)["filling"]["refused"].is_string());
   CHECK_THAT(place.run("check open.off").out, Catch::Contains("a fit refuses it:   1 hole"));
   place.file("box.off",
