@@ -37,6 +37,7 @@ void add_errors(py::module_& module) {
                            {errors.any, PyExc_ValueError});
   errors.io = new_error(module, "IoError", "The system refused: a file that cannot be written, a full disk.",
                         {errors.any, PyExc_OSError});
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): pybind11 calls it with a value
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

@@ -44,7 +44,7 @@ class Optimization {
   }
 
   std::shared_ptr<Optimized> run() {
-    const auto result = std::make_shared<Optimized>();
+    auto result = std::make_shared<Optimized>();
     const QualityReport before = work_.run("quality", [&] { return measure_quality(*mesh_); });
     json_["input"] = {{"mesh", cli::describe("", *mesh_)}, {"quality", cli::quality_json(before)}};
     if (target_) json_["input"]["target"] = cli::describe("", *target_);

@@ -39,7 +39,7 @@ class Growing {
   }
 
   std::shared_ptr<Shelled> run() {
-    const auto result = std::make_shared<Shelled>();
+    auto result = std::make_shared<Shelled>();
     options_.progress = work_.progress();
     options_.cancelled = work_.cancelled();
     preparation_.cancelled = work_.cancelled();
