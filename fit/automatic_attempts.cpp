@@ -36,12 +36,16 @@ std::vector<AutomaticAttempt> attempts_of(const AutomaticFitOptions& options, bo
     if (options.cells) counts = {*options.cells};
     for (const std::size_t cells : counts)
       attempts.push_back({Kind::smooth, cells_before(cells, options.levels), options.levels});
-  } else if (options.cells) {
-    if (*options.cells >= kChildren * kLeastTemplateCells)
-      attempts.push_back({Kind::smooth, *options.cells / kChildren, 1});
-    attempts.push_back({Kind::smooth, *options.cells, 0});
   } else {
-    for (const std::size_t cells : kAutomaticCells) attempts.push_back({Kind::smooth, cells / kChildren, 1});
+    std::vector<std::size_t> counts(kAutomaticCells.begin(), kAutomaticCells.end());
+    if (options.cells) counts = {*options.cells};
+    for (const std::size_t cells : counts)
+      if (cells >= kChildren * kLeastTemplateCells)
+        attempts.push_back({.kind = Kind::smooth,
+                            .template_cells = cells / kChildren,
+                            .levels = 1,
+                            .precedes_unrefined = cells == counts.back()});
+    attempts.push_back({Kind::smooth, counts.back(), 0});
   }
   return attempts;
 }

@@ -19,7 +19,8 @@ struct AutomaticAttempt {
   Kind kind;
   std::size_t template_cells;
   int levels;
-  bool is_last_count = true;  ///< no attempt with more cells follows
+  bool is_last_count = true;        ///< no attempt with more cells follows
+  bool precedes_unrefined = false;  ///< an attempt follows whose template has as many cells as this result
 };
 
 /// Returns the number of cells that a template of so many becomes if it is subdivided so many times.

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <utility>
 
 namespace subvol::internal {
@@ -176,13 +177,17 @@ std::vector<Index> AutomaticDriver::hopeless_cells() const {
 /// if the fit must end.
 bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
   constexpr int kMostRounds = 12, kSteps = 6;
+  constexpr int kFruitless = 4;  // rounds without fewer hopeless cells; up to three were followed by success
   constexpr double kFirst = 10, kLess = 0.1;  // weight of the surface, and what is left of it in the next round
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
   double surface = kFirst;
-  for (int round = 0; round < kMostRounds; ++round, surface *= kLess) {
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  for (int round = 0, fruitless = 0; round < kMostRounds; ++round, surface *= kLess) {
     const std::vector<Index> cells = hopeless_cells();
     if (runner_.is_to_end()) return false;
-    if (cells.empty()) break;
+    fruitless = cells.size() < fewest ? 0 : fruitless + 1;
+    fewest = std::min(fewest, cells.size());
+    if (cells.empty() || fruitless == kFruitless) break;
     if (!relaxed_at_) relaxed_at_ = target_.normalisation.from_unit({mesh_.positions[mesh_.cell(cells[0])[0]]})[0];
     const int rings = 1 + round / 2;
     const std::vector<Vec3> before = unknowns();

@@ -256,6 +256,7 @@ std::optional<FeatureMiss> AutomaticFit::feature_miss(const TriangleMesh& surfac
   std::optional<FeatureMiss> miss = largest_feature_miss(features_, ClosestPoint(surface));
   if (!miss) return miss;
   miss->place = target_.normalisation.from_unit({miss->place})[0];
+  miss->size_percent = 100 * miss->size;
   miss->distance *= target_.normalisation.diagonal;
   miss->size *= target_.normalisation.diagonal;
   return miss;
@@ -318,8 +319,7 @@ bool AutomaticFit::run_smooth(const AutomaticAttempt& attempt) {
   cage_.reset();
   std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
   if (!made) return !no_template_.empty();
-  const bool another_follows = options_.cells && attempt.levels > 0 && !options_.makes_cage;
-  if (another_follows && made->num_cells() > attempt.template_cells) return true;
+  if (attempt.precedes_unrefined && made->num_cells() > attempt.template_cells) return true;
   // Only a fine grid may have the topology; its cells need not be cut.
   const bool is_fine = !options_.makes_cage && made->num_cells() > cells_after(attempt.template_cells, attempt.levels);
   mesh_ = std::move(*made);
@@ -518,7 +518,7 @@ void AutomaticFit::conclude() {
                   miss.size, miss.distance, 100 * miss.share, miss.place.x(), miss.place.y(), miss.place.z()));
   }
   warn_of_missed_edges(result_.missed_edges, chosen.curves, "sharp edges", report);
-  mark_if_far_off(result_, options_, target_.normalisation.diagonal, "sharp edges");
+  mark_if_far_off(result_, options_, "sharp edges");
 }
 
 AutomaticFitResult AutomaticFit::run() {

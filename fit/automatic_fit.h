@@ -118,8 +118,8 @@ struct AutomaticFitResult {
 ///
 /// Without sharp edges: a pillowed template of about an eighth of the cells (`auto_templates`) is fitted by
 /// `QualityStages`, refined once (`smooth_refinement`) and fitted again. If the result is too far from the target, too
-/// poor or meets itself, a larger template is tried if the number of cells is free; otherwise one with as many cells as
-/// allowed, which is not refined.
+/// poor or meets itself, larger templates are tried if the number of cells is free, and then one with as many cells as
+/// allowed, or as are tried last, which is not refined.
 ///
 /// With sharp edges: a grid, through the target's planes where it has any, is fitted smoothly, only to find out what
 /// lies where. The edges are routed on it, and patches between them are padded (`edge_layout`). That mesh is fitted
@@ -138,8 +138,8 @@ struct AutomaticFitResult {
 ///   merit = max(0, max distance / tolerance - 1) + max(0, mean distance / tolerance - 1)
 ///         + min(3, max(0, largest miss of a feature / 0.1 of its size - 1)) if the target has sharp edges
 ///         + 5 (1 - least share of the quality that a cell reaches) + 5 max(0, 1 - least scaled Jacobian / 0.3)
-///         + 3 (1 - share of the edges within 0.1 %) + 0.6 if edges longer than 10 % are not followed, but for acute
-///         ones
+///         + 3 (1 - share of the edges within 0.1 %)
+///         + 0.6 if edges longer than 10 % are not followed, but for acute ones, or if a feature is lost
 ///         + 10 unless the boundary is found not to meet itself + 10 if cells are uncertified
 ///
 /// The 0.3 is the quality aimed at if that is lower. Features whose radius is below the mean tolerance do not count.

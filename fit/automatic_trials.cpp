@@ -17,8 +17,14 @@ constexpr double kQualityWeight = 5;  // of the share of the quality in the meri
 /// Cost of a boundary that meets itself, and of cells that are not certified: so much that a valid trial wins, however
 /// many edges an invalid one follows.
 constexpr double kNotValid = 10;
-/// Cost of long edges that are not followed: such a trial is never good, and is worth a refinement.
-constexpr double kLongEdgeLost = 0.6;
+/// Cost of long edges that are not followed, and of a feature that is lost: such a trial is far off, so that it is
+/// never good and is worth a refinement.
+constexpr double kFarOff = 0.6;
+/// Returns true if a feature that is no noise is missed by more than its radius.
+bool loses_feature(const AutomaticFitTrial& trial) {
+  const std::optional<FeatureMiss>& miss = trial.feature_miss;
+  return miss && miss->share > 1 && miss->size_percent > kLostFeaturePercent;
+}
 
 }  // namespace
 
@@ -50,7 +56,7 @@ double merit_of(const AutomaticFitTrial& trial, const AutomaticFitOptions& optio
          std::min(kMostMiss, excess(trial.volume_percent, kAutomaticVolumePercent)) +
          kQualityWeight * (1 - trial.least_share) +
          kQualityWeight * std::max(0.0, 1 - std::max(0.0, trial.least_scaled_jacobian) / least_acceptable) +
-         kEdgeWeight * (1 - trial.within_share) + (trial.long_edges_lost > 0 ? kLongEdgeLost : 0) +
+         kEdgeWeight * (1 - trial.within_share) + (trial.long_edges_lost > 0 || loses_feature(trial) ? kFarOff : 0) +
          (trial.self_intersections == std::size_t{0} ? 0 : kNotValid) + (trial.uncertified > 0 ? kNotValid : 0);
 }
 
@@ -132,8 +138,7 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
                 longest.place.z(), to_string(longest.reason).c_str()));
 }
 
-void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& options, double diagonal,
-                     const char* name) {
+void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& options, const char* name) {
   const AutomaticFitTrial& chosen = result.trials[result.chosen];
   std::vector<std::string> reasons;
   const double most = kFarOffFactor * options.max_tolerance_percent;
@@ -143,9 +148,9 @@ void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& opti
   if (num_long > 0)
     reasons.push_back(formatted("%s longer than %.3g %% of the diagonal that are not followed: %td", name,
                                 kLongEdgePercent, num_long));
-  if (const auto& miss = chosen.feature_miss;
-      miss && miss->share > 1 && 100 * miss->size > kLostFeaturePercent * diagonal)
-    reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", miss->size, miss->distance));
+  if (loses_feature(chosen))
+    reasons.push_back(formatted("a feature of radius %.4g is missed by %.4g", chosen.feature_miss->size,
+                                chosen.feature_miss->distance));
   const double most_volume = kFarOffVolumeFactor * kAutomaticVolumePercent;
   if (chosen.volume_percent > most_volume)
     reasons.push_back(formatted("the volume of a region differs by more than %.3g %%", most_volume));

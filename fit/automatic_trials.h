@@ -70,7 +70,7 @@ void warn_of_missed_edges(std::span<const MissedEdge> missed, std::size_t num_cu
 
 /// Completes the report of a finished fit, whose explanation says what was reached: `tolerance_missed` if that is far
 /// off (`kFarOffFactor` and the constants below it).
-/// name  what the curves are called.  diagonal  the target's.
-void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& options, double diagonal, const char* name);
+/// name  what the curves are called.
+void mark_if_far_off(AutomaticFitResult& result, const AutomaticFitOptions& options, const char* name);
 
 }  // namespace subvol::internal

@@ -297,7 +297,7 @@ void RegionFit::conclude() {
                                         "target; more --cells may mend that",
                                         template_.wrong_sheets));
   warn_of_missed_edges(result_.missed_edges, chosen.curves, "curves", report);
-  mark_if_far_off(result_, options_, target_.normalisation.diagonal, "curves");
+  mark_if_far_off(result_, options_, "curves");
 }
 
 AutomaticFitResult RegionFit::run() {

@@ -26,8 +26,11 @@ bool bounds_solid(const TriangleMesh& surface) {
 }
 
 bool has_sheets(const SurfaceDiagnosis& diagnosis) {
+  constexpr std::size_t kChaos = 10;  // crossings for each edge of a sheet
   const SurfaceFinding* edges = diagnosis.find(SurfaceFault::interface);
   if (!edges) return false;
+  const SurfaceFinding* crossings = diagnosis.find(SurfaceFault::crossing);
+  if (crossings && crossings->count > kChaos * edges->count) return false;
   double length = 0;
   for (const SurfacePlace& place : edges->places)
     if (place.to) length += (*place.to - place.at).norm();
@@ -41,13 +44,20 @@ std::string cause(const SurfaceDiagnosis& diagnosis) {
   return "";
 }
 
-/// Returns how far a wrap is from the surface that was given, in words.
-std::string how_far(const TriangleMesh& wrap, const TriangleMesh& given, double diagonal) {
+/// Mean distance from a wrap to the surface above which it is of something else, in percent of the diagonal: half a
+/// voxel. Wraps of solids with faults have at most a tenth of it.
+constexpr double kMostWrapPercent = 0.25;
+
+/// Returns how far a wrap is from the surface that was given, in words. InputError: it is of something else.
+std::string how_far(const TriangleMesh& wrap, const TriangleMesh& given, double diagonal, const std::string& why) {
   const SurfaceDistance distance = surface_distance(wrap, given);
   const SurfaceDistance::Extreme& farthest = distance.max_a_to_b;
-  return formatted("the wrap is %.3g %% off the surface on average, and at most %.3g %%, at (%.6g, %.6g, %.6g)",
-                   100 * distance.mean_a_to_b / diagonal, 100 * farthest.distance / diagonal, farthest.from.x(),
-                   farthest.from.y(), farthest.from.z());
+  const double mean = 100 * distance.mean_a_to_b / diagonal;
+  if (mean > kMostWrapPercent)
+    throw InputError(
+        formatted("target: %sit bounds no solid: even a wrap of it is %.3g %% off on average", why.c_str(), mean));
+  return formatted("the wrap is %.3g %% off the surface on average, and at most %.3g %%, at (%.6g, %.6g, %.6g)", mean,
+                   100 * farthest.distance / diagonal, farthest.from.x(), farthest.from.y(), farthest.from.z());
 }
 
 }  // namespace
@@ -72,10 +82,11 @@ std::optional<SurfaceRepair> wrapped_to_fill(const TriangleMesh& given, const Su
   }
   if (repair.surface.triangles.empty() || surface_parts(repair.surface).num_parts() > diagnosis.parts.size())
     return std::nullopt;
+  const std::string why = cause(diagnosis);
   repair.done.push_back(
-      "target: " + cause(diagnosis) +
+      "target: " + why +
       formatted("it bounds no solid, and is wrapped with voxels of %g %% of its diagonal; ", options.voxel_percent) +
-      how_far(repair.surface, given, diagnosis.diagonal));
+      how_far(repair.surface, given, diagnosis.diagonal, why));
   repair.is_fillable = true;
   return repair;
 }

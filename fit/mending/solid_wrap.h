@@ -12,7 +12,8 @@ namespace subvol::internal {
 
 /// Returns true if no template can be made for a surface that could not be repaired: it bounds no solid, or its parts
 /// cross and would count as several solids. False if sheets are meant to divide its inside, which would vanish in a
-/// wrap: they meet along edges that are longer, together, than the rim of a pinhole; shorter ones are accidents.
+/// wrap: they meet along edges that are longer, together, than the rim of a pinhole; shorter ones are accidents, and so
+/// are those of a surface that crosses itself ten times as often.
 ///
 /// repaired   the surface as far as it could be repaired; null if that ended with an error.
 /// diagnosis  of the given surface.
@@ -24,6 +25,7 @@ bool needs_wrap(const TriangleMesh* repaired, const SurfaceDiagnosis& diagnosis)
 /// The sentence in `done` tells how far the wrap is from the surface: covers of holes count, parts that the wrap hides
 /// inside do not.
 /// returns  nothing if the wrap is empty, or in more pieces than the surface has parts; it does not follow it then.
+/// InputError: the wrap is more than half a voxel off the surface on average, which is that of no solid.
 std::optional<SurfaceRepair> wrapped_to_fill(const TriangleMesh& given, const SurfaceDiagnosis& diagnosis,
                                              const std::function<bool()>& cancelled);
 

@@ -7,6 +7,7 @@
 #include "subvol/fit/mending/fins.h"
 #include "subvol/fit/mending/mend_surface.h"
 #include "subvol/fit/mending/part_union.h"
+#include "subvol/fit/mending/second_sides.h"
 #include "subvol/fit/mending/solid_wrap.h"
 #include "subvol/fit/target/carried_groups.h"
 #include "subvol/surface/boundary.h"
@@ -218,6 +219,14 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
 }  // namespace
 
 SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
+  if (rule != RegionRule::keep)
+    if (const std::optional<OneSidedSurface> one = without_second_sides(given)) {
+      SurfaceRepair repair = repair_surface(one->surface, cancelled, rule);
+      repair.done.insert(
+          repair.done.begin(),
+          formatted("target: %zu triangles are there with both orientations; one of each is left", one->dropped));
+      return repair;
+    }
   const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
   if (diagnosis.is_cancelled) return {.surface = given};
   RepairAttempt attempt = attempt_repair(given, diagnosis, cancelled, rule);

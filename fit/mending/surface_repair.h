@@ -26,6 +26,8 @@ struct SurfaceRepair {
 /// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting,
 /// removes small faults and fins, covers holes, and wraps what bounds no solid all the same.
 ///
+/// Of a two-sided surface one side is left (`without_second_sides`), unless RegionRule::keep is given.
+///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that
 /// points inward beside others that do not. A solid part in a void stays a part of its own.
@@ -47,8 +49,8 @@ struct SurfaceRepair {
 /// cancelled  asked now and then, from the calling thread; if it returns true, the surface is returned as it was given.
 /// InputError: as `diagnose`; sheets that divide the inside into several regions, if something crosses or an edge has
 /// only one triangle; parts that cross and can be neither united nor wrapped, with the place; a sheet with a rim, whose
-/// cover would have more than half of its area. Cost: that of `diagnose`, again after each step that changes something,
-/// and that of `wrap_surface` as a last resort.
+/// cover would have more than half of its area; a surface that even a wrap does not follow. Cost: that of `diagnose`,
+/// again after each step that changes something, and that of `wrap_surface` as a last resort.
 SurfaceRepair repair_surface(const TriangleMesh& surface, const std::function<bool()>& cancelled = {},
                              RegionRule rule = RegionRule::automatic);
 

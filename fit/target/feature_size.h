@@ -40,7 +40,8 @@ FeatureSizes feature_sizes(const TargetSurface& surface, const ClosestPoint& tre
 struct FeatureMiss {
   double share = 0;  ///< distance / size
   double distance = 0, size = 0;
-  Vec3 place{0, 0, 0};  ///< a point of the feature
+  Vec3 place{0, 0, 0};      ///< a point of the feature
+  double size_percent = 0;  ///< of the target's diagonal; `largest_feature_miss` leaves it to its caller
 };
 
 /// Returns the largest distance from the points of features to a fitted surface, as a share of their sizes; nothing if

@@ -8,6 +8,8 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <initializer_list>
 #include <limits>
 
 namespace subvol::internal {
@@ -16,10 +18,47 @@ namespace {
 
 constexpr std::size_t kEndSize = 22, kDirectoryEntrySize = 46, kHeaderSize = 30;
 constexpr std::size_t kStored = 0, kDeflated = 8;
+constexpr std::size_t kLongEndSize = 56, kLocatorSize = 20;  // of ZIP64
 constexpr std::string_view kEndMark("PK\5\6"), kDirectoryMark("PK\1\2"), kHeaderMark("PK\3\4");
+constexpr std::string_view kLongEndMark("PK\6\6"), kLocatorMark("PK\6\7");
+constexpr std::size_t kLongValues = 1;                                      // number of the extra field of ZIP64
+constexpr std::size_t kIsLong = std::numeric_limits<std::uint32_t>::max();  // the value stands in that field
 
+/// size  2, 4 or 8 bytes
 std::size_t number_at(std::string_view bytes, std::size_t at, std::size_t size) {
+  if (size == 8) return number_at(bytes, at, 4) | number_at(bytes, at + 4, 4) << 32;
   return static_cast<std::size_t>(decode(bytes.data() + at, size == 2 ? kUInt16 : kUInt32, std::endian::little));
+}
+
+/// Replaces those values of an entry that have no room in 32 bits by the ones in its extra fields, where they stand in
+/// the same order. Returns false if one of them is missing.
+bool read_long_values(std::string_view extra, std::initializer_list<std::size_t*> values) {
+  constexpr std::size_t kFieldSize = 4, kValueSize = 8;  // of a field's number and length; of a value
+  std::string_view field;
+  for (std::size_t at = 0; at + kFieldSize <= extra.size(); at += kFieldSize + number_at(extra, at + 2, 2))
+    if (number_at(extra, at, 2) == kLongValues) field = extra.substr(at + kFieldSize, number_at(extra, at + 2, 2));
+  for (std::size_t* value : values) {
+    if (*value != kIsLong) continue;
+    if (field.size() < kValueSize) return false;
+    *value = number_at(field, 0, kValueSize);
+    field.remove_prefix(kValueSize);
+  }
+  return true;
+}
+
+/// Where the directory of an archive begins, and its number of entries.
+struct Directory {
+  std::size_t begin, count;
+};
+
+/// end  where the end record stands. In ZIP64 a longer one stands before it.
+Directory directory_of(std::string_view bytes, std::size_t end) {
+  if (end >= kLocatorSize && bytes.substr(end - kLocatorSize, kLocatorMark.size()) == kLocatorMark) {
+    const std::size_t record = number_at(bytes, end - kLocatorSize + 8, 8);
+    if (record < end && end - record >= kLongEndSize && bytes.substr(record, kLongEndMark.size()) == kLongEndMark)
+      return {number_at(bytes, record + 48, 8), number_at(bytes, record + 32, 8)};
+  }
+  return {number_at(bytes, end + 16, 4), number_at(bytes, end + 10, 2)};
 }
 
 void append(std::string& bytes, std::size_t value, std::size_t size) {
@@ -43,9 +82,9 @@ ZipArchive::ZipArchive(std::string name, std::string_view bytes) : name_(std::mo
   const auto fail = [&](const char* what) { throw InputError(name_ + ": " + what); };
   const std::size_t end = bytes.rfind(kEndMark);  // a comment of up to 64 kB follows the end
   if (end == std::string_view::npos || bytes.size() - end < kEndSize) fail("no ZIP archive: its end is missing");
-  const std::size_t count = number_at(bytes, end + 10, 2);
-  std::size_t at = number_at(bytes, end + 16, 4);
-  for (std::size_t i = 0; i < count; ++i) {
+  const Directory directory = directory_of(bytes, end);
+  std::size_t at = directory.begin;
+  for (std::size_t i = 0; i < directory.count; ++i) {
     if (at > end || end - at < kDirectoryEntrySize || bytes.substr(at, 4) != kDirectoryMark)
       fail("the directory of the ZIP archive is damaged");
     const std::size_t name_size = number_at(bytes, at + 28, 2), extra = number_at(bytes, at + 30, 2),
@@ -53,9 +92,12 @@ ZipArchive::ZipArchive(std::string name, std::string_view bytes) : name_(std::mo
     const std::size_t size = kDirectoryEntrySize + name_size + extra + comment;
     if (size > end - at) fail("the directory of the ZIP archive is damaged");
     if (number_at(bytes, at + 8, 2) & 1) fail("the ZIP archive is encrypted");
-    entries_[std::string(bytes.substr(at + kDirectoryEntrySize, name_size))] = {
-        number_at(bytes, at + 10, 2), number_at(bytes, at + 16, 4), number_at(bytes, at + 20, 4),
-        number_at(bytes, at + 24, 4), number_at(bytes, at + 42, 4)};
+    Entry entry{number_at(bytes, at + 10, 2), number_at(bytes, at + 16, 4), number_at(bytes, at + 20, 4),
+                number_at(bytes, at + 24, 4), number_at(bytes, at + 42, 4)};
+    if (!read_long_values(bytes.substr(at + kDirectoryEntrySize + name_size, extra),
+                          {&entry.size, &entry.packed_size, &entry.header}))
+      fail("the directory of the ZIP archive is damaged");
+    entries_[std::string(bytes.substr(at + kDirectoryEntrySize, name_size))] = entry;
     at += size;
   }
 }
@@ -68,14 +110,15 @@ std::string ZipArchive::read(const std::string& path) const {
   if (entry.header > bytes_.size() || bytes_.size() - entry.header < kHeaderSize ||
       bytes_.substr(entry.header, 4) != kHeaderMark)
     fail("its header is damaged");
-  const std::size_t begin = entry.header + kHeaderSize + number_at(bytes_, entry.header + 26, 2) +
-                            number_at(bytes_, entry.header + 28, 2);
+  const std::size_t begin =
+      entry.header + kHeaderSize + number_at(bytes_, entry.header + 26, 2) + number_at(bytes_, entry.header + 28, 2);
   if (begin > bytes_.size() || entry.packed_size > bytes_.size() - begin) fail("is cut short");
   const std::string_view packed = bytes_.substr(begin, entry.packed_size);
   constexpr std::size_t kMostRatio = 1032;  // of zlib
   if (entry.method != kStored && entry.method != kDeflated) fail("is packed in an unknown way");
   if (entry.size > (entry.method == kStored ? packed.size() : packed.size() * kMostRatio))
     fail("claims to be larger than its packed bytes can be");
+  if (std::max(entry.size, entry.packed_size) > std::numeric_limits<uInt>::max()) fail("is larger than 4 GB");
   std::string content;
   if (entry.method == kStored) {
     content = std::string(packed.substr(0, entry.size));

@@ -8,10 +8,11 @@
 
 namespace subvol::internal {
 
-/// The files of a ZIP archive in memory, which must outlive it: stored or deflated, not encrypted, below 4 GB.
+/// The files of a ZIP archive in memory, which must outlive it: stored or deflated, not encrypted. ZIP64, which
+/// programs also write for small files, is read.
 class ZipArchive {
  public:
-  /// name: the archive's, for messages. InputError: no archive, or one that is damaged or of ZIP64.
+  /// name: the archive's, for messages. InputError: no archive, or one that is damaged or encrypted.
   ZipArchive(std::string name, std::string_view bytes);
 
   bool has(const std::string& path) const { return entries_.contains(path); }

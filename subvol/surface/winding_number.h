@@ -3,6 +3,7 @@
 
 #include "subvol/surface/triangle_mesh.h"
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -14,8 +15,8 @@ namespace subvol::internal {
 ///
 /// w is 1 inside a closed surface whose normals point outward, 0 outside it, and in between if there are holes; soups
 /// and overlaps are welcome. Solid angles follow Van Oosterom and Strackee (1983); far triangles are summed in groups
-/// by their area vectors and first moments, as in Barill, Dickson, Schmidt, Levin and Jacobson, "Fast winding numbers"
-/// (2018).
+/// by their area vectors and their first and second moments, as in Barill, Dickson, Schmidt, Levin and Jacobson, "Fast
+/// winding numbers" (2018).
 class WindingNumber {
  public:
   /// InputError: no triangles, a vertex number out of range, a position that is not finite.
@@ -29,11 +30,20 @@ class WindingNumber {
   std::vector<double> at(std::span<const Vec3> points) const;
 
  private:
+  /// What the integral of (x - c)(x - c)^T over the triangles, times their normals, adds to the winding number.
+  struct SecondMoments {
+    Vec3 linear = Vec3::Zero();
+    std::array<double, 10> cubic{};  ///< coefficients of xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz
+
+    void add(const Vec3& offset, const Vec3& area_vector);
+    double at(const Vec3& r) const;
+  };
   struct Node {
     Vec3 centre;           ///< center of area
     double radius = 0;     ///< radius of the ball around the center that contains the triangles
     Vec3 area_vector;      ///< sum over the triangles
     Mat3 moment;           ///< sum of (centroid - center) area_vector^T
+    SecondMoments second;
     Index begin = 0, end = 0;      ///< range of the triangles
     Index left = kNoIndex, right = kNoIndex;
   };

@@ -4,9 +4,11 @@
 #include "subvol/templates/voxel_steps.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <queue>
+#include <span>
 #include <vector>
 
 namespace subvol::internal {
@@ -16,12 +18,14 @@ namespace {
 constexpr int kLongLoop = 40;  // cells; longer loops count as this long
 
 /// Computes the length, in cells, of the shortest path between two groups of a cell's face neighbors. The path runs
-/// through cells with filled(c) == side and not through the cell itself. Returns 0 if there is none.
+/// through cells with filled(c) == side and not through the cell itself. Returns 0 if there is none, and kLongLoop if
+/// it is longer than that and is known to exist.
 class LoopLengths {
  public:
   explicit LoopLengths(std::size_t num_cells) : stamp_(num_cells, 0) {}
 
-  int length(const VoxelSolid& solid, Index cell, bool side, const std::array<std::uint32_t, 2>& groups) {
+  int length(const VoxelSolid& solid, Index cell, bool side, const std::array<std::uint32_t, 2>& groups,
+             bool is_known_to_exist) {
     stamps_ += 2;  // stamps_ - 1: an end, stamps_: reached
     queue_.clear();
     stamp_[cell] = stamps_;
@@ -35,7 +39,8 @@ class LoopLengths {
       queue_.push_back(c);
     });
     int steps = 1;
-    for (std::size_t q = 0, end = queue_.size(); q < queue_.size(); ++steps, end = queue_.size())
+    for (std::size_t q = 0, end = queue_.size(); q < queue_.size(); ++steps, end = queue_.size()) {
+      if (is_known_to_exist && steps >= kLongLoop) return kLongLoop;
       for (; q < end; ++q) {
         if (!solid.may_flip(queue_[q])) continue;  // the outer layer has no neighbors beyond; paths around it are long
         for (Index offset : solid.face_offsets()) {
@@ -46,6 +51,7 @@ class LoopLengths {
           queue_.push_back(c);
         }
       }
+    }
     return 0;
   }
 
@@ -66,7 +72,7 @@ struct HandleFlip {
 /// True if flipping a cell changes the number of handles in the wanted direction; then sets the fields of `flip` except
 /// `gain`.
 bool handle_flip(const VoxelSolid& solid, Index cell, bool add_handle, HandleFlip& flip) {
-  if (!solid.may_flip(cell) || !solid.good_after_flip(cell)) return false;
+  if (!solid.may_flip(cell) || !solid.is_at_boundary(cell) || !solid.good_after_flip(cell)) return false;
   const VoxelSolid::Contact k = solid.contact(cell);
   const bool two_discs = k.components == 2 && k.euler_number == 2;
   const bool annulus = k.components == 1 && k.euler_number == 0;
@@ -101,7 +107,10 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
   double best_score = 0;
   for (const HandleFlip& flip : flips) {
     if (goal.is_stopped()) return std::nullopt;
-    const int length = loops.length(solid, flip.cell, flip.through_filled, flip.ends);
+    // A cell that closes or opens a loop of one connected side touches that side at both ends. A loop that shall vanish
+    // may be none: the cell may join two sides.
+    const bool is_one = flip.through_filled ? goal.topology.components == 1 : goal.topology.cavities == 0;
+    const int length = loops.length(solid, flip.cell, flip.through_filled, flip.ends, add_handle && is_one);
     if (length == 0) continue;  // the flip would join or split components, or open or close a cavity
     const double measure = std::min(length, kLongLoop);
     const double score = (flip.gain + tolerance) * (add_handle ? measure : 1 / measure);
@@ -110,9 +119,9 @@ std::optional<Index> best_handle_flip(const VoxelSolid& solid, const VoxelGoal& 
   return best;
 }
 
-}  // namespace
-
-void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
+/// Flips cells that are not as wanted, in order of decreasing gain, as long as the topology does not change. Looks at
+/// some cells first, and then at those around what it flips.
+void evolve_from(VoxelSolid& solid, const VoxelGoal& goal, std::span<const Index> first) {
   using Entry = std::pair<double, Index>;
   const auto less = [](const Entry& a, const Entry& b) {
     return a.first != b.first ? a.first < b.first : a.second > b.second;
@@ -124,7 +133,7 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
     waiting[c] = 1;
     queue.push({goal.gain(solid, c), c});
   };
-  for (std::size_t c = 0; c < solid.num_cells() && !goal.is_stopped_at(c); ++c) offer(static_cast<Index>(c));
+  for (std::size_t i = 0; i < first.size() && !goal.is_stopped_at(i); ++i) offer(first[i]);
   // A cell is flipped at most once: afterwards it is as wanted.
   while (!queue.empty() && !goal.is_stopped()) {
     const Index c = queue.top().second;
@@ -134,6 +143,16 @@ void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
     solid.flip(c);
     for (Index offset : solid.all_offsets()) offer(c + offset);
   }
+}
+
+}  // namespace
+
+void evolve(VoxelSolid& solid, const VoxelGoal& goal) {
+  std::vector<Index> unwanted;
+  for (std::size_t c = 0; c < solid.num_cells() && !goal.is_stopped_at(c); ++c)
+    if (solid.filled(static_cast<Index>(c)) != goal.wants(static_cast<Index>(c)))
+      unwanted.push_back(static_cast<Index>(c));
+  evolve_from(solid, goal, unwanted);
 }
 
 bool make_points_good(VoxelSolid& solid, const VoxelGoal& goal) {
@@ -200,13 +219,19 @@ bool match_handles(VoxelSolid& solid, const VoxelGoal& goal) {
   if (missing == 0) return true;
   if (std::abs(missing) > kMostFlips) return false;
   LoopLengths loops(solid.num_cells());
+  std::array<Index, 26> around{};
   for (int i = 0; i < std::abs(missing); ++i) {
     std::optional<Index> cell;
     for (double tolerance : {0.25, 1.0})  // first slightly against the shape, then if necessary right through it
       if (!cell) cell = best_handle_flip(solid, goal, missing > 0, tolerance, loops);
     if (!cell) return false;
     solid.flip(*cell);
-    evolve(solid, goal);
+    if (i == 0) {
+      evolve(solid, goal);
+    } else {  // what may be flipped since the last evolution is near the cell
+      for (std::size_t n = 0; n < around.size(); ++n) around[n] = *cell + solid.all_offsets()[n];
+      evolve_from(solid, goal, around);
+    }
     if (goal.is_stopped()) return false;
   }
   return solid.topology() == goal.topology;

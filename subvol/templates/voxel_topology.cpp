@@ -192,6 +192,12 @@ bool VoxelSolid::good_after_flip(Index cell) const {
   return true;
 }
 
+bool VoxelSolid::is_at_boundary(Index cell) const {
+  const std::uint8_t uniform = filled_[cell] ? 255 : 0;
+  return std::ranges::any_of(point_offsets_,
+                             [&](Index offset) { return masks_[first_point_[cell] + offset] != uniform; });
+}
+
 VoxelSolid::Contact VoxelSolid::contact(Index cell) const {
   std::uint32_t neighbors = 0;
   for (std::size_t n = 0; n < all_offsets_.size(); ++n)

@@ -53,6 +53,9 @@ class VoxelSolid {
   /// True if all eight points of the cell would be good after flipping it.
   bool good_after_flip(Index cell) const;
 
+  /// True if one of the 26 cells around a cell is not as it is: the others are neither simple nor part of a handle.
+  bool is_at_boundary(Index cell) const;
+
   /// The part of a cell's surface that it shares with filled neighbors: a closed set K of faces, edges and vertices.
   struct Contact {
     int components = 0, euler_number = 0;

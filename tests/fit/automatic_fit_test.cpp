@@ -2,6 +2,7 @@
 #include "subvol/fit/automatic_fit.h"
 
 #include "subvol/base/error.h"
+#include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_trials.h"
 #include "subvol/fit/mesh_check.h"
 #include "subvol/subdivision/limit_surface.h"
@@ -183,14 +184,13 @@ TEST_CASE("An automatic fit says so if it needs more cells than allowed") {
 }
 
 TEST_CASE("A result that is far off says so, and why") {
-  constexpr double kDiagonal = 200;
   const AutomaticFitOptions options;
   const auto marked = [&](const AutomaticFitTrial& trial, std::vector<MissedEdge> missed) {
     AutomaticFitResult result;
     result.trials = {trial};
     result.missed_edges = std::move(missed);
     result.report.stop_reason = StopReason::converged;
-    internal::mark_if_far_off(result, options, kDiagonal, "sharp edges");
+    internal::mark_if_far_off(result, options, "sharp edges");
     CHECK(result.report.explanation.empty() == (result.report.stop_reason == StopReason::converged));
     return result.report.explanation;
   };
@@ -198,10 +198,33 @@ TEST_CASE("A result that is far off says so, and why") {
   CHECK(marked({.max_percent = 1.01}, {}) == "; the largest distance is above 1 % of the diagonal");
   CHECK(marked({}, {{NotFollowed::no_path_nearby, {}, 10.1}}) ==
         "; sharp edges longer than 10 % of the diagonal that are not followed: 1");
-  CHECK(marked({.feature_miss = FeatureMiss{.share = 1.2, .distance = 0.6, .size = 0.5}}, {}) ==
+  CHECK(marked({.feature_miss = FeatureMiss{.share = 1.2, .distance = 0.6, .size = 0.5, .size_percent = 0.25}}, {}) ==
         "; a feature of radius 0.5 is missed by 0.6");
-  CHECK(marked({.feature_miss = FeatureMiss{.share = 2, .distance = 0.6, .size = 0.3}}, {}).empty());
+  CHECK(marked({.feature_miss = FeatureMiss{.share = 2, .distance = 0.6, .size = 0.3, .size_percent = 0.15}}, {})
+            .empty());
   CHECK_FALSE(marked({.volume_percent = 1.1}, {}).empty());
+}
+
+TEST_CASE("A trial that loses a feature is never good enough") {
+  const AutomaticFitOptions options;
+  AutomaticFitTrial trial{.mean_percent = 0.01, .max_percent = 0.4, .least_scaled_jacobian = 0.7, .least_share = 1};
+  trial.self_intersections = 0;
+  const auto is_good = [&](const FeatureMiss& miss) {
+    trial.feature_miss = miss;
+    trial.merit = internal::merit_of(trial, options);
+    return internal::is_good_enough(trial);
+  };
+  CHECK(is_good({.share = 0.9, .size_percent = 1}));
+  CHECK_FALSE(is_good({.share = 1.1, .size_percent = 1}));
+  CHECK(is_good({.share = 1.1, .size_percent = 0.1}));  // noise of a triangulation
+}
+
+TEST_CASE("Templates are tried from small ones on, and at last one that is not refined") {
+  std::vector<std::size_t> most;
+  for (const internal::AutomaticAttempt& attempt : internal::attempts_of({}, false))
+    most.push_back(internal::cells_after(attempt.template_cells, attempt.levels));
+  CHECK(most == std::vector<std::size_t>{5000, 15000, 40000, 40000});
+  CHECK(internal::attempts_of({}, false).back().levels == 0);
 }
 
 TEST_CASE("An automatic fit refuses options out of range") {

@@ -3,6 +3,7 @@
 
 #include "subvol/fit/geometry/surface_distance.h"
 #include "subvol/fit/mending/mend_surface.h"
+#include "subvol/fit/mending/second_sides.h"
 #include "subvol/surface/boundary.h"
 #include "subvol/surface/welded_surface.h"
 #include "tests/support/surface_fixtures.h"
@@ -125,6 +126,55 @@ TEST_CASE("A sheet is refused, and the message says what can be made of it", "[m
       sheet.triangles.push_back({a, b + 1, a + 1});
     }
   CHECK_THROWS_WITH(repair_surface(sheet), Catch::Contains("A sheet bounds no solid") && Catch::Contains("`shell`"));
+}
+
+TEST_CASE("Of a two-sided surface one side is left", "[mending]") {
+  const TriangleMesh cube = cube_surface(4, false);
+  TriangleMesh both = cube;
+  const auto first = static_cast<Index>(cube.positions.size());  // the second side has vertices of its own
+  both.positions.insert(both.positions.end(), cube.positions.begin(), cube.positions.end());
+  for (const auto& [a, b, c] : cube.triangles) both.triangles.push_back({first + b, first + a, first + c});
+  const SurfaceRepair repair = repair_surface(both);
+  CHECK(repair.is_fillable);
+  CHECK(repair.surface.triangles.size() == cube.triangles.size());
+  CHECK(internal::signed_volume_of(repair.surface) == Approx(8));
+  REQUIRE(repair.done.size() == 1);
+  CHECK(repair.done[0] == "target: 192 triangles are there with both orientations; one of each is left");
+  // Solids that touch share some of their triangles only.
+  TriangleMesh touching = cube;
+  for (const Vec3& p : cube.positions) touching.positions.push_back(p + Vec3(2, 0, 0));
+  for (const auto& [a, b, c] : cube.triangles) touching.triangles.push_back({first + a, first + b, first + c});
+  CHECK_FALSE(internal::without_second_sides(touching));
+}
+
+TEST_CASE("A surface that even a wrap does not follow is refused", "[mending]") {
+  CHECK_THROWS_WITH(repair_surface(triangle_soup(100, 0.3, 4)),
+                    Catch::Contains("pairs of triangles cross") && Catch::Contains("it bounds no solid: even a wrap"));
+}
+
+TEST_CASE("Sheets divide the inside only of surfaces that do not cross everywhere", "[mending][slow]") {
+  TriangleMesh cube = cube_surface(4, false);
+  const auto first = static_cast<Index>(cube.positions.size());
+  for (int i = -2; i <= 2; ++i)
+    for (int j = -2; j <= 2; ++j) cube.positions.emplace_back(i / 2.0, j / 2.0, 0);
+  for (Index i = 0; i < 4; ++i)
+    for (Index j = 0; j < 4; ++j) {
+      const Index a = first + 5 * i + j, b = a + 5;
+      cube.triangles.push_back({a, b, b + 1});
+      cube.triangles.push_back({a, b + 1, a + 1});
+    }
+  REQUIRE(repair_surface(cube).regions);
+  const auto with_soup = [&](std::size_t triangles) {
+    TriangleMesh mesh = cube, soup = triangle_soup(triangles, 0.3, 4);
+    const auto start = static_cast<Index>(mesh.positions.size());
+    for (const Vec3& p : soup.positions) mesh.positions.push_back(0.6 * p);
+    for (const auto& [a, b, c] : soup.triangles) mesh.triangles.push_back({start + a, start + b, start + c});
+    return mesh;
+  };
+  CHECK_THROWS_WITH(repair_surface(with_soup(20)), Catch::Contains("divide the inside into regions"));
+  const SurfaceRepair repair = repair_surface(with_soup(400));  // triangles inside of the wrap may leave voids
+  CHECK(repair.is_fillable);
+  CHECK(internal::signed_volume_of(repair.surface) == Approx(8).epsilon(0.1));
 }
 
 TEST_CASE("A fin is left out before a surface is filled", "[mending]") {

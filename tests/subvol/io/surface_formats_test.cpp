@@ -127,6 +127,31 @@ TEST_CASE("surface formats: glTF is read in place, without its lines, with mater
       Contains("children of themselves"));
 }
 
+/// Returns an archive of one file as ZIP64: all sizes and places stand in fields of 64 bits.
+std::string as_zip64(const std::string& archive) {
+  const std::size_t directory = archive.find("PK\1\2"), end = archive.find("PK\5\6");
+  const auto number = [](std::size_t value, std::size_t size) {
+    std::string bytes;
+    for (std::size_t i = 0; i < size; ++i) bytes += static_cast<char>(value >> (8 * i) & 255);
+    return bytes;
+  };
+  const auto value_at = [&](std::size_t at) {
+    std::size_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) value |= std::size_t(static_cast<unsigned char>(archive[at + i])) << (8 * i);
+    return value;
+  };
+  const std::string unused(4, '\xff'), other_field = number(7, 2) + number(1, 2) + "x";
+  const std::string extra = other_field + number(1, 2) + number(24, 2) + number(value_at(directory + 24), 8) +
+                            number(value_at(directory + 20), 8) + number(0, 8);
+  std::string entry = archive.substr(directory, end - directory);
+  entry.replace(20, 8, unused + unused).replace(30, 2, number(extra.size(), 2)).replace(42, 4, unused);
+  const std::string record =
+      "PK\6\6" + std::string(28, '\0') + number(1, 8) + std::string(8, '\0') + number(directory, 8);
+  return archive.substr(0, directory) + entry + extra + record + "PK\6\7" + std::string(4, '\0') +
+         number(directory + entry.size() + extra.size(), 8) + std::string(4, '\0') +
+         archive.substr(end).replace(10, 2, "\xff\xff").replace(16, 4, unused);
+}
+
 TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "[io]") {
   const std::string model = R"(<?xml version="1.0"?><model unit="millimeter" xmlns="x"><resources>
 <basematerials id="9"><base name="steel" displaycolor="#FFF"/><base name="brass" displaycolor="#000"/></basematerials>
@@ -152,6 +177,10 @@ TEST_CASE("surface formats: objects of a .3mf stand where the build has them", "
   const std::string bytes = archive("one", "one");
   for (std::size_t size = 0; size < bytes.size(); size += 7)
     CHECK_FALSE(format_refusal("cut.3mf", std::string_view(bytes).substr(0, size)).empty());
+  const PolygonMesh of_zip64 = read_polygon_mesh(format_folder().file("e.3mf", as_zip64(bytes)));
+  CHECK(of_zip64.positions == found.positions);
+  for (std::size_t size = 0; size < as_zip64(bytes).size(); size += 7)
+    CHECK_FALSE(format_refusal("cut.3mf", std::string_view(as_zip64(bytes)).substr(0, size)).empty());
   std::string damaged = bytes;
   damaged[60] = static_cast<char>(damaged[60] ^ 4);
   CHECK_THAT(format_refusal("d.3mf", damaged), Contains("damaged"));

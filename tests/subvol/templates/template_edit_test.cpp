@@ -5,7 +5,6 @@
 #include "subvol/mesh/validate.h"
 #include "subvol/shell/extrude.h"
 #include "subvol/surface/boundary.h"
-#include "subvol/surface/winding_number.h"
 #include "subvol/templates/carve.h"
 #include "subvol/templates/cell_split.h"
 #include "subvol/templates/pillow.h"
@@ -54,26 +53,6 @@ TEST_CASE("A grid fills its box by counts and by size", "[templates]") {
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {1, 0, 1}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), {100000, 100000, 100000}), InputError);
   CHECK_THROWS_AS(box_grid(Vec3(0, 0, 0), Vec3(1, 1, 1), 0.0), InputError);
-}
-
-TEST_CASE("Winding numbers agree with the sum over all triangles", "[templates]") {
-  test::RandomPoints random(11);
-  for (const TriangleMesh& surface : {test::cube_surface(12, true), test::triangle_soup(500, 0.3, 4)}) {
-    const WindingNumber winding(surface);
-    for (const Vec3& p : random.points(200, 1.5)) {
-      double sum = 0;
-      for (const auto& t : surface.triangles) {
-        const Vec3 a = surface.positions[t[0]] - p, b = surface.positions[t[1]] - p, c = surface.positions[t[2]] - p;
-        const double la = a.norm(), lb = b.norm(), lc = c.norm();
-        sum += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-      }
-      CHECK(std::abs(winding.at(p) - sum / (4 * std::numbers::pi)) < 0.01);
-    }
-  }
-  const WindingNumber ball(test::cube_surface(12, true));
-  CHECK(ball.at(Vec3(0.1, 0.2, 0)) == Approx(1).margin(0.01));
-  CHECK(ball.at(Vec3(2, 0, 0)) == Approx(0).margin(0.01));
-  CHECK_THROWS_AS(WindingNumber(TriangleMesh{}), InputError);
 }
 
 TEST_CASE("Carving keeps the cells inside a surface, in a box or on a list", "[templates]") {
