@@ -105,12 +105,14 @@ struct Parts {
   std::vector<Eigen::AlignedBox3d> boxes;
 };
 
-/// Returns the least of the whole numbers near some values, or of all of them rounded if none is near one; >= 0.
+/// Returns the least of the whole numbers near some values, or of all of them rounded if none is near one; >= 0. The
+/// value of a point on another part's surface lies in the middle of two: it is rounded up, such a part lies in the other.
 int least_whole(std::span<const double> values) {
+  constexpr double kError = 0.02;  // of two winding numbers
   double clear = -1, any = -1;
   for (const double value : values) {
-    const double whole = std::max(0.0, std::round(value));
-    if (any < 0 || whole < any) any = whole;
+    const double whole = std::max(0.0, std::round(value)), upper = std::max(0.0, std::round(value + kError));
+    if (any < 0 || upper < any) any = upper;
     if (std::abs(value - whole) <= kClearlyWhole && (clear < 0 || whole < clear)) clear = whole;
   }
   return static_cast<int>(std::max(0.0, clear >= 0 ? clear : any));

@@ -32,8 +32,9 @@ class SolidAngles {
   void add(const Vec3& a, const Vec3& b, const Vec3& c) {
     const double la = a.norm(), lb = b.norm(), lc = c.norm();
     const double y = a.dot(b.cross(c)), x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    constexpr double kRounding = 1e-15;
+    if (!(std::abs(y) > kRounding * la * lb * lc)) return;  // seen from its own plane: no angle
     const double length = std::abs(x) + std::abs(y);
-    if (y == 0 || !(length > 0)) return;  // seen from its own plane: no angle
     const std::complex<double> before = product_, factor(x / length, y / length);
     product_ = {before.real() * factor.real() - before.imag() * factor.imag(),
                 before.real() * factor.imag() + before.imag() * factor.real()};

@@ -185,8 +185,9 @@ std::optional<Candidate> Search::best_in(const Mat3& frame, VoxelGrid grid, cons
   constexpr double kWanted = 0.5, kCountWeight = 0.5, kFreeCount = 0.05;
   constexpr std::array<double, 9> kThresholds{0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.12, 0.9};
   Candidate best{frame, std::move(grid), {}, 0, 0};
-  const std::vector<double> fractions = solid_fractions(solid_.surface, best.grid, kLinesOfCell, &stop_);
+  std::vector<double> fractions = solid_fractions(solid_.surface, best.grid, kLinesOfCell, &stop_);
   if (stop_.is_stopped()) return std::nullopt;
+  if (!best.grid.lines[0].empty()) empty_cells_at_chamfers(best.grid, fractions);
   const std::vector<double> volumes = cell_volumes(best.grid);
   const auto look_at = [&](VoxelStart start, double threshold) {
     if (stop_.is_stopped()) return;
@@ -377,7 +378,10 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   result.wanted = solid.topology;
   const double most_cells = most_grid_cells(options.cells);
   std::optional<AxisPlanes> planes;
-  if (options.through_planes) planes = axis_planes(solid.surface, frame_along_planes(solid.surface));
+  if (options.through_planes) {
+    planes = axis_planes(solid.surface, frame_along_planes(solid.surface));
+    add_edge_levels(solid.surface, *planes);
+  }
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));
     std::vector<Mat3> usable = frames_of_small_grids(solid, cells, most_cells, frames);

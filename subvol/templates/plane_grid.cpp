@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/plane_grid.h"
 
+#include "subvol/surface/welded_surface.h"
 #include "subvol/templates/template_frames.h"
 
 #include <Eigen/Dense>
@@ -8,10 +9,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <numeric>
 #include <set>
+#include <span>
 #include <utility>
 
 namespace subvol::internal {
@@ -264,7 +267,60 @@ class PlaneChoice {
   std::set<std::size_t> chosen_;
 };
 
-/// Positions of the planes along an axis that get a line, and of the ends of the box, increasing.
+/// The choice of the levels of edges along one axis that get a line.
+class LevelChoice {
+ public:
+  LevelChoice(const std::vector<EdgeLevel>& levels, double tolerance, double size)
+      : levels_(levels), tolerance_(tolerance), size_(size) {}
+
+  /// Inserts the levels that get one into lines, which are increasing.
+  void add_to(std::vector<double>& lines) const {
+    std::vector<std::size_t> order(levels_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return levels_[a].length > levels_[b].length; });
+    for (const std::size_t i : order) {
+      const EdgeLevel& level = levels_[i];
+      if (level.length < kLeastLength * size_) break;
+      const auto above = std::lower_bound(lines.begin(), lines.end(), level.position);
+      if (above == lines.begin() || above == lines.end()) continue;
+      const double low = *std::prev(above), high = *above;
+      if (std::min(level.position - low, high - level.position) < kThinnest * size_) continue;
+      if (bounds_strip(level, low) || bounds_strip(level, high)) lines.insert(above, level.position);
+    }
+  }
+
+ private:
+  static constexpr double kThinnest = 1.0 / 12, kLeastLength = 4, kWidest = 0.6;  // in units of the size
+
+  /// True if enough of a level's edges run close to edges on a line that is close.
+  bool bounds_strip(const EdgeLevel& level, double line) const {
+    if (std::abs(level.position - line) >= kLeastGap * size_) return false;
+    double length = 0;
+    for (const EdgeLevel& other : levels_) {
+      if (std::abs(other.position - line) > tolerance_) continue;
+      for (const auto& [a, b] : level.segments) {
+        const bool is_close = std::ranges::any_of(other.segments, [&](const std::array<Vec3, 2>& segment) {
+          return distance((a + b) / 2, segment) < kWidest * size_;
+        });
+        if (is_close) length += (b - a).norm();
+        if (length >= kLeastLength * size_) return true;
+      }
+    }
+    return false;
+  }
+
+  static double distance(const Vec3& p, const std::array<Vec3, 2>& segment) {
+    const Vec3 along = segment[1] - segment[0];
+    const double share = std::clamp((p - segment[0]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    return (segment[0] + share * along - p).norm();
+  }
+
+  const std::vector<EdgeLevel>& levels_;
+  double tolerance_, size_;
+};
+
+/// Positions of the planes along an axis that get a line, of the ends of the box, and of edges, increasing.
 std::vector<double> key_lines(const TriangleMesh& surface, const AxisPlanes& all, std::size_t axis, double size) {
   std::vector<double> lines = PlaneChoice(surface, all, axis, size).positions();
   const double low = all.low[static_cast<Index>(axis)], high = all.high[static_cast<Index>(axis)];
@@ -273,6 +329,7 @@ std::vector<double> key_lines(const TriangleMesh& surface, const AxisPlanes& all
   const bool single = lines.size() == 1;  // then one end at least is taken, however near
   if (below >= least || (single && below > above)) lines.insert(lines.begin(), low);
   if (above >= least || (single && below <= above)) lines.push_back(high);
+  LevelChoice(all.levels[axis], all.tolerance, size).add_to(lines);
   return lines;
 }
 
@@ -322,6 +379,38 @@ AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame) {
   return result;
 }
 
+void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes) {
+  constexpr double kSharpCosine = 0.766;  // 40 degrees
+  const double across = std::sqrt(1 - kAlongAxis * kAlongAxis);
+  const TriangleMesh mesh = welded(surface).mesh;
+  std::array<std::vector<EdgeLevel>, 3> found;
+  for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {
+    if (sides.size() != 2) return;
+    const Vec3 a = area_vector(mesh, mesh.triangles[sides[0].triangle]);
+    const Vec3 b = area_vector(mesh, mesh.triangles[sides[1].triangle]);
+    if (a.dot(b) > kSharpCosine * a.norm() * b.norm()) return;
+    const std::array<Vec3, 2> segment{planes.frame.transpose() * mesh.positions[sides[0].low],
+                                      planes.frame.transpose() * mesh.positions[sides[0].high]};
+    const Vec3 along = segment[1] - segment[0];
+    for (Index axis = 0; axis < 3; ++axis)
+      if (std::abs(along[axis]) <= across * along.norm())
+        found[static_cast<std::size_t>(axis)].push_back(
+            {(segment[0][axis] + segment[1][axis]) / 2, along.norm(), {segment}});
+  });
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::ranges::stable_sort(found[axis], std::less{}, &EdgeLevel::position);
+    for (EdgeLevel& edge : found[axis]) {
+      std::vector<EdgeLevel>& levels = planes.levels[axis];
+      if (levels.empty() || edge.position - levels.back().position >= planes.tolerance) {
+        levels.push_back(std::move(edge));
+        continue;
+      }
+      levels.back().length += edge.length;
+      levels.back().segments.push_back(edge.segments.front());
+    }
+  }
+}
+
 std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surface, const AxisPlanes& planes,
                                                         double size, double most) {
   constexpr double kMostPart = 1.5;  // widest of equal parts, in units of the size
@@ -345,6 +434,24 @@ std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surf
     lines[axis].push_back(keys[axis].back());
   }
   return lines;
+}
+
+void empty_cells_at_chamfers(const VoxelGrid& grid, std::vector<double>& fractions) {
+  constexpr double kLeast = 0.25, kMost = 0.75;  // of a cell that is cut along a diagonal
+  std::array<std::vector<char>, 3> is_thin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& lines = grid.lines[axis];
+    const double size = lines[1] - lines[0];  // of a spare layer
+    for (std::size_t i = 0; i + 1 < lines.size(); ++i)
+      is_thin[axis].push_back(lines[i + 1] - lines[i] < kLeastGap * size);
+  }
+  for (std::size_t c = 0; c < fractions.size(); ++c) {
+    if (fractions[c] < kLeast || fractions[c] > kMost) continue;
+    const std::array<int, 3> at = grid.place(static_cast<Index>(c));
+    int thin = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) thin += is_thin[axis][static_cast<std::size_t>(at[axis])];
+    if (thin >= 2) fractions[c] = 0;
+  }
 }
 
 double share_on_lines(const AxisPlanes& planes, const std::array<std::vector<double>, 3>& lines) {

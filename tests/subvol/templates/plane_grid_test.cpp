@@ -16,6 +16,9 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <numbers>
 #include <numeric>
@@ -61,6 +64,24 @@ TriangleMesh cylinder(Index n) {
     for (const double z : {-1.0, 1.0}) mesh.positions.emplace_back(std::cos(angle), std::sin(angle), z);
     const Index a = 2 + 2 * i, b = 2 + 2 * ((i + 1) % n);
     mesh.triangles.insert(mesh.triangles.end(), {{0, b, a}, {1, a + 1, b + 1}, {a, b, b + 1}, {a, b + 1, a + 1}});
+  }
+  return mesh;
+}
+
+/// Prism of height 2 over a rectangle of 4 by 3 whose corner at (4, 3) is cut off by a chamfer.
+TriangleMesh chamfered_block(double width) {
+  const std::array<std::array<double, 2>, 5> outline{{{0, 0}, {4, 0}, {4, 3 - width}, {4 - width, 3}, {0, 3}}};
+  TriangleMesh mesh;
+  for (const double z : {0.0, 2.0})
+    for (const auto& [x, y] : outline) mesh.positions.emplace_back(x, y, z);
+  for (Index i = 0; i < 5; ++i) {
+    const Index j = (i + 1) % 5;
+    mesh.triangles.push_back({i, j, j + 5});
+    mesh.triangles.push_back({i, j + 5, i + 5});
+  }
+  for (Index i = 1; i < 4; ++i) {
+    mesh.triangles.push_back({0, i + 1, i});
+    mesh.triangles.push_back({5, 5 + i, 6 + i});
   }
   return mesh;
 }
@@ -190,6 +211,36 @@ TEST_CASE("Lines are close together only across thin walls and gaps", "[template
   CHECK(lines_of(block(stack, everywhere), 2) == Positions{0, 1});
   // Too many cells.
   CHECK(lines_of(block(stack, everywhere), 0.04).empty());
+}
+
+TEST_CASE("Edges of a chamfer get lines if no cell can hold it", "[templates]") {
+  const auto lines_of = [](double width, double size) {
+    const TriangleMesh surface = chamfered_block(width);
+    AxisPlanes planes = axis_planes(surface, Mat3::Identity());
+    add_edge_levels(surface, planes);
+    return lines_through_planes(surface, planes, size, 1e6);
+  };
+  const auto holds = [](const std::vector<double>& lines, double position) {
+    return std::ranges::any_of(lines, [&](double line) { return std::abs(line - position) < 1e-12; });
+  };
+  constexpr double kSize = 0.3;
+  const Lines lines = lines_of(0.1, kSize);
+  CHECK(holds(lines[0], 3.9));
+  CHECK(holds(lines[1], 2.9));
+  CHECK(lines[2].size() == 8);
+  for (const double width : {0.02, 0.2}) {  // too thin for a layer of its own; wide enough for whole cells
+    CHECK_FALSE(holds(lines_of(width, kSize)[0], 4 - width));
+    CHECK_FALSE(holds(lines_of(width, kSize)[1], 3 - width));
+  }
+}
+
+TEST_CASE("The cells that a chamfer cuts along their diagonals are left out, all of them", "[templates]") {
+  const TriangleMesh surface = chamfered_block(0.1);
+  const AutoTemplate made = made_through(surface, 500);
+  CHECK(has_line(made, Vec3::UnitX(), 3.9));
+  CHECK(has_line(made, Vec3::UnitY(), 2.9));
+  const double whole = 4.0 * 3 * 2;
+  CHECK(solid_boundary(surface_of(made.mesh)).volume == Approx(whole - 0.1 * 0.1 * 2).epsilon(1e-12));
 }
 
 TEST_CASE("A cylinder has two planes", "[templates]") {
