@@ -270,41 +270,49 @@ class PlaneChoice {
 /// The choice of the levels of edges along one axis that get a line.
 class LevelChoice {
  public:
-  LevelChoice(const std::vector<EdgeLevel>& levels, double tolerance, double size)
-      : levels_(levels), tolerance_(tolerance), size_(size) {}
+  LevelChoice(const AxisPlanes& all, std::size_t axis, double size)
+      : levels_(all.levels[axis]),
+        tolerance_(all.tolerance),
+        size_(size),
+        least_length_(std::max(kLeastLength * size, kLeastShare * (all.high - all.low).norm())) {}
 
   /// Inserts the levels that get one into lines, which are increasing.
   void add_to(std::vector<double>& lines) const {
+    const std::vector<double> given = lines;
     std::vector<std::size_t> order(levels_.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return levels_[a].length > levels_[b].length; });
     for (const std::size_t i : order) {
-      const EdgeLevel& level = levels_[i];
-      if (level.length < kLeastLength * size_) break;
-      const auto above = std::lower_bound(lines.begin(), lines.end(), level.position);
+      const double at = levels_[i].position;
+      const auto above = std::lower_bound(lines.begin(), lines.end(), at);
       if (above == lines.begin() || above == lines.end()) continue;
-      const double low = *std::prev(above), high = *above;
-      if (std::min(level.position - low, high - level.position) < kThinnest * size_) continue;
-      if (bounds_strip(level, low) || bounds_strip(level, high)) lines.insert(above, level.position);
+      if (std::min(at - *std::prev(above), *above - at) < kThinnest * size_) continue;
+      if (std::ranges::any_of(given, [&](double line) { return bounds_thin_part(levels_[i], line); }))
+        lines.insert(above, at);
     }
   }
 
  private:
   static constexpr double kThinnest = 1.0 / 12, kLeastLength = 4, kWidest = 0.6;  // in units of the size
+  static constexpr double kLeastShare = 0.25;  // of the diagonal: a line passes through the whole part
 
-  /// True if enough of a level's edges run close to edges on a line that is close.
-  bool bounds_strip(const EdgeLevel& level, double line) const {
+  /// True if enough of a level's edges run close to edges on a line that is close, or if a curve turns close to enough
+  /// of these.
+  bool bounds_thin_part(const EdgeLevel& level, double line) const {
     if (std::abs(level.position - line) >= kLeastGap * size_) return false;
     double length = 0;
     for (const EdgeLevel& other : levels_) {
-      if (std::abs(other.position - line) > tolerance_) continue;
+      if (std::abs(other.position - line) > tolerance_ || other.length < least_length_) continue;
+      const auto is_close = [&](const Vec3& p) {
+        return std::ranges::any_of(
+            other.segments, [&](const std::array<Vec3, 2>& segment) { return distance(p, segment) < kWidest * size_; });
+      };
+      if (std::ranges::any_of(level.turns, is_close)) return true;
+      if (level.length < least_length_) continue;
       for (const auto& [a, b] : level.segments) {
-        const bool is_close = std::ranges::any_of(other.segments, [&](const std::array<Vec3, 2>& segment) {
-          return distance((a + b) / 2, segment) < kWidest * size_;
-        });
-        if (is_close) length += (b - a).norm();
-        if (length >= kLeastLength * size_) return true;
+        if (is_close((a + b) / 2)) length += (b - a).norm();
+        if (length >= least_length_) return true;
       }
     }
     return false;
@@ -317,7 +325,7 @@ class LevelChoice {
   }
 
   const std::vector<EdgeLevel>& levels_;
-  double tolerance_, size_;
+  double tolerance_, size_, least_length_;
 };
 
 /// Positions of the planes along an axis that get a line, of the ends of the box, and of edges, increasing.
@@ -329,7 +337,7 @@ std::vector<double> key_lines(const TriangleMesh& surface, const AxisPlanes& all
   const bool single = lines.size() == 1;  // then one end at least is taken, however near
   if (below >= least || (single && below > above)) lines.insert(lines.begin(), low);
   if (above >= least || (single && below <= above)) lines.push_back(high);
-  LevelChoice(all.levels[axis], all.tolerance, size).add_to(lines);
+  LevelChoice(all, axis, size).add_to(lines);
   return lines;
 }
 
@@ -382,31 +390,46 @@ AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame) {
 void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes) {
   constexpr double kSharpCosine = 0.766;  // 40 degrees
   const double across = std::sqrt(1 - kAlongAxis * kAlongAxis);
-  const TriangleMesh mesh = welded(surface).mesh;
+  TriangleMesh mesh = welded(surface).mesh;
+  for (Vec3& p : mesh.positions) p = planes.frame.transpose() * p;
   std::array<std::vector<EdgeLevel>, 3> found;
+  std::vector<std::vector<Index>> neighbors(mesh.positions.size());  // along sharp edges
   for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {
     if (sides.size() != 2) return;
     const Vec3 a = area_vector(mesh, mesh.triangles[sides[0].triangle]);
     const Vec3 b = area_vector(mesh, mesh.triangles[sides[1].triangle]);
     if (a.dot(b) > kSharpCosine * a.norm() * b.norm()) return;
-    const std::array<Vec3, 2> segment{planes.frame.transpose() * mesh.positions[sides[0].low],
-                                      planes.frame.transpose() * mesh.positions[sides[0].high]};
+    const auto [low, high, triangle, forward] = sides[0];
+    neighbors[low].push_back(high);
+    neighbors[high].push_back(low);
+    const std::array<Vec3, 2> segment{mesh.positions[low], mesh.positions[high]};
     const Vec3 along = segment[1] - segment[0];
     for (Index axis = 0; axis < 3; ++axis)
       if (std::abs(along[axis]) <= across * along.norm())
         found[static_cast<std::size_t>(axis)].push_back(
-            {(segment[0][axis] + segment[1][axis]) / 2, along.norm(), {segment}});
+            {(segment[0][axis] + segment[1][axis]) / 2, along.norm(), {segment}, {}});
   });
+  for (std::size_t v = 0; v < neighbors.size(); ++v)
+    for (Index axis = 0; axis < 3 && neighbors[v].size() > 1; ++axis) {
+      const Vec3& p = mesh.positions[v];
+      const auto is_turn = [&](double direction) {
+        return std::ranges::all_of(
+            neighbors[v], [&](Index w) { return direction * (mesh.positions[w][axis] - p[axis]) > -planes.tolerance; });
+      };
+      if (is_turn(1) || is_turn(-1)) found[static_cast<std::size_t>(axis)].push_back({p[axis], 0, {}, {p}});
+    }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::ranges::stable_sort(found[axis], std::less{}, &EdgeLevel::position);
-    for (EdgeLevel& edge : found[axis]) {
-      std::vector<EdgeLevel>& levels = planes.levels[axis];
-      if (levels.empty() || edge.position - levels.back().position >= planes.tolerance) {
-        levels.push_back(std::move(edge));
+    std::vector<EdgeLevel>& levels = planes.levels[axis];
+    for (EdgeLevel& next : found[axis]) {
+      if (levels.empty() || next.position - levels.back().position >= planes.tolerance) {
+        levels.push_back(std::move(next));
         continue;
       }
-      levels.back().length += edge.length;
-      levels.back().segments.push_back(edge.segments.front());
+      EdgeLevel& level = levels.back();
+      level.length += next.length;
+      level.segments.insert(level.segments.end(), next.segments.begin(), next.segments.end());
+      level.turns.insert(level.turns.end(), next.turns.begin(), next.turns.end());
     }
   }
 }

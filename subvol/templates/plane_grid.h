@@ -21,11 +21,13 @@ struct AxisPlane {
   double whole_area() const { return area[0] + area[1]; }
 };
 
-/// Sharp edges of a surface at one position along an axis of a frame, perpendicular to it.
+/// Sharp edges of a surface at one position along an axis of a frame, perpendicular to it, and points at which curves
+/// of sharp edges come no farther along the axis, such as those of a hole's rim that are closest to a wall.
 struct EdgeLevel {
   double position = 0;                        ///< along the axis, length
   double length = 0;                          ///< of all segments
   std::vector<std::array<Vec3, 2>> segments;  ///< in the frame's coordinates
+  std::vector<Vec3> turns;                    ///< likewise
 };
 
 /// The planar parts of a surface along the axes of a frame, and the surface's extent there.
@@ -60,7 +62,7 @@ Mat3 frame_along_planes(const TriangleMesh& surface);
 AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame);
 
 /// Adds the levels of sharp edges, at which the surface bends by more than 40 degrees, to planes of the same surface.
-/// Edges count as one level if their middles differ by less than the planes' tolerance along the axis.
+/// Edges and turns count as one level if their middles differ by less than the planes' tolerance along the axis.
 void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes);
 
 /// Chooses the lines of a grid with cells of about a given size that pass through the planes.
@@ -70,9 +72,10 @@ void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes);
 /// from each other, or at each other, and at least size^2 / 2 of the one faces the other. Planes that bound a stack of
 /// such walls and gaps are taken together if all fit. Ends of the bounding box are taken likewise, after the planes.
 ///
-/// Levels of edges are taken last, the longest first, if they are closer than that to a line, but by at least 1/12
-/// size: a chamfer or a ledge, which a cell cannot hold, then lies between two lines. At least 4 size of the edges must
-/// run along others on that line, closer than 0.6 size.
+/// Levels of edges are taken last, the longest first, if they are closer than that to one of these lines, but by at
+/// least 1/12 size: a chamfer, a ledge or a thin wall, which a cell cannot hold, then lies between two lines. Their
+/// edges must run along others on that line, closer than 0.6 size, for a quarter of the bounding box's diagonal and for
+/// 4 size at least; or a curve must turn that close to edges on that line that are so long in all.
 ///
 /// Then each space between two lines is cut into equal parts, round(width / size) of them, at least one.
 ///

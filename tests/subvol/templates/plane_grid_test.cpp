@@ -234,6 +234,22 @@ TEST_CASE("Edges of a chamfer get lines if no cell can hold it", "[templates]") 
   }
 }
 
+TEST_CASE("A thin wall between a hole and a long edge gets a line", "[templates]") {
+  constexpr double kSize = 0.3;
+  const auto lines_of = [](double wall, double length) {
+    // A slot in a plate that is so small that its planes do not count.
+    const Lines at{{{0, length / 2, length / 2 + 0.3, length + 0.3}, {0, wall, wall + 0.3, 3}, {0, 0.1}}};
+    const TriangleMesh surface = block(at, [](int i, int j, int) { return i != 1 || j != 1; });
+    AxisPlanes planes = axis_planes(surface, Mat3::Identity());
+    add_edge_levels(surface, planes);
+    return lines_through_planes(surface, planes, kSize, 1e6)[1];
+  };
+  CHECK(lines_of(0.05, 4)[1] == 0.05);
+  CHECK(lines_of(0.02, 4)[1] > 0.2);    // too thin for a layer of its own
+  CHECK(lines_of(0.2, 4)[1] > 0.2);     // wide enough for whole cells
+  CHECK(lines_of(0.05, 0.1)[1] > 0.2);  // the edges are short
+}
+
 TEST_CASE("The cells that a chamfer cuts along their diagonals are left out, all of them", "[templates]") {
   const TriangleMesh surface = chamfered_block(0.1);
   const AutoTemplate made = made_through(surface, 500);
