@@ -106,7 +106,8 @@ struct Parts {
 };
 
 /// Returns the least of the whole numbers near some values, or of all of them rounded if none is near one; >= 0. The
-/// value of a point on another part's surface lies in the middle of two: it is rounded up, such a part lies in the other.
+/// value of a point on another part's surface lies in the middle of two and is rounded up: such a part lies in the
+/// other.
 int least_whole(std::span<const double> values) {
   constexpr double kError = 0.02;  // of two winding numbers
   double clear = -1, any = -1;
