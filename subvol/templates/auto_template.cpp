@@ -380,7 +380,7 @@ AutoTemplateResult auto_templates(const TriangleMesh& surface, const AutoTemplat
   std::optional<AxisPlanes> planes;
   if (options.through_planes) {
     planes = axis_planes(solid.surface, frame_along_planes(solid.surface));
-    add_edge_levels(solid.surface, *planes);
+    planes->levels = edge_levels(solid.surface, planes->frame, planes->tolerance);
   }
   for (std::size_t rung = 0; rung < kLadder.size(); ++rung) {
     const auto cells = static_cast<std::size_t>(std::lround(kLadder[rung] * static_cast<double>(options.cells)));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/templates/plane_grid.h"
 
-#include "subvol/surface/welded_surface.h"
 #include "subvol/templates/template_frames.h"
 
 #include <Eigen/Dense>
@@ -9,12 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <numeric>
 #include <set>
-#include <span>
 #include <utility>
 
 namespace subvol::internal {
@@ -22,7 +19,6 @@ namespace subvol::internal {
 namespace {
 
 constexpr double kLeastPlane = 0.5;  // smallest area of a plane with a line, in units of the squared size of a cell
-constexpr double kLeastGap = 0.4;    // smallest distance of two lines, in units of the size, unless walls are thin
 
 Vec3 area_vector(const TriangleMesh& surface, const std::array<Index, 3>& t) {
   const Vec3 &a = surface.positions[t[0]], &b = surface.positions[t[1]], &c = surface.positions[t[2]];
@@ -267,67 +263,6 @@ class PlaneChoice {
   std::set<std::size_t> chosen_;
 };
 
-/// The choice of the levels of edges along one axis that get a line.
-class LevelChoice {
- public:
-  LevelChoice(const AxisPlanes& all, std::size_t axis, double size)
-      : levels_(all.levels[axis]),
-        tolerance_(all.tolerance),
-        size_(size),
-        least_length_(std::max(kLeastLength * size, kLeastShare * (all.high - all.low).norm())) {}
-
-  /// Inserts the levels that get one into lines, which are increasing.
-  void add_to(std::vector<double>& lines) const {
-    const std::vector<double> given = lines;
-    std::vector<std::size_t> order(levels_.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return levels_[a].length > levels_[b].length; });
-    for (const std::size_t i : order) {
-      const double at = levels_[i].position;
-      const auto above = std::lower_bound(lines.begin(), lines.end(), at);
-      if (above == lines.begin() || above == lines.end()) continue;
-      if (std::min(at - *std::prev(above), *above - at) < kThinnest * size_) continue;
-      if (std::ranges::any_of(given, [&](double line) { return bounds_thin_part(levels_[i], line); }))
-        lines.insert(above, at);
-    }
-  }
-
- private:
-  static constexpr double kThinnest = 1.0 / 12, kLeastLength = 4, kWidest = 0.6;  // in units of the size
-  static constexpr double kLeastShare = 0.25;  // of the diagonal: a line passes through the whole part
-
-  /// True if enough of a level's edges run close to edges on a line that is close, or if a curve turns close to enough
-  /// of these.
-  bool bounds_thin_part(const EdgeLevel& level, double line) const {
-    if (std::abs(level.position - line) >= kLeastGap * size_) return false;
-    double length = 0;
-    for (const EdgeLevel& other : levels_) {
-      if (std::abs(other.position - line) > tolerance_ || other.length < least_length_) continue;
-      const auto is_close = [&](const Vec3& p) {
-        return std::ranges::any_of(
-            other.segments, [&](const std::array<Vec3, 2>& segment) { return distance(p, segment) < kWidest * size_; });
-      };
-      if (std::ranges::any_of(level.turns, is_close)) return true;
-      if (level.length < least_length_) continue;
-      for (const auto& [a, b] : level.segments) {
-        if (is_close((a + b) / 2)) length += (b - a).norm();
-        if (length >= least_length_) return true;
-      }
-    }
-    return false;
-  }
-
-  static double distance(const Vec3& p, const std::array<Vec3, 2>& segment) {
-    const Vec3 along = segment[1] - segment[0];
-    const double share = std::clamp((p - segment[0]).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    return (segment[0] + share * along - p).norm();
-  }
-
-  const std::vector<EdgeLevel>& levels_;
-  double tolerance_, size_, least_length_;
-};
-
 /// Positions of the planes along an axis that get a line, of the ends of the box, and of edges, increasing.
 std::vector<double> key_lines(const TriangleMesh& surface, const AxisPlanes& all, std::size_t axis, double size) {
   std::vector<double> lines = PlaneChoice(surface, all, axis, size).positions();
@@ -337,7 +272,7 @@ std::vector<double> key_lines(const TriangleMesh& surface, const AxisPlanes& all
   const bool single = lines.size() == 1;  // then one end at least is taken, however near
   if (below >= least || (single && below > above)) lines.insert(lines.begin(), low);
   if (above >= least || (single && below <= above)) lines.push_back(high);
-  LevelChoice(all, axis, size).add_to(lines);
+  add_lines_at_levels(all.levels[axis], (all.high - all.low).norm(), all.tolerance, size, lines);
   return lines;
 }
 
@@ -387,53 +322,6 @@ AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame) {
   return result;
 }
 
-void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes) {
-  constexpr double kSharpCosine = 0.766;  // 40 degrees
-  const double across = std::sqrt(1 - kAlongAxis * kAlongAxis);
-  TriangleMesh mesh = welded(surface).mesh;
-  for (Vec3& p : mesh.positions) p = planes.frame.transpose() * p;
-  std::array<std::vector<EdgeLevel>, 3> found;
-  std::vector<std::vector<Index>> neighbors(mesh.positions.size());  // along sharp edges
-  for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {
-    if (sides.size() != 2) return;
-    const Vec3 a = area_vector(mesh, mesh.triangles[sides[0].triangle]);
-    const Vec3 b = area_vector(mesh, mesh.triangles[sides[1].triangle]);
-    if (a.dot(b) > kSharpCosine * a.norm() * b.norm()) return;
-    const auto [low, high, triangle, forward] = sides[0];
-    neighbors[low].push_back(high);
-    neighbors[high].push_back(low);
-    const std::array<Vec3, 2> segment{mesh.positions[low], mesh.positions[high]};
-    const Vec3 along = segment[1] - segment[0];
-    for (Index axis = 0; axis < 3; ++axis)
-      if (std::abs(along[axis]) <= across * along.norm())
-        found[static_cast<std::size_t>(axis)].push_back(
-            {(segment[0][axis] + segment[1][axis]) / 2, along.norm(), {segment}, {}});
-  });
-  for (std::size_t v = 0; v < neighbors.size(); ++v)
-    for (Index axis = 0; axis < 3 && neighbors[v].size() > 1; ++axis) {
-      const Vec3& p = mesh.positions[v];
-      const auto is_turn = [&](double direction) {
-        return std::ranges::all_of(
-            neighbors[v], [&](Index w) { return direction * (mesh.positions[w][axis] - p[axis]) > -planes.tolerance; });
-      };
-      if (is_turn(1) || is_turn(-1)) found[static_cast<std::size_t>(axis)].push_back({p[axis], 0, {}, {p}});
-    }
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::ranges::stable_sort(found[axis], std::less{}, &EdgeLevel::position);
-    std::vector<EdgeLevel>& levels = planes.levels[axis];
-    for (EdgeLevel& next : found[axis]) {
-      if (levels.empty() || next.position - levels.back().position >= planes.tolerance) {
-        levels.push_back(std::move(next));
-        continue;
-      }
-      EdgeLevel& level = levels.back();
-      level.length += next.length;
-      level.segments.insert(level.segments.end(), next.segments.begin(), next.segments.end());
-      level.turns.insert(level.turns.end(), next.turns.begin(), next.turns.end());
-    }
-  }
-}
-
 std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surface, const AxisPlanes& planes,
                                                         double size, double most) {
   constexpr double kMostPart = 1.5;  // widest of equal parts, in units of the size
@@ -457,24 +345,6 @@ std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surf
     lines[axis].push_back(keys[axis].back());
   }
   return lines;
-}
-
-void empty_cells_at_chamfers(const VoxelGrid& grid, std::vector<double>& fractions) {
-  constexpr double kLeast = 0.25, kMost = 0.75;  // of a cell that is cut along a diagonal
-  std::array<std::vector<char>, 3> is_thin;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::vector<double>& lines = grid.lines[axis];
-    const double size = lines[1] - lines[0];  // of a spare layer
-    for (std::size_t i = 0; i + 1 < lines.size(); ++i)
-      is_thin[axis].push_back(lines[i + 1] - lines[i] < kLeastGap * size);
-  }
-  for (std::size_t c = 0; c < fractions.size(); ++c) {
-    if (fractions[c] < kLeast || fractions[c] > kMost) continue;
-    const std::array<int, 3> at = grid.place(static_cast<Index>(c));
-    int thin = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) thin += is_thin[axis][static_cast<std::size_t>(at[axis])];
-    if (thin >= 2) fractions[c] = 0;
-  }
 }
 
 double share_on_lines(const AxisPlanes& planes, const std::array<std::vector<double>, 3>& lines) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "subvol/surface/triangle_mesh.h"
-#include "subvol/templates/voxel_grid.h"
+#include "subvol/templates/edge_levels.h"
 
 #include <array>
 #include <vector>
@@ -21,28 +21,15 @@ struct AxisPlane {
   double whole_area() const { return area[0] + area[1]; }
 };
 
-/// Sharp edges of a surface at one position along an axis of a frame, perpendicular to it, and points at which curves
-/// of sharp edges come no farther along the axis, such as those of a hole's rim that are closest to a wall.
-struct EdgeLevel {
-  double position = 0;                        ///< along the axis, length
-  double length = 0;                          ///< of all segments
-  std::vector<std::array<Vec3, 2>> segments;  ///< in the frame's coordinates
-  std::vector<Vec3> turns;                    ///< likewise
-};
-
 /// The planar parts of a surface along the axes of a frame, and the surface's extent there.
 struct AxisPlanes {
   Mat3 frame = Mat3::Identity();                 ///< columns: unit axes, right-handed
   std::array<std::vector<AxisPlane>, 3> planes;  ///< for each axis, by increasing position
-  std::array<std::vector<EdgeLevel>, 3> levels;  ///< likewise; none: edges get no lines of their own
+  std::array<std::vector<EdgeLevel>, 3> levels;  ///< (`edge_levels`); none: edges get no lines of their own
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  ///< corners of the bounding box, in the frame's coordinates
   double area = 0;                               ///< of the whole surface
   double tolerance = 0;                          ///< length; triangles whose positions differ by less are coplanar
 };
-
-/// Cosine between an axis and a triangle's normal above which the triangle counts as perpendicular to the axis: 1.1
-/// degrees.
-inline constexpr double kAlongAxis = 0.9998;
 
 /// Returns the frame for a grid through the surface's planes: of those that `template_frames` returns, and of the same
 /// ones turned onto the planes closest to them, the frame with the most area whose normal is along an axis. Area counts
@@ -61,10 +48,6 @@ Mat3 frame_along_planes(const TriangleMesh& surface);
 /// frame  columns: unit axes. Cost: a sort of the triangles.
 AxisPlanes axis_planes(const TriangleMesh& surface, const Mat3& frame);
 
-/// Adds the levels of sharp edges, at which the surface bends by more than 40 degrees, to planes of the same surface.
-/// Edges and turns count as one level if their middles differ by less than the planes' tolerance along the axis.
-void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes);
-
 /// Chooses the lines of a grid with cells of about a given size that pass through the planes.
 ///
 /// Planes with an area of more than size^2 / 2 are taken along each axis, the largest first, if they are at least
@@ -72,10 +55,7 @@ void add_edge_levels(const TriangleMesh& surface, AxisPlanes& planes);
 /// from each other, or at each other, and at least size^2 / 2 of the one faces the other. Planes that bound a stack of
 /// such walls and gaps are taken together if all fit. Ends of the bounding box are taken likewise, after the planes.
 ///
-/// Levels of edges are taken last, the longest first, if they are closer than that to one of these lines, but by at
-/// least 1/12 size: a chamfer, a ledge or a thin wall, which a cell cannot hold, then lies between two lines. Their
-/// edges must run along others on that line, closer than 0.6 size, for a quarter of the bounding box's diagonal and for
-/// 4 size at least; or a curve must turn that close to edges on that line that are so long in all.
+/// Levels of edges are taken last (`add_lines_at_levels`).
 ///
 /// Then each space between two lines is cut into equal parts, round(width / size) of them, at least one.
 ///
@@ -89,11 +69,6 @@ std::array<std::vector<double>, 3> lines_through_planes(const TriangleMesh& surf
 
 /// Adds the spare layers around the lines of a grid, `size` wide.
 std::array<std::vector<double>, 3> with_spare_layers(std::array<std::vector<double>, 3> lines, double size);
-
-/// Empties the cells of a grid that are thinner than lines usually are along two axes and neither nearly full nor
-/// nearly empty: a chamfer cuts them along their diagonals. Whether half a cell is filled would differ from one to the
-/// next. grid  with spare layers (`with_spare_layers`).  fractions  share of each cell that lies in the solid.
-void empty_cells_at_chamfers(const VoxelGrid& grid, std::vector<double>& fractions);
 
 /// Returns the share of the surface's area that lies on planes through the lines, in [0, 1].
 double share_on_lines(const AxisPlanes& planes, const std::array<std::vector<double>, 3>& lines);

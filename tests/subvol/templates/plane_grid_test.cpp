@@ -217,7 +217,7 @@ TEST_CASE("Edges of a chamfer get lines if no cell can hold it", "[templates]") 
   const auto lines_of = [](double width, double size) {
     const TriangleMesh surface = chamfered_block(width);
     AxisPlanes planes = axis_planes(surface, Mat3::Identity());
-    add_edge_levels(surface, planes);
+    planes.levels = edge_levels(surface, planes.frame, planes.tolerance);
     return lines_through_planes(surface, planes, size, 1e6);
   };
   const auto holds = [](const std::vector<double>& lines, double position) {
@@ -241,7 +241,7 @@ TEST_CASE("A thin wall between a hole and a long edge gets a line", "[templates]
     const Lines at{{{0, length / 2, length / 2 + 0.3, length + 0.3}, {0, wall, wall + 0.3, 3}, {0, 0.1}}};
     const TriangleMesh surface = block(at, [](int i, int j, int) { return i != 1 || j != 1; });
     AxisPlanes planes = axis_planes(surface, Mat3::Identity());
-    add_edge_levels(surface, planes);
+    planes.levels = edge_levels(surface, planes.frame, planes.tolerance);
     return lines_through_planes(surface, planes, kSize, 1e6)[1];
   };
   CHECK(lines_of(0.05, 4)[1] == 0.05);

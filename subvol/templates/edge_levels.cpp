@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "subvol/templates/edge_levels.h"
+
+#include "subvol/surface/triangle_geometry.h"
+#include "subvol/surface/welded_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <numeric>
+#include <span>
+#include <utility>
+
+namespace subvol::internal {
+
+namespace {
+
+/// The choice of the levels of edges along one axis that get a line.
+class LevelChoice {
+ public:
+  LevelChoice(const std::vector<EdgeLevel>& levels, double diagonal, double tolerance, double size)
+      : levels_(levels),
+        tolerance_(tolerance),
+        size_(size),
+        least_length_(std::max(kLeastLength * size, kLeastShare * diagonal)) {}
+
+  /// Inserts the levels that get one into lines, which are increasing.
+  void add_to(std::vector<double>& lines) const {
+    const std::vector<double> given = lines;
+    std::vector<std::size_t> order(levels_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return levels_[a].length > levels_[b].length; });
+    for (const std::size_t i : order) {
+      const double at = levels_[i].position;
+      const auto above = std::lower_bound(lines.begin(), lines.end(), at);
+      if (above == lines.begin() || above == lines.end()) continue;
+      if (std::min(at - *std::prev(above), *above - at) < kThinnest * size_) continue;
+      if (std::ranges::any_of(given, [&](double line) { return bounds_thin_part(levels_[i], line); }))
+        lines.insert(above, at);
+    }
+  }
+
+ private:
+  static constexpr double kThinnest = 1.0 / 12, kLeastLength = 4, kWidest = 0.6;  // in units of the size
+  static constexpr double kLeastShare = 0.25;  // of the diagonal: a line passes through the whole part
+
+  /// True if enough of a level's edges run close to edges on a line that is close, or if a curve turns close to enough
+  /// of these.
+  bool bounds_thin_part(const EdgeLevel& level, double line) const {
+    if (std::abs(level.position - line) >= kLeastGap * size_) return false;
+    double length = 0;
+    for (const EdgeLevel& other : levels_) {
+      if (std::abs(other.position - line) > tolerance_ || other.length < least_length_) continue;
+      const auto is_close = [&](const Vec3& p) {
+        return std::ranges::any_of(
+            other.segments, [&](const std::array<Vec3, 2>& segment) { return distance(p, segment) < kWidest * size_; });
+      };
+      if (std::ranges::any_of(level.turns, is_close)) return true;
+      if (level.length < least_length_) continue;
+      for (const auto& [a, b] : level.segments) {
+        if (is_close((a + b) / 2)) length += (b - a).norm();
+        if (length >= least_length_) return true;
+      }
+    }
+    return false;
+  }
+
+  static double distance(const Vec3& p, const std::array<Vec3, 2>& segment) {
+    const Vec3 along = segment[1] - segment[0];
+    const double share = std::clamp((p - segment[0]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    return (segment[0] + share * along - p).norm();
+  }
+
+  const std::vector<EdgeLevel>& levels_;
+  double tolerance_, size_, least_length_;
+};
+
+/// The sharp edges of a surface, in the coordinates of a frame.
+struct SharpEdges {
+  std::vector<Vec3> positions;  ///< of all vertices
+  std::vector<std::array<Index, 2>> edges;
+  std::vector<std::vector<Index>> neighbors;  ///< of each vertex, along sharp edges
+};
+
+SharpEdges sharp_edges(const TriangleMesh& surface, const Mat3& frame) {
+  constexpr double kSharpCosine = 0.766;  // 40 degrees
+  const TriangleMesh mesh = welded(surface).mesh;
+  SharpEdges sharp;
+  for (const Vec3& p : mesh.positions) sharp.positions.push_back(frame.transpose() * p);
+  sharp.neighbors.resize(mesh.positions.size());
+  for_each_edge(sorted_half_edges(mesh.triangles, mesh.positions.size()), [&](std::span<const SurfaceHalfEdge> sides) {
+    if (sides.size() != 2) return;
+    const Vec3 a = doubled_area_vector(mesh, mesh.triangles[sides[0].triangle]);
+    const Vec3 b = doubled_area_vector(mesh, mesh.triangles[sides[1].triangle]);
+    if (a.dot(b) > kSharpCosine * a.norm() * b.norm()) return;
+    sharp.edges.push_back({sides[0].low, sides[0].high});
+    sharp.neighbors[sides[0].low].push_back(sides[0].high);
+    sharp.neighbors[sides[0].high].push_back(sides[0].low);
+  });
+  return sharp;
+}
+
+/// True if no sharp edge leads from a vertex farther along an axis, or none farther back.
+bool is_turn(const SharpEdges& sharp, std::size_t vertex, Index axis, double tolerance) {
+  const auto leads_on = [&](double direction) {
+    return std::ranges::any_of(sharp.neighbors[vertex], [&](Index w) {
+      return direction * (sharp.positions[w][axis] - sharp.positions[vertex][axis]) >= tolerance;
+    });
+  };
+  return sharp.neighbors[vertex].size() > 1 && (!leads_on(1) || !leads_on(-1));
+}
+
+/// Makes one level of those whose positions agree.
+std::vector<EdgeLevel> merged(std::vector<EdgeLevel> all, double tolerance) {
+  std::ranges::stable_sort(all, std::less{}, &EdgeLevel::position);
+  std::vector<EdgeLevel> levels;
+  for (EdgeLevel& next : all) {
+    if (levels.empty() || next.position - levels.back().position >= tolerance) {
+      levels.push_back(std::move(next));
+      continue;
+    }
+    EdgeLevel& level = levels.back();
+    level.length += next.length;
+    level.segments.insert(level.segments.end(), next.segments.begin(), next.segments.end());
+    level.turns.insert(level.turns.end(), next.turns.begin(), next.turns.end());
+  }
+  return levels;
+}
+
+}  // namespace
+
+std::array<std::vector<EdgeLevel>, 3> edge_levels(const TriangleMesh& surface, const Mat3& frame, double tolerance) {
+  const double across = std::sqrt(1 - kAlongAxis * kAlongAxis);
+  const SharpEdges sharp = sharp_edges(surface, frame);
+  std::array<std::vector<EdgeLevel>, 3> levels;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto axis = static_cast<Index>(a);
+    std::vector<EdgeLevel> all;
+    for (const auto& [low, high] : sharp.edges) {
+      const Vec3 &p = sharp.positions[low], &q = sharp.positions[high];
+      const double length = (q - p).norm();
+      if (std::abs(q[axis] - p[axis]) <= across * length)
+        all.push_back({(p[axis] + q[axis]) / 2, length, {{p, q}}, {}});
+    }
+    for (std::size_t v = 0; v < sharp.positions.size(); ++v)
+      if (is_turn(sharp, v, axis, tolerance)) all.push_back({sharp.positions[v][axis], 0, {}, {sharp.positions[v]}});
+    levels[a] = merged(std::move(all), tolerance);
+  }
+  return levels;
+}
+
+void add_lines_at_levels(const std::vector<EdgeLevel>& levels, double diagonal, double tolerance, double size,
+                         std::vector<double>& lines) {
+  LevelChoice(levels, diagonal, tolerance, size).add_to(lines);
+}
+
+void empty_cells_at_chamfers(const VoxelGrid& grid, std::vector<double>& fractions) {
+  constexpr double kLeast = 0.25, kMost = 0.75;  // of a cell that is cut along a diagonal
+  std::array<std::vector<char>, 3> is_thin;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& lines = grid.lines[axis];
+    const double size = lines[1] - lines[0];  // of a spare layer
+    for (std::size_t i = 0; i + 1 < lines.size(); ++i)
+      is_thin[axis].push_back(lines[i + 1] - lines[i] < kLeastGap * size);
+  }
+  for (std::size_t c = 0; c < fractions.size(); ++c) {
+    if (fractions[c] < kLeast || fractions[c] > kMost) continue;
+    const std::array<int, 3> at = grid.place(static_cast<Index>(c));
+    int thin = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) thin += is_thin[axis][static_cast<std::size_t>(at[axis])];
+    if (thin >= 2) fractions[c] = 0;
+  }
+}
+
+}  // namespace subvol::internal
