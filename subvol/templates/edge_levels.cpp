@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <iterator>
 #include <numeric>
@@ -44,10 +45,11 @@ class LevelChoice {
 
  private:
   static constexpr double kThinnest = 1.0 / 12, kLeastLength = 4, kWidest = 0.6;  // in units of the size
+  static constexpr std::ptrdiff_t kLeastTurns = 2;                                // the rims at both ends of a hole
   static constexpr double kLeastShare = 0.25;  // of the diagonal: a line passes through the whole part
 
-  /// True if enough of a level's edges run close to edges on a line that is close, or if a curve turns close to enough
-  /// of these.
+  /// True if enough of a level's edges run close to edges on a line that is close, or if curves turn close to enough of
+  /// these.
   bool bounds_thin_part(const EdgeLevel& level, double line) const {
     if (std::abs(level.position - line) >= kLeastGap * size_) return false;
     double length = 0;
@@ -57,7 +59,7 @@ class LevelChoice {
         return std::ranges::any_of(
             other.segments, [&](const std::array<Vec3, 2>& segment) { return distance(p, segment) < kWidest * size_; });
       };
-      if (std::ranges::any_of(level.turns, is_close)) return true;
+      if (std::ranges::count_if(level.turns, is_close) >= kLeastTurns) return true;
       if (level.length < least_length_) continue;
       for (const auto& [a, b] : level.segments) {
         if (is_close((a + b) / 2)) length += (b - a).norm();
@@ -102,14 +104,22 @@ SharpEdges sharp_edges(const TriangleMesh& surface, const Mat3& frame) {
   return sharp;
 }
 
-/// True if no sharp edge leads from a vertex farther along an axis, or none farther back.
+/// True if two sharp edges meet at a vertex without a corner, and neither leads farther along an axis, or neither
+/// farther back.
 bool is_turn(const SharpEdges& sharp, std::size_t vertex, Index axis, double tolerance) {
+  constexpr double kSmooth = -0.64;  // cosine between the edges: 130 degrees
+  if (sharp.neighbors[vertex].size() != 2) return false;
+  const Vec3& p = sharp.positions[vertex];
+  const auto direction_to = [&](std::size_t i) {
+    return (sharp.positions[sharp.neighbors[vertex][i]] - p).normalized();
+  };
+  if (direction_to(0).dot(direction_to(1)) > kSmooth) return false;
   const auto leads_on = [&](double direction) {
     return std::ranges::any_of(sharp.neighbors[vertex], [&](Index w) {
       return direction * (sharp.positions[w][axis] - sharp.positions[vertex][axis]) >= tolerance;
     });
   };
-  return sharp.neighbors[vertex].size() > 1 && (!leads_on(1) || !leads_on(-1));
+  return !leads_on(1) || !leads_on(-1);
 }
 
 /// Makes one level of those whose positions agree.

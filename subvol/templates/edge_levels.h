@@ -16,8 +16,8 @@ inline constexpr double kAlongAxis = 0.9998;
 /// Smallest distance of two lines of a grid, in units of its cells' size, unless something thin lies between them.
 inline constexpr double kLeastGap = 0.4;
 
-/// Sharp edges of a surface at one position along an axis of a frame, perpendicular to it, and points at which curves
-/// of sharp edges come no farther along the axis, such as those of a hole's rim that are closest to a wall.
+/// Sharp edges of a surface at one position along an axis of a frame, perpendicular to it, and points at which smooth
+/// curves of sharp edges come no farther along the axis, such as those of a hole's rim that are closest to a wall.
 struct EdgeLevel {
   double position = 0;                        ///< along the axis, length
   double length = 0;                          ///< of all segments
@@ -37,8 +37,8 @@ std::array<std::vector<EdgeLevel>, 3> edge_levels(const TriangleMesh& surface, c
 ///
 /// Levels are taken, the longest first, if they are closer than `kLeastGap` size to a line that is given, but by at
 /// least 1/12 size to all: a chamfer, a ledge or a thin wall then lies between two lines. Their edges must run along
-/// others on the given line, closer than 0.6 size, for a quarter of the diagonal and for 4 size at least; or a curve
-/// must turn that close to edges on the given line that are so long in all.
+/// others on the given line, closer than 0.6 size, for a quarter of the diagonal and for 4 size at least; or two
+/// curves, such as the rims of a hole, must turn that close to edges on the given line that are so long in all.
 ///
 /// diagonal   of the part's bounding box.  tolerance  as for `edge_levels`.
 /// size       of the grid's cells, length.

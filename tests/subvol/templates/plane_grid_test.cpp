@@ -234,20 +234,32 @@ TEST_CASE("Edges of a chamfer get lines if no cell can hold it", "[templates]") 
   }
 }
 
-TEST_CASE("A thin wall between a hole and a long edge gets a line", "[templates]") {
-  constexpr double kSize = 0.3;
-  const auto lines_of = [](double wall, double length) {
-    // A slot in a plate that is so small that its planes do not count.
-    const Lines at{{{0, length / 2, length / 2 + 0.3, length + 0.3}, {0, wall, wall + 0.3, 3}, {0, 0.1}}};
-    const TriangleMesh surface = block(at, [](int i, int j, int) { return i != 1 || j != 1; });
-    AxisPlanes planes = axis_planes(surface, Mat3::Identity());
-    planes.levels = edge_levels(surface, planes.frame, planes.tolerance);
-    return lines_through_planes(surface, planes, kSize, 1e6)[1];
+TEST_CASE("A thin wall between a hole and long edges gets a line", "[templates]") {
+  constexpr double kSize = 0.3, kDiagonal = 5;
+  const auto lines_with = [](double wall, std::vector<Vec3> turns, double length) {
+    const EdgeLevel side{0, length, {{Vec3(0, 0, 0), Vec3(length, 0, 0)}}, {}}, rims{wall, 0, {}, std::move(turns)};
+    std::vector<double> lines{0, 3};
+    add_lines_at_levels({side, rims}, kDiagonal, 1e-5, kSize, lines);
+    return lines;
   };
-  CHECK(lines_of(0.05, 4)[1] == 0.05);
-  CHECK(lines_of(0.02, 4)[1] > 0.2);    // too thin for a layer of its own
-  CHECK(lines_of(0.2, 4)[1] > 0.2);     // wide enough for whole cells
-  CHECK(lines_of(0.05, 0.1)[1] > 0.2);  // the edges are short
+  using Positions = std::vector<double>;
+  const std::vector<Vec3> turns{Vec3(1, 0.05, 0), Vec3(1, 0.05, 0.1)};
+  CHECK(lines_with(0.05, turns, 4) == Positions{0, 0.05, 3});
+  CHECK(lines_with(0.02, turns, 4) == Positions{0, 3});                         // too thin for a layer of its own
+  CHECK(lines_with(0.2, turns, 4) == Positions{0, 3});                          // wide enough for whole cells
+  CHECK(lines_with(0.05, turns, 1) == Positions{0, 3});                         // the edge is short
+  CHECK(lines_with(0.05, {turns.front()}, 4) == Positions{0, 3});               // one curve
+  CHECK(lines_with(0.05, {turns[0], Vec3(1, 0.05, 1)}, 4) == Positions{0, 3});  // the other one is far from the edge
+}
+
+TEST_CASE("Only smooth curves turn", "[templates]") {
+  const auto turns_of = [](const TriangleMesh& surface) {
+    std::size_t count = 0;
+    for (const EdgeLevel& level : edge_levels(surface, Mat3::Identity(), 1e-6)[0]) count += level.turns.size();
+    return count;
+  };
+  CHECK(turns_of(cylinder(50)) == 4);  // at either side of both ends
+  CHECK(turns_of(box(Vec3(1, 2, 3))) == 0);
 }
 
 TEST_CASE("The cells that a chamfer cuts along their diagonals are left out, all of them", "[templates]") {
