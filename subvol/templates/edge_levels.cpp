@@ -59,14 +59,25 @@ class LevelChoice {
         return std::ranges::any_of(
             other.segments, [&](const std::array<Vec3, 2>& segment) { return distance(p, segment) < kWidest * size_; });
       };
-      if (std::ranges::count_if(level.turns, is_close) >= kLeastTurns) return true;
+      if (std::ranges::count_if(sample(level.turns), is_close) >= kLeastTurns) return true;
       if (level.length < least_length_) continue;
-      for (const auto& [a, b] : level.segments) {
-        if (is_close((a + b) / 2)) length += (b - a).norm();
-        if (length >= least_length_) return true;
-      }
+      const std::vector<std::array<Vec3, 2>> segments = sample(level.segments);
+      const double weight = static_cast<double>(level.segments.size()) / static_cast<double>(segments.size());
+      for (const auto& [a, b] : segments)
+        if (is_close((a + b) / 2)) length += weight * (b - a).norm();
+      if (length >= least_length_) return true;
     }
     return false;
+  }
+
+  /// Returns all of some items, or some hundreds that are evenly spread: each is compared with all edges of a level.
+  template <class Item>
+  static std::vector<Item> sample(const std::vector<Item>& items) {
+    constexpr std::size_t kMost = 300;
+    const std::size_t step = std::max<std::size_t>(1, items.size() / kMost);
+    std::vector<Item> some;
+    for (std::size_t i = 0; i < items.size(); i += step) some.push_back(items[i]);
+    return some;
   }
 
   static double distance(const Vec3& p, const std::array<Vec3, 2>& segment) {
