@@ -219,7 +219,9 @@ double smallest_cell(const SurfaceDiagnosis& diagnosis, std::size_t cells) {
 }  // namespace
 
 SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool()>& cancelled, RegionRule rule) {
-  if (rule != RegionRule::keep)
+  const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
+  if (diagnosis.is_cancelled) return {.surface = given};
+  if (rule != RegionRule::keep && diagnosis.find(SurfaceFault::face_contact))
     if (const std::optional<OneSidedSurface> one = without_second_sides(given)) {
       SurfaceRepair repair = repair_surface(one->surface, cancelled, rule);
       repair.done.insert(
@@ -227,8 +229,6 @@ SurfaceRepair repair_surface(const TriangleMesh& given, const std::function<bool
           formatted("target: %zu triangles are there with both orientations; one of each is left", one->dropped));
       return repair;
     }
-  const SurfaceDiagnosis diagnosis = diagnose(given, cancelled);
-  if (diagnosis.is_cancelled) return {.surface = given};
   RepairAttempt attempt = attempt_repair(given, diagnosis, cancelled, rule);
   if (attempt.is_successful()) return std::move(*attempt.repair);
   if (cancelled && cancelled()) return {.surface = given};

@@ -26,7 +26,7 @@ struct SurfaceRepair {
 /// Unites the parts of a surface that cross or overlap, turns parts whose orientation disagrees with their nesting,
 /// removes small faults and fins, covers holes, and wraps what bounds no solid all the same.
 ///
-/// Of a two-sided surface one side is left (`without_second_sides`), unless RegionRule::keep is given.
+/// The second sides of a two-sided surface are dropped (`without_second_sides`), unless RegionRule::keep is given.
 ///
 /// Closed parts that cross or share stretches of faces are united (`united`); if one of them is the wall of a void, its
 /// inside is taken out of the others (`without`). A wall of a void that points outward is turned, and so is a part that

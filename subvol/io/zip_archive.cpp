@@ -46,7 +46,7 @@ bool read_long_values(std::string_view extra, std::initializer_list<std::size_t*
   return true;
 }
 
-/// Where the directory of an archive begins, and its number of entries.
+/// Tells where the directory of an archive begins, and how many entries it has.
 struct Directory {
   std::size_t begin, count;
 };

@@ -30,7 +30,8 @@ class WindingNumber {
   std::vector<double> at(std::span<const Vec3> points) const;
 
  private:
-  /// What the integral of (x - c)(x - c)^T over the triangles, times their normals, adds to the winding number.
+  /// Holds the integral of (x - c)(x - c)^T n over the triangles, with center c and normals n, as far as the winding
+  /// number depends on it.
   struct SecondMoments {
     Vec3 linear = Vec3::Zero();
     std::array<double, 10> cubic{};  ///< coefficients of xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz
