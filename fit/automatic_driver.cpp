@@ -177,7 +177,7 @@ std::vector<Index> AutomaticDriver::hopeless_cells() const {
 /// if the fit must end.
 bool AutomaticDriver::relax_hopeless_cells(QualityStages& stages, const StageRecord& record) {
   constexpr int kMostRounds = 12, kSteps = 6;
-  constexpr int kFruitless = 4;  // rounds without fewer hopeless cells; of seven relaxations, none that succeeded had two
+  constexpr int kFruitless = 4;  // rounds without fewer hopeless cells: no success was seen after two
   constexpr double kFirst = 10, kLess = 0.1;  // weight of the surface, and what is left of it in the next round
   const QualityWeights weights{.hinge = 50, .threshold = 0.5};
   double surface = kFirst;
