@@ -12,6 +12,7 @@
 #include "subvol/fit/features/flat_facets.h"
 #include "subvol/fit/features/polyline.h"
 #include "subvol/fit/fits/flat_faces.h"
+#include "subvol/fit/fits/graded_template.h"
 #include "subvol/fit/fits/level_samples.h"
 #include "subvol/fit/fits/local_cells.h"
 #include "subvol/fit/fits/smooth_refinement.h"
@@ -44,6 +45,8 @@ namespace {
 
 constexpr double kRoomForTemplates = 0.85;  // share of the cells allowed that a template is asked for first
 constexpr double kMostGrowth = 1.5;         // of the number of cells by cutting some of them
+/// Largest share of the cells allowed that a template may have if some of its cells are to be cut.
+constexpr double kMostShareOfGrid = 0.75;
 /// Largest number of rounds in which some cells are cut: cells of size 1 / 9 are the smallest. The fits with edges that
 /// had a second round (i07 twice, fan-shroud) gained nothing by it.
 constexpr int kMostRefinements = 2, kMostRefinementsWithEdges = 1;
@@ -75,6 +78,12 @@ struct LevelLayout {
   FollowedCreases creases;
 };
 
+Vec3 center_of(const VolumeMesh& mesh, Index cell) {
+  Vec3 sum = Vec3::Zero();
+  for (const Index v : mesh.cell(cell)) sum += mesh.positions[v];
+  return sum / static_cast<double>(mesh.cell(cell).size());
+}
+
 /// Returns the share of the curves' length that paths follow.
 double routed_share(const FeatureRouting& routing, const FeatureCurves& curves) {
   double all = 0, routed = 0;
@@ -103,6 +112,7 @@ class AutomaticFit : AutomaticDriver {
   bool run_attempt(const AutomaticAttempt& attempt);
   bool run_smooth(const AutomaticAttempt& attempt);
   bool run_edges(const AutomaticAttempt& attempt);
+  bool run_graded();
   bool run_refined();
   void lay_out(RoutingOptions routing);
   void begin_cage() override;
@@ -112,7 +122,7 @@ class AutomaticFit : AutomaticDriver {
   std::vector<Fault> faults_of_best() const;
   std::vector<double> faults_of_cells() const;
   std::optional<AutoTemplate> make_template(AutoTemplateOptions options);
-  std::optional<VolumeMesh> make_template_of_at_most(std::size_t cells);
+  std::optional<AutoTemplate> make_template_of_at_most(std::size_t cells);
   bool fit_level(int level, const QualitySchedule& schedule, const char* what, double portion = 1) override;
   std::optional<FeatureMiss> feature_miss(const TriangleMesh& surface) const;
   std::optional<CreaseDistance> distance_of_edges() const;
@@ -142,6 +152,7 @@ class AutomaticFit : AutomaticDriver {
   std::vector<AutomaticAttempt> skipped_;  ///< their grids were too coarse for many edges
   std::string refusal_;                    ///< why there was no template for the last attempt that had none
   std::optional<SurfaceDiagnosis> diagnosis_;  ///< of the target; none: no attempt has been without a template
+  std::optional<AutoTemplate> finest_;         ///< of the templates that were not refined, in the target's coordinates
   double aligned_share_ = 0;          ///< of the target's area on planes of the last grid through planes
 };
 
@@ -185,11 +196,11 @@ std::optional<AutoTemplate> AutomaticFit::make_template(AutoTemplateOptions opti
 
 /// Makes a pillowed template of at most so many cells; if there is none, the smallest that was found. Returns nothing
 /// as `make_template`.
-std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cells) {
+std::optional<AutoTemplate> AutomaticFit::make_template_of_at_most(std::size_t cells) {
   constexpr int kTries = 3;
   constexpr double kLess = 0.97;
   double asked = kRoomForTemplates * static_cast<double>(cells);
-  std::optional<VolumeMesh> smallest;
+  std::optional<AutoTemplate> smallest;
   for (int trial = 1;; ++trial) {
     const auto count = std::clamp(static_cast<std::size_t>(asked), kLeastTemplateCells, kMostTemplateCells);
     std::optional<AutoTemplate> made = make_template({.cells = count, .pillow = true});
@@ -199,7 +210,7 @@ std::optional<VolumeMesh> AutomaticFit::make_template_of_at_most(std::size_t cel
       return smallest;
     }
     const std::size_t got = made->mesh.num_cells();
-    if (!smallest || got < smallest->num_cells()) smallest = std::move(made->mesh);
+    if (!smallest || got < smallest->mesh.num_cells()) smallest = std::move(made);
     if (got <= cells || count == kLeastTemplateCells || trial == kTries) return smallest;
     asked *= kLess * static_cast<double>(cells) / static_cast<double>(got);
   }
@@ -244,7 +255,9 @@ bool AutomaticFit::fit_level(int level, const QualitySchedule& schedule, const c
         layout_ ? std::span<const EdgeCap>(level_layout_.caps.edges) : std::span<const EdgeCap>();
     const double least_edge = cage_ ? 0 : least_edge_share(start_.grid.mesh, lengths);
     stages.energy().forbid_folds(edges, least_edge);
-    if (layout_) stages.energy().set_caps(edges, level_layout_.caps.vertices);
+    QualityCaps caps = layout_ ? level_layout_.caps : QualityCaps();
+    add_caps_between_sizes(mesh_, sizes, caps);
+    stages.energy().set_caps(caps.edges, caps.vertices);
   });
   start_.far = state_.far_cells;
   start_.poor = state_.cells.poor;
@@ -317,15 +330,18 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
 /// Fits a pillowed template. Returns false if the fit must end.
 bool AutomaticFit::run_smooth(const AutomaticAttempt& attempt) {
   cage_.reset();
-  std::optional<VolumeMesh> made = make_template_of_at_most(attempt.template_cells);
+  std::optional<AutoTemplate> made = make_template_of_at_most(attempt.template_cells);
   if (!made) return !no_template_.empty();
-  if (attempt.precedes_unrefined && made->num_cells() > attempt.template_cells) return true;
+  const std::size_t cells = made->mesh.num_cells();
+  if (attempt.precedes_unrefined && cells > attempt.template_cells) return true;
   // Only a fine grid may have the topology; its cells need not be cut.
-  const bool is_fine = !options_.makes_cage && made->num_cells() > cells_after(attempt.template_cells, attempt.levels);
-  mesh_ = std::move(*made);
+  const bool is_fine = !options_.makes_cage && cells > cells_after(attempt.template_cells, attempt.levels);
+  const int levels = is_fine ? 0 : attempt.levels;
+  mesh_ = made->mesh;
   sizes_.clear();
   start_ = {};
-  return fit_and_refine(is_fine ? 0 : attempt.levels);
+  if (levels == 0) finest_ = std::move(made);
+  return fit_and_refine(levels);
 }
 
 /// Returns how poor each cell of the present mesh, or of its cage, is, 0 for good ones.
@@ -460,6 +476,39 @@ std::vector<Fault> AutomaticFit::faults_of_best() const {
   return faults;
 }
 
+/// Fits a template whose cells are smaller where the best trial is not as good as aimed at: where the target is missed,
+/// and at cells that meet or are poor. Returns false if the fit must end.
+bool AutomaticFit::run_graded() {
+  constexpr double kLostShare = 1;      // of its radius by which a lost feature is missed
+  constexpr double kShareOfGrid = 0.6;  // of the cells allowed; the others are left for the small ones
+  const std::size_t most = options_.cells.value_or(static_cast<std::size_t>(kMostGrowth * kAutomaticCells.back()));
+  if (!finest_ || static_cast<double>(finest_->mesh.num_cells()) > kMostShareOfGrid * static_cast<double>(most)) {
+    const auto cells = static_cast<std::size_t>(kShareOfGrid * static_cast<double>(most));
+    finest_ = make_template({.cells = std::clamp(cells, kLeastTemplateCells, kMostTemplateCells), .pillow = true});
+    if (!finest_) return !no_template_.empty();
+  }
+  target_.sample(0);
+  const ClosestPoint fitted(refined_triangles(boundary_surface(result_.mesh, MeshTopology(result_.mesh))));
+  std::vector<Vec3> places = missed_points(target_.surface, fitted, options_.max_tolerance_percent / 100);
+  const std::vector<Vec3> lost = missed_feature_points(features_, fitted, kLostShare);
+  places.insert(places.end(), lost.begin(), lost.end());
+  for (const Fault& fault : faults_of_best())
+    for (const Index c : fault) places.push_back(center_of(result_.mesh, c));
+  SearchStop stop([this] { return !runner_.is_to_end(); });
+  std::optional<SizedMesh> graded = graded_template(solid_boundary(original_).surface, finest_->grid, finest_->kept,
+                                                    target_.normalisation.from_unit(std::move(places)), most, stop);
+  if (!graded) return !stop.is_stopped();
+  take_in(graded->mesh);
+  layout_.reset();
+  cage_.reset();
+  mesh_ = std::move(graded->mesh);
+  sizes_ = graded->sizes;
+  start_ = {.grid = {{}, std::move(graded->sizes)}};
+  AutomaticFitTrial trial{.template_cells = finest_->mesh.num_cells(), .refined_cells = mesh_.num_cells()};
+  return fit_level(0, aiming_at_distance(single_quality_schedule(options_.quality)), ", graded") && judge(trial) &&
+         relax_last_trial();
+}
+
 /// Cuts the cells at which the best trial is not as good as aimed at, and fits the result. Returns false if the fit
 /// must end.
 bool AutomaticFit::run_refined() {
@@ -539,6 +588,10 @@ AutomaticFitResult AutomaticFit::run() {
     going = run_attempt(attempt);
   }
   if (going && result_.trials.empty()) throw InputError(refusal_);
+  if (going && !follows_.any() && is_worth_refining()) {
+    begin_attempt();
+    going = run_graded();
+  }
   const int most_refinements = edges_.features.curves.empty() ? kMostRefinements : kMostRefinementsWithEdges;
   for (int round = 0; going && is_worth_refining() && round < most_refinements; ++round) {
     const std::size_t before = result_.chosen;

@@ -148,9 +148,12 @@ struct AutomaticFitResult {
 /// judged again: the cells around are minimized with less and less weight of the surface, until they take the room that
 /// they had on the grid.
 ///
-/// If no trial is good, cells of the best one are cut in 27 where it meets itself, where it is too far from the target,
-/// where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the result is
-/// fitted: up to twice, and to the number of cells allowed, or half as many again if the number is free.
+/// If no trial is good and there are no edges to follow, a template is tried whose grid has smaller cells where the
+/// best trial is too far from the target, meets itself or has poor cells (`fit/fits/graded_template.h`).
+///
+/// If no trial is good still, cells of the best one are cut in 27 where it meets itself, where it is too far from the
+/// target, where cells are poor, and where edges or small features are missed (`fit/fits/local_cells.h`), and the
+/// result is fitted: up to twice, and to the number of cells allowed, or half as many again if the number is free.
 ///
 /// If no trial is valid, a pillowed template is fitted without edges: a valid mesh with round edges is worth more.
 ///

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/fits/local_cells.h"
 
+#include "subvol/mesh/cell_topology.h"
 #include "subvol/templates/refine.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 namespace subvol::internal {
@@ -132,6 +134,25 @@ std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const doubl
     all.push_back(size);
   }
   return all;
+}
+
+void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> sizes, QualityCaps& caps) {
+  constexpr double kCap = 0.57;       // the goal at a cap is lower by 0.02
+  constexpr double kRounding = 0.01;  // of the number of times that cells were cut; the next such number is 0.94
+  std::vector<std::uint8_t> is_between(mesh.num_vertices(), 0);
+  for (std::size_t c = 0; c < sizes.size(); ++c) {
+    const double times_cut = -std::log(sizes[c]) / std::log(3);
+    if (std::abs(times_cut - std::round(times_cut)) < kRounding) continue;
+    const auto cell = mesh.cell(c);
+    for (const Index v : cell) is_between[v] = 1;
+    const CellTopology& topology = cell_topology(mesh.kinds[c]);
+    for (int e = 0; e < topology.num_edges; ++e) {
+      const auto [low, high] = std::minmax(cell[topology.edges[e][0]], cell[topology.edges[e][1]]);
+      caps.edges.push_back({{low, high}, kCap});
+    }
+  }
+  for (std::size_t v = 0; v < is_between.size(); ++v)
+    if (is_between[v]) caps.vertices.push_back({static_cast<Index>(v), kCap});
 }
 
 std::vector<Vec3> wanted_lengths(const MeshTopology& topology, std::span<const double> sizes, std::size_t num_cells,

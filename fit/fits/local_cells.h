@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include "subvol/fit/features/quality_caps.h"
 #include "subvol/fit/geometry/site_tree.h"
 #include "subvol/mesh/mesh_topology.h"
 #include "subvol/mesh/volume_mesh.h"
@@ -58,6 +59,11 @@ std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double>
 /// Returns the sizes of a mesh that was padded: cells beyond the given ones have that of a cell behind them. Empty if
 /// the sizes are.
 std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes);
+
+/// Adds bounds on the scaled Jacobian in cells between small and large ones: those whose size is no power of 1/3
+/// (`refine_locally`). A flat layer of them around small cubes has 0.55 at best: it was optimized alone.
+/// sizes  of the cells, or empty.  caps  receives bounds at the edges and corners of these cells.
+void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> sizes, QualityCaps& caps);
 
 /// Returns the lengths of edges that cells are to have (`QualityStages`): in proportion to their sizes, and such that
 /// the boundary faces together have an area. sizes: of the cells, or empty.

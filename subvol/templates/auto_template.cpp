@@ -359,7 +359,9 @@ AutoTemplate finished(const Candidate& candidate, const AutoTemplateOptions& opt
                       .pillowed = options.pillow,
                       .axes = candidate.frame,
                       .score = candidate.score,
-                      .lines = used_lines(candidate.grid, candidate.kept)};
+                      .lines = used_lines(candidate.grid, candidate.kept),
+                      .grid = candidate.grid,
+                      .kept = candidate.kept};
   if (options.pillow) result.mesh = pillow(result.mesh);
   return result;
 }

@@ -39,6 +39,8 @@ struct AutoTemplate {
   /// For each axis the positions x . axis of the grid lines from the first to the last that the cells touch, length,
   /// increasing; empty if the cells are equal cubes.
   std::array<std::vector<double>, 3> lines;
+  VoxelGrid grid;               ///< of which the mesh is a part
+  std::vector<char> kept;       ///< for each cell of the grid, non-zero if it is in the mesh
   double aligned_share = 0;     ///< share of the surface's area on planes through `lines`, in [0, 1]
 };
 

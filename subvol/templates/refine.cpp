@@ -365,7 +365,6 @@ void cut_creases(const FeatureTags& tags, const PlaceNumbers& numbers, FeatureTa
 LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> marked, WarpedParts warped) {
   if (marked.size() != mesh.num_vertices())
     throw InputError("refine: marked must have one entry per vertex, " + std::to_string(mesh.num_vertices()));
-  require_sound(mesh, "refine");
   require_no_pyramids(mesh.kinds, "refine: pyramids do not split into hexes, because four edges meet at their apex");
   std::vector<char> marks(marked.begin(), marked.end());
   grow_marks(mesh, marks);
@@ -401,6 +400,7 @@ LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> mar
 }
 
 VolumeMesh refine_at(const VolumeMesh& mesh, std::span<const char> marked) {
+  require_sound(mesh, "refine");
   return refine_locally(mesh, marked, WarpedParts::refused).mesh;
 }
 

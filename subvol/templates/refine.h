@@ -42,7 +42,8 @@ struct LocalRefinement {
   std::vector<Index> parents;  ///< for each cell, the cell that it is a part of, or was
 };
 
-/// As `refine_at`, with the parents of the cells. Parts that are inverted are no error if they are to be kept.
+/// As `refine_at`, with the parents of the cells. Parts that are inverted are no error if they are to be kept. The mesh
+/// may touch itself at edges and vertices.
 LocalRefinement refine_locally(const VolumeMesh& mesh, std::span<const char> marked, WarpedParts warped);
 
 /// Marks all vertices of the chosen cells, as `refine_at` expects them: those cells are cut into 27. chosen: one entry

@@ -136,7 +136,7 @@ VoxelSolid::VoxelSolid(const std::array<int, 3>& cells, VertexRule rule) : cells
   }
   const std::size_t count = std::size_t(nx) * std::size_t(ny) * std::size_t(nz);
   filled_.assign(count, 0);
-  outer_.assign(count, 0);
+  frozen_.assign(count, 0);
   first_point_.resize(count);
   masks_.assign(std::size_t(layer) * std::size_t(nz + 1), 0);
   std::size_t c = 0;
@@ -144,7 +144,7 @@ VoxelSolid::VoxelSolid(const std::array<int, 3>& cells, VertexRule rule) : cells
     for (int j = 0; j < ny; ++j)
       for (int i = 0; i < nx; ++i, ++c) {
         first_point_[c] = i + row * j + layer * k;
-        outer_[c] = i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1;
+        frozen_[c] = i == 0 || j == 0 || k == 0 || i == nx - 1 || j == ny - 1 || k == nz - 1;
       }
 }
 
@@ -258,7 +258,7 @@ int VoxelSolid::components(bool value, std::vector<int>& component) const {
       const Index c = stack.back();
       stack.pop_back();
       std::array<bool, 6> there{true, true, true, true, true, true};
-      if (outer_[c]) {
+      if (frozen_[c]) {
         const int i = c % nx, j = c / nx % ny, k = c / nx / ny;
         there = {i > 0, i + 1 < nx, j > 0, j + 1 < ny, k > 0, k + 1 < nz};
       }

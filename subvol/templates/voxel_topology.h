@@ -23,7 +23,8 @@ const std::array<bool, 256>& vertex_table(VertexRule rule);
 
 /// A solid made of the cells of a grid, each filled or empty, that keeps track of its topology.
 ///
-/// The solid is the union of the closed filled cells. Cells on the grid's outer layer stay empty. For each lattice
+/// The solid is the union of the closed filled cells. Cells on the grid's outer layer stay empty, and frozen cells stay
+/// as they are. For each lattice
 /// point a bit mask holds the filled cells around it. If all points are good by `VertexRule::manifold`, the boundary is
 /// a 2-manifold, and connectivity through faces, edges or vertices is the same.
 class VoxelSolid {
@@ -35,7 +36,8 @@ class VoxelSolid {
   std::span<const char> filled() const { return filled_; }
   std::size_t num_filled() const { return num_filled_; }
   std::size_t num_cells() const { return filled_.size(); }
-  bool may_flip(Index cell) const { return !outer_[cell]; }
+  bool may_flip(Index cell) const { return !frozen_[cell]; }
+  void freeze(Index cell) { frozen_[cell] = 1; }
   void flip(Index cell);
 
   /// Differences between the number of a cell and those of its neighbors: the 6 across faces, and all 26.
@@ -82,7 +84,7 @@ class VoxelSolid {
  private:
   std::array<int, 3> cells_;
   const std::array<bool, 256>* table_;
-  std::vector<char> filled_, outer_;
+  std::vector<char> filled_, frozen_;
   std::vector<std::uint8_t> masks_;
   std::vector<Index> first_point_;  ///< for each cell: the lattice point in whose mask it has bit 7
   std::array<Index, 6> face_offsets_;

@@ -54,6 +54,26 @@ TEST_CASE("Cells are found by points near the boundary and by cells of another m
   CHECK(cells_at(grid, grid.positions, other, std::vector<Index>{0, 0, 1}).size() == 2);
 }
 
+TEST_CASE("Cells between small and large ones have caps", "[local_cells]") {
+  const VolumeMesh grid = test::lattice(5, 5, 5);
+  QualityCaps caps;
+  add_caps_between_sizes(grid, {}, caps);
+  CHECK(caps.edges.empty());
+  CHECK(caps.vertices.empty());
+  const auto refined = refined_at_faults(grid, {}, std::vector<Fault>{{62}}, 1000);
+  REQUIRE(refined);
+  add_caps_between_sizes(refined->mesh, refined->sizes, caps);
+  std::vector<std::uint8_t> has_cap(refined->mesh.num_vertices(), 0);
+  for (const VertexCap& cap : caps.vertices) has_cap[cap.vertex] = 1;
+  for (std::size_t c = 0; c < refined->mesh.num_cells(); ++c) {
+    const auto cell = refined->mesh.cell(c);
+    const auto num_capped = std::ranges::count_if(cell, [&](Index v) { return has_cap[v] != 0; });
+    const bool is_between = refined->sizes[c] < 0.99 && refined->sizes[c] > 0.34;
+    if (is_between) CHECK(num_capped == 8);
+    if (!is_between) CHECK(num_capped < 8);
+  }
+}
+
 TEST_CASE("Cells of pads are as large as those behind them", "[local_cells]") {
   const VolumeMesh grid = test::lattice(3, 1, 1);
   CHECK(padded_sizes(grid, {}).empty());
