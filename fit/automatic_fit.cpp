@@ -306,6 +306,9 @@ bool AutomaticFit::judge(AutomaticFitTrial trial) {
     follow_cage();
   }
   const QualityReport quality = measure_quality(mesh_);
+  // The stages ask for less between cells of two sizes; a trial without such cells is better.
+  for (const Index c : cells_between_sizes(sizes_))
+    state_.cells.least_share = std::min(state_.cells.least_share, quality.cell_minima[c] / options_.quality);
   const TriangleMesh surface = refined_triangles(boundary_surface(mesh_, MeshTopology(mesh_)));
   trial.mean_percent = trial.max_percent = 0;  // the trial may have those of another state
   const auto measure = [&](const TriangleMesh& fitted) {

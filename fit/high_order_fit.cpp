@@ -388,9 +388,11 @@ HighOrderFitResult HighOrderFit::run() {
 
 HighOrderFitResult fit_high_order(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                   const HighOrderFitOptions& options) {
-  if (const std::optional<RegionSurface> regions = regions_as_in(target, template_mesh))
-    return HighOrderFit(FitTarget(*regions), template_mesh, options).run();
-  return HighOrderFit(FitTarget(target), template_mesh, options).run();
+  const MatchedTarget matched = matched_target(target, template_mesh);
+  if (matched.regions) return HighOrderFit(FitTarget(*matched.regions), template_mesh, options).run();
+  auto result = HighOrderFit(FitTarget(matched.outer ? *matched.outer : target), template_mesh, options).run();
+  if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
+  return result;
 }
 
 HighOrderFitResult fit_high_order(const PointCloud& target, const VolumeMesh& template_mesh,

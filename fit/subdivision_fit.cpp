@@ -235,9 +235,11 @@ FitResult SubdivisionFit::run() {
 
 FitResult fit_subdivision_volume(const TriangleMesh& target, const VolumeMesh& template_mesh,
                                  const FitOptions& options) {
-  if (const std::optional<RegionSurface> regions = regions_as_in(target, template_mesh))
-    return SubdivisionFit(FitTarget(*regions), template_mesh, options).run();
-  return SubdivisionFit(FitTarget(target), template_mesh, options).run();
+  const MatchedTarget matched = matched_target(target, template_mesh);
+  if (matched.regions) return SubdivisionFit(FitTarget(*matched.regions), template_mesh, options).run();
+  auto result = SubdivisionFit(FitTarget(matched.outer ? *matched.outer : target), template_mesh, options).run();
+  if (!matched.warning.empty()) result.report.warnings.insert(result.report.warnings.begin(), matched.warning);
+  return result;
 }
 
 FitResult fit_subdivision_volume(const PointCloud& target, const VolumeMesh& template_mesh, const FitOptions& options) {

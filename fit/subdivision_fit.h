@@ -26,7 +26,8 @@ struct FitResult {
 /// template_mesh  hexes, prisms and tets; must pass `validate` except for unused vertices and should lie roughly at the
 ///                target's place. Interfaces between its regions (cells of different references) are fitted to those of
 ///                the target if it has the same regions (`regions_as_in`). Otherwise they keep their shape: they are
-///                fitted to themselves, as the boundary is to the target. If the target is a cloud, they are not held.
+///                fitted to themselves, as the boundary is to the target's outer surface, and a warning says so if the
+///                target has regions (`matched_target`). If the target is a cloud, they are not held.
 /// returns        the best state reached. Every cell of `mesh` is certified (`certificate.h`) unless report.stop_reason
 ///                is `stalled` or the template has cells that are not certified: no step makes a certified cell lose
 ///                its certificate.

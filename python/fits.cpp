@@ -55,7 +55,7 @@ class Fit {
   Fit(const py::object& target, const py::object& template_mesh, const py::kwargs& given)
       : keywords_("fit", given), work_(keywords_), checkpoints_(keywords_) {
     read_options(!template_mesh.is_none());
-    target_ = target_from(target, "target");
+    target_ = target_with_regions_from(target, "target");
     refuse_for_points(template_mesh.is_none());
     double& time_limit = curved_ ? high_order_.time_limit_seconds : subdivision_.time_limit_seconds;
     template_options_.time_limit_seconds = kTemplateShareOfTime * time_limit;

@@ -398,6 +398,17 @@ cli::Target target_from(const py::object& object, const char* name) {
   return cloud;
 }
 
+cli::Target target_with_regions_from(const py::object& object, const char* name) {
+  if (is_path(object))
+    return read_with_warnings([path = path_from(object)](std::vector<std::string>& warnings) {
+      return cli::load_target_with_regions(path, warnings);
+    });
+  if (!py::isinstance<VolumeMesh>(object)) return target_from(object, name);
+  const auto& mesh = object.cast<const VolumeMesh&>();
+  require_finite(mesh.positions, name);
+  return cli::surface_with_interfaces(mesh);
+}
+
 SurfaceMesh surface_from(const py::object& object, const char* name) {
   if (py::isinstance<SurfaceMesh>(object)) {
     const auto& surface = object.cast<const SurfaceMesh&>();

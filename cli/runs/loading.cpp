@@ -77,6 +77,14 @@ Cells as_chosen(Cells cells, const std::string& references) {
   return cells;
 }
 
+/// Returns what a file holds as a surface: of cells, their boundary. path  that of the file, for messages.
+TriangleMesh surface_of(Content content, const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (auto* mesh = std::get_if<VolumeMesh>(&content)) return triangulate(tagged_polygons(*mesh).polygons);
+  if (auto* surface = std::get_if<PolygonMesh>(&content))
+    return sound_triangles(std::move(*surface), path.string(), &warnings);
+  refuse_curved(path, "a surface is wanted");
+}
+
 constexpr int kCellDimension = 3;
 
 /// Returns the number of the region with this name or number. UsageError: there is none; it begins with `option`.
@@ -122,21 +130,27 @@ Target load_target(const std::filesystem::path& path, std::vector<std::string>& 
   return load_surface(path, warnings);
 }
 
-std::optional<RegionSurface> regions_of_target(const Target& target, const VolumeMesh& mesh) {
-  const auto* surface = std::get_if<TriangleMesh>(&target);
-  return surface ? regions_as_in(*surface, mesh) : std::nullopt;
+Target load_target_with_regions(const std::filesystem::path& path, std::vector<std::string>& warnings) {
+  if (!is_nodal_extension(path)) return load_target(path, warnings);
+  Content content = content_of(path, warnings, true, {});
+  if (const auto* mesh = std::get_if<VolumeMesh>(&content)) return surface_with_interfaces(*mesh);
+  return surface_of(std::move(content), path, warnings);
 }
 
-Target outer_target(const Target& target, const std::optional<RegionSurface>& regions) {
-  return regions ? Target(outer_surface(*regions)) : target;
+TriangleMesh surface_with_interfaces(const VolumeMesh& mesh) {
+  if (region_references(mesh).size() > 1) return surface_of_regions(mesh).mesh;
+  return triangulate(tagged_polygons(mesh).polygons);
+}
+
+FittedTarget fitted_target(const Target& target, const VolumeMesh& mesh) {
+  const auto* surface = std::get_if<TriangleMesh>(&target);
+  if (!surface) return {{}, target};
+  MatchedTarget matched = matched_target(*surface, mesh);
+  return {std::move(matched.regions), matched.outer ? Target(*std::move(matched.outer)) : target};
 }
 
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings) {
-  Content content = content_of(path, warnings, true, {});
-  if (auto* mesh = std::get_if<VolumeMesh>(&content)) return triangulate(tagged_polygons(*mesh).polygons);
-  if (auto* surface = std::get_if<PolygonMesh>(&content))
-    return sound_triangles(std::move(*surface), path.string(), &warnings);
-  refuse_curved(path, "a surface is wanted");
+  return surface_of(content_of(path, warnings, true, {}), path, warnings);
 }
 
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings) {

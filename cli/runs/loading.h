@@ -42,10 +42,17 @@ inline bool is_cloud(const Target& target) { return std::holds_alternative<Point
 
 /// Loads points, a surface from a surface file, or the boundary of a volume mesh. InputError as the readers.
 Target load_target(const std::filesystem::path& path, std::vector<std::string>& warnings);
-/// Returns the regions of a surface if a mesh has the same ones (`regions_as_in`).
-std::optional<RegionSurface> regions_of_target(const Target& target, const VolumeMesh& mesh);
-/// Returns what the boundary of a result is compared with: the outer surface of the regions, or else the target.
-Target outer_target(const Target& target, const std::optional<RegionSurface>& regions);
+/// The same for fits, which reproduce the interfaces between the regions of a volume mesh as well.
+Target load_target_with_regions(const std::filesystem::path& path, std::vector<std::string>& warnings);
+/// Returns the boundary of a mesh, with the interfaces between its regions if it has several.
+TriangleMesh surface_with_interfaces(const VolumeMesh& mesh);
+
+/// What a fit with a template reproduces of its target (`matched_target`).
+struct FittedTarget {
+  std::optional<RegionSurface> regions;  ///< of the target, if the template has the same
+  Target outer;                          ///< what the boundary of the result is compared with
+};
+FittedTarget fitted_target(const Target& target, const VolumeMesh& template_mesh);
 /// Load a surface or the boundary of a volume mesh, as triangles or as polygons; points are refused.
 TriangleMesh load_surface(const std::filesystem::path& path, std::vector<std::string>& warnings);
 PolygonMesh load_polygons(const std::filesystem::path& path, std::vector<std::string>& warnings);

@@ -108,7 +108,7 @@ class FitRun : public CageRun {
   const FitArguments& arguments_;
   Target target_;
   std::optional<RegionSurface> regions_;  ///< of the target, if the template has the same
-  Target outer_;                          ///< what the boundary is compared with: the outer surface of regions
+  Target outer_;                          ///< what the boundary is compared with
   VolumeMesh template_mesh_;
   std::optional<AutomaticFitResult> made_;  ///< if the template was made
   std::optional<Checkpointing> checkpointing_;
@@ -118,7 +118,7 @@ class FitRun : public CageRun {
 };
 
 void FitRun::load() {
-  target_ = load_target(arguments_.target, warnings_);
+  target_ = load_target_with_regions(arguments_.target, warnings_);
   require_fitting_options(verb_, is_cloud(target_));
   if (arguments_.template_mesh.path.empty()) {
     repair_to_fill(target_, template_options(arguments_).regions, warnings_);
@@ -138,8 +138,9 @@ void FitRun::load_template() {
                       {.time_limit_seconds = arguments_.fit.time_limit_seconds}, template_mesh_, warnings_);
   made_ = std::move(loaded.made);
   require_regions(outputs_, regions_of(template_mesh_));
-  regions_ = regions_of_target(target_, template_mesh_);
-  outer_ = outer_target(target_, regions_);
+  FittedTarget fitted = fitted_target(target_, template_mesh_);
+  regions_ = std::move(fitted.regions);
+  outer_ = std::move(fitted.outer);
   if (!made_) warn_of_losses(marks_of(template_mesh_), marks_of(template_mesh_), outputs_, warnings_);
   tell_warnings();
   if (made_ && !arguments_.run.quiet) std::cerr << template_text(*made_);

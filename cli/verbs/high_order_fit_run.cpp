@@ -123,7 +123,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
     for (; !arguments.run.quiet && told < warnings.size(); ++told)
       std::cerr << "subvol: warning: " << warnings[told] << '\n';
   };
-  Target target = arguments.takes_points ? load_target(arguments.target, warnings)
+  Target target = arguments.takes_points ? load_target_with_regions(arguments.target, warnings)
                                          : Target(load_surface(arguments.target, warnings));
   require_fitting_options(verb, is_cloud(target));
   if (arguments.template_mesh.path.empty()) {  // made templates consist of hexes, and making one takes minutes
@@ -178,8 +178,7 @@ int run_high_order_fit(const HighOrderFitArguments& arguments, const CLI::App& v
   writing.options = options_used(arguments, result.lambda_close, options_of_result(verb));
   HighOrderFile file{std::move(result.mesh), template_mesh.references, template_mesh.face_groups,
                      template_mesh.regions};
-  const std::optional<RegionSurface> regions = regions_of_target(target, template_mesh);
-  const Target outer = outer_target(target, regions);
+  const auto [regions, outer] = fitted_target(target, template_mesh);
   const GroupsFound groups = carry_groups(outer, file);
   warnings.insert(warnings.end(), groups.warnings.begin(), groups.warnings.end());
   tell_warnings();

@@ -136,13 +136,20 @@ std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const doubl
   return all;
 }
 
-void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> sizes, QualityCaps& caps) {
-  constexpr double kCap = 0.57;       // the goal at a cap is lower by 0.02
-  constexpr double kRounding = 0.01;  // of the number of times that cells were cut; the next such number is 0.94
-  std::vector<std::uint8_t> is_between(mesh.num_vertices(), 0);
+std::vector<Index> cells_between_sizes(std::span<const double> sizes) {
+  constexpr double kRounding = 0.01;  // of the number of times that a cell was cut; 22 parts of one were cut 0.94 times
+  std::vector<Index> cells;
   for (std::size_t c = 0; c < sizes.size(); ++c) {
     const double times_cut = -std::log(sizes[c]) / std::log(3);
-    if (std::abs(times_cut - std::round(times_cut)) < kRounding) continue;
+    if (std::abs(times_cut - std::round(times_cut)) > kRounding) cells.push_back(static_cast<Index>(c));
+  }
+  return cells;
+}
+
+void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> sizes, QualityCaps& caps) {
+  constexpr double kCap = 0.57;  // the goal at a cap is lower by 0.02
+  std::vector<std::uint8_t> is_between(mesh.num_vertices(), 0);
+  for (const Index c : cells_between_sizes(sizes)) {
     const auto cell = mesh.cell(c);
     for (const Index v : cell) is_between[v] = 1;
     const CellTopology& topology = cell_topology(mesh.kinds[c]);

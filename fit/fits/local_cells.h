@@ -60,9 +60,12 @@ std::vector<double> vertex_sizes(const VolumeMesh& mesh, std::span<const double>
 /// the sizes are.
 std::vector<double> padded_sizes(const VolumeMesh& padded, std::span<const double> sizes);
 
-/// Adds bounds on the scaled Jacobian in cells between small and large ones: those whose size is no power of 1/3
-/// (`refine_locally`). A flat layer of them around small cubes has 0.55 at best: it was optimized alone.
-/// sizes  of the cells, or empty.  caps  receives bounds at the edges and corners of these cells.
+/// Returns the cells between small and large ones, ascending: those whose size is no power of 1/3 (`refine_locally`).
+std::vector<Index> cells_between_sizes(std::span<const double> sizes);
+
+/// Adds bounds on the scaled Jacobian in cells between small and large ones. A flat layer of them around small cubes
+/// has 0.55 at best: it was optimized alone. sizes  of the cells, or empty.  caps  receives bounds at the edges and
+/// corners of these cells.
 void add_caps_between_sizes(const VolumeMesh& mesh, std::span<const double> sizes, QualityCaps& caps);
 
 /// Returns the lengths of edges that cells are to have (`QualityStages`): in proportion to their sizes, and such that

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "subvol/fit/target/region_matching.h"
 
+#include "subvol/base/disjoint_sets.h"
 #include "subvol/mesh/interfaces.h"
 #include "subvol/mesh/mesh_topology.h"
+#include "subvol/surface/boundary.h"
 #include "subvol/surface/winding_number.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
+#include <array>
 #include <map>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -23,6 +29,33 @@ std::optional<RegionSurface> find_so_many_regions(const TriangleMesh& target, st
   return std::nullopt;
 }
 
+/// Returns the reference of each region: of all pairs of a reference and a region, those with the most votes first, as
+/// long as neither has been taken.
+std::map<int, int> one_to_one(const std::map<std::array<int, 2>, std::size_t>& votes) {
+  std::vector<std::pair<std::size_t, std::array<int, 2>>> pairs;
+  for (const auto& [pair, count] : votes) pairs.push_back({count, pair});
+  std::ranges::stable_sort(pairs, [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::map<int, int> reference_of;
+  std::set<int> taken;
+  for (const auto& [count, pair] : pairs)
+    if (!taken.contains(pair[0]) && reference_of.try_emplace(pair[1], pair[0]).second) taken.insert(pair[0]);
+  return reference_of;
+}
+
+/// Returns true if a part of the mesh's boundary faces inward as a whole: the wall of a void.
+bool has_cavity(const VolumeMesh& mesh) {
+  const TriangleMesh boundary = triangulate(boundary_surface(mesh, MeshTopology(mesh)));
+  DisjointSets parts(boundary.positions.size());
+  for (const auto& t : boundary.triangles) {
+    parts.join(t[0], t[1]);
+    parts.join(t[0], t[2]);
+  }
+  std::map<Index, double> volumes;
+  for (const auto& t : boundary.triangles)
+    volumes[parts.of(t[0])] += boundary.positions[t[0]].dot(boundary.positions[t[1]].cross(boundary.positions[t[2]]));
+  return std::ranges::any_of(volumes, [](const auto& part) { return part.second < 0; });
+}
+
 }  // namespace
 
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh) {
@@ -37,17 +70,13 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
     for (const Index v : mesh.cell(c)) sum += mesh.positions[v];
     centers.push_back(sum / static_cast<double>(mesh.cell(c).size()));
   }
-  std::map<int, std::map<int, std::size_t>> votes;  // by reference, then by region of the target
+  std::map<std::array<int, 2>, std::size_t> votes;  // by reference and region of the target
   for (const Group& region : regions->regions) {
     const std::vector<double> inside = WindingNumber(boundary_of_region(*regions, region.number)).at(centers);
     for (std::size_t c = 0; c < centers.size(); ++c)
-      if (inside[c] > kInside) ++votes[mesh.references[c]][region.number];
+      if (inside[c] > kInside) ++votes[{mesh.references[c], region.number}];
   }
-  std::map<int, int> reference_of;
-  for (const auto& [reference, vote] : votes)
-    reference_of[std::max_element(vote.begin(), vote.end(), [](const auto& a, const auto& b) {
-                   return a.second < b.second;
-                 })->first] = reference;
+  std::map<int, int> reference_of = one_to_one(votes);
   if (reference_of.size() != references.size()) return std::nullopt;
   reference_of[kOutside] = kOutside;
   for (auto& sides : regions->sides)
@@ -60,6 +89,23 @@ std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const Vol
     if (pair[0] != kOutside) inner.push_back(pair);
   if (find_interfaces(mesh, MeshTopology(mesh)).pairs != inner) return std::nullopt;
   return regions;
+}
+
+MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh) {
+  MatchedTarget matched{.regions = regions_as_in(target, template_mesh), .outer = {}, .warning = {}};
+  if (matched.regions) {
+    matched.outer = outer_surface(*matched.regions);
+    return matched;
+  }
+  const std::optional<RegionSurface> others = find_regions(target);
+  if (!others || has_cavity(template_mesh)) return matched;
+  matched.outer = outer_surface(*others);
+  const std::size_t count = std::max<std::size_t>(1, region_references(template_mesh).size());
+  matched.warning = "the target has " + std::to_string(others->regions.size()) + " regions, and the template " +
+                    (count == others->regions.size() ? "has others" : "has " + std::to_string(count)) +
+                    ": only the target's outer surface is reproduced" +
+                    (count > 1 ? ", and interfaces keep the template's shape" : "");
+  return matched;
 }
 
 }  // namespace subvol::internal

@@ -6,18 +6,34 @@
 #include "subvol/surface/triangle_mesh.h"
 
 #include <optional>
+#include <string>
 
 namespace subvol::internal {
 
 /// Returns the regions of a target, numbered as the regions of a mesh in which they lie.
 ///
 /// The target has the regions that `find_regions` finds, with voids as regions (`RegionRule::keep`) if only then there
-/// are as many as in the mesh. Each region of the mesh gets that in which most of its cells' centers are, by winding
-/// numbers.
+/// are as many as in the mesh. Regions of the mesh and the target belong to each other one to one: those in which the
+/// most centers of cells are come first, by winding numbers.
 ///
-/// returns  nothing if the mesh has one region or the target has another number of them; if two regions of the mesh
-///          would get the same one of the target; or if other pairs of regions have an interface.
+/// returns  nothing if the mesh has one region or the target has another number of them; if a region of the mesh is in
+///          none of the target that is left for it; or if other pairs of regions have an interface.
 /// InputError: as `find_regions`. Cost: a winding number for each cell and region.
 std::optional<RegionSurface> regions_as_in(const TriangleMesh& target, const VolumeMesh& mesh);
+
+/// What a fit with a template reproduces of a target.
+struct MatchedTarget {
+  std::optional<RegionSurface> regions;  ///< those of the target, if the template has the same
+  /// What the boundary reproduces, if that is not all of the target: the outer surface of its regions.
+  std::optional<TriangleMesh> outer;
+  std::string warning;  ///< why sheets inside the target are left out; empty: none are
+};
+
+/// Finds what a template can reproduce of a target. If the target has regions, and the template has not the same ones
+/// (`regions_as_in`) and no cavity, that is the target's outer surface: sheets inside would draw the boundary inward.
+/// The walls of cavities may look like regions, depending on their orientation; they stay.
+///
+/// InputError: as `regions_as_in`. Cost: as `find_regions`, and `regions_as_in` if the template has regions.
+MatchedTarget matched_target(const TriangleMesh& target, const VolumeMesh& template_mesh);
 
 }  // namespace subvol::internal

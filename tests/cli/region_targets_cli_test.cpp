@@ -27,6 +27,31 @@ std::string npy(const LabelGrid& grid) {
 
 }  // namespace
 
+TEST_CASE("With a template, too, the interfaces of a mesh are targets", "[cli][regions]") {
+  const Workplace place;
+  const auto layers = [&](const char* name, double first, double second) {
+    VolumeMesh mesh = lattice(3, 3, 3);
+    for (Vec3& p : mesh.positions)
+      p = {p.x() / 3, p.y() / 3, p.z() < 0.5 ? 0 : p.z() < 1.5 ? first : p.z() < 2.5 ? second : 1};
+    for (std::size_t c = 0; c < mesh.num_cells(); ++c) mesh.references.push_back(static_cast<int>(c / 9) + 1);
+    write_volume_mesh(place / name, mesh);
+  };
+  layers("target.mesh", 0.3, 0.6);
+  layers("start.mesh", 0.35, 0.7);
+  for (const char* options : {"--levels 1", "--order 2"}) {
+    const Run fit =
+        place.run(std::string("fit target.mesh --template start.mesh --crease-angle 40 --report a.json --force ") +
+                  "-o a.vtu " + options);
+    CAPTURE(options, fit.err);
+    REQUIRE(fit.status == 0);
+    const nlohmann::json cells = place.json("a.json")["regions"]["cells"];
+    REQUIRE(cells.size() == 3);
+    for (const auto& region : cells)
+      CHECK(region["volume"].get<double>() == Approx(region["target_volume"].get<double>()).epsilon(2e-3));
+    CHECK(cells[2]["target_volume"].get<double>() == Approx(0.4));
+  }
+}
+
 TEST_CASE("A surface with sheets inside is filled region by region, with the target's volumes beside the result's",
           "[cli][regions][slow]") {
   const Workplace place;

@@ -3,7 +3,7 @@
 #include "subvol/base/error.h"
 #include "subvol/fit/mending/surface_repair.h"
 #include "subvol/surface/solid_topology.h"
-#include "tests/support/surface_fixtures.h"
+#include "tests/support/region_fixtures.h"
 
 #include <catch2/catch.hpp>
 
@@ -11,39 +11,23 @@
 #include <utility>
 
 using namespace subvol;
+using test::box_surface;
+using test::together;
+using test::turned;
 
 namespace {
-
-/// A box from `low` to `high` with 2 x 2 squares on each side, outward.
-TriangleMesh box(const Vec3& low, const Vec3& high) {
-  TriangleMesh mesh = test::cube_surface(2, false);
-  for (Vec3& p : mesh.positions) p = low + (high - low).cwiseProduct((p + Vec3::Ones()) / 2);
-  return mesh;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
-  return mesh;
-}
-
-TriangleMesh together(TriangleMesh a, const TriangleMesh& b) {
-  const auto first = static_cast<Index>(a.positions.size());
-  a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
-  for (const auto& [i, j, k] : b.triangles) a.triangles.push_back({first + i, first + j, first + k});
-  return a;
-}
 
 std::size_t count(const SurfaceDiagnosis& diagnosis, SurfaceFault fault) {
   const SurfaceFinding* found = diagnosis.find(fault);
   return found ? found->count : 0;
 }
 
-const TriangleMesh kUnit = box({0, 0, 0}, {1, 1, 1});
+const TriangleMesh kUnit = box_surface({0, 0, 0}, {1, 1, 1});
 
 }  // namespace
 
 TEST_CASE("A clean box can be filled, and its wall is as thick as it is", "[diagnosis]") {
-  const SurfaceDiagnosis found = diagnose(box({0, 0, 0}, {1, 1, 0.01}));
+  const SurfaceDiagnosis found = diagnose(box_surface({0, 0, 0}, {1, 1, 0.01}));
   CHECK(found.is_fillable());
   CHECK(found.parts.size() == 1);
   CHECK(found.volume == Approx(0.01));
@@ -54,7 +38,7 @@ TEST_CASE("A clean box can be filled, and its wall is as thick as it is", "[diag
 }
 
 TEST_CASE("Crossing parts are told with their triangles and places, and united", "[diagnosis]") {
-  const TriangleMesh surface = together(kUnit, box({0.5, 0.25, 0.25}, {2, 0.75, 0.75}));
+  const TriangleMesh surface = together(kUnit, box_surface({0.5, 0.25, 0.25}, {2, 0.75, 0.75}));
   const SurfaceDiagnosis found = diagnose(surface);
   CHECK(!found.is_fillable());
   const SurfaceFinding* crossing = found.find(SurfaceFault::crossing);
@@ -75,7 +59,7 @@ TEST_CASE("Crossing parts are told with their triangles and places, and united",
 
 TEST_CASE("Parts that touch along a face are told and united", "[diagnosis]") {
   for (const double shift : {0.0, 0.3}) {  // the same triangles on the face, or others
-    const TriangleMesh surface = together(kUnit, box({1, shift, 0}, {2, 1 + shift, 1}));
+    const TriangleMesh surface = together(kUnit, box_surface({1, shift, 0}, {2, 1 + shift, 1}));
     CHECK(count(diagnose(surface), SurfaceFault::face_contact) > 0);
     const SurfaceRepair repair = repair_surface(surface);
     CHECK(repair.done.size() == 1);
@@ -86,7 +70,7 @@ TEST_CASE("Parts that touch along a face are told and united", "[diagnosis]") {
 }
 
 TEST_CASE("Parts that share an edge or a corner stay two parts, and the place is told", "[diagnosis]") {
-  const TriangleMesh edge = together(kUnit, box({1, 1, 0}, {2, 2, 1}));
+  const TriangleMesh edge = together(kUnit, box_surface({1, 1, 0}, {2, 2, 1}));
   SurfaceDiagnosis found = diagnose(edge);
   CHECK(found.is_fillable());
   CHECK(found.parts.size() == 2);
@@ -94,7 +78,7 @@ TEST_CASE("Parts that share an edge or a corner stay two parts, and the place is
   CHECK(found.find(SurfaceFault::edge_contact)->places.front().at.head<2>() == Eigen::Vector2d(1, 1));
   CHECK(solid_boundary(edge).topology == BettiNumbers{2, 0, 0});
   CHECK(solid_boundary(turned(edge)).topology == BettiNumbers{2, 0, 0});
-  const TriangleMesh corner = together(kUnit, box({1, 1, 1}, {2, 2, 2}));
+  const TriangleMesh corner = together(kUnit, box_surface({1, 1, 1}, {2, 2, 2}));
   found = diagnose(corner);
   CHECK(found.is_fillable());
   REQUIRE(count(found, SurfaceFault::vertex_contact) == 1);
@@ -115,8 +99,8 @@ TEST_CASE("A corner that touches a face from outside is a contact at a point", "
 }
 
 TEST_CASE("Nested parts are told apart by how deep they lie", "[diagnosis]") {
-  const TriangleMesh outer = box({-2, -2, -2}, {2, 2, 2}), middle = box({-1, -1, -1}, {1, 1, 1}),
-                     inner = box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
+  const TriangleMesh outer = box_surface({-2, -2, -2}, {2, 2, 2}), middle = box_surface({-1, -1, -1}, {1, 1, 1}),
+                     inner = box_surface({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
   const TriangleMesh hollow = together(outer, turned(middle));
   CHECK(diagnose(hollow).is_fillable());
   CHECK(diagnose(hollow).volume == Approx(56));
@@ -178,12 +162,12 @@ TEST_CASE("A flap is a fin, and a sheet through the inside divides it into regio
   const SurfaceRepair merged = repair_surface(divided, {}, RegionRule::merge);
   CHECK(merged.surface.triangles.size() == 6);
   CHECK(merged.done.size() == 1);
-  TriangleMesh crossed = together(divided, box({0.1, 0.1, -0.2}, {0.4, 0.4, 0.2}));
+  TriangleMesh crossed = together(divided, box_surface({0.1, 0.1, -0.2}, {0.4, 0.4, 0.2}));
   CHECK_THROWS_WITH(repair_surface(crossed), Catch::Contains("edges that they share"));
 }
 
 TEST_CASE("Gaps, sharp angles, turned and repeated triangles are told", "[diagnosis]") {
-  const SurfaceDiagnosis gap = diagnose(together(kUnit, box({1.002, 0, 0}, {2, 1, 1})));
+  const SurfaceDiagnosis gap = diagnose(together(kUnit, box_surface({1.002, 0, 0}, {2, 1, 1})));
   REQUIRE(count(gap, SurfaceFault::thin_gap) == 1);
   CHECK(gap.find(SurfaceFault::thin_gap)->places.front().measure == Approx(0.002));
   const TriangleMesh wedge{{{0, 0, 0}, {1, 0, 0}, {1, 0.1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0.1, 1}},
@@ -211,13 +195,13 @@ TEST_CASE("What no diagnosis can be made of is refused", "[diagnosis]") {
 }
 
 TEST_CASE("Why no grid has the topology is told with the place", "[diagnosis]") {
-  const SurfaceDiagnosis plate = diagnose(box({0, 0, 0}, {1, 1, 0.002}));
+  const SurfaceDiagnosis plate = diagnose(box_surface({0, 0, 0}, {1, 1, 0.002}));
   const std::string text = why_no_grid(plate, 300, {1, 0, 0});
   CHECK_THAT(text, Catch::Contains("1 component") && Catch::Contains("thinnest wall is 0.002 wide") &&
                        Catch::Contains("thinner than a cell"));
   CHECK_FALSE(is_too_thin_for_grids(plate, 300));  // its cells are 0.0069 wide
-  CHECK_FALSE(is_too_thin_for_grids(diagnose(box({0, 0, 0}, {1, 1, 0.1})), 300));
-  const SurfaceDiagnosis slit = diagnose(together(kUnit, box({1.0002, 0, 0}, {2, 1, 1})));
+  CHECK_FALSE(is_too_thin_for_grids(diagnose(box_surface({0, 0, 0}, {1, 1, 0.1})), 300));
+  const SurfaceDiagnosis slit = diagnose(together(kUnit, box_surface({1.0002, 0, 0}, {2, 1, 1})));
   CHECK(is_too_thin_for_grids(slit, 3000));
   CHECK_FALSE(is_too_thin_for_grids(slit, 30'000'000));
 }
