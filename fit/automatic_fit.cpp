@@ -5,6 +5,7 @@
 #include "subvol/base/format.h"
 #include "subvol/fit/automatic_attempts.h"
 #include "subvol/fit/automatic_driver.h"
+#include "subvol/fit/automatic_groups.h"
 #include "subvol/fit/certificate/certificate.h"
 #include "subvol/fit/features/crisp_edges.h"
 #include "subvol/fit/features/edge_layout.h"
@@ -623,10 +624,16 @@ AutomaticFitResult fit_automatically(const TriangleMesh& target, const Automatic
     return fit_regions(*regions, options);
   }
   const AutomaticFitOptions checked = checked_options(options);
-  const EdgeChoice follows{has_edges_to_follow(target, checked.crease_angle_degrees, checked.follows_all_edges),
-                           options.keeps_groups && !group_borders(target, target).empty()};
-  if (!follows.any()) return AutomaticFit(target, follows, options).run();
-  return AutomaticFit(solid_boundary(target).surface, follows, options).run();
+  const bool follows_sharp = has_edges_to_follow(target, checked.crease_angle_degrees, checked.follows_all_edges);
+  const auto fit = [&](bool follows_borders, const AutomaticFitOptions& given) {
+    const EdgeChoice follows{follows_sharp, follows_borders};
+    if (!follows.any()) return AutomaticFit(target, follows, given).run();
+    return AutomaticFit(solid_boundary(target).surface, follows, given).run();
+  };
+  const bool may_follow_borders = checked.crease_angle_degrees && !options.keeps_groups && !options.makes_cage &&
+                                  has_smooth_borders(target, *checked.crease_angle_degrees);
+  if (may_follow_borders) return fit_for_groups(target, options, fit);
+  return fit(options.keeps_groups && !group_borders(target, target).empty(), options);
 }
 
 }  // namespace subvol

@@ -54,7 +54,8 @@ struct AutomaticFitOptions {
   /// False: edges are followed only on surfaces of designed parts (`EdgeCrispness::is_designed`), not on scans.
   bool follows_all_edges = false;
   RegionRule regions = RegionRule::automatic;  ///< how targets with several regions are taken (`find_regions`)
-  /// Borders between groups of the target's faces are followed like sharp edges, also where the surface is smooth.
+  /// Borders between groups of the target's faces are followed like sharp edges, also where the surface is smooth. If
+  /// not set, and edges are followed (`crease_angle_degrees`), this is tried if a result without it misses groups.
   bool keeps_groups = false;
   /// The result is a subdivision volume: a control mesh, the cage, whose vertices are the only unknowns, and the mesh
   /// that it is subdivided to once. `cells` are then those of that mesh. Only for targets of one region.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Borders between groups on smooth surfaces are feature curves where it is asked for.
+// Borders between groups on smooth surfaces are feature curves if that is asked for, or if groups are missed otherwise.
 
 #include "subvol/fit/automatic_fit.h"
+#include "subvol/fit/automatic_groups.h"
 #include "subvol/fit/features/feature_curves.h"
 #include "subvol/fit/target/carried_groups.h"
 #include "subvol/io/surface_io.h"
@@ -12,6 +13,7 @@
 
 #include <map>
 #include <set>
+#include <vector>
 
 using namespace subvol;
 using namespace subvol::internal;
@@ -60,6 +62,26 @@ std::pair<double, std::size_t> border_of(const TriangleMesh& target, const Volum
   return {farthest, count};
 }
 
+/// A result whose mesh is the unit ball, moved along z.
+AutomaticFitResult fake_result(double shift) {
+  constexpr int kCells = 8;
+  AutomaticFitResult result;
+  result.mesh = lattice(kCells, kCells, kCells);
+  for (Vec3& p : result.mesh.positions) {
+    const Vec3 place = p / (kCells / 2) - Vec3::Ones();
+    const double length = place.norm();
+    p = length > 0 ? Vec3(place * (place.cwiseAbs().maxCoeff() / length)) : place;
+    p.z() += shift;
+  }
+  result.trials = {{.least_share = 1, .self_intersections = 0}};
+  StageRecord stage;
+  stage.kept = true;
+  result.report.stages = {stage};
+  result.report.seconds = {{"total", 1.0}};
+  result.report.stop_reason = StopReason::converged;
+  return result;
+}
+
 }  // namespace
 
 TEST_CASE("keep_groups: borders are the edges between triangles of different groups", "[fit]") {
@@ -91,6 +113,65 @@ TEST_CASE("keep_groups: an automatic fit of a smooth surface follows the border 
   CHECK(near < 0.012);  // 0.35 % of the diagonal
   CHECK(kept.trials[kept.chosen].least_scaled_jacobian > 0.4);
   CHECK(kept.missed_edges.empty());
+}
+
+TEST_CASE("keep_groups: smooth borders are found beside sharp ones", "[fit]") {
+  CHECK(has_smooth_borders(grouped_sphere(2), 40));
+  CHECK(!has_smooth_borders(grouped_sphere(0), 40));  // an octahedron: all of its edges are sharp
+  TriangleMesh plain = grouped_sphere(2);
+  plain.face_groups = {};
+  CHECK(!has_smooth_borders(plain, 40));
+}
+
+TEST_CASE("keep_groups: a second fit follows borders if the first one misses groups", "[fit]") {
+  const TriangleMesh sphere = grouped_sphere(4);
+  const AutomaticFitResult good = fake_result(0), bad = fake_result(0.2);
+  REQUIRE(num_groups_missed(sphere, good.mesh) == 0);
+  REQUIRE(num_groups_missed(sphere, bad.mesh) == 2);
+  std::vector<bool> asked;
+  double time_limit = 0;
+  const auto run = [&](const AutomaticFitResult& without, const AutomaticFitResult& with, double limit = 0) {
+    asked.clear();
+    AutomaticFitOptions options;
+    options.time_limit_seconds = limit;
+    return fit_for_groups(sphere, options, [&](bool follows_borders, const AutomaticFitOptions& given) {
+      asked.push_back(follows_borders);
+      CHECK(given.keeps_groups == follows_borders);
+      time_limit = given.time_limit_seconds;
+      return follows_borders ? with : without;
+    });
+  };
+  const auto is_good = [&](const AutomaticFitResult& result) { return result.mesh.positions == good.mesh.positions; };
+
+  CHECK(run(good, bad).trials.size() == 1);
+  CHECK(asked == std::vector<bool>{false});
+
+  const AutomaticFitResult second = run(bad, good, 10);
+  CHECK(asked == std::vector<bool>{false, true});
+  CHECK(time_limit == Approx(9));
+  CHECK(is_good(second));
+  CHECK(second.trials.size() == 2);
+  CHECK(second.chosen == 1);
+  REQUIRE(second.report.stages.size() == 2);
+  CHECK(!second.report.stages[0].kept);
+  CHECK(second.report.stages[1].kept);
+  CHECK(second.report.seconds.front().second == Approx(2));
+
+  AutomaticFitResult poor = good;
+  poor.trials.front().least_share = 0.5;
+  poor.trials.front().merit = 2.5;
+  const AutomaticFitResult first = run(bad, poor);
+  CHECK(!is_good(first));
+  CHECK(first.trials.size() == 2);
+  CHECK(first.chosen == 0);
+  CHECK(first.report.stages[0].kept);
+  CHECK(!first.report.stages[1].kept);
+  CHECK(!is_good(run(bad, bad)));
+
+  AutomaticFitResult ended = bad;
+  ended.report.stop_reason = StopReason::time_limit;
+  run(ended, good);
+  CHECK(asked == std::vector<bool>{false});
 }
 
 TEST_CASE("keep_groups: a rounded cube keeps all of its faces", "[fit][data][slow]") {
